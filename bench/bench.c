@@ -1,4 +1,4 @@
-// How a run is measured, and what all tables share.
+// Measurement of runs, shared by all tables.
 #include "bench/bench.h"
 
 #include "base/output.h"

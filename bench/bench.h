@@ -1,4 +1,4 @@
-// What the timing tables share: a scene run to the end of its script, and its figures.
+// Shared by the timing tables: a scene run to the end of its script, and its figures.
 #ifndef SELDINGER_BENCH_BENCH_H
 #define SELDINGER_BENCH_BENCH_H
 
@@ -23,12 +23,12 @@ typedef struct StepFigures { // of all steps of a run; times are the thread's CP
     unsigned flags;
     int64_t crowded_step;    // the first with 80 candidates, or else the most
     StepReport last;
-    double inserted_mm, stalled_mm;      // at the end; what the hand fed and the tool did not take
+    double inserted_mm, stalled_mm;      // at the end; fed by the hand but not taken by the tool
     uint64_t hash;
 } StepFigures;
 
 int64_t bench_cpu_ns(void);
-// What a simulator tells at the end of a run; all but `crowded_step` and `stalled_mm`. cpu_s: what the run took.
+// Figures at the end of a run, all but `crowded_step` and `stalled_mm`. cpu_s: CPU time of the run.
 void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures);
 Spread bench_spread(const TimeHistogram *histogram, double unit);
 void bench_add_spread(cJSON *object, const char *name, Spread s);
@@ -63,13 +63,13 @@ typedef struct BenchOptions {
     int threads;
     const char *json;
 } BenchOptions;
-// One of these (or an unknown one) in a table's own getopt loop. -1: go on; otherwise the exit code.
+// One of these (or an unknown one) in a table's own getopt loop. -1: continue; otherwise the exit code.
 int bench_take(int choice, const char *table, const char *help, BenchOptions *options);
-// All of them where a table has no others. -1: go on; otherwise the exit code.
+// Parses all options if a table has no others. -1: continue; otherwise the exit code.
 int bench_parse(int argc, char **argv, const char *table, const char *help, BenchOptions *options);
-// Where the text goes: not where the JSON goes.
+// The stream for text: standard error if the JSON goes to standard output.
 FILE *bench_text(const BenchOptions *options);
-// Nothing where no --json was given.
+// No effect without --json.
 bool bench_write_json(const BenchOptions *options, const cJSON *root, Faults *faults);
 
 #endif

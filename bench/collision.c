@@ -1,9 +1,9 @@
 // seldinger bench collision: implicit models against triangles, the exact wall and a sampled distance, in one run (Kerrien 2017, sections 6.3 to 6.5).
 //
-//   same motion    where all free nodes were in a run on the exact wall, asked of each representation: what detection costs, and how far its answers are
+//   same motion positions of all free nodes in a run on the exact wall, queried from each representation: the cost of detection, and its errors
 //                  from the truth
-//   closed loop    the same push on each representation, with the solver; where the wire went is judged by the truth
-//   no friction    the same with mu = 0: what the hand feels then is the wall's roughness
+//   closed loop the same push on each representation, with the solver; the wire's course is compared with the truth
+//   no friction the same with mu = 0: the push is then due to the wall's roughness
 //   clamps         the contact solve stopped after 50, 100, 200, 1000 iterations (section 6.5)
 #include "bench/bench.h"
 
@@ -21,7 +21,7 @@
 
 enum { CASES = 7, SCENES_MOST = 16, CAPS = 4, FORMS = 2, SCENE_TRIANGLES = 105000, QUICK_STEPS = 300, QUICK_TRIANGLES = 12000 };
 enum { CLAMP_STEPS = 1000, POINTWISE_STEPS = 600, QUICK_POINTWISE_STEPS = 200 };
-enum { LARGE = 100000, TIMES_FASTER = 8 };   // what detection in the field of blobs is held to: so many times faster than on so many triangles …
+enum { LARGE = 100000, TIMES_FASTER = 8 };   // required speed of detection in the field of blobs: this many times faster than on this many triangles …
 static const double FLAT = 1.2;              // … and within this ratio whatever the size of the tree
 
 static const CollisionCase cases[CASES] = {
@@ -179,7 +179,7 @@ static bool is_mesh_search(const char *name)
     return !strcmp(name, "mesh full") || !strcmp(name, "mesh warm") || !strcmp(name, "mesh cached");
 }
 
-// The search that answers soonest stands for the mesh in closed loop: all give the same answers.
+// The fastest search represents the mesh in closed loop: all give the same answers.
 static bool is_fastest_search(const CollisionBench *bench, const Run *run, const Row *row)
 {
     for (int i = run->first_row; i < bench->row_count; i++) {
@@ -206,7 +206,7 @@ static bool run_loops(CollisionBench *bench, Run *run, int index, Faults *faults
         return false;
     if (is_reference)
         run->reference_steps = row->smooth.steps;
-    // what the hand feels of a wall that the wire is caught in or has left is no friction
+    // the push on a wall in which the wire is caught, or which it has left, is not friction
     row->push = collision_push(options.push_n, row->smooth.survived ? row->smooth.steps : row->smooth.failed_step, run->reference_push, run->reference_steps);
     return true;
 }
@@ -217,7 +217,7 @@ static bool no_memory(const char *name, Faults *faults)
     return false;
 }
 
-// A shape's own distance is no way to simulate: what it costs is seen in a few steps, and it makes no error.
+// A shape's own distance is too slow for simulation: its cost is measured in a few steps, and its error is zero.
 static bool replay(const CollisionSurface *s, const CollisionWall *wall, const CollisionMotion *motion, int repeats, CollisionReplay *out,
                    Faults *faults)
 {
@@ -317,7 +317,7 @@ static bool try_mesh(const Run *run, double wanted, EqualError *equal, Faults *f
     return good;
 }
 
-// A mesh's error falls with its triangles' size squared: with one over their number. So from one mesh to the one with the wanted error.
+// A mesh's error is proportional to its triangles' size squared, i.e. to one over their number, which gives the mesh with the required error.
 static bool find_equal_error(CollisionBench *bench, const Run *run, Faults *faults)
 {
     enum { ROUNDS = 3, LEAST = 300, MOST = 1000000 };
@@ -410,7 +410,7 @@ static void print_motion(FILE *out, const CollisionBench *bench, int first)
     }
 }
 
-// What the push without friction has more than on the reference; nothing can be said of a wall in which the wire was caught or which it left.
+// The excess of the push without friction over the reference; undefined for a wall in which the wire was caught or which it left.
 static double artificial_friction(const Row *row) { return row->smooth.survived ? row->push.mean_n - row->push.reference_n : NAN; }
 
 static void print_loops(FILE *out, const CollisionBench *bench, int first)
@@ -524,8 +524,8 @@ enum { NEAR_POINTS, ALL_POINTS, TIMES };
 
 static double time_of(const Row *row, int what) { return what == NEAR_POINTS ? row->motion.us_per_80_points : row->motion.us_per_step; }
 
-// The same motion's near points, which are what collision is about, and all, of which the solver leaves out most far ones. Embree is what the field is held
-// to; the triangles remembered about each point (geom/triangle_groups.h), which do without it, they are to be no slower than.
+// The near points of the same motion, which matter for contact, and all points, of which the solver skips most far ones. The field is compared with
+// Embree; cached triangles (geom/triangle_groups.h) must be at least as fast.
 static bool judge_surface(CollisionBench *bench, const CollisionCase *of, Faults *faults)
 {
     static const char *const what[TIMES] = {"80 near points", "all points"};

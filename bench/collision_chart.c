@@ -1,5 +1,5 @@
-// Five panels: detection by surface, error against time, growth, artificial friction, work lost. All axes but the lists' are logarithmic: a decade is the
-// same way everywhere. Representations differ by colour (Okabe and Ito's, told apart by the colour-blind) and by shape.
+// Five panels: detection by surface, error against time, growth, artificial friction, work lost. All axes but the lists' are logarithmic: a decade
+// has the same length everywhere. Representations differ by colour (Okabe and Ito's, told apart by the colour-blind) and by shape.
 #include "bench/collision_chart.h"
 
 #include "base/output.h"
@@ -49,7 +49,7 @@ static void add_name(Names *names, const cJSON *item)
         names->name[names->count++] = item->valuestring;
 }
 
-// The number at `keys`, "a.b" for a within which b; NAN where there is none.
+// The number at `keys`, "a.b" for a within which b; NAN if there is none.
 static double number_at(const cJSON *item, const char *keys)
 {
     char key[64];
@@ -202,7 +202,7 @@ static double draw_legend(const Chart *chart, double top)
 
 // --- detection by surface ---
 
-// The paper's time of a row; false where it has none, or a row before has the same (its table knows one kind of mesh and of local models).
+// The paper's time of a row; false if it has none, or a row before has the same (its table knows one kind of mesh and of local models).
 static bool paper_us(const Chart *chart, const cJSON *row, double *us)
 {
     const cJSON *before;
@@ -413,7 +413,7 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
     open_panel(chart, id, left, top, title);
     cJSON_ArrayForEach(row, chart->rows)
         axis_hold(&x, fabs(number_at(row, keys)));
-    x.low = fmax(x.low, 1e-9 * x.high);   // what is less is none
+    x.low = fmax(x.low, 1e-9 * x.high);   // smaller values are not drawn
     bool filled = axis_close(&x, left + 150, left + width - 10);
     if (filled) {
         for (int k = 0; k < chart->representations.count; k++) {
@@ -437,7 +437,7 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
     close_panel(chart, filled, left, top);
 }
 
-// --- the whole ---
+// --- the chart ---
 
 static bool draw(const Chart *chart)
 {

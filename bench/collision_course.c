@@ -21,7 +21,7 @@ typedef struct Walker {
 
 static bool has_wall(const VesselHit *hit) { return hit->flags == 0 && isfinite(hit->gap); }
 
-// Moved along the normal until it is as far inside as this stretch wants.
+// Moves along the normal to the depth required by this stretch.
 static bool pull(const Vessel *exact, Walker *w)
 {
     enum { ROUNDS = 8 };
@@ -44,7 +44,7 @@ static bool begin_walk(const Vessel *exact, const VesselTree *nodes, Vec3 x, int
     return pull(exact, w);
 }
 
-// A step along the node's direction, or on as before over a blind end; never back, save where the wall ends.
+// A step along the node's direction, or straight on over a blind end; never back, except where the wall ends.
 static void walk(const Vessel *exact, const VesselTree *nodes, Walker *w)
 {
     Walker before = *w;

@@ -49,15 +49,15 @@ static VesselTree *fit(Growth *g, const VesselTree *samples, double target_mm, d
     return lim_fit(samples, &options, NULL, g->faults);
 }
 
-// --- a wall, and what is asked of it ---
+// --- a wall and its queries ---
 
 typedef struct Wall {
     const char *name;
     const Vessel *exact;
     const VesselTree *nodes;
     double area;             // [mm2] cell^2 times triangles of its meshes
-    const Vessel *near_exact;        // what is meshed where that takes too long on `exact`; NULL: not so …
-    const Shape *shape;      // … and whose surface the vertices then go on to
+    const Vessel *near_exact;        // source for meshing if `exact` is too slow; NULL: `exact` …
+    const Shape *shape;      // … and whose surface the vertices then continue to
     Course wire, spread;
 } Wall;
 
@@ -413,7 +413,7 @@ static void time_locations(const Vessel *vessel, int tools, const Course *tool, 
     }
 }
 
-// A tool starts on the wall of some node from which its stretch still goes on.
+// A tool starts on the wall of some node from which its stretch still continues.
 static bool place_tool(const Vessel *vessel, const VesselTree *tree, int node, int steps, Course *tool)
 {
     Vec3 x = vec3_add_scaled(tree->center[node], 0.8 * tree->radius[node], vec3_normal_to(tree->direction[node]));
@@ -482,7 +482,7 @@ static void close_size(Size *s)
     vessel_tree_free(s->tree);
 }
 
-// The wire is measured on all sizes in turn, again and again, so that a busy moment of the machine falls on all of them.
+// The wire is measured on all sizes in turn, repeatedly, so that load on the machine affects all of them.
 static bool measure_sizes(Growth *g, int count, Size *size)
 {
     bool good = true;

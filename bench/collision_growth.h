@@ -1,5 +1,5 @@
-// What size costs: the part of `seldinger bench collision` on meshes of more and more triangles, trees of more and more nodes, blobs and triangles for the
-// same error, and memory per millimetre of vessel.
+// The cost of size: the part of `seldinger bench collision` on meshes of more and more triangles, trees of more and more nodes, blobs and triangles
+// for the same error, and memory per millimetre of vessel.
 #ifndef SELDINGER_BENCH_COLLISION_GROWTH_H
 #define SELDINGER_BENCH_COLLISION_GROWTH_H
 
@@ -18,8 +18,8 @@
 //   blobs_to_match: [{gap_error_um, normal_error_deg, target_mm, blobs, bytes, ns_per_query, fit_s, mesh: {triangles, bytes, as growth}}]: rms against the true
 //     shape
 //   memory: [{tree, representation, length_mm, edge_mm, primitives, bytes, bytes_per_mm, build_s, as growth}]
-// `quick`: meshes to 64,000 triangles, trees to 10,000 nodes, the last two lists empty. `threads` (0: all cores) are for the fits. Without Embree the meshes
-// are left out, and the text says so. False with a fault where memory lacks or a fit fails.
+// `quick`: meshes to 64,000 triangles, trees to 10,000 nodes, the last two lists empty. `threads` (0: all cores) are for the fits. Without Embree the
+// meshes are left out, and the text reports it. False with a fault if memory runs out or a fit fails.
 bool collision_growth(FILE *out, cJSON *into, bool quick, int threads, Faults *faults);
 
 #endif

@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-// What solver/step_detect.c looks after beyond the speed of the nodes, and the most [mm]; it asks for twice as much.
+// The margin of solver/step_detect.c beyond the speed of the nodes, and its maximum [mm]; it queries twice as much.
 static const double LOOK = 0.2, LOOK_MAX = 5;
 static const double CONTAINED = 0.05, STALLED = 0.1; // [mm]
 static const double GONE = 1;                // [mm] a node further outside: the run is over
 enum { JUDGE_EVERY = 5 };                    // steps
 
-// --- a follower: every free node with its own memory of a wall ---
+// --- a follower: every free node with its own query state ---
 
 static void follow_locate(const Vessel *wall, int first, int node_count, const Vec3 *point, VesselMemory *memory)
 {
@@ -140,7 +140,7 @@ static double time_all(const Vessel *wall, const CollisionMotion *motion, Vessel
     return (double)(bench_cpu_ns() - begin) / 1000;
 }
 
-// The near points alone. With `ask` false only what surrounds the questions, which is no part of them.
+// Only the near points. With `ask` false, only the loop around the queries, to be subtracted.
 static double time_near(const Vessel *wall, const CollisionMotion *motion, bool ask, VesselMemory *memory, const Gathered *near)
 {
     follow_start(memory, motion->node_count);
@@ -189,7 +189,7 @@ static void measure_errors(const Vessel *wall, const CollisionMotion *motion, Ve
             }
             out->judged++;
             add_error(&out->gap_um, fabs(h->gap - motion->gap[p]) * 1000);
-            // near the middle of the lumen the direction to the wall is nobody's
+            // near the middle of the lumen the direction to the wall is undefined
             if (clear_of_tool(motion, step, p) > motion->radius[0] / 2)
                 continue;
             normals++;
@@ -228,7 +228,7 @@ bool collision_replay(const Vessel *wall, const CollisionMotion *motion, int rep
 
 // --- closed loop ---
 
-typedef struct Judge {       // where the wall truly is, asked outside of what is timed
+typedef struct Judge {       // the true wall, queried outside the timed part
     const Vessel *wall, *truth, *truth_gap;
     int node_count;
     VesselMemory *memory;    // (M) of the truth, for depths …
@@ -362,7 +362,7 @@ typedef struct Hand {
     double length, fed, travel;      // [mm] of the wire; in, as the hand has it; pushed and pulled in all
 } Hand;
 
-// One step and what is read after it; false where the run is over.
+// One step and its measurements; false if the run is over.
 static bool loop_step(Simulator *simulator, const Scene *scene, const LoopOptions *o, int64_t i, Command command, Judge *judge, Hand *hand, CollisionLoop *out,
                       bool *memory_lacks)
 {

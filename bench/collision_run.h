@@ -1,4 +1,4 @@
-// What `bench collision` measures: a recorded motion asked of any wall, and runs in closed loop judged by where the wall truly is.
+// What `bench collision` measures: a recorded motion queried from any wall, and runs in closed loop compared with the true wall.
 #ifndef SELDINGER_BENCH_COLLISION_RUN_H
 #define SELDINGER_BENCH_COLLISION_RUN_H
 
@@ -14,12 +14,12 @@ typedef struct CollisionMotion {
     double *reach;           // (S) [mm] what the solver asks for at that step
     size_t point_capacity;
     Vec3 *point;             // (P)
-    double *gap;             // (P) the truth [mm]; +HUGE_VAL where it is beyond reach or there is no wall
+    double *gap;             // (P) the truth [mm]; +HUGE_VAL if it is beyond reach or there is no wall
     Vec3 *normal;            // (P) the truth
 } CollisionMotion;
 
 void collision_motion_free(CollisionMotion *motion);
-// Fills gap and normal by asking `truth`. False where memory lacks.
+// Fills gap and normal by queries to `truth`. False if out of memory.
 bool collision_motion_judge(CollisionMotion *motion, const Vessel *truth);
 
 typedef struct ErrorFigures {
@@ -29,11 +29,11 @@ typedef struct ErrorFigures {
 typedef struct CollisionReplay {
     int64_t steps, near_points;      // near: gap less the tool's radius below the reach of half a question, as of the solver's candidates
     double points_per_step, us_per_step, us_per_80_points;
-    int64_t judged, lost;            // near points compared; those for which the wall had no answer
+    int64_t judged, lost;            // near points compared; those without an answer
     ErrorFigures gap_um, normal_deg; // over judged points; the normal where the wall is nearer than half of the tool's room
 } CollisionReplay;
 
-// Each node with its own memory, as the solver asks. Times are CPU times of the queries, the least of `repeats` replays. False where memory lacks.
+// Each node has its own state, as in the solver. Times are CPU times of the queries, the least of `repeats` replays. False if out of memory.
 bool collision_replay(const Vessel *wall, const CollisionMotion *motion, int repeats, CollisionReplay *out);
 
 typedef struct CollisionLoop {
@@ -47,7 +47,7 @@ typedef struct CollisionLoop {
     double fed_mm, stalled_mm;
     bool survived;
     int64_t failed_step;             // -1
-    char why[96];                    // what failed first
+    char why[96];                    // first failure
     // measured where asked for
     double work_n;                   // [mJ/mm] lost along the true wall for each millimetre fed
     double work_mu;                  // the same over the work of the wall's forces taken as normal ones: a coefficient of friction
@@ -62,7 +62,7 @@ typedef struct LoopOptions {
     double *push_n;                  // (bench_steps) proximal force at each step; NULL
 } LoopOptions;
 
-// `truth_gap` answers the same gaps as `truth` and perhaps nothing else; depths are asked of it.
+// `truth_gap` gives the same gaps as `truth`, perhaps without normals; it is used for depths.
 bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth, const Vessel *truth_gap, const LoopOptions *options, CollisionLoop *out,
                     Faults *faults);
 

@@ -15,7 +15,7 @@
 #include <string.h>
 #include <time.h>
 
-static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 0.401485;  // [mm]; the width gives the radius half way (references.md)
+static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 0.401485;  // [mm]; the width gives the radius half way (docs/references.md, "Blobs")
 enum { FINE = 10 };                          // by how much the fine fit is closer
 enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
@@ -57,7 +57,7 @@ static void capsule_points(VesselTree *tree, const TriangleMesh *samples)
     }
 }
 
-// With the samples and with or without the blobs; NULL where memory lacks.
+// With the samples and with or without the blobs; NULL if out of memory.
 static VesselTree *capsule_tree(const TriangleMesh *samples, bool is_model)
 {
     VesselTree *tree = vessel_tree_create(CAPSULE_NODES, samples ? samples->vertex_count : 0, is_model ? CAPSULE_NODES * CAPSULE_NODES : 0);
@@ -108,7 +108,7 @@ static bool open_capsule(CollisionSurface *s, Faults *faults)
     return s->exact && s->nodes;
 }
 
-// --- what scenes name ---
+// --- vessels of scenes ---
 
 // `closer`: what the usual tolerances are divided by.
 static VesselTree *fit(const VesselTree *nodes, double voxel_mm, double closer, int threads, double *cpu_s, Faults *faults)
@@ -139,7 +139,7 @@ typedef struct GapVessel {
     Vessel vessel;           // first: a Vessel * to us is a GapVessel *
     const Shape *shape;
     const Vessel *whole;     // answers beyond open ends
-    double limit;            // [mm] further from the wall the shape's field will do, which is never more than the distance
+    double limit;            // [mm] further from the wall the shape's field suffices, which never exceeds the distance
 } GapVessel;
 
 static void gap_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -245,7 +245,7 @@ bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurfa
         out->truth = out->lim;
     if (!out->truth_gap)
         out->truth_gap = out->truth;
-    // where the tool comes in is the same for all
+    // the tool's entry is the same for all
     return open_vessel_inlet(out->scene, &(OpenVessel){.vessel = out->scene->source == SOURCE_TUBE ? out->exact : out->lim}, faults);
 }
 
@@ -275,7 +275,7 @@ static TriangleMesh *mesh_of(const CollisionSurface *s, const Vessel *wall, doub
     return contact_surface_mesh(wall, s->nodes, open_end, cell_mm, s->of->name, cli_note, faults);
 }
 
-// Moves all vertices onto the wall, to 1e-9 mm. False where one would go further than half a cell, or does not get there.
+// Moves all vertices onto the wall, to 1e-9 mm. False if one would go further than half a cell, or does not get there.
 static bool project(TriangleMesh *mesh, const Vessel *wall, double cell_mm)
 {
     enum { ROUNDS = 20 };
@@ -399,7 +399,7 @@ static bool add_lim(const CollisionSurface *s, CollisionWalls *walls, const char
     return true;
 }
 
-// Vessels are built anew, to know how long that takes.
+// Vessels are built again to measure the time.
 static bool add_model(const CollisionSurface *s, CollisionWalls *walls, const char *name, const VesselTree *model, double fit_s, Faults *faults)
 {
     double begin = collision_build_clock_s();

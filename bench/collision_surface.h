@@ -1,4 +1,4 @@
-// The surfaces of `bench collision` and what stands for each of them: the exact wall, blobs (one field, local models), meshes, a sampled distance.
+// The surfaces of `bench collision` and their representations: the exact wall, blobs (one field, local models), meshes, a sampled distance.
 #ifndef SELDINGER_BENCH_COLLISION_SURFACE_H
 #define SELDINGER_BENCH_COLLISION_SURFACE_H
 
@@ -17,22 +17,22 @@ typedef struct CollisionCase {
     bool convolution_capsule;        // the vessel is the paper's capsule
     int mesh_count, triangles[SURFACE_MESHES];   // about so many
     int pointwise_steps;     // of the runs with the slow pointwise contact solve
-    const char *paper_name;          // of the rows that stand beside; NULL: none
+    const char *paper_name;          // of the paper's rows for comparison; NULL: none
     PaperRow paper_mesh[SURFACE_MESHES], paper_lim;
 } CollisionCase;
 
 typedef struct CollisionSurface {
     const CollisionCase *of;
     Scene *scene;
-    const Vessel *truth;             // where the wall is
-    const Vessel *truth_gap;         // the same without curvature, sooner answered
+    const Vessel *truth;             // the true wall
+    const Vessel *truth_gap;         // the same without curvature, which is faster
     const char *truth_is;            // in words
     bool truth_is_model;             // the model itself: there is no other truth
-    VesselTree *nodes;               // centres, radii and samples: what was fitted, and where the wall is looked for
+    VesselTree *nodes;               // centres, radii and samples: what was fitted, and where to search for the wall
     VesselTree *model;               // the default: one field of shared blobs, or what a file holds
-    VesselTree *local;               // a model for each node of the same points; NULL where the model came from a file
-    VesselTree *fine;                // the default, fitted to a tenth of the usual distance; NULL where the model came from a file
-    double fit_s, local_s, fine_s;   // CPU time of the fits; NAN where the model came from a file
+    VesselTree *local;               // a model for each node of the same points; NULL if the model came from a file
+    VesselTree *fine;                // the default, fitted to a tenth of the usual distance; NULL if the model came from a file
+    double fit_s, local_s, fine_s;   // CPU time of the fits; NAN if the model came from a file
     double length_mm;                // of the centreline
     // owned
     Vessel *exact, *lim, *gap_only;
@@ -57,7 +57,7 @@ typedef struct CollisionWall {
 typedef struct CollisionWalls {
     int count;
     CollisionWall wall[WALLS_MOST];
-    const char *without_mesh;        // why there are no meshes; NULL where there are
+    const char *without_mesh;        // why there are no meshes; NULL if there are
     Vessel *owned[WALLS_MOST];
     int owned_count;
 } CollisionWalls;
@@ -68,12 +68,12 @@ void collision_walls_close(CollisionWalls *walls);
 const CollisionWall *collision_wall_find(const CollisionWalls *walls, const char *name, int mesh);   // NULL: not there
 
 // A mesh of the true wall with about `triangles` triangles: a coarse one tells the cell. A shape's is that of its model, every vertex moved onto the
-// shape (asking the shape itself at each point of a lattice takes ten times as long). NULL with a fault.
+// shape (evaluating the shape itself on a lattice takes ten times as long). NULL with a fault.
 typedef struct CollisionMesh {
     double cell_mm, made_s;  // CPU time, of the mesh alone
 } CollisionMesh;
 TriangleMesh *collision_mesh(const CollisionSurface *surface, double triangles, CollisionMesh *out, Faults *faults);
-Vessel *collision_lim(const VesselTree *model, LimField field);   // NULL where memory lacks
+Vessel *collision_lim(const VesselTree *model, LimField field);   // NULL if out of memory
 double collision_build_clock_s(void);    // CPU time of all threads
 
 #endif

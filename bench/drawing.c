@@ -1,4 +1,4 @@
-// seldinger bench drawing: what a picture of the trainer costs, and whether drawing disturbs the 1 kHz thread.
+// seldinger bench drawing: the cost of a picture of the trainer, and whether drawing disturbs the 1 kHz thread.
 #include "bench/bench.h"
 
 #include "render/gl_canvas.h"
@@ -79,7 +79,7 @@ typedef struct Case {
     PanelView view;
     int width, height;
     bool flows, arm_turns, camera_turns;
-    double must_ms;                  // issue 6; 0: none
+    double must_ms;                  // limit [ms]; 0: none
     int only;                        // 0: everything; else 1 + the one view that is drawn, or ONLY_PANELS
 } Case;
 
@@ -105,7 +105,7 @@ enum { CASES = sizeof cases / sizeof cases[0] };
 
 static void draw(Studio *studio, const Case *what, int frame)
 {
-    int at = frame % (2 * MOMENTS - 2), moment = at < MOMENTS ? at : 2 * MOMENTS - 2 - at;   // to and fro
+    int at = frame % (2 * MOMENTS - 2), moment = at < MOMENTS ? at : 2 * MOMENTS - 2 - at;   // back and forth
     const Pose *pose = studio->pose[moment];
     LessonView *lesson = lesson_of(studio, moment);
     XrayControl xray = pose->xray;
@@ -181,7 +181,7 @@ typedef struct Turn {
     double seconds;
 } Turn;
 
-// A session driven by the scene's script, `seconds` long, with pictures beside it or without.
+// A session driven by the scene's script, `seconds` long, with or without concurrent drawing.
 static bool take_turn(Studio *studio, double seconds, bool draws, Turn *turn, Faults *faults)
 {
     static HandPort hand[TOOLS_MOST];

@@ -131,7 +131,7 @@ static void json_range(cJSON *row, const char *name, Range range)
     cJSON_AddNumberToObject(out, "max", range.most);
 }
 
-// True where the shape keeps all limits of issue 4.
+// True if the shape meets all limits.
 static bool report_shape(const Table3 *table, int s, FILE *text, cJSON *rows)
 {
     static const struct {
@@ -232,7 +232,8 @@ static double process_cpu_s(void)
 }
 
 // Triangles a blob. As the paper counts: marching cubes of the tree's surface on the volume's grid. Of equal error: equilateral triangles on each
-// node's piece of tube whose sag in the middle of an edge, h^2 / (8 r), is the model's own d_a: a mesh as good as the model, had it no other error.
+// node's piece of tube whose sag in the middle of an edge, h^2 / (8 r), is the model's own d_a: i.e. a mesh as accurate as the model, if it had no
+// other error.
 static bool count_triangles(const VesselTree *model, double voxel, double *on_grid, double *equal)
 {
     TriangleMesh *mesh = isosurface_of_tree(model, voxel);
@@ -305,7 +306,7 @@ static bool report_tree(const FitBench *bench, const VesselTree *tree, const cha
     return true;
 }
 
-// The tree of the scene's angiogram; NULL without a fault where that is not here.
+// The tree of the scene's angiogram; NULL without a fault if that is missing.
 static VesselTree *segment_aneurism(int threads, Faults *faults)
 {
     static const char volume_path[] = "../shared/data/aneurism.nrrd", trace_path[] = "scenes/aneurism/trace.yaml";

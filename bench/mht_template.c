@@ -172,7 +172,7 @@ static double moment(const double m[MOMENTS], int i, int j)
     return m[a * BASIS - a * (a - 1) / 2 + b - a];
 }
 
-// Contrast and background of least squares, and the weighted sum of squares that they leave. False where they are not defined.
+// Contrast and background of least squares, and the weighted sum of squares that they leave. False if they are not defined.
 static bool solve_linear(double ww, double wt, double wtt, double wi, double wti, double wii, double *contrast, double *background, double *cost)
 {
     double det = ww * wtt - wt * wt;
@@ -263,7 +263,7 @@ static void normal_equations(const double m[MOMENTS], const MhtTemplate *t, doub
     }
 }
 
-// (A + damping diag A) step = right by Cholesky; false where that is not positive.
+// (A + damping diag A) step = right by Cholesky; false if that is not positive.
 static bool solve_damped(double a[SHAPE][SHAPE], const double right[SHAPE], double damping, double step[SHAPE])
 {
     double l[SHAPE][SHAPE], y[SHAPE];

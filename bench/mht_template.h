@@ -12,12 +12,12 @@ typedef struct MhtTemplate {
     Vec3 center, axis;       // axis: unit
     double radius;           // [mm]
     double contrast, background;   // k and m, in the volume's units
-    double score;            // t of k; the noise of the voxels counts as independent
+    double score;            // t of k; assumes independent noise of the voxels
 } MhtTemplate;
 
-// Voxels with their weights, as arrays for vector units. Holds its memory from one window to the next; one owner.
+// Voxels with their weights, as arrays for vector units. Memory is reused from window to window; one owner.
 typedef struct MhtWindow MhtWindow;
-MhtWindow *mht_window_create(void);   // NULL where memory lacks
+MhtWindow *mht_window_create(void);   // NULL if out of memory
 void mht_window_free(MhtWindow *window);
 // Collects the voxels about a template, with weights exp(-x^2 / sigma^2), sigma = `size` * radius across it. Where they are more than about 12,000, every
 // second, third … along each axis is taken; the score stays the t statistic of those. Voxels outside the volume are left out. Returns their number; with

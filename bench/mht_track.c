@@ -202,7 +202,7 @@ static int predict(Tracker *t, const MhtTemplate *from, MhtTemplate *out, int ca
     return found;
 }
 
-// One more step from every leaf. False where none is left.
+// One more step from every leaf. False if none is left.
 static bool extend(Tracker *t, Branch *branch)
 {
     enum { MAX_GUESSES = 8 };
@@ -216,7 +216,7 @@ static bool extend(Tracker *t, Branch *branch)
             t->why = "no template fits";
             bool good = fit(t, &guess[k], &from, &branch->limits) && is_progress(t, branch, branch->leaf[i], &guess[k]);
             why = good ? why : t->why;
-            // fits often fall together
+            // fits often coincide
             for (int other = 0; other < kept && good; other++)
                 if (vec3_distance(guess[other].center, guess[k].center) < t->voxel && vec3_dot(guess[other].axis, guess[k].axis) > 0.9) {
                     good = false;
@@ -278,8 +278,8 @@ static bool take(Tracker *t, Branch *branch, int next)
     return !t->out_of_memory;
 }
 
-// The nodes of a branch from its fitted first one until it ends, t->why says how. `until_tree`: it is on its way back to its parent and ends inside another
-// branch's tube.
+// The nodes of a branch from its fitted first one until it ends, t->why says how. `until_tree`: it is on its return path to its parent and ends
+// inside another branch's tube.
 static void follow(Tracker *t, Branch *branch, const MhtTemplate *first, bool until_tree)
 {
     const MhtParameters *p = t->parameters;
@@ -320,14 +320,14 @@ static void branch_free(Branch *branch)
     chain_free(&branch->tried);
 }
 
-// Fits the first template where it is wanted and follows it. False where it does not score.
+// Fits the first template at the requested place and follows it. False if it does not score.
 static bool track_branch(Tracker *t, const MhtTemplate *start, const MhtLimits *limits, Branch *out, bool until_tree)
 {
     const MhtParameters *p = t->parameters;
     MhtTemplate first = *start;
     *out = (Branch){.limits = *limits};
     t->why = "no template fits";
-    // the window moves after the template: the start is a click
+    // the window follows the template, because the start is a click
     for (int i = 0; i < 4; i++) {
         Vec3 before = first.center;
         if (!fit(t, &first, NULL, limits))
@@ -359,7 +359,7 @@ static double link_brightness(const Tracker *t, Vec3 a, Vec3 b)
     return ends > 0 ? least / ends : 0;
 }
 
-// Where a branch that starts at x hangs on the tree: the node of least power distance in plain sight, or the one in plainest sight.
+// Where to attach a branch that starts at x: the node of least power distance in line of sight, or the one with the brightest line.
 static int attachment(const Tracker *t, Vec3 x)
 {
     int best = -1, brightest = 0;
@@ -402,8 +402,8 @@ static double gap_to_tree(const Tracker *t, const MhtTemplate *template)
     return least - template->radius;
 }
 
-// Appends a branch's nodes: those of the way back reversed, then those of the way out. A way back that missed its parent is joined where it came nearest, and
-// what lies beyond is a limb of its own there: by a link from its far end it would cross the background.
+// Appends a branch's nodes: those of the return path reversed, then those of the way out. A return path that missed its parent is joined where it
+// came nearest, and what lies beyond is a limb of its own there: by a link from its far end it would cross the background.
 static bool adopt(Tracker *t, const Chain *out, const Chain *back, int number)
 {
     bool is_first = t->tree.count == 0, good = true;
@@ -472,7 +472,7 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
         behind = (Branch){.limits = limits};
         follow(t, &behind, &first, true);
     }
-    // its first node is the branch's own first one, seen the other way
+    // its first node is the branch's own first one, in the opposite direction
     Chain back = behind.way.count > 1 ? (Chain){behind.way.node + 1, behind.way.count - 1, 0} : none;
     if (found && !t->out_of_memory)
         t->out_of_memory = !adopt(t, &out.way, &back, number);

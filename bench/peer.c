@@ -1,4 +1,4 @@
-// seldinger bench peer: the scenes on which SOFA v26.06 with BeamAdapter v26.06 was measured (shared/data/README.md, "Peer scenes"), each at
+// seldinger bench peer: the scenes on which SOFA v26.06 with BeamAdapter v26.06 was measured (docs/benchmarks.md, "Against SOFA"), each at
 // 100 and 20 GPa, on the exact tube, on local blobby models fitted to it and on a mesh of it, beside the peer's figures. The peer was measured on its
 // machine and on meshes of the same tubes: its times are printed to give the order of magnitude.
 #include "bench/bench.h"

@@ -1,5 +1,6 @@
-// A trial is a random tree with its own band, noise and click. Three kinds of answer are right: in a volume whose trunk can be seen a start in it, with its radius
-// and four fifths of its length; where noise hides the trunk, or the click is beside all vessels, a refusal; and where a result is wrong, a warning with it.
+// A trial is a random tree with its own band, noise and click. Three kinds of result are correct: in a volume whose trunk can be seen a start in it,
+// with its radius and four fifths of its length; where noise hides the trunk, or the click is beside all vessels, a refusal; and where a result is
+// wrong, a warning with it.
 #include "bench/starts.h"
 
 #include "base/parallel.h"
@@ -36,7 +37,7 @@ enum { KINDS = sizeof kinds / sizeof kinds[0], ENOUGH = 8 };
 
 typedef struct Trial {
     bool is_refused, is_right, failed;
-    int warnings;            // others than that a smoothed copy was tracked
+    int warnings;            // other warnings than that a smoothed copy was tracked
     bool is_smoothed;
     double drift, offset;    // [true radii] from the click to the axis that was found; of that from the true axis
     double radius;           // found over true
@@ -308,7 +309,7 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
         missing += kinds[k].is_hidden ? row.tracked : 0;
         silent += row.silent;
     }
-    bool *judged = seeds >= ENOUGH ? kept : NULL;   // a seed or two say nothing about a rate
+    bool *judged = seeds >= ENOUGH ? kept : NULL;   // one or two seeds cannot estimate a rate
     if (good) {
         fprintf(out,
                 "right: the start within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused; warn: tracked, with a\n"

@@ -1,11 +1,11 @@
-// seldinger bench step: what a simulation step costs, where, and how right it is.
+// seldinger bench step: the cost of a simulation step, by stage, and its accuracy.
 //
 //   scenes       the whole script of spiral, phantom and aneurism on the widest SIMD level: CPU time of the step and its stages, contacts, depth
 //   force error  every so many steps, and each that did not converge, is taken again from its checkpoint with tolerance 1e-10; the error is the
 //                largest difference of a node's wall force, over the step's largest. Some are taken a third time by the pointwise form, to 1e-8
 //   growth       the spiral's wire in 50 to 800 elements
 //   levels       the same runs with each SIMD level forced: the state hash must not change
-//   kernels      assembly, factor and solve, detection alone, against the budgets (DESIGN.md section 7)
+//   kernels      assembly, factor and solve, detection alone, against the budgets (list_budgets)
 #include "bench/tools.h"
 
 #include "base/heap.h"
@@ -73,7 +73,7 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Largest difference of a node's force over the largest force of `exact`; -1 where nothing touches.
+// Largest difference of a node's force over the largest force of `exact`; -1 if nothing touches.
 static double force_difference(const NodeReport *node, const NodeReport *exact, int count)
 {
     double top = 0, worst = 0;
@@ -182,7 +182,7 @@ static double time_of(void (*call)(void *context), void *context)
 
 static void call_assemble(void *context) { step_assemble(context); }
 
-// 200 elements, all of them free: a wire without sheath and vessel.
+// 200 free elements: a wire without sheath and vessel.
 static double time_assembly(const Scene *spiral, Faults *faults)
 {
     Scene loose = *spiral;
@@ -212,7 +212,7 @@ static void call_factor_solve(void *context)
     block_factor_solve(s->factor, s->b, s->x);
 }
 
-// 201 blocks: the time does not depend on what they hold.
+// 201 blocks: the time does not depend on their contents.
 static double time_factor_solve(void)
 {
     enum { NODES = 201 };
@@ -266,7 +266,7 @@ void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, dou
     NodeReport *node = HEAP_ZEROED((size_t)nodes, sizeof *node);
     Vec3 *before = HEAP_ZEROED((size_t)nodes, sizeof *before);
     double *gap = HEAP_ZEROED((size_t)nodes, sizeof *gap);
-    Detection d = {.vessel = vessel, .reach = 1};   // what a step at this speed asks for
+    Detection d = {.vessel = vessel, .reach = 1};   // the query range of a step at this speed
     for (int64_t i = 0; i <= step; i++) {
         memcpy(before, simulator_state(simulator)->position, (size_t)nodes * sizeof *before);
         simulator_step(simulator, bench_command(scene, i, &cursor));
@@ -350,7 +350,7 @@ static void print_scene(FILE *out, const char *name, const StepFigures *run, con
             run->hash);
 }
 
-// A tool that stands still is quick and tells nothing.
+// A tool at rest is fast and uninformative.
 static void print_stall(FILE *out, const StepFigures *run)
 {
     if (fabs(run->stalled_mm) > 0.01)

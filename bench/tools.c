@@ -1,4 +1,4 @@
-// seldinger bench step --tools: what a step of coaxial tools costs, by their number and the number of nodes.
+// seldinger bench step --tools: the cost of a step of coaxial tools, by number of tools and nodes.
 //
 // Stacks of four library tools in the phantom, the arch and the angiogram; with three the intermediate catheter is taken out, with two the guide too, with one
 // the microcatheter. Nodes are spread evenly from the outermost hub to the depth to which the wire goes, and tool j of K goes to (j + 1) / K of it: each layer has the same share.
@@ -19,7 +19,7 @@ static const struct {
                           {"scenes/coaxial/angiogram.yaml", "scenes/aneurism/aneurism.h5", 100, 20}};
 const int tools_bench_nodes[TOOLS_NODES] = {50, 100, 200, 400};
 static const double margin_mm = 15, hub_mm = 25;     // of the outermost tool, in the sheath at the end; by which the hub of each inner one is further back
-// What so many tools with so many nodes are to cost at most: median and p99.9.
+// Limits for the cost by number of tools and nodes: median and p99.9.
 static const double must_us[2] = {300, 1000};
 enum { MUST_TOOLS = 3, MUST_NODES = 200, SECTIONS_MOST = 64 };
 

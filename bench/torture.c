@@ -1,4 +1,5 @@
-// seldinger bench torture: random hands, tools and vessels, judged by the true wall. Every run is a scene file made from its seed (torture_scene.h).
+// seldinger bench torture: random commands, tools and vessels, checked against the true wall. Every run is a scene file made from its seed
+// (torture_scene.h).
 #define _XOPEN_SOURCE 700   // realpath
 #include "base/output.h"
 #include "bench/bench.h"
@@ -18,8 +19,8 @@
 enum { MODELS_MOST = 8, TRUTH_EVERY = 5, FAULT_TEXT = 240 };
 static const double outside_mm = 0.2;     // deeper in the true wall than this: failed
 static const double unreported_mm = 0.05; // or by this much deeper than the program says
-static const double kink_rad = 1;         // an element that turns by more is no beam any longer: such runs are counted, and their energy is not judged
-static const double stuck_mm = 10;        // of what the hand fed did not go in, and went in where steps and elements were half as long
+static const double kink_rad = 1;         // an element that turns by more is outside beam theory: such runs are counted, and their energy is not judged
+static const double stuck_mm = 10;        // [mm] fed but not inserted, though inserted with steps and elements half as long
 
 static const char help[] =
     "Usage: seldinger bench torture [options]\n\n"
@@ -49,7 +50,7 @@ typedef struct Outcome {
     int64_t steps, cut, not_converged;
     double deepest, unreported;      // [mm] in the true wall; by how much more than reported
     double deepest_s, gained, gained_end, gained_mean, work;  // when; [mJ]
-    double not_taken;                // [mm] that the hands fed and no tool took
+    double not_taken;                // [mm] fed by the hands but not inserted
     bool was_compared, kinks;
     char reason[FAULT_TEXT];         // FAILED_REFUSED
 } Outcome;
@@ -62,7 +63,7 @@ typedef struct Torture {
     const char *model[MODELS_MOST];
     double lumen[MODELS_MOST];
     Outcome *outcome;        // (runs)
-    pthread_mutex_t files;   // HDF5 is not for several threads
+    pthread_mutex_t files;   // HDF5 is not thread-safe
 } Torture;
 
 // --- one run ---
@@ -77,7 +78,7 @@ typedef struct Witness {
     double fed[STEP_TOOLS_MAX];
 } Witness;
 
-// Without memory of where the wall was.
+// Without the previous position on the wall.
 static double true_gap(const Vessel *vessel, Vec3 place, double reach)
 {
     VesselHit hit;
@@ -181,7 +182,7 @@ static void drive(const Scene *scene, const Vessel *contact, const Vessel *truth
     simulator_destroy(simulator);
 }
 
-// A scene's text to its end; `name` for messages.
+// A scene's text completely; `name` for messages.
 static void run_text(Torture *torture, const char *text, const char *name, Outcome *outcome)
 {
     Faults *faults = calloc(1, sizeof *faults);
@@ -307,7 +308,7 @@ static cJSON *row_json(const char *vessel, const char *tool, const Row *row)
     return at;
 }
 
-// True where no run failed.
+// True if no run failed.
 static bool print_table(const Torture *torture, cJSON *list)
 {
     static Row row[TORTURE_VESSELS][TORTURE_TOOLS], all;
@@ -382,7 +383,7 @@ static int parse(int argc, char **argv, Torture *torture)
     return -1;
 }
 
-// The radius of each model at its root, and its path from anywhere.
+// The radius of each model at its root, and its absolute path.
 static bool look_at_models(Torture *torture, Faults *faults)
 {
     static char whole[MODELS_MOST][PATH_MAX];

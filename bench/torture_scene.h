@@ -1,5 +1,5 @@
-// Random scenes for `bench torture`: a vessel, tools, a hand, all of them from a seed, as the text of a scene file, so that a run that fails is kept and
-// replayed by `seldinger run`.
+// Random scenes for `bench torture`: a vessel, tools and commands from a seed, as the text of a scene file, so that a failed run can be kept and
+// repeated by `seldinger run`.
 #ifndef SELDINGER_BENCH_TORTURE_SCENE_H
 #define SELDINGER_BENCH_TORTURE_SCENE_H
 
@@ -17,8 +17,8 @@ typedef struct TortureScene {
     char *text;              // the caller frees
 } TortureScene;
 
-// The scene of a seed: the same text for the same arguments. `model`: files for TORTURE_MODEL (none: that kind is not drawn), `lumen_mm` the radius at the
-// inlet of each. Text NULL where there is no memory.
+// The scene of a seed: the same text for the same arguments. `model`: files for TORTURE_MODEL (none: that kind is not drawn), `lumen_mm` the radius
+// at the inlet of each. Text NULL if there is no memory.
 TortureScene torture_scene(uint64_t seed, int64_t steps, int model_count, const char *const *model, const double *lumen_mm);
 // The same scene, but with steps and elements half as long: a run that ends elsewhere there was not converged.
 char *torture_scene_finer(uint64_t seed, int64_t steps, int model_count, const char *const *model, const double *lumen_mm);

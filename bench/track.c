@@ -1,8 +1,8 @@
 // seldinger bench track: trackers on synthetic angiograms with truth, labelled as in Kerrien et al. 2017, Table 2.
 //
-// Per row all trees of a kind: random trees at four noise levels, and what the paper names as trouble: vessels in contact, bone, aneurysms, anisotropic
-// voxels, contrast that fades, clipped brightness. "from one click" tracks the whole tree from the root's start. The others are run as the authors ran
-// them (5.2.1): one run a branch, started in it with the true point, direction and radius, and judged on that branch alone.
+// Per row all trees of a kind: random trees at four noise levels, and the difficulties named in the paper: vessels in contact, bone, aneurysms,
+// anisotropic voxels, contrast that fades, clipped brightness. "from one click" tracks the whole tree from the root's start. The others are run as
+// the authors ran them (5.2.1): one run a branch, started in it with the true point, direction and radius, and judged on that branch alone.
 #include "base/output.h"
 #include "bench/bench.h"
 #include "bench/starts.h"
@@ -201,7 +201,7 @@ static RbtSeed seed_at(const Angiogram *image, const TrackBranch *branch, double
     return (RbtSeed){.start = truth->center[at], .toward = truth->center[next], .has_toward = true, .radius = truth->radius[at], .name = "start"};
 }
 
-// b of all that blurs the image on its way to the edge.
+// b of the total blur of the image.
 static double blur_of(const Angiogram *image, const RbtParameters *parameters)
 {
     double v2 = 0;

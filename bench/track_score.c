@@ -1,5 +1,5 @@
 // Every tracked node is located on the true tree. From the root outwards a node is good while it lies in the lumen where its parent leads to; where
-// it leaves, a run begins that goes on to the run's last node. A short run that comes back to where it left is an excursion, no leak.
+// it leaves, a run begins that continues to the run's last node. A short run that comes back to where it left is an excursion, no leak.
 #include "bench/track_score.h"
 
 #include "recon/volume/blurred_edge.h"
@@ -248,7 +248,7 @@ static void judge_node(Judge *j, int i)
         step->jumped = true;
         return;
     }
-    // back on the same way by more than three radii; a sister branch is no way back
+    // back on the same way by more than three radii; a sister branch is no return path
     int m = meeting(&j->map, before->furthest, step->place.node);
     if (m == step->place.node && j->map.arc[before->furthest] - step->place.arc > 3 * fmax(step->place.radius, j->truth->tree->radius[before->furthest])) {
         begin_run(j, step, before, true);

@@ -1,4 +1,4 @@
-// seldinger bench wall: the wall of fitted trees in one table, each line with what it must and should be.
+// seldinger bench wall: the wall of fitted trees in one table, each line with its required and desired value.
 //
 // Trees and models are made by the commands of `seldinger`, which lies beside this program, as a user makes them (their command is printed), or named on the command line.
 #include "bench/wall_measures.h"
@@ -116,7 +116,7 @@ static void wall_add(WallTable *table, const char *what, double value, const cha
     fflush(table->out);
 }
 
-// Says that a row is left out, and why.
+// Prints that a row is skipped, and why.
 static void wall_skip(WallTable *table, const char *why) { fprintf(table->out, "%-10s %-22s left out: %s\n", table->row, table->on, why); }
 
 // --- Trees and models ---
@@ -482,11 +482,11 @@ static bool row_spread(WallBench *bench, const WallModel *m, Faults *faults)
         if (m) {
             work_path(bench, "spread", "-tree.h5", tree);
             work_path(bench, "spread", ".h5", path);
-            // a tenth of the voxel of an angiogram like these: what another noise of the image moves an edge by
+            // a tenth of a voxel: the shift of an edge between noise realisations
             good = wall_write_jittered(m->tree, 0.02, (uint64_t)seed + 1, tree, faults) && fit(bench, tree, path, NULL, faults);
             model = good ? tree_file_load(path, NULL, faults) : NULL;
         } else {
-            // the samples' places must stay: the noise is added here
+            // the samples' positions must stay: the noise is added here
             char exact[PATH];
             work_path(bench, "spread", "-exact.h5", exact);
             work_path(bench, "spread", "-tree.h5", tree);
@@ -510,7 +510,7 @@ static bool row_spread(WallBench *bench, const WallModel *m, Faults *faults)
     return good;
 }
 
-// --- What the hand feels, and what a step costs ---
+// --- Forces at the hand, and the cost of a step ---
 
 static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
 {

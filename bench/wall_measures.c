@@ -98,7 +98,7 @@ bool wall_points(const VesselTree *model, PointFigures *out)
     return good;
 }
 
-// The parent's axis may be a little off the true one: only the line outside of the parent's own ball is judged.
+// The parent's axis may be a little off the true one: only the line outside the parent's own ball is judged.
 static bool is_false_link(const VesselTree *tree, const ReachJunction *junction, const Shape *truth, double slack)
 {
     enum { PLACES = 40 };

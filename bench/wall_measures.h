@@ -1,11 +1,11 @@
-// What `bench wall` measures of a model, and the commands that make its trees and models.
+// The measurements of `bench wall`, and the commands that make its trees and models.
 #ifndef SELDINGER_BENCH_WALL_MEASURES_H
 #define SELDINGER_BENCH_WALL_MEASURES_H
 
 #include "bench/bench.h"
 #include "geom/reach.h"
 
-// --- The commands of `seldinger`, run as children in the order of use, so that what is measured is what a user gets ---
+// --- The commands of `seldinger`, run as children in the order of use, so that users' results are measured ---
 typedef struct WallCost {
     double cpu_s, wall_s;    // of all its threads
 } WallCost;
@@ -19,7 +19,7 @@ typedef struct PointFigures {
 } PointFigures;
 bool wall_points(const VesselTree *model, PointFigures *out);
 
-// The junctions of a tree against the true shape: a link is false where its line leaves the true lumen by more than `slack_mm`.
+// The junctions of a tree against the true shape: a link is false if its line leaves the true lumen by more than `slack_mm`.
 typedef struct Shape Shape;
 typedef struct TruthFigures {
     int junctions, capped, false_links, false_open;   // capped: of the true ones

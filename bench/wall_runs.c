@@ -1,4 +1,4 @@
-// Tools in a model for `bench wall`: a stiff wire pushed in, and what the hand feels of the wall without friction.
+// Tools in a model for `bench wall`: a stiff wire pushed in, and the push due to the wall without friction.
 #include "bench/wall_runs.h"
 
 #include "bench/collision_run.h"

@@ -10,7 +10,7 @@ typedef struct StiffRun {
 typedef struct StiffFigures {
     double in_mm, fed_mm, deepest_mm, push_max_n;
     unsigned flags;
-    bool all_in;             // what the hand fed is in, to 0.1 mm
+    bool all_in;             // all that was fed is inserted, to 0.1 mm
 } StiffFigures;
 // A straight wire of 100 GPa and `diameter_mm`, pushed for `seconds` from the inlet. The scene is made here; nothing is read. False with a fault.
 bool wall_stiff_run(const Vessel *vessel, double diameter_mm, double length_mm, double seconds, StiffRun run, StiffFigures *out, Faults *faults);
