@@ -1,5 +1,5 @@
 // The exact tube: the union of spheres of one radius along a centreline of lines and arcs, or along a polyline. The reference geometry
-// of the mechanics tests (shared/references.md "Wire in tubes").
+// of the mechanics tests (docs/references.md "Wire and walls").
 //
 // With d the distance from X to the centreline and F its foot there: gap = radius - d, normal = (F - X) / d, and the gap's Hessian is -Hess d:
 //   straight: 1/d about the axis, 0 along it;  arc of radius R, rho the distance to its axis of turning: also (rho - R) / (rho d) along the turn;

@@ -1,5 +1,5 @@
 // The corotational beam element: large rotation, small strain, Timoshenko shear, circular section, rest curvature.
-// DESIGN section 3; equations in beam_equations.h. Lengths mm, forces N, moments N mm, energies mJ.
+// Equations in beam_equations.h. Lengths mm, forces N, moments N mm, energies mJ.
 //
 // Arrays are one per quantity (lanes are elements, so that loops over elements vectorise); the caller owns all of them.
 // Nothing here allocates. Kernels give the same bits on every instruction set (no contraction, one order per lane).

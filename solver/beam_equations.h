@@ -17,7 +17,7 @@
 // everywhere, which acos is not.
 //
 // Tangent: J' C J (main), positive semi-definite, and the geometric stiffness of a tension only: a compression's part would make the
-// matrix indefinite (DESIGN section 4, item 2). To first order in the angles
+// matrix indefinite (docs/design.md, "Stability", 2). To first order in the angles
 //   d theta_i = B_i d phi_i + D_i (d x2 - d x1),   B_i = s_i I - t_i e',   D_i = -[t_i]x P / l,   s_i = e . t_i,   P = I - e e'
 // B_i, not P: B_i t_i = 0, so spinning a bent wire about its own tangent costs nothing, as it should. With P in its place the matrix held
 // EI k^2 of stiffness a length against spin and lacked as much elsewhere; eigenvalues of the true Hessian against it reached 9 in a wire coiled

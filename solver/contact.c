@@ -1,4 +1,4 @@
-// The wall's curvature as stiffness (DESIGN section 4, item 1).
+// The wall's curvature as stiffness (docs/design.md, "Stability", 1).
 //
 // Over a step the normal turns by H d (H the Hessian of the gap), so a contact force_n n does the work of a spring -force_n H. Its positive part
 // in the tangent plane goes into the matrix, or the tip oscillates; the negative part (a convex wall) would make the matrix indefinite and is left

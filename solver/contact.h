@@ -81,7 +81,7 @@ typedef struct ContactSet {
 } ContactSet;
 
 // Adds the curvature and roll stiffness of the set (warm-start forces) to the first six unknowns of a node's diagonal block (and couplings where
-// xi > 0), and to `b`, which may be NULL, what it does to `slid`. DESIGN section 4, item 1.
+// xi > 0), and to `b`, which may be NULL, what it does to `slid`. See docs/design.md, "Stability", 1.
 struct BlockChain;
 void contact_add_curvature(const ContactSet *set, struct BlockChain *chain, double *b);
 // Is a degree of freedom of a node free? A constrained one is recognised by its unit row; contacts neither push nor stiffen it.

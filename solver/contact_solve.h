@@ -1,6 +1,6 @@
 // The contact solve of a step. Find u and forces with   A u = b + sum_k J_k^T f_k,   Signorini and Coulomb, and slides between tools (contact.h).
 //
-// Two forms behind one call (DESIGN section 4, items 5 and 6); both reach the same solution.
+// Two forms behind one call (docs/design.md, "Stability", 4); both reach the same solution.
 //   pointwise: Gauss-Seidel over contacts (the paper's, and the reference), on the chain's semi-separable structure: W is never formed.
 //   block:     both fields together by a semismooth Newton method with a line search, an iteration being one chain factorisation
 //              (contact_newton.c), of the nodes that carry contacts where these are few: the others are eliminated once (block_condense.h).

@@ -1,5 +1,5 @@
 // The sheath: a frictionless straight guide that ends at the mouth. Behind the mouth the wire is a chain of axial and torsional
-// springs; the element that lies across the mouth bends with the part that is outside. DESIGN section 3; equations in sheath.c.
+// springs; the element that lies across the mouth bends with the part that is outside. Equations in sheath.c.
 #ifndef SELDINGER_SOLVER_SHEATH_H
 #define SELDINGER_SOLVER_SHEATH_H
 

@@ -1,5 +1,5 @@
 // Candidates at the iterate: contact points whose gap could close in this step. A contact point p is node p, or beyond the nodes slot p - M
-// (slot.h). A point that is certainly further away is not asked again before it has travelled that far (DESIGN section 5).
+// (slot.h). A point that is certainly further away is not asked again before it has travelled that far (docs/design.md, "Stability", 6).
 //
 // Nodes first. A slot between two nodes is left out as long as they keep it off the wall: from the answers at the three, gaps, slopes and bends, follows how
 // far it may go until the element could be nearer to the wall there than at its nodes (guarded_for). That holds for elements of any length. Left to what

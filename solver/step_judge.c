@@ -1,4 +1,4 @@
-// When an implicit Euler step (step.h) is solved, and its end. Kerrien 2017 section 6.1 with what DESIGN sections 3 and 4 add.
+// When an implicit Euler step (step.h) is solved, and its end. Kerrien 2017 section 6.1 with the additions of docs/design.md, "Stability".
 //
 // The system is linear about x_n. A step that turns an element by more than NEWTON_MOTION is linearised again about what came out, with the
 // unknown still the whole displacement from x_n, so that inertia, damping, gaps and friction keep their meaning: Newton's method on the

@@ -1,5 +1,5 @@
 // The tool: a chain of corotational 3D beam elements (large rotation, small strain), circular or tubular, sections that differ,
-// rest curvature, Rayleigh damping; a sheath that guides it on a line, or a test rig that clamps and loads it. DESIGN section 3.
+// rest curvature, Rayleigh damping; a sheath that guides it on a line, or a test rig that clamps and loads it. Equations in beam_equations.h.
 //
 // Units inside: mm, g, ms, hence N, MPa, mJ. Node 0 is proximal, node M-1 the tip. A node's body frame: e1 along the tool towards the
 // tip, e2 the direction to which a rest curvature with plane angle 0 bends the distal part, e3 = e1 x e2; quaternions carry body into space.

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""References of the free-wire scenes that shared/references.md does not list; needs numpy and scipy, prints them all.
+"""References of the free-wire scenes that docs/references.md does not list; needs numpy and scipy, prints them all.
 
 A special Cosserat rod (bending, twist, stretch, shear) by shooting: unknowns are force n and moment m at the proximal end,
     r' = R (e1 + C^-1 R' n),  R' = R [k0 + K^-1 R' m]x,  n' = 0,  m' = -r' x n,
