@@ -84,7 +84,7 @@ static void step_tables(void **state)
         assert_true(number(step, "median") > 0 && number(step, "median") <= number(step, "p99"));
         assert_true(number(step, "p99") <= number(step, "p999") && number(step, "p999") <= number(step, "max"));
         samples += number(error, "samples");
-        assert_true(number(error, "median") <= 1e-6 && number(error, "max") <= 1e-3);   // DESIGN section 7
+        assert_true(number(error, "median") <= 1e-6 && number(error, "max") <= 1e-3);   // the bounds of bench/step.c
     }
     assert_true(samples > 10);
     cJSON *growth = cJSON_GetObjectItem(root, "growth");

@@ -294,7 +294,7 @@ static void helix_to_its_end(void **state)
                       center / nodes, worst,
                       tree->node_count, report.branch[0].end);
         assert_true(furthest > 8.0);
-        // not beyond the end either; Kerrien's values do go on into the background (their table 2 has 8.9 % of such), and lag in the curve
+        // not beyond the end either; Kerrien's values do continue into the background (their table 2 has 8.9 % of such), and lag in the curve
         assert_true(kind == 2 || report.branch[0].length < length + 0.5);
         assert_true(center / nodes < (kind == 2 ? 0.2 : 0.1) && worst < 0.25);
         rbt_report_free(&report);
@@ -395,7 +395,7 @@ static double passing_depth(Vec3 x)
     return fmax(segment_depth(x, vec3(10, 4, -2), vec3(10, 4, 14), 1), segment_depth(x, vec3(-2, 7.2, 8), vec3(22, 7.2, 8), 1));
 }
 
-// A way back that passes its parent without meeting it hangs there, not by a link from its far end through the background.
+// A return path that passes its parent without meeting it hangs there, not by a link from its far end through the background.
 static void joined_where_it_passes(void **state)
 {
     (void)state;

@@ -217,7 +217,7 @@ typedef struct Wall {
     double off, facet;       // of vertices and of triangles' middles from the truth, away from open ends
 } Wall;
 
-// `ends`: cover of the last nodes of branches, in radii: a model goes on beyond them.
+// `ends`: cover of the last nodes of branches, in radii: a model continues beyond them.
 static Wall mesh_wall(const Shape *shape, const Vessel *vessel, const VesselTree *tree, double ends, double cell)
 {
     double *reach = calloc((size_t)tree->node_count, sizeof *reach);

@@ -39,8 +39,8 @@ static cJSON *run(const char *name, const char *suffix, const char *model)
 static double number(const cJSON *json, const char *name) { return cJSON_GetObjectItem(json, name)->valuedouble; }
 static const char *state_of(const cJSON *score) { return cJSON_GetObjectItem(score, "state")->valuestring; }
 
-// What is left to mend in coaxial steps: how many may stop at the contact solve's cap or have their motion cut, and what share of the hands' work single
-// steps may gain. Of other flags none; a single tool has none at all.
+// What is left to correct in coaxial steps: how many may stop at the contact solve's cap or have their motion cut, and what share of the hands' work
+// single steps may gain. Of other flags none; a single tool has none at all.
 typedef struct LeftToMend {
     int unconverged, limited;
     double gained;

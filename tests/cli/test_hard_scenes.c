@@ -132,7 +132,7 @@ static void a_hand_that_slips_makes_no_energy(void **state)
     cJSON_Delete(holds((HardCase){"hand-slips-in-bends", 20, 1e-6, 0, 0, true}));
 }
 
-// Behind the mouth too, whole turns of the tool that goes on at a tip are no twist: 3,908 mJ in a step before, and 87 steps not solved.
+// Behind the mouth too, whole turns of the tool that continues at a tip are no twist: 3,908 mJ in a step before, and 87 steps not solved.
 static void a_guide_is_drawn_back_over_a_turned_wire(void **state)
 {
     (void)state;

@@ -124,7 +124,7 @@ static const char several[] = "seldinger: 1\n"
 static const char *const variant[] = {"SELDINGER_SIMD=avx512", "SELDINGER_SIMD=avx2", "SELDINGER_SIMD=sse2", NO_FUSED, "SELDINGER_SIMD=sse2 " NO_FUSED};
 enum { VARIANTS = sizeof variant / sizeof *variant };
 
-// The state after a run, its model fitted anew.
+// The state after a run, its model fitted again.
 static void state_after(const char *scene, const char *environment, char hash[17])
 {
     char before[600];

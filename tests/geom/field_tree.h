@@ -43,7 +43,7 @@ static inline void field_tree_blob(FieldTree *t, int owner, Vec3 center, double 
 }
 
 // From `from` to `to`, the first node's parent is `parent`; a blob at each node unless it lies within [bare_from, bare_to] mm from the beginning. The
-// row of blobs goes on for 2 r beyond an end that is `open_before` or at the last node: ends are flat there. Returns the last node.
+// row of blobs continues for 2 r beyond an end that is `open_before` or at the last node: ends are flat there. Returns the last node.
 static inline int field_tree_branch(FieldTree *t, int parent, Vec3 from, Vec3 to, double radius, double bare_from, double bare_to)
 {
     double length = vec3_distance(from, to), a = field_tree_amplitude();

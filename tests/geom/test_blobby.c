@@ -1,4 +1,4 @@
-// Blobby models: the table of shared/references.md, derivatives against central differences with their order, the closest surface point
+// Blobby models: the table of docs/references.md, derivatives against central differences with their order, the closest surface point
 // against spheres (exact) and against sampling.
 #include "geom/blobby.h"
 #include "random_numbers.h"

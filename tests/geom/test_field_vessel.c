@@ -280,7 +280,7 @@ static void alone_as_in_company(void **state)
         VesselMemory a = together[k], b = together[k];
         if (!a.has_foot || a.blobs < 0)
             continue;
-        b.held_for2 = -1;    // has to be made anew
+        b.held_for2 = -1;    // has to be made again
         VesselHit ha, hb;
         vessel_query(v, 1, &x[k], 0.5, &a, &ha);
         vessel_query(v, 1, &x[k], 0.5, &b, &hb);

@@ -170,7 +170,7 @@ static void sides_are_right(void **state)
     }
 }
 
-// A wire leaves by the bell and finds no wall out there; upstream the lumen goes on.
+// A wire leaves by the bell and finds no wall out there; upstream the lumen continues.
 static void open_ends(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 // Surfaces: the derived table of marching cubes, closed manifolds facing outwards, a sphere's area and volume with order 2, the Hausdorff bound
-// voxel^2 / (2 R) of shared/references.md, trees whose models join, what cannot be meshed, and the cost.
+// voxel^2 / (2 R) of docs/references.md, trees whose models join, what cannot be meshed, and the cost.
 #include "blob_tube.h"
 #include "geom/cube_triangles.h"
 #include "geom/isosurface.h"

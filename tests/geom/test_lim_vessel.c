@@ -325,7 +325,7 @@ static void inlet_is_open(void **state)
         Vec3 p, d;
         assert_true(v->inlet(v, &p, &d));
         assert_true(vec3_norm(p) == 0 && vec3_distance(d, vec3(1, 0, 0)) < 1e-12);
-        // upstream the section at the root goes on as a cylinder
+        // upstream the section at the root continues as a cylinder
         for (double x = -5; x < -0.5; x += 0.3) {
             VesselHit hit = ask(v, vec3(x, 0.3, 0.2), 0, 1), root = ask(v, vec3(-20, 0.3, 0.2), 0, 1);
             assert_true(hit.flags == VESSEL_BEYOND && hit.node == 0);
@@ -473,8 +473,8 @@ static void nodes_without_blobs(void **state)
     vessel_tree_free(u);
 }
 
-// One model of a fork: a point that follows the outer wall of one arm and then crosses to the carina finds that wall in time, though the remembered foot
-// stays the locally closest; the same on the way back.
+// One model of a fork: a point that follows the outer wall of one arm and then crosses to the carina finds that wall in time, though the remembered
+// foot stays the locally closest; the same on the return path.
 static void another_wall_comes_closer(void **state)
 {
     (void)state;

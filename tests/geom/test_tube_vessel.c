@@ -182,7 +182,7 @@ static void ends(void **state)
     Vessel *open = make(&o);
     o.closed_ends = true;
     Vessel *closed = make(&o);
-    // upstream the first section goes on
+    // upstream the first section continues
     VesselHit before = ask(open, vec3(-50, 0.2, 0.3), -1), after = ask(open, vec3(17, 6.01, 0), -1);
     assert_true(before.flags == VESSEL_BEYOND);
     assert_near(before.gap, 0.5 - hypot(0.2, 0.3), 1e-12);
@@ -319,8 +319,8 @@ static void coils_that_coincide(void **state)
     v->destroy(v);
 }
 
-// A polyline helix of 540 points whose turns nearly touch, as dense as the peer tubes: a point led along the wall that faces the next turn stays in its
-// own, its gap is the exact tube's within the chords' sag, and nodes go on one by one.
+// A polyline helix of 540 points whose turns nearly touch, as dense as the peer tubes: a point led along the wall that faces the next turn stays in
+// its own, its gap is the exact tube's within the chords' sag, and nodes continue one by one.
 static void turns_that_nearly_touch(void **state)
 {
     (void)state;

@@ -46,7 +46,7 @@ static void a_y_has_two_branches(void **state)
     VesselBranches *b = vessel_branches_create(t);
     assert_non_null(b);
     assert_int_equal(b->count, 3);
-    assert_int_equal(b->branch[0].count, 15);   // goes on through the wide child
+    assert_int_equal(b->branch[0].count, 15);   // continues through the wide child
     assert_int_equal(b->of_node[17], 0);
     assert_int_equal(b->of_node[12], 1);
     assert_int_equal(b->of_node[20], -1);

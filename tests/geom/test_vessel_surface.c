@@ -535,7 +535,7 @@ static void model_has_one_rim(void **state)
     double reach[NODES];
     int from[NODES];
     for (int i = 0; i < NODES; i++)
-        reach[i] = i == NODES - 1 ? 5 : 1.6, from[i] = i;   // the last model goes on beyond its node
+        reach[i] = i == NODES - 1 ? 5 : 1.6, from[i] = i;   // the last model continues beyond its node
     TriangleMesh *mesh = isosurface_of_vessel(vessel, NODES, tree->center, reach, from, 0.2);
     assert_non_null(mesh);
     SurfaceCensus c = census_of(mesh);

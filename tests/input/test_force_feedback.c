@@ -215,7 +215,7 @@ static void a_late_tick_does_not_jump(void **state)
             fail_msg("never: %s", #condition); \
     } while (0)
 
-// The magnitude in the last Set Constant Force report; 0 where none was sent. *when: the time of it.
+// The magnitude in the last Set Constant Force report; 0 if none was sent. *when: the time of it.
 static int magnitude_of(FakeHid *hid, int index, int *writes)
 {
     int magnitude = 0, count = 0;
@@ -259,7 +259,7 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
     HandInfo info;
     wait_for((hands_info(hands, 0, &info), strstr(info.force, "255 steps for 8 N")));
     const uint8_t rest[] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-    // 2 N of 8 N: 64 of 255 steps, reached by the slew; steps and reports go on
+    // 2 N of 8 N: 64 of 255 steps, reached by the slew; steps and reports continue
     atomic_store(&port->force_n, 2);
     int64_t until = fake_now_us() + 10000000;
     while (last_magnitude(hid, NULL) != 64 && fake_now_us() < until) {
@@ -292,7 +292,7 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
         fake_sleep_us(1000);
     }
     assert_int_equal(last_magnitude(hid, NULL), 0);
-    // it goes on, and the session ends: zero, stop, and nothing after
+    // it continues, and the session ends: zero, stop, and nothing after
     until = fake_now_us() + 10000000;
     while (last_magnitude(hid, NULL) != 64 && fake_now_us() < until) {
         atomic_fetch_add(&port->step, 1);

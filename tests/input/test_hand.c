@@ -118,14 +118,14 @@ static void unplugged_it_stops_and_replugged_it_goes_on(void **state)
     fake_plug(session.hid, 0, 0x1209, 1, "A", HID_USAGE(1, 2), roller, sizeof roller);
     wait_for(atomic_load(&port->state) == HAND_READY);
     fake_report(session.hid, 0, (const uint8_t[]){0, 0, 10, 0, 0xf0, 0xff}, 6);    // 10 counts; the dial's first value counts nothing
-    fake_report(session.hid, 0, (const uint8_t[]){0, 0, 0xfe, 0xff, 0x10, 0}, 6);  // -2 counts; the dial goes on by 32 over its end
+    fake_report(session.hid, 0, (const uint8_t[]){0, 0, 0xfe, 0xff, 0x10, 0}, 6);  // -2 counts; the dial continues by 32 over its end
     wait_for(atomic_load(&port->reports) == 2);
     assert_true(near(atomic_load(&port->advanced_mm), 0.5 * 8 + 0.01 * 32));
     for (int round = 0; round < 3; round++) {
         fake_unplug(session.hid, 0);
         wait_for(atomic_load(&port->state) == HAND_LOST);
         assert_true(near(atomic_load(&port->advanced_mm), 0.5 * 8 + 0.01 * (32 + 5 * round)));
-        // it comes back at another path, and its counter has started anew
+        // it comes back at another path, and its counter has started again
         fake_plug(session.hid, 0, 0x1209, 1, "A", HID_USAGE(1, 2), roller, sizeof roller);
         wait_for(atomic_load(&port->state) == HAND_READY);
         fake_report(session.hid, 0, (const uint8_t[]){0, 0, 0, 0, 0x00, 0x40}, 6);
@@ -174,7 +174,7 @@ static void two_devices_have_two_ports(void **state)
     fake_unplug(session.hid, 0);
     wait_for(atomic_load(&left->state) == HAND_LOST);
     put_stick(&session, 1, 0, 127, 0);
-    wait_for(near(atomic_load(&right->twist_deg_s), -240));    // the other one goes on
+    wait_for(near(atomic_load(&right->twist_deg_s), -240));    // the other one continues
     fake_plug(session.hid, 0, 1, 2, "left", HID_USAGE(1, 4), stick, sizeof stick);
     wait_for(atomic_load(&left->state) == HAND_READY);
     assert_int_equal(atomic_load(&right->state), HAND_READY);

@@ -120,7 +120,7 @@ static void check_force(const RecordedRun *run, const Log *log, double full_scal
             last = i + 1 < force->count ? force->entry[i + 1].t : log->ended;
         largest = fmax(largest, abs(now->value));
     }
-    // of what was sent, as the device lets go by itself where it is told too late to go on
+    // of what was sent, as the device lets go by itself where it is told too late to continue
     for (int i = 0; i < log->sent.count; i++) {
         for (int j = 0; j < i; j++) {
             double rise = (abs(log->sent.entry[i].value) - abs(log->sent.entry[j].value)) * unit;

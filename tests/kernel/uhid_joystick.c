@@ -1,5 +1,5 @@
-// A force-feedback joystick that exists only in the kernel (uhid): to every program it is a HID device on a bus. Commands come by standard input,
-// one a line; each is answered by a line on standard output when it is done. Input reports go out every 8 ms while the device is open.
+// A force-feedback joystick that exists only in the kernel (uhid): to every program it is a HID device on a bus. Commands come by standard input, one
+// per line; each is answered by a line on standard output when it is done. Input reports go out every 8 ms while the device is open.
 //   usage: uhid_joystick NAME VENDOR:PRODUCT LOG [SERIAL [LIE]]      (ids in hexadecimal)
 // LIE: wide, its X has 64 bits; mixed, its input report has no id though others have; full, it never has room for an effect. The kernel takes them all.
 //   axis X DIAL      from now on the stick is at X (-32767..32767) and the dial turns by DIAL counts a report
@@ -61,7 +61,7 @@ static const unsigned char descriptor[] = {
     0x09, 0x78, 0xa1, 0x02, 0x09, 0x79, 0x09, 0x7a, 0x09, 0x7b, 0x15, 0x01, 0x25, 0x03, 0x91, 0x00, 0xc0,   // start, solo, stop
     0x09, 0x7c, 0x15, 0x00, 0x26, 0xff, 0x00, 0x91, 0x02, 0xc0,             // loop count
     0x09, 0x90, 0xa1, 0x02, 0x85, BLOCK_FREE, 0x09, 0x22, 0x15, 0x01, 0x25, EFFECTS, 0x91, 0x02, 0xc0,
-    0x09, 0x95, 0xa1, 0x02, 0x85, CONTROL, 0x09, 0x96, 0xa1, 0x02,          // device control: enable, disable, stop all, reset, pause, go on
+    0x09, 0x95, 0xa1, 0x02, 0x85, CONTROL, 0x09, 0x96, 0xa1, 0x02,          // device control: enable, disable, stop all, reset, pause, continue
     0x09, 0x97, 0x09, 0x98, 0x09, 0x99, 0x09, 0x9a, 0x09, 0x9b, 0x09, 0x9c, 0x15, 0x01, 0x25, 0x06, 0x91, 0x00, 0xc0, 0xc0,
     0x09, 0x7d, 0xa1, 0x02, 0x85, DEVICE_GAIN, 0x09, 0x7e, 0x15, 0x00, 0x26, 0xff, 0x00, 0x91, 0x02, 0xc0,
     0x09, 0xab, 0xa1, 0x02, 0x85, CREATE_NEW,                               // Create New Effect Report: type, bytes

@@ -16,7 +16,7 @@ static double basis(double x)
     return x < 1 ? 2.0 / 3 - x * x + x * x * x / 2 : x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6 : 0;
 }
 
-// Every voxel's contribution, and the background's for those that are not there.
+// Every voxel's contribution, and the background's for those that do not exist.
 static double reference(const Volume *v, Vec3 x)
 {
     double sum = 0;
@@ -76,7 +76,7 @@ static void reproduces_planes(void **state)
     volume_free(v);
 }
 
-// The second moment of the response to one voxel is 1/3: the blur of references.md, 0.1155 mm at 0.2 mm.
+// The second moment of the response to one voxel is 1/3: the blur of docs/references.md, 0.1155 mm at 0.2 mm.
 static void smooths_by_a_known_width(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// The guarded reader of HDF5: a dataset as ours are is read; whatever lies elsewhere, is packed otherwise than by
-// deflate, is no number or promises what is not there is refused by name.
+// The guarded reader of HDF5: a dataset as ours are is read; whatever lies elsewhere, is packed otherwise than by deflate, is no number or promises
+// what does not exist is refused by name.
 #include "recon/hdf5_reader.h"
 
 #include <setjmp.h>
@@ -148,7 +148,7 @@ static void data_elsewhere_are_not_read(void **state)
 
 // --- packed chunks ---
 
-enum { PART = 20 };          // values a chunk: the last of the three is cut off at ROWS
+enum { PART = 20 };          // values a chunk: the last of the three ends at ROWS
 static hid_t packed(bool is_shuffled)
 {
     hid_t creation = chunks(PART);

@@ -190,7 +190,7 @@ static void columns_equal_differences(void **state)
     lim_points_free(&c.points);
 }
 
-// Steps towards the foot end on the surface, with the way back to the point along the normal.
+// Steps towards the foot end on the surface, with the return path to the point along the normal.
 static void feet_are_on_the_surface(void **state)
 {
     (void)state;

@@ -19,7 +19,7 @@
 #include "tests/geom/random_numbers.h"
 #include "tests/recon/fitted_shape.h"
 
-// references.md: rho'^2 (sqrt(2 rho'/T) - 1) = rho^2 (sqrt(rho/T) - 1) at T = 0.1; and the level set of any value stays where it was.
+// docs/references.md: rho'^2 (sqrt(2 rho'/T) - 1) = rho^2 (sqrt(rho/T) - 1) at T = 0.1; and the level set of any value stays where it was.
 static void split_is_the_references(void **state)
 {
     (void)state;
@@ -168,7 +168,7 @@ static void capsule_of_table_3(void **state)
             most = blobs[run] > most ? blobs[run] : most;
         }
         print_message("sigma %.2f: d mean %.3f mm, at most %d blobs\n", sigma, sum, most);
-        assert_true(sum < sigma);   // DESIGN.md: about one sigma, since 3 sigma lets a crude model pass
+        assert_true(sum < sigma);   // about one sigma, since 3 sigma lets a crude model pass
         assert_true(most <= 15);
     }
     shape_free(shape);
@@ -196,7 +196,7 @@ static void threads_do_not_matter(void **state)
     shape_free(shape);
 }
 
-// The tool comes in through the root's plane: the tube goes on at least one radius upstream, as wide as the vessel. The paper's models close there
+// The tool comes in through the root's plane: the tube continues at least one radius upstream, as wide as the vessel. The paper's models close there
 // at some point, which shows that the extension does it.
 static void inlet_is_tubular(void **state)
 {

@@ -1,4 +1,4 @@
-// A closed box of 12 triangles, spoilt one way at a time: what is told, and that the mended mesh has the box's volume again.
+// A closed box of 12 triangles, spoilt one way at a time: what is told, and that the repaired mesh has the box's volume again.
 #include "recon/surface/mesh_check.h"
 
 #include <setjmp.h>

@@ -1,6 +1,6 @@
-// Tracking on volumes with known truth, and on the real angiogram where it is there.
+// Tracking on volumes with known truth, and on the real angiogram if present.
 //
-// A disc of radius R blurred by a Gaussian of standard deviation b has its steepest edge at R - b^2 / (2 R) (references.md). The image's own blur and the
+// A disc of radius R blurred by a Gaussian of standard deviation b has its steepest edge at R - b^2 / (2 R) (docs/references.md). The image's own blur and the
 // spline's (1/sqrt(3) voxel) add up in squares, and so does the moving average along the rays (w^2 / 12) for rays across the axis.
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_track.h"

@@ -388,7 +388,7 @@ static void nothing_breaks_it(void **state)
     for (int k = 0; k < 8; k++) {
         bool is_dark = false;
         switch (k) {
-        case 1:   // far outside of the vessel
+        case 1:   // far outside the vessel
             for (int i = 0; i < 12; i++)
                 pose->position[i].x += 500;
             is_dark = true;

@@ -45,7 +45,7 @@ static void the_c_arm_stops_at_its_limits(void **state)
     hold(&desk, ACTION_LAO, 1, 50);
     double turned = (double)desk.xray.lao_deg;
     assert_true(turned > 5 && turned < 90);
-    hold(&desk, ACTION_RAO, 1, 10);   // the same way back, whatever the frames
+    hold(&desk, ACTION_RAO, 1, 10);   // the same return path, whatever the frames
     assert_near((double)desk.xray.lao_deg, 0, 1e-4);
     hold(&desk, ACTION_LAO, 100, 100);
     assert_true(desk.xray.lao_deg == 90 && desk.xray.cra_deg == 0);

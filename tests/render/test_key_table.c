@@ -102,7 +102,7 @@ static void each_key_does_its_own_action_only(void **unused)
             assert_int_equal(state.held[j], j == i && key_table[i].kind == ACTION_HOLD);
             assert_int_equal(state.pressed[j], j == i && key_table[i].kind == ACTION_PRESS);
         }
-        for (int repeat = 0; repeat < 3; repeat++) {   // the keyboard repeats: held goes on, a press stays one
+        for (int repeat = 0; repeat < 3; repeat++) {   // the keyboard repeats: held continues, a press stays one
             key(&input, true, key_table[i].key, key_table[i].modifiers, true);
             feed(&state, &input, false);
             assert_int_equal(state.held[i], key_table[i].kind == ACTION_HOLD);

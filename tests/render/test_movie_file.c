@@ -110,7 +110,7 @@ static void check_movie(const char *path, int width, int height, const char *rat
         assert_true(sqrt(square / (3 * width * height)) < 8);
         int middle = 3 * ((height / 3 + height / 8) * even_width + 2 + i * (width - height / 4 - 4) / 30 + height / 8);
         assert_true(abs(got[middle] - 230) < 12 && abs(got[middle + 1] - 200) < 12 && abs(got[middle + 2] - 60) < 16);
-        // what an odd size is filled up with goes on with the edge
+        // what an odd size is filled up with continues with the edge
         for (int y = 0; y < even_height && even_width > width; y++)
             assert_true(abs(got[(y * even_width + width) * 3 + 1] - got[(y * even_width + width - 1) * 3 + 1]) < 12);
     }

@@ -84,7 +84,7 @@ static void the_scenes_devices_and_those_that_fit_are_there(void **state)
         assert_true(near(tray.device[i].end_mm[tray.device[i].step_count - 1], 400));
     }
     assert_true(tray.device[steel].can_be_shaped && !tray.device[find("0.014 inch wire, nitinol core")].can_be_shaped);
-    // a folder is not asked for where the scene says what there is, nor one that is not there
+    // a folder is not asked for where the scene says what there is, nor one that does not exist
     assert_true(trainer_tray_open(&tray, scene, 0, NULL, pose, &in));
     assert_int_equal(tray.devices.count, 2);
     assert_string_equal(tray.devices.device[1].title, "a longer one");

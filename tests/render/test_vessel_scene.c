@@ -1,4 +1,5 @@
-// The live 3D view, pixel by pixel: what moves lies where the projection says, cached walls are those drawn afresh, sections, arrows, broken input.
+// The live 3D view, pixel by pixel: what moves lies where the projection says, cached walls are those drawn from scratch, sections, arrows, broken
+// input.
 #include "geom/blobby.h"
 #include "geom/tube_mesh.h"
 #include "render/vessel_scene.h"

@@ -243,7 +243,7 @@ static void keys_are_held_and_let_go(void **unused)
     assert_true(comes_to(is_still));
     hand("keydown Shift_L keydown f keydown Up");
     assert_true(comes_to(pushes_fast_with_xray));
-    hand("keydown Shift_R keyup Shift_L");   // the other Shift goes on
+    hand("keydown Shift_R keyup Shift_L");   // the other Shift continues
     for (int i = 0; i < 3; i++)
         frame();
     assert_true(pushes_fast_with_xray());

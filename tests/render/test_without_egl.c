@@ -1,4 +1,4 @@
-// Where EGL finds no driver (the environment set in CMakeLists.txt hides it) every picture says so and the program goes on.
+// Where EGL finds no driver (the environment set in CMakeLists.txt hides it) every picture reports it and the program continues.
 #include "render/picture.h"
 
 #include <setjmp.h>

@@ -29,7 +29,7 @@ typedef struct ViewStage {
     ViewPort port;             // all of it
 } ViewStage;
 
-// False where no EGL is: skip then.
+// False if no EGL is: skip then.
 static inline bool stage_open(ViewStage *stage)
 {
     char message[256] = "";

@@ -21,7 +21,7 @@ typedef struct XrayRoom {
     char message[300];
 } XrayRoom;
 
-// NULL where no EGL is. `options` NULL: an empty room.
+// NULL if no EGL is. `options` NULL: an empty room.
 static inline XrayRoom *room_open(const FluoroscopeOptions *options, int side)
 {
     XrayRoom *s = calloc(1, sizeof *s);
@@ -93,7 +93,7 @@ static inline float *layer_read(const Layer *layer)
 // Brightness of transmission in the live picture with no anatomy, 0 to 255: automatic exposure sets empty air to 0.27.
 static inline double live_grey(double attenuation) { return 255 * 1.75 * pow(0.27 * exp(-attenuation), 0.72); }
 
-// Length of a ray from `from` inside of the mesh, in double precision.
+// Length of a ray from `from` inside the mesh, in double precision.
 static inline double ray_inside(const TriangleMesh *mesh, Vec3 from, Vec3 along)
 {
     double sum = 0;

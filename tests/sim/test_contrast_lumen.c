@@ -358,7 +358,7 @@ static void the_lumen_is_the_chosen_tool_s_or_the_next_around_it(void **state)
         assert_int_equal(contrast_injection_tool(of_three, &xray), expected[chosen]);
         assert_int_equal(contrast_injection_tool(of_wire, &xray), -1);
     }
-    // a wire alone: all of it, as if through a catheter that is not there
+    // a wire alone: all of it, as if through a catheter that does not exist
     const double inserted[TOOLS_MOST] = {100};
     xray.contrast_ml_s = 3;
     assert_close(contrast_injection_flow(of_wire, &xray, inserted), 3, 1e-12);

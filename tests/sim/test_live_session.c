@@ -221,7 +221,7 @@ static void open_coaxial(void)
     assert_non_null(trainer.open.vessel);
 }
 
-// Two hands push two tools, lock them, let one go; recorded, the session gives its states again, and another goes on from it.
+// Two hands push two tools, lock them, let one go; recorded, the session gives its states again, and another continues from it.
 static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
 {
     (void)state;
@@ -293,7 +293,7 @@ static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
     trainer = former;
 }
 
-// The operator asks for another wire, too early at first; recorded, the session gives its states again, and another goes on from it.
+// The operator asks for another wire, too early at first; recorded, the session gives its states again, and another continues from it.
 static void a_tool_is_exchanged_and_replayed(void **state)
 {
     (void)state;
@@ -328,7 +328,7 @@ static void a_tool_is_exchanged_and_replayed(void **state)
     assert_true(recorded_run_fitted(run, 1, 90) == 0 && recorded_run_commands(run, 90).fitted[1] == 1 && recorded_run_fitted(run, 1, 700) == 1);
     assert_replays(run, &score);
 
-    // from 0.6 s on the new wire is still in, and goes on
+    // from 0.6 s on the new wire is still in, and continues
     char again[200];
     snprintf(again, sizeof again, "%s", in_folder("exchanged-again.h5"));
     options.record_path = again;

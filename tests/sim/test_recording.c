@@ -36,7 +36,7 @@ static const char scene_text[] = "seldinger: 1\n"
                                  "rig: {gravity_m_s2: [0, 0, -9.81]}\n"
                                  "script: [[0, 10, 90], [0.2, -5, 0], [0.4, 0, 0]]\n";
 
-// As many as there can be, each going on from the one around it; the hands let tips come out and go in again.
+// As many as there can be, each continuing from the one around it; the hands let tips come out and go in again.
 static const char tools_text[] =
     "seldinger: 1\n"
     "tools:\n"
@@ -158,7 +158,7 @@ static void what_is_read_is_what_was_simulated(void **state)
     recorded_run_free(run);
 }
 
-// All rows of a dataset as a reader that knows nothing of us gets them; NULL where they cannot be read.
+// All rows of a dataset as a reader that knows nothing of us gets them; NULL if they cannot be read.
 static double *read_rows(hid_t file, const char *name, hsize_t *rows, hsize_t *values)
 {
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT), space = set >= 0 ? H5Dget_space(set) : -1;

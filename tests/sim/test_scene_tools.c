@@ -288,7 +288,7 @@ static const Broken broken[] = {
     {WITH("name: a, kind: wire, sections: [{length_mm: 700, diameter_mm: 1, young_modulus_gpa: 1, rest_curvature_1_mm: -2}]"), "5:114", "tighter than the tool's own radius 0.5 mm"},
     {WITH("name: a, kind: wire, " SECTION("400", "0.36", "0") ", rest: [{arc: {radius_mm: 0.3, angle_deg: 10}}]"), "5:127", "smaller than the tool's diameter"},
     {WITH("name: a, kind: catheter, " SECTION("400", "0.36", "0") ", rest: [{line_mm: 401}]"), "5:130", "the tool 400 mm"},
-    // a device that is not there
+    // a device that does not exist
     {WITH("name: a, device: nowhere.yaml"), "", "nowhere.yaml"},
     // scripts in place
     {THREE "script: [{t_s: 0, wir.push_mm_s: 1, wire.twist_deg_s: 0}]\n", "7:19", "did you mean 'wire.push_mm_s'"},

@@ -313,7 +313,7 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     assert_near(f.error[ERROR_WRONG_BRANCH].last_s, 2.6, 0.03);       // node 14 (28 mm) is the tip's from 27 mm on
     f = practice_go(p, 10, 0.5);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
-    practice_go(p, -10, 1.3);                      // to 23 mm and at once in again: the same error goes on
+    practice_go(p, -10, 1.3);                      // to 23 mm and at once in again: the same error continues
     f = practice_go(p, 10, 0.8);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
     practice_go(p, -10, 1.1);                      // to 20 mm, for a while

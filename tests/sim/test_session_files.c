@@ -147,7 +147,7 @@ static void the_session_file_is_of_its_recording(void **state)
     assert_true(strstr(session.scene_path, saved.scene_path) > session.scene_path);      // named from anywhere
     memcpy(session.scene_path, saved.scene_path, sizeof saved.scene_path);
     assert_memory_equal(&session, &saved, sizeof session);
-    // a recording that is not there
+    // a recording that does not exist
     faults_clear(&faults);
     assert_false(session_files_save(it.scene, "Ada", "keyboard", "2023-11-14T22:13:20Z", score, in_folder("nowhere.h5"), &faults));
     assert_true(faults.count > 0);

@@ -120,7 +120,7 @@ static Drag draw_sections(const Pulley *p, double clearance, double proximal, do
 // off at the bends' ends is just the clearance, and wire and tube are straight behind. In a bend the tension is less by e = EI/(2 R^2); friction acts
 // on the tool's skin, whose way is shorter by r/R:     T_prox = (T - e) exp(mu theta (1 - r/R)) + e
 // (checked by elastica of 400 links with the same friction: 90 deg, a = 20: 0.99481 of T exp(mu theta) at mu 0.1, 0.98373 at 0.3; this formula 0.9943, 0.9845).
-// references.md: within 2 % of T exp(mu theta).
+// docs/references.md: within 2 % of T exp(mu theta).
 static double pulled(const Pulley *p, double tension, double friction, double clearance)
 {
     double R = p->radius - clearance, e = EI_STANDARD / (2 * R * R);

@@ -159,7 +159,7 @@ static Vec3 random_unit(void)
     }
 }
 
-// A straight Timoshenko wire along a random direction: mass plus stiffness as in DESIGN section 3, loaded at random, with contacts around it.
+// A straight Timoshenko wire along a random direction: mass plus stiffness as in solver/beam_equations.h, loaded at random, with contacts around it.
 static void problem_randomise(Problem *p, double young, double length, double friction, double offset)
 {
     int m = p->chain.count;

@@ -1,7 +1,7 @@
-// The wire against exact solutions (shared/references.md), with the convergence order, and the laws of a step.
+// The wire against exact solutions (docs/references.md), with the convergence order, and the laws of a step.
 // Errors are printed: `test_step` alone shows the table.
 //
-// The element's bow makes it fourth order in bending, where references.md expects second: bounds here are those of this element.
+// The element's bow makes it fourth order in bending, where docs/references.md expects second: bounds here are those of this element.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -127,7 +127,7 @@ static void bathe_bolourchi(void **state)
             Vec3 x = tip_of(s);
             double error = fmax(fmax(fabs(x.x - reference[k][1]), fabs(x.y - reference[k][2])), fabs(x.z - reference[k][3]));
             print_message("45 degree bend P %g N %-3d (%.4f, %.4f, %.4f) error %.4f\n", reference[k][0], n, x.x, x.y, x.z, error);
-            // references.md allows 0.05, 0.02, 0.01; shear and stretch of this section are 1e-3
+            // docs/references.md allows 0.05, 0.02, 0.01; shear and stretch of this section are 1e-3
             assert_true(error < (n == 8 ? 0.02 : n == 16 ? 0.006 : 0.002));
             if (before > 0)
                 assert_true(before / error > 3);

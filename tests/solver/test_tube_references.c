@@ -1,8 +1,8 @@
 // A wire in curved channels without friction against independent equilibria.
 //
-// References (shared/references.md's arc, and ours): the planar inextensible elastica as N straight links with hinges EI/ds, clamped at the origin
+// References (the arc of docs/references.md, and ours): the planar inextensible elastica as N straight links with hinges EI/ds, clamped at the origin
 // along +x, |offset from the centreline| <= clearance at every joint; energy minimised with an augmented Lagrangian, Newton with the exact Hessian,
-// N = 120, 240, 480 and Richardson's extrapolation (second order). It gives the arc of references.md to all its digits.
+// N = 120, 240, 480 and Richardson's extrapolation (second order). It gives the arc of docs/references.md to all its digits.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -80,7 +80,7 @@ static void planar(const PlanarCase *c)
         row(name, "sheath push N", push, got);
         print_message("%-34s tip off by %.5f mm, deepest %.1e mm\n", name, tip, w.deepest);
         // a contact sits at a node, so that a short lever between two contacts is off by an element at worst: clamp moment 2 %
-        // references.md: 1 mm elements, energy 0.5 %, forces 1 to 2 %, tip 0.02 mm, violation 0.005 mm; refined ones a tenth of the former
+        // docs/references.md: 1 mm elements, energy 0.5 %, forces 1 to 2 %, tip 0.02 mm, violation 0.005 mm; refined ones a tenth of the former
         bool fine = k == 2;
         assert_true(energy < (fine ? 5e-4 : 5e-3) && sum < (fine ? 5e-3 : 2e-2) && tip < (fine ? 4e-3 : 2e-2) && w.deepest < 1e-6);
         double scale = c->sum / 2;

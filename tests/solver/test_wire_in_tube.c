@@ -1,4 +1,4 @@
-// The wire against walls: exact solutions of shared/references.md "Wire in tubes" and the incline.
+// The wire against walls: exact solutions of docs/references.md "Wire and walls" and the incline.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -4,7 +4,7 @@
 
 #include "solver/solver.h"
 
-#define EI_STANDARD 65.958366            // [N mm2] of references.md's standard wire
+#define EI_STANDARD 65.958366            // [N mm2] of the standard wire (docs/references.md)
 #define GJ_STANDARD 50.7372
 
 static const double QUASI_STATIC = 1e6;  // [ms] a step so long that inertia is nothing: a step is a Newton iteration of statics

@@ -1,7 +1,9 @@
 // Calls that fail when they are asked to: loaded before the program (LD_PRELOAD).
 //   FAIL_HEAP=N    of what the program's own code allocates, told by the address that the call returns to, the Nth is refused (1: the first)
-//   FAIL_LIST=F    of all whose numbers the file F holds, rising, each is refused in a process of its own, which goes on from there in a copy of the working folder,
-//                  FAIL_FOLDER/forks/N/work, with `said` and `complained` beside it; not where other threads run, as they would not go on. Much faster than one by one
+//   FAIL_LIST=F of all whose numbers the file F holds, rising, each is refused in a process of its own, which continues from there in a copy of the
+//   working folder,
+//                  FAIL_FOLDER/forks/N/work, with `said` and `complained` beside it; not where other threads run, as they would not continue. Much
+//                  faster than one by one
 //   FAIL_FILE=N    of the system calls on files below FAIL_FOLDER (a path that ends with /) and on standard output, the Nth fails with FAIL_ERROR, of any library:
 //                  they are trapped by seccomp where that is permitted (x86-64)
 //   FAIL_MODE      once (default); full: the Nth and all later ones that write; gone: the Nth and all later ones; short: reads and writes move half of what is
@@ -102,7 +104,8 @@ static int copy_entry(const char *path, const struct stat *status, int kind, str
     return 0;
 }
 
-// Each open file anew, where it stood: those of the working folder as their copies, the others so that both processes have a place of their own in them.
+// Each open file again, where it stood: those of the working folder as their copies, the others so that both processes have a place of their own in
+// them.
 static void open_anew(void)
 {
     for (int i = 0; i < 64; i++) {
@@ -129,7 +132,7 @@ static void open_anew(void)
     }
 }
 
-// True in the process that is to go on without its memory.
+// True in the process that is to continue without its memory.
 static bool is_fork(long count, uintptr_t place_of)
 {
     struct stat tasks;
