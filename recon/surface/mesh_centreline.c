@@ -10,7 +10,7 @@
 
 #include "base/same_math.h"
 #include "recon/surface/mesh_lumen.h"
-#include "recon/track/way_heap.h"
+#include "recon/track/path_heap.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +30,7 @@ typedef struct Finding {
     int *from;               // (V) -1 at the start and where there is no way
     int *owner;              // (V) the curve point in whose inscribed sphere the voxel lies, relatively deepest; -1
     float *depth;            // (V) distance to that point in its radii
-    WayHeap heap;
+    PathHeap heap;
     int *tip, tip_count;     // voxels farther than their neighbours, farthest first
     CurveSet *set;
     int cut_count;           // loops that are pinched …
@@ -43,7 +43,7 @@ typedef struct Finding {
 
 static int compare_tips(const void *a, const void *b)
 {
-    const WayEntry *x = a, *y = b;
+    const PathEntry *x = a, *y = b;
     return x->way != y->way ? (x->way < y->way) - (x->way > y->way) : (x->place > y->place) - (x->place < y->place);
 }
 
@@ -58,10 +58,10 @@ static bool find_ways(Finding *f, int start)
     }
     f->cost[start] = 0;
     f->heap.count = 0;
-    bool good = way_heap_push(&f->heap, (WayEntry){0, start});
+    bool good = path_heap_push(&f->heap, (PathEntry){0, start});
     const float least = (float)(0.2 * l->h), h = (float)l->h;
     while (good && f->heap.count) {
-        WayEntry at = way_heap_pop(&f->heap);
+        PathEntry at = path_heap_pop(&f->heap);
         if (at.way > f->cost[at.place])
             continue;
         int other[LUMEN_NEIGHBOURS];
@@ -73,7 +73,7 @@ static bool find_ways(Finding *f, int start)
                 f->cost[other[k]] = cost;
                 f->length[other[k]] = f->length[at.place] + step[k] * h;
                 f->from[other[k]] = at.place;
-                good = way_heap_push(&f->heap, (WayEntry){cost, other[k]});
+                good = path_heap_push(&f->heap, (PathEntry){cost, other[k]});
             }
         }
     }
@@ -85,7 +85,7 @@ static bool find_tips(Finding *f)
 {
     const Lumen *l = f->lumen;
     int room = 1024;
-    WayEntry *entry = malloc((size_t)room * sizeof *entry);
+    PathEntry *entry = malloc((size_t)room * sizeof *entry);
     f->tip_count = 0;
     for (int i = 0; entry && i < l->count; i++) {
         if (f->from[i] < 0)
@@ -99,14 +99,14 @@ static bool find_tips(Finding *f)
             continue;
         if (f->tip_count == room) {
             room *= 2;
-            WayEntry *more = realloc(entry, (size_t)room * sizeof *more);
+            PathEntry *more = realloc(entry, (size_t)room * sizeof *more);
             if (!more) {
                 free(entry);
                 return false;
             }
             entry = more;
         }
-        entry[f->tip_count++] = (WayEntry){f->length[i], i};
+        entry[f->tip_count++] = (PathEntry){f->length[i], i};
     }
     free(f->tip);
     f->tip = entry ? malloc(((size_t)f->tip_count + 1) * sizeof *f->tip) : NULL;

@@ -2,7 +2,7 @@
 #include "recon/track/link_lattice.h"
 
 #include "base/same_math.h"
-#include "recon/track/way_heap.h"
+#include "recon/track/path_heap.h"
 
 #include <stdlib.h>
 
@@ -85,12 +85,12 @@ static void lattice_free(Lattice *l)
 // False: out of memory.
 static bool cross_lattice(Lattice *l, const LinkGround *ground, int start, int goal)
 {
-    WayHeap heap = {0};
+    PathHeap heap = {0};
     l->cost[start] = 0;
     l->before[start] = -1;
-    bool good = way_heap_push(&heap, (WayEntry){0, start});
+    bool good = path_heap_push(&heap, (PathEntry){0, start});
     while (good && heap.count > 0) {
-        WayEntry here = way_heap_pop(&heap);
+        PathEntry here = path_heap_pop(&heap);
         int at[3];
         if (here.place == goal)
             break;
@@ -108,7 +108,7 @@ static bool cross_lattice(Lattice *l, const LinkGround *ground, int start, int g
                 continue;
             l->cost[k] = cost;
             l->before[k] = here.place;
-            good = way_heap_push(&heap, (WayEntry){cost, k});
+            good = path_heap_push(&heap, (PathEntry){cost, k});
         }
     }
     free(heap.entry);

@@ -4,7 +4,7 @@
 
 #include "base/same_math.h"
 #include "base/sort_doubles.h"
-#include "recon/track/way_heap.h"
+#include "recon/track/path_heap.h"
 #include "recon/volume/bspline.h"
 
 #include <stdlib.h>
@@ -193,16 +193,16 @@ static void box_free(Box *b)
 static int search_box(const Tracker *t, Box *b, int start, double reach, double least, const LinkLight *light, bool *good)
 {
     Grid *g = &b->grid;
-    WayHeap heap = {0};
+    PathHeap heap = {0};
     int found = -1, at[3];
     // the cost limit allows a path that is dim throughout, but no longer one
     double most = reach / same_square(same_square(least));
     g->cost[start] = 0;
     g->from[start] = -1;
     g->lit[start] = 1;
-    *good = way_heap_push(&heap, (WayEntry){0, start});
+    *good = path_heap_push(&heap, (PathEntry){0, start});
     while (*good && heap.count > 0 && found < 0) {
-        WayEntry here = way_heap_pop(&heap);
+        PathEntry here = path_heap_pop(&heap);
         if (here.way > g->cost[here.place])
             continue;
         if (b->owner[here.place] > 0) {
@@ -224,7 +224,7 @@ static int search_box(const Tracker *t, Box *b, int start, double reach, double 
             if (cost < g->cost[k] && (double)cost < most) {
                 g->cost[k] = cost;
                 g->from[k] = here.place;
-                *good = way_heap_push(&heap, (WayEntry){cost, k});
+                *good = path_heap_push(&heap, (PathEntry){cost, k});
             }
         }
     }

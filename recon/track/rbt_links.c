@@ -4,7 +4,7 @@
 
 #include "base/same_math.h"
 #include "recon/track/rbt_branch.h"
-#include "recon/track/way_heap.h"
+#include "recon/track/path_heap.h"
 #include "recon/volume/bspline.h"
 
 #include <stdlib.h>
@@ -92,7 +92,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
     size_t box = (size_t)s.size[0] * (size_t)s.size[1] * (size_t)s.size[2];
     if (box > (1u << 24))
         return 0;
-    WayHeap heap = {0};
+    PathHeap heap = {0};
     s.cost = malloc(box * sizeof *s.cost);
     s.from = malloc(box * sizeof *s.from);
     int goal = index_in(&s, last), origin = index_in(&s, first), reached = -1, count = -1;
@@ -102,7 +102,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
         step = vec3_add_scaled(vec3_add_scaled(step, n / 3 % 3 - 1, v->axis[1]), n / 9 - 1, v->axis[2]);
         length[n] = (float)vec3_norm(step);
     }
-    bool good = s.cost && s.from && way_heap_push(&heap, (WayEntry){0, origin});
+    bool good = s.cost && s.from && path_heap_push(&heap, (PathEntry){0, origin});
     for (size_t i = 0; good && i < box; i++)
         s.cost[i] = HUGE_VALF;
     if (good) {
@@ -110,7 +110,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
         s.from[origin] = -1;
     }
     while (good && heap.count > 0 && reached < 0) {
-        WayEntry here = way_heap_pop(&heap);
+        PathEntry here = path_heap_pop(&heap);
         if (here.way > s.cost[here.place])
             continue;
         Vec3 x = volume_point_of(v, voxel_in(&s, here.place));
@@ -142,7 +142,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
             if (cost < s.cost[k]) {
                 s.cost[k] = cost;
                 s.from[k] = here.place;
-                good = way_heap_push(&heap, (WayEntry){cost, k});
+                good = path_heap_push(&heap, (PathEntry){cost, k});
             }
         }
     }

@@ -4,7 +4,7 @@
 #include "recon/track/rbt_residue.h"
 #include "base/heap.h"
 #include "base/sort_doubles.h"
-#include "recon/track/way_heap.h"
+#include "recon/track/path_heap.h"
 #include "recon/volume/bspline.h"
 
 #include <stdlib.h>
@@ -25,7 +25,7 @@ typedef struct Flood {
     int count, capacity;
     int *slot;               // (slots, a power of two) index + 1 of a wet voxel by its place
     int slots;
-    WayHeap heap;
+    PathHeap heap;
     bool out_of_memory;
 } Flood;
 
@@ -80,7 +80,7 @@ static int add_wet(Flood *f, const int at[3], float way, int from, int node)
     return f->count++;
 }
 
-static void put_in_heap(Flood *f, float way, int wet) { f->out_of_memory = !way_heap_push(&f->heap, (WayEntry){way, wet}) || f->out_of_memory; }
+static void put_in_heap(Flood *f, float way, int wet) { f->out_of_memory = !path_heap_push(&f->heap, (PathEntry){way, wet}) || f->out_of_memory; }
 
 static bool neighbour_of(const Volume *v, const int at[3], int n, int next[3])
 {
@@ -115,7 +115,7 @@ static void flood(Flood *f, const Tracker *t, const RbtPaint *paint, int first, 
         length[n] = (float)vec3_norm(step);
     }
     while (f->heap.count > 0 && !f->out_of_memory) {
-        WayEntry here = way_heap_pop(&f->heap);
+        PathEntry here = path_heap_pop(&f->heap);
         Wet wet = f->wet[here.place];
         const Border *b = &border[wet.node - first];
         if (here.way > wet.way)

@@ -1,14 +1,14 @@
-#include "recon/track/way_heap.h"
+#include "recon/track/path_heap.h"
 
 #include <stdlib.h>
 
-static bool is_before(WayEntry a, WayEntry b) { return a.way < b.way || (a.way == b.way && a.place < b.place); }
+static bool is_before(PathEntry a, PathEntry b) { return a.way < b.way || (a.way == b.way && a.place < b.place); }
 
-bool way_heap_push(WayHeap *heap, WayEntry entry)
+bool path_heap_push(PathHeap *heap, PathEntry entry)
 {
     if (heap->count == heap->capacity) {
         int capacity = heap->capacity ? 2 * heap->capacity : 1024;
-        WayEntry *grown = realloc(heap->entry, (size_t)capacity * sizeof *grown);
+        PathEntry *grown = realloc(heap->entry, (size_t)capacity * sizeof *grown);
         if (!grown)
             return false;
         heap->entry = grown;
@@ -21,9 +21,9 @@ bool way_heap_push(WayHeap *heap, WayEntry entry)
     return true;
 }
 
-WayEntry way_heap_pop(WayHeap *heap)
+PathEntry path_heap_pop(PathHeap *heap)
 {
-    WayEntry top = heap->entry[0], last = heap->entry[--heap->count];
+    PathEntry top = heap->entry[0], last = heap->entry[--heap->count];
     int i = 0;
     for (int child; (child = 2 * i + 1) < heap->count; i = child) {
         if (child + 1 < heap->count && is_before(heap->entry[child + 1], heap->entry[child]))
