@@ -9,7 +9,7 @@
 #include "render/drawable_mesh.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
-#include "render/solids.h"
+#include "render/primitives.h"
 
 #include <epoxy/gl.h>
 #include <stdint.h>
@@ -50,7 +50,7 @@ struct Angioscope {
     GLsizei *draw_count;
     const void **draw_offset;
     const ToolLooks *tools;
-    Solids solids;             // the tools in the view
+    Primitives primitives;             // the tools in the view
     unsigned program;
     unsigned wall_array, wall_vertices, wall_indices;
     unsigned tool_array, tool_vertices, tool_indices;
@@ -263,7 +263,7 @@ void angioscope_destroy(Angioscope *scope)
     const unsigned buffer[4] = {scope->wall_vertices, scope->wall_indices, scope->tool_vertices, scope->tool_indices};
     glDeleteBuffers(4, buffer);
     gl_canvas_destroy(&scope->canvas);
-    solids_free(&scope->solids);
+    primitives_free(&scope->primitives);
     free(scope->patch);
     free(scope->vertex);
     free(scope->node);
@@ -502,20 +502,20 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
         color[count] = color_rgb(206, 212, 220);
         is_hollow |= lumen[count] > 0;
     }
-    scope->solids.sides = is_own ? 48 : 32;
+    scope->primitives.sides = is_own ? 48 : 32;
     if (is_hollow)
-        solids_pipe(&scope->solids, count, point, radius, lumen, color, color_rgb(58, 62, 70), NULL);
+        primitives_pipe(&scope->primitives, count, point, radius, lumen, color, color_rgb(58, 62, 70), NULL);
     else
-        solids_tube(&scope->solids, count, point, radius, color);
+        primitives_tube(&scope->primitives, count, point, radius, color);
 }
 
 static void draw_tools(Angioscope *scope, const Pose *pose, int own, Vec3 eye, double reach)
 {
-    solids_clear(&scope->solids);
-    scope->solids.origin = scope->origin;
+    primitives_clear(&scope->primitives);
+    scope->primitives.origin = scope->origin;
     for (int k = 0; k < pose->tool_count; k++)
         add_tool(scope, pose, k, k == own, eye, reach);
-    const Solids *tool = &scope->solids;
+    const Primitives *tool = &scope->primitives;
     if (tool->index_count == 0)
         return;
     glBindVertexArray(scope->tool_array);
@@ -524,11 +524,11 @@ static void draw_tools(Angioscope *scope, const Pose *pose, int own, Vec3 eye, d
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, scope->tool_indices);
     glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)((size_t)tool->index_count * sizeof *tool->index), tool->index, GL_STREAM_DRAW);
     glEnableVertexAttribArray(0);
-    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(SolidVertex), at_byte(offsetof(SolidVertex, position)));
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(PrimitiveVertex), at_byte(offsetof(PrimitiveVertex, position)));
     glEnableVertexAttribArray(1);
-    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(SolidVertex), at_byte(offsetof(SolidVertex, normal)));
+    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(PrimitiveVertex), at_byte(offsetof(PrimitiveVertex, normal)));
     glEnableVertexAttribArray(2);
-    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(SolidVertex), at_byte(offsetof(SolidVertex, color)));
+    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(PrimitiveVertex), at_byte(offsetof(PrimitiveVertex, color)));
     glUniform4f(glGetUniformLocation(scope->program, "tint"), 0, 0, 0, 1);
     glUniform3f(glGetUniformLocation(scope->program, "shine"), 0.5f, 1, 0);
     glUniform1f(glGetUniformLocation(scope->program, "edge"), 1);

@@ -15,7 +15,7 @@ typedef struct RunDrawing {
     const PictureScene *scene;
     ShellStyle style;
     double force_scale;        // [N] top of the map
-    Solids solids;
+    Primitives primitives;
     double *radius, *lumen;    // (longest tool and its tip) scratch
     Vec3 *point;
     Color *color;
@@ -135,7 +135,7 @@ static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureT
         // square root: a tenth of the force is still seen
         double long_as = longest * sqrt(fmin(size / drawing->force_scale, 2));
         Vec3 tip = vec3_add_scaled(place, -radius, direction);
-        solids_arrow(&drawing->solids, vec3_add_scaled(tip, -long_as, direction), tip, line, ARROW_COLOR);
+        primitives_arrow(&drawing->primitives, vec3_add_scaled(tip, -long_as, direction), tip, line, ARROW_COLOR);
     }
 }
 
@@ -182,10 +182,10 @@ static void add_stretch(RunDrawing *drawing, int first, int last, bool is_open, 
     for (int i = first; i <= last; i++)
         is_hollow |= drawing->lumen[i] > 0;
     if (is_hollow)
-        solids_pipe(&drawing->solids, count, drawing->point + first, drawing->radius + first, drawing->lumen + first, drawing->color + first, inside,
+        primitives_pipe(&drawing->primitives, count, drawing->point + first, drawing->radius + first, drawing->lumen + first, drawing->color + first, inside,
                     is_open ? &camera->back : NULL);
     else
-        solids_tube(&drawing->solids, count, drawing->point + first, drawing->radius + first, drawing->color + first);
+        primitives_tube(&drawing->primitives, count, drawing->point + first, drawing->radius + first, drawing->color + first);
 }
 
 static void add_coaxial_tools(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double thin, int stub)
@@ -225,7 +225,7 @@ static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureToo
     if (has_several(tool))
         add_coaxial_tools(drawing, camera, tool, thin, first);
     else
-        solids_tube(&drawing->solids, tool->node_count - first, tool->position + first, drawing->radius + first, drawing->color + first);
+        primitives_tube(&drawing->primitives, tool->node_count - first, tool->position + first, drawing->radius + first, drawing->color + first);
     add_arrows(drawing, camera, tool, thin);
 }
 
@@ -234,11 +234,11 @@ static void add_targets(RunDrawing *drawing, const Camera *camera)
     double line = 0.75 * drawing->sheet->scale * camera->mm_per_pixel;
     for (int i = 0; i < drawing->scene->target_count; i++) {
         const SceneTarget *target = &drawing->scene->target[i];
-        solids_circle(&drawing->solids, target->point, camera->back, target->radius, line, TARGET_COLOR);
+        primitives_circle(&drawing->primitives, target->point, camera->back, target->radius, line, TARGET_COLOR);
         const Vec3 tilted[2] = {vec3_unit(vec3_add_scaled(camera->right, 0.35, camera->back)),
                                 vec3_unit(vec3_add_scaled(camera->up, 0.35, camera->back))};
         for (int k = 0; k < 2; k++)
-            solids_circle(&drawing->solids, target->point, tilted[k], target->radius, 0.6 * line, TARGET_COLOR);
+            primitives_circle(&drawing->primitives, target->point, tilted[k], target->radius, 0.6 * line, TARGET_COLOR);
     }
 }
 
@@ -248,15 +248,15 @@ static bool draw_panel(RunDrawing *drawing, const Camera *camera, const ShellSty
     GlCanvas *panel = sheet_begin_panel(drawing->sheet, camera->width, camera->height);
     if (!panel)
         return false;
-    solids_clear(&drawing->solids);
-    drawing->solids.origin = camera->center;
+    primitives_clear(&drawing->primitives);
+    drawing->primitives.origin = camera->center;
     add_tool(drawing, camera, tool);
     add_targets(drawing, camera);
     if (drawing->scene->has_entry)
-        solids_sphere(&drawing->solids, drawing->scene->entry, 4 * drawing->sheet->scale * camera->mm_per_pixel, SHEATH_COLOR);
-    if (drawing->solids.is_short_of_memory)
+        primitives_sphere(&drawing->primitives, drawing->scene->entry, 4 * drawing->sheet->scale * camera->mm_per_pixel, SHEATH_COLOR);
+    if (drawing->primitives.is_short_of_memory)
         return message_fail(drawing->sheet->message, drawing->sheet->capacity, "not enough memory for a picture");
-    surface_view_draw_solids(drawing->sheet->view, camera, &drawing->solids, style);
+    surface_view_draw_primitives(drawing->sheet->view, camera, &drawing->primitives, style);
     surface_view_draw_shell(drawing->sheet->view, camera, style);
     sheet_end_panel(drawing->sheet, panel, x, y);
     return true;
@@ -618,7 +618,7 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
     free(drawing.point);
     free(drawing.color);
     free(drawing.frame_point);
-    solids_free(&drawing.solids);
+    primitives_free(&drawing.primitives);
     return drawn;
 }
 

@@ -266,11 +266,11 @@ void surface_view_draw_shell(SurfaceView *view, const Camera *camera, const Shel
     glDisable(GL_BLEND);
 }
 
-void surface_view_draw_solids(SurfaceView *view, const Camera *camera, const Solids *solids, const ShellStyle *style)
+void surface_view_draw_primitives(SurfaceView *view, const Camera *camera, const Primitives *primitives, const ShellStyle *style)
 {
-    if (solids->index_count == 0)
+    if (primitives->index_count == 0)
         return;
-    set_camera(view->solid_program, camera, solids->origin);
+    set_camera(view->solid_program, camera, primitives->origin);
     glUniform3fv(glGetUniformLocation(view->solid_program, "haze"), 1, style->haze);
     glUniform1f(glGetUniformLocation(view->solid_program, "haze_amount"), 0);
     glEnable(GL_DEPTH_TEST);
@@ -280,18 +280,18 @@ void surface_view_draw_solids(SurfaceView *view, const Camera *camera, const Sol
     glDisable(GL_CULL_FACE);
     glBindVertexArray(view->list_array);
     glBindBuffer(GL_ARRAY_BUFFER, view->list_vertices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)solids->vertex_count * sizeof *solids->vertex), solids->vertex, GL_STREAM_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)primitives->vertex_count * sizeof *primitives->vertex), primitives->vertex, GL_STREAM_DRAW);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, view->list_indices);
-    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)((size_t)solids->index_count * sizeof *solids->index), solids->index, GL_STREAM_DRAW);
-    const GLsizei stride = sizeof(SolidVertex);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)((size_t)primitives->index_count * sizeof *primitives->index), primitives->index, GL_STREAM_DRAW);
+    const GLsizei stride = sizeof(PrimitiveVertex);
     glEnableVertexAttribArray(0);
-    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, at_byte(offsetof(SolidVertex, position)));
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, at_byte(offsetof(PrimitiveVertex, position)));
     glEnableVertexAttribArray(1);
-    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, at_byte(offsetof(SolidVertex, normal)));
+    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, at_byte(offsetof(PrimitiveVertex, normal)));
     glEnableVertexAttribArray(2);
-    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride, at_byte(offsetof(SolidVertex, color)));
+    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, stride, at_byte(offsetof(PrimitiveVertex, color)));
     glDisableVertexAttribArray(3);
-    glDrawElements(GL_TRIANGLES, solids->index_count, GL_UNSIGNED_INT, at_byte(0));
+    glDrawElements(GL_TRIANGLES, primitives->index_count, GL_UNSIGNED_INT, at_byte(0));
     glBindVertexArray(0);
 }
 

@@ -1,12 +1,12 @@
-// The 3D view: a translucent vessel, opaque solids inside and before it, points. Needs a current GL context; draws into the bound framebuffer.
+// The 3D view: a translucent vessel, opaque shapes inside and before it, points. Needs a current GL context; draws into the bound framebuffer.
 //
-// Order: solids and points first (they write depth), then the shell, its triangles sorted from far to near, blended, tested against that depth.
+// Order: shapes and points first (they write depth), then the shell, its triangles sorted from far to near, blended, tested against that depth.
 #ifndef SELDINGER_RENDER_SURFACE_VIEW_H
 #define SELDINGER_RENDER_SURFACE_VIEW_H
 
 #include "geom/isosurface.h"
 #include "render/camera.h"
-#include "render/solids.h"
+#include "render/primitives.h"
 
 #include <stddef.h>
 
@@ -34,7 +34,7 @@ SurfaceView *surface_view_create(char *message, size_t capacity);
 void surface_view_destroy(SurfaceView *view);
 // Takes a copy. False if indices are out of range, numbers are not finite, or memory runs out.
 bool surface_view_set_mesh(SurfaceView *view, const TriangleMesh *mesh, char *message, size_t capacity);
-void surface_view_draw_solids(SurfaceView *view, const Camera *camera, const Solids *solids, const ShellStyle *style);
+void surface_view_draw_primitives(SurfaceView *view, const Camera *camera, const Primitives *primitives, const ShellStyle *style);
 void surface_view_draw_points(SurfaceView *view, const Camera *camera, Vec3 origin, int count, const ViewPoint *point);
 void surface_view_draw_shell(SurfaceView *view, const Camera *camera, const ShellStyle *style);
 

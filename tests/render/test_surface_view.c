@@ -150,13 +150,13 @@ static double redness(Stage *stage, const Camera *camera, const ShellStyle *styl
     const Vec3 point[3] = {vec3_add_scaled(middle, -2, camera->right), middle, vec3_add_scaled(middle, 2, camera->right)};
     const double radius[3] = {0.5, 0.5, 0.5};
     const Color red[3] = {{255, 0, 0, 255}, {255, 0, 0, 255}, {255, 0, 0, 255}};
-    Solids solids = {.origin = camera->center};
-    solids_tube(&solids, 3, point, radius, red);
+    Primitives primitives = {.origin = camera->center};
+    primitives_tube(&primitives, 3, point, radius, red);
     stage_clear(stage);
-    surface_view_draw_solids(stage->view, camera, &solids, style);
+    surface_view_draw_primitives(stage->view, camera, &primitives, style);
     surface_view_draw_shell(stage->view, camera, style);
     gl_canvas_read(&stage->canvas, &stage->rgb[0][0][0]);
-    solids_free(&solids);
+    primitives_free(&primitives);
     const uint8_t *on = stage->rgb[HEIGHT / 2][WIDTH / 2], *off = stage->rgb[HEIGHT / 2 + 30][WIDTH / 2];
     return (on[0] - (on[1] + on[2]) / 2.0) - (off[0] - (off[1] + off[2]) / 2.0);
 }
@@ -245,30 +245,30 @@ static void translucency_does_not_depend_on_the_order_of_triangles(void **state)
     stage_close(stage);
 }
 
-static void solids_are_closed_and_face_outwards(void **state)
+static void primitives_are_closed_and_face_outwards(void **state)
 {
     (void)state;
     const Vec3 point[5] = {{0, 0, 0}, {3, 0.5, 0}, {5, 3, 1}, {5, 6, 1}, {2, 8, 0}};
     const double radius[5] = {0.4, 0.5, 0.5, 0.3, 0.4};
     const Color c = {1, 2, 3, 255}, color[5] = {c, c, c, c, c};
     for (int kind = 0; kind < 4; kind++) {
-        Solids solids = {.origin = {1, 1, 1}};
+        Primitives primitives = {.origin = {1, 1, 1}};
         double volume = 0, expected = 0;
         if (kind == 0)
-            solids_tube(&solids, 5, point, radius, color);
+            primitives_tube(&primitives, 5, point, radius, color);
         else if (kind == 1) {
-            solids_sphere(&solids, vec3(2, 3, 4), 1.5, c);
+            primitives_sphere(&primitives, vec3(2, 3, 4), 1.5, c);
             expected = 4 * PI / 3 * 1.5 * 1.5 * 1.5;
         } else if (kind == 2)
-            solids_arrow(&solids, vec3(0, 1, 0), vec3(4, 2, 1), 0.2, c);
+            primitives_arrow(&primitives, vec3(0, 1, 0), vec3(4, 2, 1), 0.2, c);
         else {
-            solids_circle(&solids, vec3(0, 0, 0), vec3(0, 0, 1), 4, 0.3, c);
+            primitives_circle(&primitives, vec3(0, 0, 0), vec3(0, 0, 1), 4, 0.3, c);
             expected = 2 * PI * 4 * PI * 0.09;
         }
-        for (int i = 0; i < solids.index_count; i += 3) {
+        for (int i = 0; i < primitives.index_count; i += 3) {
             Vec3 p[3], n = {0, 0, 0};
             for (int k = 0; k < 3; k++) {
-                const SolidVertex *v = &solids.vertex[solids.index[i + k]];
+                const PrimitiveVertex *v = &primitives.vertex[primitives.index[i + k]];
                 p[k] = vec3(v->position[0], v->position[1], v->position[2]);
                 n = vec3_add(n, vec3(v->normal[0], v->normal[1], v->normal[2]));
             }
@@ -280,7 +280,7 @@ static void solids_are_closed_and_face_outwards(void **state)
         assert_true(volume > 0);   // a closed surface's volume is positive only if it faces outwards
         if (expected > 0)          // 14-gons in 16 rings: 14/(2 pi) sin(2 pi/14) = 0.967 and less
             assert_true(volume > 0.93 * expected && volume < expected);
-        solids_free(&solids);
+        primitives_free(&primitives);
     }
 }
 
@@ -314,7 +314,7 @@ int main(void)
         cmocka_unit_test(balls_are_as_large_as_the_projection_says),
         cmocka_unit_test(a_tool_shows_through_exactly_the_walls_before_it),
         cmocka_unit_test(translucency_does_not_depend_on_the_order_of_triangles),
-        cmocka_unit_test(solids_are_closed_and_face_outwards),
+        cmocka_unit_test(primitives_are_closed_and_face_outwards),
         cmocka_unit_test(broken_meshes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
