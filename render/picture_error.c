@@ -1,7 +1,7 @@
 // A model's surface coloured by its distance to the data, and the paper's Table 4 as a histogram.
 #include "base/sort_doubles.h"
 #include "render/message.h"
-#include "render/sheet.h"
+#include "render/picture_page.h"
 
 #include <stdlib.h>
 
@@ -22,45 +22,45 @@ static double find_scale(const PictureOptions *options, int count, const double 
         scale = sorted[(int)(0.98 * (finite - 1))];
     }
     free(sorted);
-    return options->distance_full_scale > 0 ? options->distance_full_scale : scale > 0 ? sheet_scale_end(scale) : 0.1;
+    return options->distance_full_scale > 0 ? options->distance_full_scale : scale > 0 ? picture_page_scale_end(scale) : 0.1;
 }
 
-bool sheet_error_surface(Sheet *sheet, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
+bool picture_page_error_surface(PicturePage *page, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
                          int width, int height)
 {
     Camera camera = {0};
     camera_orient(&camera, options->view, options->up, mesh->vertex_count, mesh->vertex);
-    camera_frame(&camera, width, height, 28 * sheet->scale, mesh->vertex_count, mesh->vertex, 0);
+    camera_frame(&camera, width, height, 28 * page->scale, mesh->vertex_count, mesh->vertex, 0);
     if (options->focus_radius > 0)
-        camera_frame_sphere(&camera, width, height, 8 * sheet->scale, options->focus, options->focus_radius);
-    GlCanvas *panel = sheet_begin_panel(sheet, width, height);
+        camera_frame_sphere(&camera, width, height, 8 * page->scale, options->focus, options->focus_radius);
+    GlCanvas *panel = picture_page_begin_panel(page, width, height);
     ViewPoint *point = malloc((size_t)mesh->vertex_count * sizeof *point);
     if (!panel || !point) {
         free(point);
-        return panel ? message_fail(sheet->message, sheet->capacity, "not enough memory for a picture") : false;
+        return panel ? message_fail(page->message, page->capacity, "not enough memory for a picture") : false;
     }
     double edge = 0;
     for (int t = 0; t < mesh->triangle_count; t++)
         edge += vec3_distance(mesh->vertex[mesh->triangle[t][0]], mesh->vertex[mesh->triangle[t][1]]) / mesh->triangle_count;
-    double size = fmax(1.8 * edge / camera.mm_per_pixel, 1.5 * sheet->scale);
+    double size = fmax(1.8 * edge / camera.mm_per_pixel, 1.5 * page->scale);
     for (int v = 0; v < mesh->vertex_count; v++) {
         Vec3 d = vec3_sub(mesh->vertex[v], camera.center);
         Color color = isfinite(error[v]) ? color_diverging(error[v] / scale) : color_rgb(150, 154, 160);
         point[v] = (ViewPoint){{(float)d.x, (float)d.y, (float)d.z}, color, (float)size};
     }
-    surface_view_draw_points(sheet->view, &camera, camera.center, mesh->vertex_count, point);
-    sheet_end_panel(sheet, panel, x, y);
-    sheet_scale_bar(sheet, x + 16 * sheet->scale, y + height - 14 * sheet->scale, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
+    surface_view_draw_points(page->view, &camera, camera.center, mesh->vertex_count, point);
+    picture_page_end_panel(page, panel, x, y);
+    picture_page_scale_bar(page, x + 16 * page->scale, y + height - 14 * page->scale, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
     free(point);
     return true;
 }
 
-void sheet_class_chart(Sheet *sheet, double x, double y, double width, double height, int count, const double *error, double voxel)
+void picture_page_class_chart(PicturePage *page, double x, double y, double width, double height, int count, const double *error, double voxel)
 {
     static const double border[5] = {0, 0.5, 1, 2, 2.5};
     static const Color color[4] = {{0, 114, 90, 255}, {11, 95, 165, 255}, {213, 94, 0, 255}, {179, 0, 27, 255}};
     int bin[BINS] = {0}, in_class[4] = {0}, most = 1;
-    double s = sheet->scale, end = border[4];
+    double s = page->scale, end = border[4];
     for (int i = 0; i < count; i++) {
         double part = error[i] / voxel;
         if (!isfinite(part) || part < 0)
@@ -70,24 +70,24 @@ void sheet_class_chart(Sheet *sheet, double x, double y, double width, double he
     }
     for (int k = 0; k < BINS; k++)
         most = bin[k] > most ? bin[k] : most;
-    overlay_fill(sheet->overlay, x, y, width, height, SHEET_PANEL);
+    overlay_fill(page->overlay, x, y, width, height, SHEET_PANEL);
     for (int k = 0; k < BINS; k++) {
         double from = end * k / BINS, tall = bin[k] > 0 ? fmax((height - 30 * s) * bin[k] / most, 1.5 * s) : 0;
-        overlay_fill(sheet->overlay, x + width * k / BINS, y + height - tall, width / BINS - 1, tall, color[from < 0.5 ? 0 : from < 1 ? 1 : from < 2 ? 2 : 3]);
+        overlay_fill(page->overlay, x + width * k / BINS, y + height - tall, width / BINS - 1, tall, color[from < 0.5 ? 0 : from < 1 ? 1 : from < 2 ? 2 : 3]);
     }
     for (int k = 0; k < 4; k++) {
         double left = x + width * border[k] / end, right = x + width * border[k + 1] / end;
         char text[64];
         if (k > 0)
-            overlay_line(sheet->overlay, left, y, left, y + height, SHEET_INK, s);
+            overlay_line(page->overlay, left, y, left, y + height, SHEET_INK, s);
         snprintf(text, sizeof text, "C%d %.1f %%", k + 1, count > 0 ? 100.0 * in_class[k] / count : 0);
-        sheet_text_anchored(sheet, 0.5 * (left + right), y + 4 * s, 0.5, TEXT_SMALL, color[k], text);
+        picture_page_text_anchored(page, 0.5 * (left + right), y + 4 * s, 0.5, TEXT_SMALL, color[k], text);
         snprintf(text, sizeof text, "%g", border[k]);
-        sheet_text_anchored(sheet, left, y + height + 4 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+        picture_page_text_anchored(page, left, y + height + 4 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
     }
     char text[96];
     snprintf(text, sizeof text, "d_a [voxels of %g mm], %d local models, tallest bar %d", voxel, count, most);
-    sheet_text(sheet, x, y + height + 24 * s, TEXT_SMALL, SHEET_MUTED, "%s", text);
+    picture_page_text(page, x, y + height + 24 * s, TEXT_SMALL, SHEET_MUTED, "%s", text);
 }
 
 bool picture_of_error(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm,
@@ -100,19 +100,19 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
     for (int v = 0; v < mesh->vertex_count; v++)
         if (!vec3_is_finite(mesh->vertex[v]))
             return message_fail(message, capacity, "vertex %d is not a finite number: nothing is drawn", v);
-    Sheet sheet;
-    if (!sheet_open(&sheet, options, options->height, message, capacity))
+    PicturePage page;
+    if (!picture_page_open(&page, options, options->height, message, capacity))
         return false;
-    double s = sheet.scale, gap = 20 * s, top = 62 * s, column = 0.3 * sheet.width, left = sheet.width - gap - column;
+    double s = page.scale, gap = 20 * s, top = 62 * s, column = 0.3 * page.width, left = page.width - gap - column;
     double scale = find_scale(options, mesh->vertex_count, error);
-    bool drawn = sheet_error_surface(&sheet, options, mesh, error, scale, gap, top, (int)(left - 2 * gap), (int)(sheet.height - top - gap));
+    bool drawn = picture_page_error_surface(&page, options, mesh, error, scale, gap, top, (int)(left - 2 * gap), (int)(page.height - top - gap));
     if (drawn) {
-        sheet_title(&sheet, gap, 18 * s, sheet.width - 2 * gap, options->title ? options->title : "distance of the surface to the data");
-        sheet_color_bar(&sheet, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale, "data to surface [mm]: blue outside the model, red inside");
-        sheet_text(&sheet, left, top + 90 * s, TEXT_NORMAL, SHEET_INK, "local models by distance to their data (Table 4)");
-        sheet_class_chart(&sheet, left, top + 120 * s, column, 240 * s, tree->node_count, tree->error, voxel_mm);
-        drawn = sheet_save(&sheet, path);
+        picture_page_title(&page, gap, 18 * s, page.width - 2 * gap, options->title ? options->title : "distance of the surface to the data");
+        picture_page_color_bar(&page, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale, "data to surface [mm]: blue outside the model, red inside");
+        picture_page_text(&page, left, top + 90 * s, TEXT_NORMAL, SHEET_INK, "local models by distance to their data (Table 4)");
+        picture_page_class_chart(&page, left, top + 120 * s, column, 240 * s, tree->node_count, tree->error, voxel_mm);
+        drawn = picture_page_save(&page, path);
     }
-    sheet_close(&sheet);
+    picture_page_close(&page);
     return drawn;
 }

@@ -5,7 +5,7 @@
 // cells; its neighbours' contours, faint, show where the wall jumps from one local model to the next.
 #include "base/sort_doubles.h"
 #include "render/message.h"
-#include "render/sheet.h"
+#include "render/picture_page.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,7 @@
 enum { SLICE_CELLS = 140, WORST_MOST = 12, BINS = 60 };
 
 typedef struct FitDrawing {
-    Sheet *sheet;
+    PicturePage *page;
     const PictureOptions *options;
     const VesselTree *tree;
     const TriangleMesh *mesh;
@@ -62,15 +62,15 @@ static double percentile(const FitDrawing *drawing, double part)
 
 static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int height)
 {
-    Sheet *sheet = drawing->sheet;
+    PicturePage *page = drawing->page;
     const VesselTree *tree = drawing->tree;
-    double s = sheet->scale;
+    double s = page->scale;
     if (drawing->mesh && drawing->mesh->vertex_count > 0 && tree->point_count > 0) {
         double *error = malloc((size_t)drawing->mesh->vertex_count * sizeof *error);
         bool drawn = error && surface_point_error(drawing->mesh, tree, error, NULL) &&
-                     sheet_error_surface(sheet, drawing->options, drawing->mesh, error, drawing->full_scale, x, y, width, height);
+                     picture_page_error_surface(page, drawing->options, drawing->mesh, error, drawing->full_scale, x, y, width, height);
         free(error);
-        return drawn || message_fail(sheet->message, sheet->capacity, "not enough memory for a picture");
+        return drawn || message_fail(page->message, page->capacity, "not enough memory for a picture");
     }
     const Vec3 *shown = tree->point_count > 0 ? tree->point : tree->center;
     int shown_count = shown == tree->center ? tree->node_count : (int)tree->point_count;
@@ -79,11 +79,11 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
     camera_frame(&camera, width, height, 28 * s, shown_count, shown, 0);
     if (drawing->options->focus_radius > 0)
         camera_frame_sphere(&camera, width, height, 8 * s, drawing->options->focus, drawing->options->focus_radius);
-    GlCanvas *panel = sheet_begin_panel(sheet, width, height);
+    GlCanvas *panel = picture_page_begin_panel(page, width, height);
     ViewPoint *point = malloc(((size_t)tree->point_count + 1) * sizeof *point);
     if (!panel || !point) {
         free(point);
-        return panel ? message_fail(sheet->message, sheet->capacity, "not enough memory for a picture") : false;
+        return panel ? message_fail(page->message, page->capacity, "not enough memory for a picture") : false;
     }
     // as large as half the spacing on a vessel of the mean size, so that single points are seen and none hides its neighbours
     double size = fmin(fmax(0.22 / camera.mm_per_pixel, 1.6 * s), 9 * s);
@@ -94,16 +94,16 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
         Vec3 d = vec3_sub(tree->point[k], camera.center);
         point[count++] = (ViewPoint){{(float)d.x, (float)d.y, (float)d.z}, color_diverging(drawing->distance[k] / drawing->full_scale), (float)size};
     }
-    surface_view_draw_points(sheet->view, &camera, camera.center, count, point);
-    sheet_end_panel(sheet, panel, x, y);
-    sheet_scale_bar(sheet, x + 16 * s, y + height - 14 * s, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
+    surface_view_draw_points(page->view, &camera, camera.center, count, point);
+    picture_page_end_panel(page, panel, x, y);
+    picture_page_scale_bar(page, x + 16 * s, y + height - 14 * s, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
     free(point);
     return true;
 }
 
 static void draw_histogram(FitDrawing *drawing, double x, double y, double width, double height)
 {
-    Sheet *sheet = drawing->sheet;
+    PicturePage *page = drawing->page;
     int64_t bin[BINS] = {0}, most = 1, beyond = 0;
     for (int64_t k = 0; k < drawing->tree->point_count; k++) {
         double place = (drawing->distance[k] / drawing->full_scale + 1) / 2 * BINS;
@@ -114,16 +114,16 @@ static void draw_histogram(FitDrawing *drawing, double x, double y, double width
     }
     for (int i = 0; i < BINS; i++)
         most = bin[i] > most ? bin[i] : most;
-    overlay_fill(sheet->overlay, x, y, width, height, SHEET_PANEL);
+    overlay_fill(page->overlay, x, y, width, height, SHEET_PANEL);
     for (int i = 0; i < BINS; i++) {
-        double tall = (height - 6 * sheet->scale) * (double)bin[i] / (double)most;
+        double tall = (height - 6 * page->scale) * (double)bin[i] / (double)most;
         Color color = color_diverging((i + 0.5) / BINS * 2 - 1);
-        overlay_fill(sheet->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color);
-        overlay_rectangle(sheet->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color_with_alpha(SHEET_MUTED, 0.5), 1);
+        overlay_fill(page->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color);
+        overlay_rectangle(page->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color_with_alpha(SHEET_MUTED, 0.5), 1);
     }
-    overlay_line(sheet->overlay, x + width / 2, y, x + width / 2, y + height, SHEET_MUTED, sheet->scale);
+    overlay_line(page->overlay, x + width / 2, y, x + width / 2, y + height, SHEET_MUTED, page->scale);
     if (beyond > 0)
-        sheet_text(sheet, x + 6 * sheet->scale, y + 4 * sheet->scale, TEXT_SMALL, SHEET_MUTED, "%lld beyond the ends", (long long)beyond);
+        picture_page_text(page, x + 6 * page->scale, y + 4 * page->scale, TEXT_SMALL, SHEET_MUTED, "%lld beyond the ends", (long long)beyond);
 }
 
 // Where the field crosses zero on the edge between two corners.
@@ -167,7 +167,7 @@ static void draw_contour(FitDrawing *drawing, const Slice *slice, int node, Colo
                 if ((f[k] > 0) != (f[(k + 1) % 4] > 0))
                     crossing(corner[k], f[k], corner[(k + 1) % 4], f[(k + 1) % 4], cut[cuts++]);
             for (int k = 0; k + 1 < cuts; k += 2)
-                overlay_line(drawing->sheet->overlay, cut[k][0], cut[k][1], cut[k + 1][0], cut[k + 1][1], color, thickness);
+                overlay_line(drawing->page->overlay, cut[k][0], cut[k][1], cut[k + 1][0], cut[k + 1][1], color, thickness);
         }
 }
 
@@ -182,9 +182,9 @@ static void slice_place(const Slice *slice, Vec3 point, double *x, double *y, do
 
 static void draw_slice(FitDrawing *drawing, int node, double x, double y, double side)
 {
-    Sheet *sheet = drawing->sheet;
+    PicturePage *page = drawing->page;
     const VesselTree *tree = drawing->tree;
-    double s = sheet->scale, r = tree->radius[node], worst = -1;
+    double s = page->scale, r = tree->radius[node], worst = -1;
     Slice slice = {.center = tree->center[node], .along = tree->direction[node], .half = 3 * r, .x = x, .y = y + 20 * s, .side = side - 20 * s};
     Vec3 aside = vec3_normal_to(slice.along);
     for (int64_t k = tree->point_offset[node]; k < tree->point_offset[node + 1]; k++) {
@@ -196,17 +196,17 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     slice.across = aside;
     slice.normal = vec3_cross(slice.along, aside);
-    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "%d: r %.2f, error %.2f mm", node, r, tree->error ? tree->error[node] : NAN);
-    overlay_fill(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_PANEL);
-    overlay_push_clip(sheet->overlay, slice.x, slice.y, slice.side, slice.side);
+    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%d: r %.2f, error %.2f mm", node, r, tree->error ? tree->error[node] : NAN);
+    overlay_fill(page->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_PANEL);
+    overlay_push_clip(page->overlay, slice.x, slice.y, slice.side, slice.side);
     double px, py, off, scale = slice.side / (2 * slice.half);
     for (int64_t b = tree->blob_offset[node]; b < tree->blob_offset[node + 1]; b++) {
         slice_place(&slice, tree->blob_center[b], &px, &py, &off);
         double radius = blob_radius(tree->blob_width[b], tree->iso_level) * scale;
         if (radius > 0)
-            overlay_circle(sheet->overlay, px, py, radius, (Color){0, 158, 115, 70}, 1.2 * s);
-        overlay_line(sheet->overlay, px - 3 * s, py, px + 3 * s, py, (Color){0, 120, 90, 200}, s);
-        overlay_line(sheet->overlay, px, py - 3 * s, px, py + 3 * s, (Color){0, 120, 90, 200}, s);
+            overlay_circle(page->overlay, px, py, radius, (Color){0, 158, 115, 70}, 1.2 * s);
+        overlay_line(page->overlay, px - 3 * s, py, px + 3 * s, py, (Color){0, 120, 90, 200}, s);
+        overlay_line(page->overlay, px, py - 3 * s, px, py + 3 * s, (Color){0, 120, 90, 200}, s);
     }
     for (int i = 0; i < tree->node_count; i++)
         if (tree->parent[i] == node || tree->parent[node] == i)
@@ -216,15 +216,15 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
         slice_place(&slice, tree->point[k], &px, &py, &off);
         if (fabs(off) > 0.3 * r || !isfinite(drawing->distance[k]))
             continue;
-        overlay_disc(sheet->overlay, px, py, 3.2 * s, color_with_alpha(SHEET_INK, 0.7));
-        overlay_disc(sheet->overlay, px, py, 2.5 * s, color_diverging(drawing->distance[k] / drawing->full_scale));
+        overlay_disc(page->overlay, px, py, 3.2 * s, color_with_alpha(SHEET_INK, 0.7));
+        overlay_disc(page->overlay, px, py, 2.5 * s, color_diverging(drawing->distance[k] / drawing->full_scale));
     }
-    overlay_pop_clip(sheet->overlay);
-    overlay_rectangle(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_FAINT, s);
+    overlay_pop_clip(page->overlay);
+    overlay_rectangle(page->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_FAINT, s);
     char blobs[32];
     snprintf(blobs, sizeof blobs, "%d blobs", blobby_of(tree, node).count);
-    sheet_label(sheet, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, SHEET_MUTED, blobs);
-    sheet_scale_bar(sheet, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
+    picture_page_label(page, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, SHEET_MUTED, blobs);
+    picture_page_scale_bar(page, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
 }
 
 // The largest errors first, none beside one already chosen.
@@ -249,33 +249,33 @@ static int choose_worst(const VesselTree *tree, int most, int chosen[WORST_MOST]
 
 static bool draw_fit(FitDrawing *drawing)
 {
-    Sheet *sheet = drawing->sheet;
+    PicturePage *page = drawing->page;
     const VesselTree *tree = drawing->tree;
     int chosen[WORST_MOST], worst = choose_worst(tree, drawing->options->worst_count, chosen);
-    double s = sheet->scale, gap = 20 * s, top = 62 * s, column = (worst > 0 ? 0.42 : 0.28) * sheet->width, left = sheet->width - gap - column;
-    if (!draw_surface(drawing, gap, top, (int)(left - 2 * gap), (int)(sheet->height - top - gap)))
+    double s = page->scale, gap = 20 * s, top = 62 * s, column = (worst > 0 ? 0.42 : 0.28) * page->width, left = page->width - gap - column;
+    if (!draw_surface(drawing, gap, top, (int)(left - 2 * gap), (int)(page->height - top - gap)))
         return false;
-    sheet_title(sheet, gap, 18 * s, sheet->width - 2 * gap, drawing->options->title);
+    picture_page_title(page, gap, 18 * s, page->width - 2 * gap, drawing->options->title);
 
     double tall = 120 * s, y = top;
     draw_histogram(drawing, left, y, column, tall);
     y += tall + 8 * s;
     char title[128];
     snprintf(title, sizeof title, "signed distance [mm]: blue outside the model, red inside");
-    sheet_color_bar(sheet, left, y, column, 12 * s, map_diverging, -1, -drawing->full_scale, drawing->full_scale, title);
+    picture_page_color_bar(page, left, y, column, 12 * s, map_diverging, -1, -drawing->full_scale, drawing->full_scale, title);
     y += 66 * s;
-    sheet_text(sheet, left, y, TEXT_NORMAL, SHEET_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
+    picture_page_text(page, left, y, TEXT_NORMAL, SHEET_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
                (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99),
                percentile(drawing, 1));
-    sheet_text(sheet, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f a node", tree->node_count, (long long)tree->blob_count,
+    picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f a node", tree->node_count, (long long)tree->blob_count,
                (double)tree->blob_count / tree->node_count);
     y += 56 * s;
     if (worst < 1)
         return true;
-    sheet_text(sheet, left, y, TEXT_NORMAL, SHEET_MUTED, "nodes of the largest errors, cut through axis and worst point; neighbours' walls grey");
+    picture_page_text(page, left, y, TEXT_NORMAL, SHEET_MUTED, "nodes of the largest errors, cut through axis and worst point; neighbours' walls grey");
     y += 28 * s;
     int best_columns = 1;
-    double room = sheet->height - gap - y, best = 0;
+    double room = page->height - gap - y, best = 0;
     for (int columns = 1; columns <= worst; columns++) {
         int rows = (worst + columns - 1) / columns;
         double side = fmin((column + 10 * s) / columns - 10 * s + 20 * s, room / rows - 6 * s);
@@ -295,19 +295,19 @@ bool picture_of_fit(const char *path, const PictureOptions *options, const Vesse
 {
     if (!tree || tree->node_count < 1 || !vessel_tree_is_model(tree))
         return message_fail(message, capacity, "the tree has no fitted model to draw");
-    Sheet sheet;
-    if (!sheet_open(&sheet, options, options->height, message, capacity))
+    PicturePage page;
+    if (!picture_page_open(&page, options, options->height, message, capacity))
         return false;
-    FitDrawing drawing = {.sheet = &sheet, .options = options, .tree = tree, .mesh = mesh};
+    FitDrawing drawing = {.page = &page, .options = options, .tree = tree, .mesh = mesh};
     bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "not enough memory for a picture");
     if (drawn) {
         double wide = percentile(&drawing, 0.98);
-        drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? sheet_scale_end(wide) : 0.1;
+        drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? picture_page_scale_end(wide) : 0.1;
     }
-    drawn = drawn && draw_fit(&drawing) && sheet_save(&sheet, path);
+    drawn = drawn && draw_fit(&drawing) && picture_page_save(&page, path);
     free(drawing.distance);
     free(drawing.sorted);
     free(drawing.field);
-    sheet_close(&sheet);
+    picture_page_close(&page);
     return drawn;
 }

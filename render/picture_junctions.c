@@ -4,7 +4,7 @@
 // it: each pixel's corner is answered by the node to which a walk leads from the nearest node around.
 #include "render/message.h"
 #include "geom/power_walk.h"
-#include "render/sheet.h"
+#include "render/picture_page.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,7 @@ typedef struct JunctionCell {
 } JunctionCell;
 
 typedef struct JunctionDrawing {
-    Sheet *sheet;
+    PicturePage *page;
     const PictureJunctions *what;
     float low, high;         // of the volume's values: black and white
     float *field;            // (CELLS + 1)^2
@@ -126,16 +126,16 @@ static void draw_image(JunctionDrawing *drawing, const JunctionCell *cell)
             share = share > 0 ? share < 1 ? share : 1 : 0;
             drawing->grey[j * GREY + i] = (uint8_t)(inside ? 225 * pow(share, 0.6) + 0.5 : 0);   // thin branches are faint
         }
-    unsigned texture = sheet_grey_texture(drawing->sheet, GREY, GREY, drawing->grey);
+    unsigned texture = picture_page_grey_texture(drawing->page, GREY, GREY, drawing->grey);
     if (texture)
-        overlay_image(drawing->sheet->overlay, texture, cell->x, cell->y, cell->side, cell->side, true);
+        overlay_image(drawing->page->overlay, texture, cell->x, cell->y, cell->side, cell->side, true);
 }
 
 static void draw_wall(JunctionDrawing *drawing, const JunctionCell *cell)
 {
     const int n = CELLS + 1;
-    Overlay *overlay = drawing->sheet->overlay;
-    double s = drawing->sheet->scale, pixel = cell->side / CELLS;
+    Overlay *overlay = drawing->page->overlay;
+    double s = drawing->page->scale, pixel = cell->side / CELLS;
     bool over_image = drawing->what->value != NULL;
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++)
@@ -165,8 +165,8 @@ static void draw_wall(JunctionDrawing *drawing, const JunctionCell *cell)
 static void draw_tree(JunctionDrawing *drawing, const JunctionCell *cell)
 {
     const VesselTree *tree = cell->tree;
-    Overlay *overlay = drawing->sheet->overlay;
-    double s = drawing->sheet->scale, x, y, off, x1, y1, off1;
+    Overlay *overlay = drawing->page->overlay;
+    double s = drawing->page->scale, x, y, off, x1, y1, off1;
     for (int k = 0; k < cell->near_count; k++) {
         int node = cell->near[k], parent = tree->parent[node];
         for (int64_t i = tree->point_offset[node]; i < tree->point_offset[node + 1]; i++) {
@@ -188,25 +188,25 @@ static void draw_tree(JunctionDrawing *drawing, const JunctionCell *cell)
 static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double clearance, Vec3 where,
                       const char *label, double x, double y, double side)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale, head = 20 * s, tool = drawing->what->tool_radius, px, py, off;
+    PicturePage *page = drawing->page;
+    double s = page->scale, head = 20 * s, tool = drawing->what->tool_radius, px, py, off;
     JunctionCell cell = {.x = x, .y = y + head, .side = side - head};
     Color color = clearance < 0 ? CAPPED : clearance < tool ? NARROW : OPEN;
     find_plane(of, junction, &cell);
     find_near(in, &cell);
-    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance, junction->apart ? ", apart" : "");
-    overlay_fill(sheet->overlay, cell.x, cell.y, cell.side, cell.side, SHEET_PANEL);
-    overlay_push_clip(sheet->overlay, cell.x, cell.y, cell.side, cell.side);
+    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance, junction->apart ? ", apart" : "");
+    overlay_fill(page->overlay, cell.x, cell.y, cell.side, cell.side, SHEET_PANEL);
+    overlay_push_clip(page->overlay, cell.x, cell.y, cell.side, cell.side);
     draw_image(drawing, &cell);
     draw_wall(drawing, &cell);
     draw_tree(drawing, &cell);
     place(&cell, where, &px, &py, &off);
-    overlay_circle(sheet->overlay, px, py, 6 * s, color, 2 * s);
-    overlay_pop_clip(sheet->overlay);
-    overlay_rectangle(sheet->overlay, cell.x, cell.y, cell.side, cell.side, color, (clearance < tool ? 3 : 1) * s);
+    overlay_circle(page->overlay, px, py, 6 * s, color, 2 * s);
+    overlay_pop_clip(page->overlay);
+    overlay_rectangle(page->overlay, cell.x, cell.y, cell.side, cell.side, color, (clearance < tool ? 3 : 1) * s);
     if (drawing->what->value)
-        overlay_fill(sheet->overlay, cell.x + 2 * s, cell.y + cell.side - 32 * s, 0.35 * cell.side + 12 * s, 30 * s, (Color){0, 0, 0, 130});
-    sheet_scale_bar(sheet, cell.x + 6 * s, cell.y + cell.side - 6 * s, 0.35 * cell.side, 2 * cell.half / cell.side,
+        overlay_fill(page->overlay, cell.x + 2 * s, cell.y + cell.side - 32 * s, 0.35 * cell.side + 12 * s, 30 * s, (Color){0, 0, 0, 130});
+    picture_page_scale_bar(page, cell.x + 6 * s, cell.y + cell.side - 6 * s, 0.35 * cell.side, 2 * cell.half / cell.side,
                     drawing->what->value ? (Color){255, 255, 255, 255} : SHEET_INK);
 }
 
@@ -252,10 +252,10 @@ static void page_path(const char *path, int page, char *out, size_t capacity)
 
 static void draw_head(JunctionDrawing *drawing, const char *title, int first, int end, int count)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale;
-    sheet_title(sheet, 20 * s, 14 * s, sheet->width - 40 * s, title);
-    sheet_text(sheet, 20 * s, 42 * s, TEXT_SMALL, SHEET_MUTED,
+    PicturePage *page = drawing->page;
+    double s = page->scale;
+    picture_page_title(page, 20 * s, 14 * s, page->width - 40 * s, title);
+    picture_page_text(page, 20 * s, 42 * s, TEXT_SMALL, SHEET_MUTED,
                "junctions %d to %d of %d, narrowest first: section through parent's axis and branch; wall %s, centreline blue, data orange; frame red: capped, "
                "orange: less than %.2f mm",
                first + 1, end, count, drawing->what->value ? "light blue over the image" : "black, lumen tinted", drawing->what->tool_radius);
@@ -264,8 +264,8 @@ static void draw_head(JunctionDrawing *drawing, const char *title, int first, in
 static bool draw_page(JunctionDrawing *drawing, const PictureOptions *options, int first, int end, int count)
 {
     const PictureJunctions *what = drawing->what;
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale, gap = 12 * s, top = 66 * s, width = (sheet->width - gap) / COLUMNS - gap, height = (options->height - top) / ROWS - gap;
+    PicturePage *page = drawing->page;
+    double s = page->scale, gap = 12 * s, top = 66 * s, width = (page->width - gap) / COLUMNS - gap, height = (options->height - top) / ROWS - gap;
     double side = fmin(width + 20 * s, height);
     draw_head(drawing, options->title, first, end, count);
     for (int k = first; k < end; k++) {
@@ -295,18 +295,18 @@ bool picture_of_junctions(const char *path, const PictureOptions *options, const
         return message_fail(message, capacity, "the path is too long");
     for (int first = 0; first < what->junction_count; first += each, ++*pages) {
         int end = first + each < what->junction_count ? first + each : what->junction_count;
-        Sheet sheet;
+        PicturePage page;
         int slots = (end - first) * (what->before ? 2 : 1), rows = (slots + COLUMNS - 1) / COLUMNS;
-        double top = 66 * sheet_scale_of(options);
-        if (!sheet_open(&sheet, options, (int)(top + (options->height - top) * rows / ROWS), message, capacity))
+        double top = 66 * picture_page_scale_of(options);
+        if (!picture_page_open(&page, options, (int)(top + (options->height - top) * rows / ROWS), message, capacity))
             return false;
-        JunctionDrawing drawing = {.sheet = &sheet, .what = what, .field = malloc((CELLS + 1) * (CELLS + 1) * sizeof(float)), .grey = malloc(GREY * GREY)};
+        JunctionDrawing drawing = {.page = &page, .what = what, .field = malloc((CELLS + 1) * (CELLS + 1) * sizeof(float)), .grey = malloc(GREY * GREY)};
         page_path(path, *pages, name, sizeof name);
         bool drawn = (drawing.field && drawing.grey && choose_window(&drawing)) || message_fail(message, capacity, "not enough memory for a picture");
-        drawn = drawn && draw_page(&drawing, options, first, end, what->junction_count) && sheet_save(&sheet, name);
+        drawn = drawn && draw_page(&drawing, options, first, end, what->junction_count) && picture_page_save(&page, name);
         free(drawing.field);
         free(drawing.grey);
-        sheet_close(&sheet);
+        picture_page_close(&page);
         if (!drawn)
             return false;
     }

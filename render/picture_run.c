@@ -5,12 +5,12 @@
 // Depth: the tool's tube, arrows and target spheres are opaque and write depth; the vessel's wall, back and front faces, is blended over them from
 // far to near, so a tool inside is seen through exactly the walls that lie before it.
 #include "render/message.h"
-#include "render/sheet.h"
+#include "render/picture_page.h"
 
 #include <stdlib.h>
 
 typedef struct RunDrawing {
-    Sheet *sheet;
+    PicturePage *page;
     const PictureOptions *options;
     const PictureScene *scene;
     ShellStyle style;
@@ -103,7 +103,7 @@ static double largest_force(int tool_count, const PictureTool *tool)
 // [mm] of the arrow for a force at the top of the scale
 static double arrow_length(const RunDrawing *drawing, const Camera *camera)
 {
-    return fmin(64 * drawing->sheet->scale, 0.12 * (camera->width < camera->height ? camera->width : camera->height)) * camera->mm_per_pixel;
+    return fmin(64 * drawing->page->scale, 0.12 * (camera->width < camera->height ? camera->width : camera->height)) * camera->mm_per_pixel;
 }
 
 // One arrow for each stretch of the tool of about 16 pixels: the sum of its nodes' forces, its head at the tool where the wall pushes.
@@ -111,7 +111,7 @@ static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureT
 {
     if (!tool->force || !drawing->options->arrows)
         return;
-    double stretch = 16 * drawing->sheet->scale * camera->mm_per_pixel, longest = arrow_length(drawing, camera);
+    double stretch = 16 * drawing->page->scale * camera->mm_per_pixel, longest = arrow_length(drawing, camera);
     for (int i = first_free(tool); i < tool->node_count;) {
         Vec3 sum = {0, 0, 0}, place = {0, 0, 0};
         double weight = 0, radius = 0, length = 0;
@@ -209,7 +209,7 @@ static bool has_several(const PictureTool *tool) { return tool->pose && tool->lo
 
 static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureTool *tool)
 {
-    double thin = 1.0 * drawing->sheet->scale * camera->mm_per_pixel;   // at least two pixels wide
+    double thin = 1.0 * drawing->page->scale * camera->mm_per_pixel;   // at least two pixels wide
     int free_node = first_free(tool);
     for (int i = 0; i < tool->node_count; i++) {
         drawing->radius[i] = fmax(tool->radius[i], thin);
@@ -217,7 +217,7 @@ static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureToo
     }
     // behind the mouth only a short stub is shown
     int first = free_node;
-    double stub = 0, most = 30 * drawing->sheet->scale * camera->mm_per_pixel;
+    double stub = 0, most = 30 * drawing->page->scale * camera->mm_per_pixel;
     while (first > 0 && stub < most) {
         stub += vec3_distance(tool->position[first], tool->position[first - 1]);
         first--;
@@ -231,7 +231,7 @@ static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureToo
 
 static void add_targets(RunDrawing *drawing, const Camera *camera)
 {
-    double line = 0.75 * drawing->sheet->scale * camera->mm_per_pixel;
+    double line = 0.75 * drawing->page->scale * camera->mm_per_pixel;
     for (int i = 0; i < drawing->scene->target_count; i++) {
         const SceneTarget *target = &drawing->scene->target[i];
         primitives_circle(&drawing->primitives, target->point, camera->back, target->radius, line, TARGET_COLOR);
@@ -245,7 +245,7 @@ static void add_targets(RunDrawing *drawing, const Camera *camera)
 // One 3D panel with its upper left corner at (x, y) of the page.
 static bool draw_panel(RunDrawing *drawing, const Camera *camera, const ShellStyle *style, const PictureTool *tool, double x, double y)
 {
-    GlCanvas *panel = sheet_begin_panel(drawing->sheet, camera->width, camera->height);
+    GlCanvas *panel = picture_page_begin_panel(drawing->page, camera->width, camera->height);
     if (!panel)
         return false;
     primitives_clear(&drawing->primitives);
@@ -253,20 +253,20 @@ static bool draw_panel(RunDrawing *drawing, const Camera *camera, const ShellSty
     add_tool(drawing, camera, tool);
     add_targets(drawing, camera);
     if (drawing->scene->has_entry)
-        primitives_sphere(&drawing->primitives, drawing->scene->entry, 4 * drawing->sheet->scale * camera->mm_per_pixel, SHEATH_COLOR);
+        primitives_sphere(&drawing->primitives, drawing->scene->entry, 4 * drawing->page->scale * camera->mm_per_pixel, SHEATH_COLOR);
     if (drawing->primitives.is_short_of_memory)
-        return message_fail(drawing->sheet->message, drawing->sheet->capacity, "not enough memory for a picture");
-    surface_view_draw_primitives(drawing->sheet->view, camera, &drawing->primitives, style);
-    surface_view_draw_shell(drawing->sheet->view, camera, style);
-    sheet_end_panel(drawing->sheet, panel, x, y);
+        return message_fail(drawing->page->message, drawing->page->capacity, "not enough memory for a picture");
+    surface_view_draw_primitives(drawing->page->view, camera, &drawing->primitives, style);
+    surface_view_draw_shell(drawing->page->view, camera, style);
+    picture_page_end_panel(drawing->page, panel, x, y);
     return true;
 }
 
 // Names beside the target spheres and the entry, kept inside the panel.
 static void label_panel(RunDrawing *drawing, const Camera *camera, double x, double y)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale;
+    PicturePage *page = drawing->page;
+    double s = page->scale;
     for (int i = 0; i < drawing->scene->target_count + drawing->scene->has_entry; i++) {
         bool is_target = i < drawing->scene->target_count;
         const char *name = is_target ? drawing->scene->target[i].name : "sheath";
@@ -274,11 +274,11 @@ static void label_panel(RunDrawing *drawing, const Camera *camera, double x, dou
         if (p.x < 0 || p.y < 0 || p.x > camera->width || p.y > camera->height)
             continue;
         double width, height, away = is_target ? drawing->scene->target[i].radius / camera->mm_per_pixel + 4 * s : 8 * s;
-        overlay_text_size(sheet->overlay, TEXT_NORMAL, name, &width, &height);
+        overlay_text_size(page->overlay, TEXT_NORMAL, name, &width, &height);
         bool fits_right = p.x + away + width < camera->width - 4 * s;
         double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s),
                top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
-        sheet_label(sheet, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : SHEET_MUTED, name);
+        picture_page_label(page, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : SHEET_MUTED, name);
     }
 }
 
@@ -332,15 +332,15 @@ static void outline_close_up(RunDrawing *drawing, const Camera *whole, const Cam
 {
     Vec3 p = camera_project(whole, close->center);
     double half = 0.5 * close->width * close->mm_per_pixel / whole->mm_per_pixel;
-    overlay_push_clip(drawing->sheet->overlay, x, y, whole->width, whole->height);
-    overlay_rectangle(drawing->sheet->overlay, x + p.x - half, y + p.y - half, 2 * half, 2 * half, SHEET_MUTED, 1.2 * drawing->sheet->scale);
-    overlay_pop_clip(drawing->sheet->overlay);
+    overlay_push_clip(drawing->page->overlay, x, y, whole->width, whole->height);
+    overlay_rectangle(drawing->page->overlay, x + p.x - half, y + p.y - half, 2 * half, 2 * half, SHEET_MUTED, 1.2 * drawing->page->scale);
+    overlay_pop_clip(drawing->page->overlay);
 }
 
 static void force_bar(RunDrawing *drawing, double x, double y, double width)
 {
     bool milli = drawing->force_scale < 1;
-    sheet_color_bar(drawing->sheet, x, y, width, 14 * drawing->sheet->scale, color_sequential, 0, 0, drawing->force_scale * (milli ? 1000 : 1),
+    picture_page_color_bar(drawing->page, x, y, width, 14 * drawing->page->scale, color_sequential, 0, 0, drawing->force_scale * (milli ? 1000 : 1),
                     milli ? "wall force on a node [mN]" : "wall force on a node [N]");
 }
 
@@ -357,14 +357,14 @@ static void readings_text(char *text, size_t capacity, const PictureTool *tool)
 // Each tool with its colour and what its hand feels. Returns the height.
 static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x, double y)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale, line = 23 * s;
+    PicturePage *page = drawing->page;
+    double s = page->scale, line = 23 * s;
     for (int k = 0; k < tool->pose->tool_count; k++, y += 2 * line) {
         const PoseTool *own = &tool->pose->tool[k];
         const ToolLook *look = &tool->looks->tool[k];
-        overlay_fill(sheet->overlay, x, y + 3 * s, 14 * s, 14 * s, look->on_paper);
-        sheet_text(sheet, x + 22 * s, y, TEXT_NORMAL, SHEET_INK, "%s, %.1f mm inserted", look->name, own->inserted_mm);
-        sheet_text(sheet, x + 22 * s, y + 0.9 * line, TEXT_NORMAL, SHEET_MUTED, "push %.3g N, torque %.3g N mm", own->push_n, own->torque_n_mm);
+        overlay_fill(page->overlay, x, y + 3 * s, 14 * s, 14 * s, look->on_paper);
+        picture_page_text(page, x + 22 * s, y, TEXT_NORMAL, SHEET_INK, "%s, %.1f mm inserted", look->name, own->inserted_mm);
+        picture_page_text(page, x + 22 * s, y + 0.9 * line, TEXT_NORMAL, SHEET_MUTED, "push %.3g N, torque %.3g N mm", own->push_n, own->torque_n_mm);
     }
     return 2 * line * tool->pose->tool_count + 6 * s;
 }
@@ -372,47 +372,47 @@ static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x
 // Returns the height of the text.
 static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x, double y, double width)
 {
-    Sheet *sheet = drawing->sheet;
-    double line = 23 * sheet->scale;
+    PicturePage *page = drawing->page;
+    double line = 23 * page->scale;
     int touching = 0, targets = drawing->scene->target_count < 6 ? drawing->scene->target_count : 6;
     double largest = largest_force(1, tool);
     for (int i = 0; tool->force && i < tool->node_count; i++)
         touching += vec3_norm2(tool->force[i]) > 0;
-    sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "largest %.3g %s, %d nodes touch the wall", largest < 1 ? 1000 * largest : largest,
+    picture_page_text(page, x, y, TEXT_NORMAL, SHEET_INK, "largest %.3g %s, %d nodes touch the wall", largest < 1 ? 1000 * largest : largest,
                largest < 1 ? "mN" : "N", touching);
     Vec3 tip = tool->position[tool->node_count - 1];
-    sheet_text(sheet, x, y + line, TEXT_NORMAL, SHEET_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
-    overlay_push_clip(sheet->overlay, x, y, width, sheet->height - y);
+    picture_page_text(page, x, y + line, TEXT_NORMAL, SHEET_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
+    overlay_push_clip(page->overlay, x, y, width, page->height - y);
     for (int i = 0; i < targets; i++) {
         const SceneTarget *target = &drawing->scene->target[i];
         double away = vec3_distance(tip, target->point);
-        sheet_text(sheet, x, y + (2 + i) * line, TEXT_NORMAL, TARGET_COLOR, "%s: %.1f mm from the tip%s", target->name, away,
+        picture_page_text(page, x, y + (2 + i) * line, TEXT_NORMAL, TARGET_COLOR, "%s: %.1f mm from the tip%s", target->name, away,
                    away <= target->radius ? ", reached" : "");
     }
-    overlay_pop_clip(sheet->overlay);
+    overlay_pop_clip(page->overlay);
     return (2 + targets) * line;
 }
 
 // The same from the right hand side.
 static bool draw_side_view(RunDrawing *drawing, const Camera *whole, const PictureTool *tool, double x, double y, double width, double height)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale;
+    PicturePage *page = drawing->page;
+    double s = page->scale;
     Camera side = {.right = vec3_negate(whole->back), .up = whole->up, .back = whole->right};
     frame_all(drawing, &side, (int)width, (int)height, 12 * s, s);
     if (!draw_panel(drawing, &side, &drawing->style, tool, x, y))
         return false;
-    sheet_label(sheet, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, SHEET_MUTED, "from the right");
-    sheet_scale_bar(sheet, x + 14 * s, y + (int)height - 10 * s, 0.2 * width, side.mm_per_pixel, SHEET_INK);
+    picture_page_label(page, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, SHEET_MUTED, "from the right");
+    picture_page_scale_bar(page, x + 14 * s, y + (int)height - 10 * s, 0.2 * width, side.mm_per_pixel, SHEET_INK);
     return true;
 }
 
 static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
 {
-    Sheet *sheet = drawing->sheet;
+    PicturePage *page = drawing->page;
     const PictureOptions *options = drawing->options;
-    double s = sheet->scale, gap = 20 * s, top = 62 * s, column = fmin(0.32 * sheet->width, 0.56 * sheet->height);
-    int width = (int)(sheet->width - column - 3 * gap), height = (int)(sheet->height - top - gap);
+    double s = page->scale, gap = 20 * s, top = 62 * s, column = fmin(0.32 * page->width, 0.56 * page->height);
+    int width = (int)(page->width - column - 3 * gap), height = (int)(page->height - top - gap);
     Camera whole = {0};
     camera_orient(&whole, options->view, options->up, drawing->frame_count, drawing->frame_point);
     frame_all(drawing, &whole, width, height, 34 * s, s);
@@ -421,9 +421,9 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     if (!draw_panel(drawing, &whole, &drawing->style, tool, gap, top))
         return false;
     label_panel(drawing, &whole, gap, top);
-    sheet_scale_bar(sheet, gap + 16 * s, top + height - 14 * s, 0.22 * width, whole.mm_per_pixel, SHEET_INK);
+    picture_page_scale_bar(page, gap + 16 * s, top + height - 14 * s, 0.22 * width, whole.mm_per_pixel, SHEET_INK);
 
-    double left = sheet->width - gap - column, below = top;
+    double left = page->width - gap - column, below = top;
     if (options->inset) {
         Vec3 tip = tool->position[tool->node_count - 1];
         double radius = inset_radius_of(drawing, tip);
@@ -432,9 +432,9 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
         if (!draw_panel(drawing, &close, &style, tool, left, top))
             return false;
         label_panel(drawing, &close, left, top);
-        overlay_rectangle(sheet->overlay, left, top, (int)column, (int)column, SHEET_MUTED, 1.2 * s);
+        overlay_rectangle(page->overlay, left, top, (int)column, (int)column, SHEET_MUTED, 1.2 * s);
         outline_close_up(drawing, &whole, &close, gap, top);
-        sheet_scale_bar(sheet, left + 14 * s, top + column - 12 * s, 0.3 * column, close.mm_per_pixel, SHEET_INK);
+        picture_page_scale_bar(page, left + 14 * s, top + column - 12 * s, 0.3 * column, close.mm_per_pixel, SHEET_INK);
         below += column + 18 * s;
     }
     force_bar(drawing, left, below, column);
@@ -442,21 +442,21 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     if (has_several(tool))
         below += write_tools(drawing, tool, left, below);
     below += write_facts(drawing, tool, left, below, column) + 14 * s;
-    double room_below = sheet->height - gap - below;
+    double room_below = page->height - gap - below;
     if (room_below > 140 * s && !draw_side_view(drawing, &whole, tool, left, below, column, room_below))
         return false;
 
     char text[256];
     readings_text(text, sizeof text, tool);
     double wide;
-    overlay_text_size(sheet->overlay, TEXT_NORMAL, text, &wide, NULL);
-    double title = sheet_title(sheet, gap, 18 * s, sheet->width - 2 * gap - wide - 28 * s, options->title);
+    overlay_text_size(page->overlay, TEXT_NORMAL, text, &wide, NULL);
+    double title = picture_page_title(page, gap, 18 * s, page->width - 2 * gap - wide - 28 * s, options->title);
     double start = gap + (title > 0 ? title + 28 * s : 0);
-    overlay_text(sheet->overlay, start, 23 * s, TEXT_NORMAL, SHEET_INK, text);
-    overlay_push_clip(sheet->overlay, start + wide, 0, sheet->width - gap - start - wide, top);
+    overlay_text(page->overlay, start, 23 * s, TEXT_NORMAL, SHEET_INK, text);
+    overlay_push_clip(page->overlay, start + wide, 0, page->width - gap - start - wide, top);
     if (tool->label)
-        sheet_text(sheet, start + wide + 24 * s, 23 * s, TEXT_NORMAL, SHEET_MUTED, "%s", tool->label);
-    overlay_pop_clip(sheet->overlay);
+        picture_page_text(page, start + wide + 24 * s, 23 * s, TEXT_NORMAL, SHEET_MUTED, "%s", tool->label);
+    overlay_pop_clip(page->overlay);
     return true;
 }
 
@@ -484,8 +484,8 @@ static int emptiest_corner(const RunDrawing *drawing, const Camera *camera, cons
 
 static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureTool *tool, double x, double y, double header)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale;
+    PicturePage *page = drawing->page;
+    double s = page->scale;
     char text[256];
     int length = snprintf(text, sizeof text, "t %.2f s", tool->time_s), tools = has_several(tool) ? tool->pose->tool_count : 0;
     if (tools == 0)
@@ -493,17 +493,17 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     for (int k = 0; k < tools; k++)
         length += snprintf(text + length, sizeof text - (size_t)length, "   %.31s %.1f mm, %.3g N", tool->looks->tool[k].name, tool->pose->tool[k].inserted_mm,
                            tool->pose->tool[k].push_n);
-    overlay_push_clip(sheet->overlay, x, y, whole->width, header);
+    overlay_push_clip(page->overlay, x, y, whole->width, header);
     if (tool->label)
-        sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
-    sheet_text(sheet, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s",
+        picture_page_text(page, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
+    picture_page_text(page, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s",
                text);
-    overlay_pop_clip(sheet->overlay);
+    overlay_pop_clip(page->overlay);
     double top = y + header;
     if (!draw_panel(drawing, whole, &drawing->style, tool, x, top))
         return false;
     label_panel(drawing, whole, x, top);
-    sheet_scale_bar(sheet, x + 12 * s, top + whole->height - 12 * s, 0.22 * whole->width, whole->mm_per_pixel, SHEET_INK);
+    picture_page_scale_bar(page, x + 12 * s, top + whole->height - 12 * s, 0.22 * whole->width, whole->mm_per_pixel, SHEET_INK);
     if (!drawing->options->inset)
         return true;
     Vec3 tip = tool->position[tool->node_count - 1];
@@ -519,8 +519,8 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     ShellStyle style = close_up_style(drawing, radius);
     if (!draw_panel(drawing, &close, &style, tool, left, above))
         return false;
-    overlay_rectangle(sheet->overlay, left, above, side, side, SHEET_MUTED, 1.2 * s);
-    sheet_scale_bar(sheet, left + 10 * s, above + side - 8 * s, 0.36 * side, close.mm_per_pixel, SHEET_INK);
+    overlay_rectangle(page->overlay, left, above, side, side, SHEET_MUTED, 1.2 * s);
+    picture_page_scale_bar(page, left + 10 * s, above + side - 8 * s, 0.36 * side, close.mm_per_pixel, SHEET_INK);
     return true;
 }
 
@@ -534,7 +534,7 @@ typedef struct MomentLayout {
 static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
 {
     const PictureOptions *options = drawing->options;
-    double s = sheet_scale_of(options), foot = 66 * s, border = 26 * s;
+    double s = picture_page_scale_of(options), foot = 66 * s, border = 26 * s;
     MomentLayout layout = {.columns = tool_count, .header = 46 * s, .gap = 16 * s, .top = options->title ? 54 * s : 14 * s};
     Camera camera = {0};
     camera_orient(&camera, options->view, options->up, drawing->frame_count, drawing->frame_point);
@@ -563,24 +563,24 @@ static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
 
 static bool draw_moments(RunDrawing *drawing, const MomentLayout *layout, int tool_count, const PictureTool *tool)
 {
-    Sheet *sheet = drawing->sheet;
-    double s = sheet->scale, gap = layout->gap;
-    sheet_title(sheet, gap, 14 * s, sheet->width - 2 * gap, drawing->options->title);
+    PicturePage *page = drawing->page;
+    double s = page->scale, gap = layout->gap;
+    picture_page_title(page, gap, 14 * s, page->width - 2 * gap, drawing->options->title);
     for (int k = 0; k < tool_count; k++) {
         double x = gap + (k % layout->columns) * (layout->camera.width + gap);
         double y = layout->top + (k / layout->columns) * (layout->camera.height + layout->header);
         if (!draw_moment(drawing, &layout->camera, &tool[k], x, y, layout->header))
             return false;
     }
-    force_bar(drawing, gap, sheet->height - 56 * s, fmin(420 * s, sheet->width - 2 * gap));
+    force_bar(drawing, gap, page->height - 56 * s, fmin(420 * s, page->width - 2 * gap));
     return true;
 }
 
-static bool draw_on(Sheet *sheet, RunDrawing *drawing, const char *path, int tool_count, const PictureTool *tool, const MomentLayout *layout)
+static bool draw_on(PicturePage *page, RunDrawing *drawing, const char *path, int tool_count, const PictureTool *tool, const MomentLayout *layout)
 {
-    drawing->sheet = sheet;
-    return surface_view_set_mesh(sheet->view, drawing->scene->vessel, sheet->message, sheet->capacity) &&
-           (layout ? draw_moments(drawing, layout, tool_count, tool) : draw_run(drawing, tool)) && sheet_save(sheet, path);
+    drawing->page = page;
+    return surface_view_set_mesh(page->view, drawing->scene->vessel, page->message, page->capacity) &&
+           (layout ? draw_moments(drawing, layout, tool_count, tool) : draw_run(drawing, tool)) && picture_page_save(page, path);
 }
 
 static bool draw(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool, bool is_single,
@@ -590,7 +590,7 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
         return false;
     RunDrawing drawing = {.options = options, .scene = scene, .style = shell_style_glass()};
     double largest = largest_force(tool_count, tool);
-    drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? sheet_scale_end(largest) : 0.1;
+    drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? picture_page_scale_end(largest) : 0.1;
     int longest = 0;
     for (int k = 0; k < tool_count; k++)
         for (int i = 0; i < tool[k].node_count; i++)
@@ -606,11 +606,11 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
     if (!drawing.radius || !drawing.lumen || !drawing.point || !drawing.color || !gather_frame(&drawing, tool_count, tool))
         message_fail(message, capacity, "not enough memory for a picture");
     else {
-        Sheet sheet;
+        PicturePage page;
         MomentLayout layout = lay_out_moments(&drawing, tool_count);
-        if (sheet_open(&sheet, options, is_single ? options->height : (int)ceil(layout.height), message, capacity)) {
-            drawn = draw_on(&sheet, &drawing, path, tool_count, tool, is_single ? NULL : &layout);
-            sheet_close(&sheet);
+        if (picture_page_open(&page, options, is_single ? options->height : (int)ceil(layout.height), message, capacity)) {
+            drawn = draw_on(&page, &drawing, path, tool_count, tool, is_single ? NULL : &layout);
+            picture_page_close(&page);
         }
     }
     free(drawing.radius);

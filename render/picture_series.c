@@ -1,7 +1,7 @@
 // Time series, one panel above the other on one time axis. Where several samples fall on a pixel column, their least and greatest are drawn, so
 // that no spike is lost.
 #include "render/message.h"
-#include "render/sheet.h"
+#include "render/picture_page.h"
 
 #include <stdlib.h>
 
@@ -45,7 +45,7 @@ static void find_range(Chart *chart, int count, const PicturePanel *panel)
 }
 
 // Cut at sharp turns: ImGui's mitred joints tear there, as noisy data shows.
-static void stroke(Sheet *sheet, int count, const float (*point)[2], Color color)
+static void stroke(PicturePage *page, int count, const float (*point)[2], Color color)
 {
     int first = 0;
     for (int i = 1; i < count; i++) {
@@ -56,20 +56,20 @@ static void stroke(Sheet *sheet, int count, const float (*point)[2], Color color
             is_sharp = ax * bx + ay * by < 0.5 * hypot(ax, ay) * hypot(bx, by);
         }
         if (is_sharp) {
-            overlay_polyline(sheet->overlay, i + 1 - first, point + first, color, 1.6 * sheet->scale);
+            overlay_polyline(page->overlay, i + 1 - first, point + first, color, 1.6 * page->scale);
             first = i;
         }
     }
 }
 
-static void draw_line(Sheet *sheet, const Chart *chart, int count, const double *time, const double *value, Color color, float (*point)[2])
+static void draw_line(PicturePage *page, const Chart *chart, int count, const double *time, const double *value, Color color, float (*point)[2])
 {
     double sx = chart->width / (chart->t1 - chart->t0), sy = chart->height / (chart->high - chart->low);
     int n = 0;
     for (int i = 0; i < count;) {
         double v = mapped(chart, value[i]);
         if (isnan(v)) {
-            stroke(sheet, n, (const float(*)[2])point, color);
+            stroke(page, n, (const float(*)[2])point, color);
             n = 0;
             i++;
             continue;
@@ -97,25 +97,25 @@ static void draw_line(Sheet *sheet, const Chart *chart, int count, const double 
             point[n++][1] = (float)(chart->y + chart->height - sy * (way[k] - chart->low));
         }
     }
-    stroke(sheet, n, (const float(*)[2])point, color);
+    stroke(page, n, (const float(*)[2])point, color);
 }
 
-static void draw_level(Sheet *sheet, const Chart *chart, double level, const char *text, bool is_zero)
+static void draw_level(PicturePage *page, const Chart *chart, double level, const char *text, bool is_zero)
 {
-    double s = sheet->scale, y = chart->y + chart->height * (1 - (level - chart->low) / (chart->high - chart->low)), height;
+    double s = page->scale, y = chart->y + chart->height * (1 - (level - chart->low) / (chart->high - chart->low)), height;
     if (y < chart->y - 1e-6 || y > chart->y + chart->height + 1e-6)
         return;
-    overlay_line(sheet->overlay, chart->x, y, chart->x + chart->width, y, is_zero ? SHEET_MUTED : SHEET_FAINT, s);
-    overlay_text_size(sheet->overlay, TEXT_SMALL, text, NULL, &height);
-    sheet_text_anchored(sheet, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+    overlay_line(page->overlay, chart->x, y, chart->x + chart->width, y, is_zero ? SHEET_MUTED : SHEET_FAINT, s);
+    overlay_text_size(page->overlay, TEXT_SMALL, text, NULL, &height);
+    picture_page_text_anchored(page, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
 }
 
-static void draw_grid(Sheet *sheet, const Chart *chart, bool is_last)
+static void draw_grid(PicturePage *page, const Chart *chart, bool is_last)
 {
-    double s = sheet->scale;
-    overlay_fill(sheet->overlay, chart->x, chart->y, chart->width, chart->height, SHEET_PANEL);
+    double s = page->scale;
+    overlay_fill(page->overlay, chart->x, chart->y, chart->width, chart->height, SHEET_PANEL);
     char text[48];
-    double step = sheet_tick_step(chart->low, chart->high, chart->height > 150 * s ? 6 : 4);
+    double step = picture_page_tick_step(chart->low, chart->high, chart->height > 150 * s ? 6 : 4);
     if (chart->logarithmic) {
         // whole decades, and 2 and 5 between them where there is room
         static const double part[3] = {1, 2, 5};
@@ -126,41 +126,41 @@ static void draw_grid(Sheet *sheet, const Chart *chart, bool is_last)
             for (int j = 0; j < parts; j++) {
                 double value = part[j] * pow(10, k * step);
                 snprintf(text, sizeof text, "%g", value);
-                draw_level(sheet, chart, log10(value), text, false);
+                draw_level(page, chart, log10(value), text, false);
             }
     }
     for (double k = ceil(chart->low / step - 1e-9); !chart->logarithmic && k * step <= chart->high + 1e-9 * step; k++) {
-        sheet_format_tick(text, sizeof text, k * step, step);
-        draw_level(sheet, chart, k * step, text, k == 0);
+        picture_page_format_tick(text, sizeof text, k * step, step);
+        draw_level(page, chart, k * step, text, k == 0);
     }
-    step = sheet_tick_step(chart->t0, chart->t1, 10);
+    step = picture_page_tick_step(chart->t0, chart->t1, 10);
     for (double k = ceil(chart->t0 / step - 1e-9); k * step <= chart->t1 + 1e-9 * step; k++) {
         double x = chart->x + chart->width * (k * step - chart->t0) / (chart->t1 - chart->t0);
-        overlay_line(sheet->overlay, x, chart->y, x, chart->y + chart->height, SHEET_FAINT, s);
-        sheet_format_tick(text, sizeof text, k * step, step);
+        overlay_line(page->overlay, x, chart->y, x, chart->y + chart->height, SHEET_FAINT, s);
+        picture_page_format_tick(text, sizeof text, k * step, step);
         if (is_last)
-            sheet_text_anchored(sheet, x, chart->y + chart->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+            picture_page_text_anchored(page, x, chart->y + chart->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
     }
     if (is_last)
-        sheet_text_anchored(sheet, chart->x + chart->width / 2, chart->y + chart->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, "time [s]");
+        picture_page_text_anchored(page, chart->x + chart->width / 2, chart->y + chart->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, "time [s]");
 }
 
-static void draw_panel(Sheet *sheet, Chart *chart, int count, const double *time, const PicturePanel *panel, bool is_last, float (*point)[2])
+static void draw_panel(PicturePage *page, Chart *chart, int count, const double *time, const PicturePanel *panel, bool is_last, float (*point)[2])
 {
-    double s = sheet->scale;
+    double s = page->scale;
     find_range(chart, count, panel);
-    draw_grid(sheet, chart, is_last);
+    draw_grid(page, chart, is_last);
     double key = chart->x + chart->width;
-    sheet_text(sheet, chart->x, chart->y - 22 * s, TEXT_NORMAL, SHEET_INK, "%s", panel->title ? panel->title : "");
-    overlay_push_clip(sheet->overlay, chart->x, chart->y - 1, chart->width + 1, chart->height + 2);
+    picture_page_text(page, chart->x, chart->y - 22 * s, TEXT_NORMAL, SHEET_INK, "%s", panel->title ? panel->title : "");
+    overlay_push_clip(page->overlay, chart->x, chart->y - 1, chart->width + 1, chart->height + 2);
     for (int k = 0; k < panel->line_count; k++)
-        draw_line(sheet, chart, count, time, panel->line[k].value, color_qualitative(LINE_COLOR[k % 6]), point);
-    overlay_pop_clip(sheet->overlay);
+        draw_line(page, chart, count, time, panel->line[k].value, color_qualitative(LINE_COLOR[k % 6]), point);
+    overlay_pop_clip(page->overlay);
     for (int k = panel->line_count - 1; k >= 0; k--)
         if (panel->line[k].label) {
             Color color = color_qualitative(LINE_COLOR[k % 6]);
-            key -= sheet_text_anchored(sheet, key, chart->y - 20 * s, 1, TEXT_SMALL, SHEET_INK, panel->line[k].label) + 6 * s;
-            overlay_fill(sheet->overlay, key - 18 * s, chart->y - 13 * s, 18 * s, 3 * s, color);
+            key -= picture_page_text_anchored(page, key, chart->y - 20 * s, 1, TEXT_SMALL, SHEET_INK, panel->line[k].label) + 6 * s;
+            overlay_fill(page->overlay, key - 18 * s, chart->y - 13 * s, 18 * s, 3 * s, color);
             key -= 36 * s;
         }
 }
@@ -175,36 +175,36 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
     for (int i = 0; i < count; i++)
         if (!isfinite(time_s[i]) || (i > 0 && time_s[i] < time_s[i - 1]))
             return message_fail(message, capacity, "time %d of a chart is not a number or goes backwards: nothing is drawn", i);
-    Sheet sheet;
-    if (!sheet_open(&sheet, options, options->height, message, capacity))
+    PicturePage page;
+    if (!picture_page_open(&page, options, options->height, message, capacity))
         return false;
-    double s = sheet.scale, top = options->title || event_count > 0 ? 54 * s : 10 * s, left = 84 * s, head = 32 * s, foot = 48 * s;
-    double each = (sheet.height - top - foot) / panel_count;
+    double s = page.scale, top = options->title || event_count > 0 ? 54 * s : 10 * s, left = 84 * s, head = 32 * s, foot = 48 * s;
+    double each = (page.height - top - foot) / panel_count;
     bool drawn = true;
     // four points a sample at most
     float(*point)[2] = malloc((4 * (size_t)count + 4) * sizeof *point);
     if (!point)
         drawn = message_fail(message, capacity, "not enough memory for a chart of %d samples", count);
-    Chart chart = {.x = left, .width = sheet.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = fmax(time_s[count - 1], time_s[0] + LEAST_SPAN)};
+    Chart chart = {.x = left, .width = page.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = fmax(time_s[count - 1], time_s[0] + LEAST_SPAN)};
     if (!(chart.t1 > chart.t0))
         chart.t1 = chart.t0 + 1;
     for (int k = 0; drawn && k < panel_count; k++) {
         chart.y = top + k * each + head;
         chart.logarithmic = panel[k].logarithmic;
-        draw_panel(&sheet, &chart, count, time_s, &panel[k], k + 1 == panel_count, point);
+        draw_panel(&page, &chart, count, time_s, &panel[k], k + 1 == panel_count, point);
     }
     for (int i = 0; drawn && i < event_count; i++) {
         double x = chart.x + chart.width * (event[i].time_s - chart.t0) / (chart.t1 - chart.t0);
         if (!(x >= chart.x && x <= chart.x + chart.width))
             continue;
-        overlay_line(sheet.overlay, x, top + head - 4 * s, x, sheet.height - foot, SHEET_MUTED, 1.2 * s);
+        overlay_line(page.overlay, x, top + head - 4 * s, x, page.height - foot, SHEET_MUTED, 1.2 * s);
         if (event[i].label)
-            sheet_label(&sheet, x, top - 12 * s, 0.5, TEXT_SMALL, SHEET_MUTED, event[i].label);
+            picture_page_label(&page, x, top - 12 * s, 0.5, TEXT_SMALL, SHEET_MUTED, event[i].label);
     }
     if (drawn)
-        sheet_title(&sheet, 20 * s, 12 * s, sheet.width - 40 * s, options->title);
-    drawn = drawn && sheet_save(&sheet, path);
+        picture_page_title(&page, 20 * s, 12 * s, page.width - 40 * s, options->title);
+    drawn = drawn && picture_page_save(&page, path);
     free(point);
-    sheet_close(&sheet);
+    picture_page_close(&page);
     return drawn;
 }

@@ -3,7 +3,7 @@
 // A point X falls on pixel ((X - O) . a / |a|^2, (X - O) . b / |b|^2) with a, b the steps across and up: right for orthogonal voxel axes, oblique or
 // not. The images are darker than the lines drawn over them.
 #include "render/message.h"
-#include "render/sheet.h"
+#include "render/picture_page.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -71,7 +71,7 @@ static bool find_window(int count, const PictureProjection *projection, float *l
     return true;
 }
 
-static unsigned upload(Sheet *sheet, const PictureProjection *p, float low, float high)
+static unsigned upload(PicturePage *page, const PictureProjection *p, float low, float high)
 {
     size_t count = (size_t)p->width * (size_t)p->height;
     uint8_t *grey = malloc(count);
@@ -82,7 +82,7 @@ static unsigned upload(Sheet *sheet, const PictureProjection *p, float low, floa
         x = x > 0 ? x < 1 ? x : 1 : 0;   // NaN is black
         grey[i] = (uint8_t)(8 + 165 * sqrtf(x) * (0.4f + 0.6f * x) + 0.5f);
     }
-    unsigned texture = sheet_grey_texture(sheet, p->width, p->height, grey);
+    unsigned texture = picture_page_grey_texture(page, p->width, p->height, grey);
     free(grey);
     return texture;
 }
@@ -95,7 +95,7 @@ static void place(const Panel *panel, Vec3 point, double *x, double *y)
     *y = panel->y + panel->height * (1 - (vec3_dot(d, p->up) / vec3_norm2(p->up) + 0.5) / p->height);
 }
 
-static void draw_outline(Sheet *sheet, const Panel *panel, const PicturePolyline *line, const float (*at)[2], float (*side)[2], Color color)
+static void draw_outline(PicturePage *page, const Panel *panel, const PicturePolyline *line, const float (*at)[2], float (*side)[2], Color color)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         for (int i = 0; i < line->count; i++) {
@@ -104,61 +104,61 @@ static void draw_outline(Sheet *sheet, const Panel *panel, const PicturePolyline
             side[i][0] = at[i][0] - (float)(length > 0 ? r * dy / length : 0);
             side[i][1] = at[i][1] + (float)(length > 0 ? r * dx / length : 0);
         }
-        overlay_polyline(sheet->overlay, line->count, (const float(*)[2])side, color_with_alpha(color, 0.6), 0.8 * sheet->scale);
+        overlay_polyline(page->overlay, line->count, (const float(*)[2])side, color_with_alpha(color, 0.6), 0.8 * page->scale);
     }
 }
 
-static void draw_axes(Sheet *sheet, const Panel *panel)
+static void draw_axes(PicturePage *page, const Panel *panel)
 {
     const PictureProjection *p = panel->image;
-    double s = sheet->scale;
+    double s = page->scale;
     for (int way = 0; way < 2; way++) {
         Vec3 step = way ? p->up : p->across;
         int pixels = way ? p->height : p->width;
         double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size,
-               tick = sheet_tick_step(low, high, 6);
+               tick = picture_page_tick_step(low, high, 6);
         for (double k = ceil(low / tick); k * tick <= high; k++) {
             char text[32];
-            sheet_format_tick(text, sizeof text, k * tick, tick);
+            picture_page_format_tick(text, sizeof text, k * tick, tick);
             double part = (k * tick - low) / (high - low);
             if (way) {
                 double y = panel->y + panel->height * (1 - part), height;
-                overlay_text_size(sheet->overlay, TEXT_SMALL, text, NULL, &height);
-                overlay_line(sheet->overlay, panel->x - 4 * s, y, panel->x, y, SHEET_INK, s);
-                sheet_text_anchored(sheet, panel->x - 6 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+                overlay_text_size(page->overlay, TEXT_SMALL, text, NULL, &height);
+                overlay_line(page->overlay, panel->x - 4 * s, y, panel->x, y, SHEET_INK, s);
+                picture_page_text_anchored(page, panel->x - 6 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
             } else {
                 double x = panel->x + panel->width * part;
-                overlay_line(sheet->overlay, x, panel->y + panel->height, x, panel->y + panel->height + 4 * s, SHEET_INK, s);
-                sheet_text_anchored(sheet, x, panel->y + panel->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+                overlay_line(page->overlay, x, panel->y + panel->height, x, panel->y + panel->height + 4 * s, SHEET_INK, s);
+                picture_page_text_anchored(page, x, panel->y + panel->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
             }
         }
     }
     char text[128];
     if (p->across_name) {
         snprintf(text, sizeof text, "%s [mm]", p->across_name);
-        sheet_text_anchored(sheet, panel->x + panel->width / 2, panel->y + panel->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+        picture_page_text_anchored(page, panel->x + panel->width / 2, panel->y + panel->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
     }
     if (p->up_name) {
         snprintf(text, sizeof text, "%s [mm]", p->up_name);
-        sheet_text_anchored(sheet, panel->x, panel->y - 20 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+        picture_page_text_anchored(page, panel->x, panel->y - 20 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
     }
 }
 
-static bool draw_projection(Sheet *sheet, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline,
+static bool draw_projection(PicturePage *page, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline,
                             int mark_count, const PictureMark *mark)
 {
-    unsigned texture = upload(sheet, panel->image, low, high);
+    unsigned texture = upload(page, panel->image, low, high);
     int longest = 1;
     for (int k = 0; k < polyline_count; k++)
         longest = polyline[k].count > longest ? polyline[k].count : longest;
     float(*at)[2] = malloc(2 * (size_t)longest * sizeof *at);
     if (!texture || !at) {
         free(at);
-        return message_fail(sheet->message, sheet->capacity, "not enough memory for a picture");
+        return message_fail(page->message, page->capacity, "not enough memory for a picture");
     }
-    double s = sheet->scale;
-    overlay_image(sheet->overlay, texture, panel->x, panel->y, panel->width, panel->height, true);
-    overlay_push_clip(sheet->overlay, panel->x, panel->y, panel->width, panel->height);
+    double s = page->scale;
+    overlay_image(page->overlay, texture, panel->x, panel->y, panel->width, panel->height, true);
+    overlay_push_clip(page->overlay, panel->x, panel->y, panel->width, panel->height);
     for (int k = 0; k < polyline_count; k++) {
         const PicturePolyline *line = &polyline[k];
         for (int i = 0; i < line->count; i++) {
@@ -169,24 +169,24 @@ static bool draw_projection(Sheet *sheet, const Panel *panel, float low, float h
         }
         Color color = color_qualitative(line->color);
         if (line->radius)
-            draw_outline(sheet, panel, line, (const float(*)[2])at, at + longest, color);
-        overlay_polyline(sheet->overlay, line->count, (const float(*)[2])at, color, 1.7 * s);
+            draw_outline(page, panel, line, (const float(*)[2])at, at + longest, color);
+        overlay_polyline(page->overlay, line->count, (const float(*)[2])at, color, 1.7 * s);
     }
     for (int i = 0; i < mark_count; i++) {
         double x, y, width, height;
         place(panel, mark[i].point, &x, &y);
-        overlay_disc(sheet->overlay, x, y, 5.5 * s, color_rgb(20, 20, 20));
-        overlay_disc(sheet->overlay, x, y, 4 * s, color_rgb(255, 255, 255));
+        overlay_disc(page->overlay, x, y, 5.5 * s, color_rgb(20, 20, 20));
+        overlay_disc(page->overlay, x, y, 4 * s, color_rgb(255, 255, 255));
         if (!mark[i].label)
             continue;
-        overlay_text_size(sheet->overlay, TEXT_SMALL, mark[i].label, &width, &height);
+        overlay_text_size(page->overlay, TEXT_SMALL, mark[i].label, &width, &height);
         bool fits = x + 9 * s + width < panel->x + panel->width;
         double left = fits ? x + 9 * s : x - 9 * s - width;
-        overlay_fill(sheet->overlay, left - 2 * s, y - height / 2 - s, width + 4 * s, height + 2 * s, (Color){0, 0, 0, 150});
-        overlay_text(sheet->overlay, left, y - height / 2, TEXT_SMALL, color_rgb(255, 255, 255), mark[i].label);
+        overlay_fill(page->overlay, left - 2 * s, y - height / 2 - s, width + 4 * s, height + 2 * s, (Color){0, 0, 0, 150});
+        overlay_text(page->overlay, left, y - height / 2, TEXT_SMALL, color_rgb(255, 255, 255), mark[i].label);
     }
-    overlay_pop_clip(sheet->overlay);
-    draw_axes(sheet, panel);
+    overlay_pop_clip(page->overlay);
+    draw_axes(page, panel);
     free(at);
     return true;
 }
@@ -203,7 +203,7 @@ static double length_of(int count, const PicturePolyline *polyline)
 // All panels at one scale, in the arrangement of rows that makes them largest. Returns the height they need.
 static double lay_out(const PictureOptions *page, int count, const PictureProjection *projection, double top, Panel *panel)
 {
-    double s = sheet_scale_of(page), left = 52 * s, between = 14 * s, foot = 48 * s, head = 26 * s, best = 0;
+    double s = picture_page_scale_of(page), left = 52 * s, between = 14 * s, foot = 48 * s, head = 26 * s, best = 0;
     int best_columns = count;
     for (int columns = count; columns >= 1; columns--) {
         int rows = (count + columns - 1) / columns;
@@ -246,21 +246,21 @@ bool picture_of_projections(const char *path, const PictureOptions *options, int
         return false;
     if (!(high > low) && !find_window(projection_count, projection, &low, &high))
         return message_fail(message, capacity, "not enough memory for a picture");
-    Sheet sheet;
+    PicturePage page;
     Panel panel[6];
-    double s = sheet_scale_of(options), needed = lay_out(options, projection_count, projection, 46 * s, panel);
-    if (!sheet_open(&sheet, options, (int)ceil(needed), message, capacity))
+    double s = picture_page_scale_of(options), needed = lay_out(options, projection_count, projection, 46 * s, panel);
+    if (!picture_page_open(&page, options, (int)ceil(needed), message, capacity))
         return false;
     char text[160];
     snprintf(text, sizeof text, "maximum intensity %.4g to %.4g; %d branch%s, %.0f mm", (double)low, (double)high, polyline_count,
              polyline_count == 1 ? "" : "es", length_of(polyline_count, polyline));
-    double wide = sheet_text_anchored(&sheet, sheet.width - 20 * s, 17 * s, 1, TEXT_NORMAL, SHEET_MUTED, text);
-    sheet_title(&sheet, 20 * s, 12 * s, sheet.width - wide - 60 * s, options->title);
+    double wide = picture_page_text_anchored(&page, page.width - 20 * s, 17 * s, 1, TEXT_NORMAL, SHEET_MUTED, text);
+    picture_page_title(&page, 20 * s, 12 * s, page.width - wide - 60 * s, options->title);
     bool drawn = true;
     for (int k = 0; k < projection_count && drawn; k++)
-        drawn = draw_projection(&sheet, &panel[k], low, high, polyline_count, polyline, mark_count, mark);
-    drawn = drawn && sheet_save(&sheet, path);
-    sheet_close(&sheet);
+        drawn = draw_projection(&page, &panel[k], low, high, polyline_count, polyline, mark_count, mark);
+    drawn = drawn && picture_page_save(&page, path);
+    picture_page_close(&page);
     return drawn;
 }
 
