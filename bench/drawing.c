@@ -32,7 +32,7 @@ typedef struct Studio {
     GlCanvas canvas;
     Views *views;
     Panel *panel;
-    Desk desk;
+    OperatorControls controls;
     TrainerPanel shown;
     LessonView *lesson;              // (MOMENTS, stride)
     size_t stride;
@@ -48,7 +48,7 @@ static bool take_moments(Studio *studio, Faults *faults)
     const Scene *scene = studio->scene.scene;
     Simulator *simulator = simulator_create(scene, studio->scene.open.vessel, faults);
     Lesson *lesson = simulator ? lesson_create(simulator, studio->scene.open.tree) : NULL;
-    XrayControl xray = studio->desk.xray;
+    XrayControl xray = studio->controls.xray;
     int cursor = 0;
     xray.pedal = 1;
     xray.contrast_ml_s = 3;
@@ -111,11 +111,11 @@ static void draw(Studio *studio, const Case *what, int frame)
     XrayControl xray = pose->xray;
     xray.lao_deg = what->arm_turns ? (float)(frame % 60) : 0;
     if (what->camera_turns)
-        free_camera_orbit(&studio->desk.look.camera, 3, 0);
+        free_camera_orbit(&studio->controls.look.camera, 3, 0);
     PanelLayout layout = panel_layout(what->width, what->height, 1, what->view, true);
     ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL,
                         .filling = what->flows ? lesson->concentration + lesson->node_count : NULL, .pulse = ++studio->pulse,
-                        .look = &studio->desk.look};
+                        .look = &studio->controls.look};
     WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
     for (int i = 0; what->only && i < VIEW_COUNT; i++)
         if (what->only != 1 + i)
@@ -123,8 +123,8 @@ static void draw(Studio *studio, const Case *what, int frame)
     views_draw(studio->views, &views, &layout, what->width, what->height, studio->canvas.framebuffer);
     trainer_panel_show(&studio->shown, studio->scene.scene, pose, &lesson->score, NULL, &xray);
     studio->shown.state.now_s = studio->shown.state.time_s = frame / 30.0;
-    studio->desk.view = what->view;
-    trainer_panel_views(&studio->shown, &studio->desk, studio->views, &xray);
+    studio->controls.view = what->view;
+    trainer_panel_views(&studio->shown, &studio->controls, studio->views, &xray);
     if (what->only == 0 || what->only == ONLY_PANELS)
         panel_draw(studio->panel, &input, &studio->shown.state, studio->canvas.framebuffer);
     gl_canvas_finish();
@@ -191,7 +191,7 @@ static bool take_turn(Studio *studio, double seconds, bool draws, Turn *turn, Fa
         atomic_store(&hand[k].drives, DRIVES_TOOL + k);
     }
     LiveSession session;
-    LiveSessionOptions options = {.hand_count = studio->scene.scene->tool_count, .hand = hands, .xray = studio->desk.xray};
+    LiveSessionOptions options = {.hand_count = studio->scene.scene->tool_count, .hand = hands, .xray = studio->controls.xray};
     if (!live_session_open(&session, studio->scene.scene, &studio->scene.open, &options, faults))
         return false;
     double begin = clock_s(CLOCK_MONOTONIC), next = begin;
@@ -261,7 +261,7 @@ static bool set_studio(Studio *studio, const char *path, Faults *faults)
         faults_add(faults, path, 0, 0, "nothing can be drawn: %s", message);
         return false;
     }
-    studio->views = scene_views_create(studio->scene.scene, &studio->scene.open, &studio->desk, message, sizeof message, faults);
+    studio->views = scene_views_create(studio->scene.scene, &studio->scene.open, &studio->controls, message, sizeof message, faults);
     if (!studio->views)
         return false;
     trainer_panel_begin(&studio->shown, studio->scene.scene, "");

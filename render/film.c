@@ -22,7 +22,7 @@ typedef struct Film {
     GlCanvas canvas;
     Views *views;
     Panel *panel;
-    Desk desk;
+    OperatorControls controls;
     Playback *playback;
     TrainerPanel shown;
     Rescore *rescore;
@@ -63,7 +63,7 @@ static Vec3 middle_of_tips(Film *film)
 static bool open_playback(Film *film, const VesselTree *tree)
 {
     const FilmOptions *options = film->options;
-    XrayControl watched = film->desk.xray;
+    XrayControl watched = film->controls.xray;
     watched.pedal = 1;
     if (!isnan(options->lao_deg))
         watched.lao_deg = (float)options->lao_deg;
@@ -76,8 +76,8 @@ static bool open_playback(Film *film, const VesselTree *tree)
     watched.field_mm = (float)options->close_up_mm;
     for (int k = 0; k < 3; k++)
         watched.table_mm[k] = (float)(&middle.x)[k];
-    film->desk.look.camera.focus = middle;
-    film->desk.look.camera.width_mm = film->desk.look.camera.height_mm = options->close_up_mm;
+    film->controls.look.camera.focus = middle;
+    film->controls.look.camera.width_mm = film->controls.look.camera.height_mm = options->close_up_mm;
     playback_close(film->playback);
     film->playback = playback_open(film->run, film->scene, tree, &watched);
     return film->playback != NULL;
@@ -93,14 +93,14 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
     film->rescore = rescore_create(run, scene, open, faults);
     bool good = film->rgb && film->rescore && film->context && gl_canvas_create(&film->canvas, options->width, options->height, 1, message, sizeof message) &&
                 (film->panel = panel_create(message, sizeof message)) &&
-                (film->views = scene_views_create(scene, open, &film->desk, message, sizeof message, faults));
+                (film->views = scene_views_create(scene, open, &film->controls, message, sizeof message, faults));
     if (good) {
         good = open_playback(film, open->tree);
         snprintf(message, sizeof message, "the recording holds no frame");
     }
     if (good) {
-        film->desk.look.full_detail = true;
-        film->desk.view = options->view;
+        film->controls.look.full_detail = true;
+        film->controls.view = options->view;
         panel_show_hints(film->panel, false);
         trainer_panel_begin(&film->shown, scene, "");
         return true;
@@ -143,7 +143,7 @@ static void film_draw(Film *film, double time_s)
     if (jumped)
         fluoroscope_forget(views_fluoroscope(film->views));
     ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(film->playback), .filling = playback_filling(film->playback),
-                        .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->desk.look,
+                        .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->controls.look,
                         .is_still = true};
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
     if (options->has_panels) {
@@ -151,7 +151,7 @@ static void film_draw(Film *film, double time_s)
         sample_plots(film, pose->time_s);   // a time beyond the end is the end
         trainer_panel_show(&film->shown, film->scene, pose, score_now(film), NULL, &pose->xray);
         film->shown.state.now_s = pose->time_s;
-        trainer_panel_views(&film->shown, &film->desk, film->views, &pose->xray);
+        trainer_panel_views(&film->shown, &film->controls, film->views, &pose->xray);
         trainer_panel_injection(&film->shown, film->scene, playback_contrast_tool(film->playback), playback_flow_ml_s(film->playback), &pose->xray);
         film->shown.state.step_median_us = film->shown.state.step_p999_us = film->shown.state.real_time_factor = NAN;
         panel_draw(film->panel, &input, &film->shown.state, film->canvas.framebuffer);

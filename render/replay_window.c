@@ -22,7 +22,7 @@ typedef struct ReplayWindow {
     Panel *panel;
     Timeline *timeline;
     Views *views;
-    Desk desk;
+    OperatorControls controls;
     Playback *playback;
     Rescore *rescore;
     TrainerPanel shown;
@@ -39,10 +39,10 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
     snprintf(title, sizeof title, "Seldinger replay: %.200s", options->name);
     bool good = (replay->window = window_create(title, options->width, options->height, 0, message, sizeof message)) &&
                 (replay->panel = panel_create(message, sizeof message)) && (replay->timeline = timeline_create(message, sizeof message)) &&
-                (replay->views = scene_views_create(replay->scene, open, &replay->desk, message, sizeof message, faults)) &&
+                (replay->views = scene_views_create(replay->scene, open, &replay->controls, message, sizeof message, faults)) &&
                 (replay->rescore = rescore_create(replay->run, replay->scene, open, faults));
     if (good) {
-        XrayControl watched = replay->desk.xray;
+        XrayControl watched = replay->controls.xray;
         watched.pedal = 1;
         if (!isnan(options->lao_deg))
             watched.lao_deg = (float)options->lao_deg;
@@ -56,7 +56,7 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
         faults_add(faults, options->name, 0, 0, "no window: %s", message);
     if (!good)
         return false;
-    replay->desk.view = options->view;
+    replay->controls.view = options->view;
     panel_show_hints(replay->panel, false);
     trainer_panel_begin(&replay->shown, replay->scene, "");
     replay->line = (TimelineState){.end_s = playback_end_s(replay->playback), .is_playing = true, .speed = 1, .note = options->name};
@@ -117,12 +117,12 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
 {
     const Pose *pose = playback_pose(replay->playback);
     ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(replay->playback), .filling = playback_filling(replay->playback),
-                        .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->desk.look, .scope_tool = replay->desk.grip.chosen + 1};
+                        .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->controls.look, .scope_tool = replay->controls.grip.chosen + 1};
     views_draw(replay->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
     PanelState *state = &replay->shown.state;
     state->now_s = clock_s(CLOCK_MONOTONIC) - replay->begun_s;
-    trainer_panel_views(&replay->shown, &replay->desk, replay->views, &pose->xray);
+    trainer_panel_views(&replay->shown, &replay->controls, replay->views, &pose->xray);
     trainer_panel_injection(&replay->shown, replay->scene, playback_contrast_tool(replay->playback), playback_flow_ml_s(replay->playback), &pose->xray);
     state->is_paused = !replay->line.is_playing;
     state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
@@ -146,14 +146,14 @@ static void run_window(ReplayWindow *replay)
         double now = clock_s(CLOCK_MONOTONIC), passed = fmin(now - last, 0.1);
         last = now;
         panel_take_input(replay->panel, input, &actions);
-        PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->desk.view, true);
-        desk_obey(&replay->desk, views_scene(replay->views), &actions, &layout, passed);
+        PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
+        controls_obey(&replay->controls, views_scene(replay->views), &actions, &layout, passed);
         obey(replay, &actions, passed);
         goes_on = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
                   !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);
         if (!goes_on || !visible)
             continue;
-        layout = panel_layout(input->width, input->height, input->scale, replay->desk.view, true);
+        layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
         draw(replay, input, &layout);
         window_swap(replay->window);
     }

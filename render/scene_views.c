@@ -45,7 +45,7 @@ static double contrast_rate(const VesselTree *tree)
     return fmax(1, fmin(20, 3 * radius * radius));
 }
 
-static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, Desk *desk, char *note, size_t capacity, Faults *faults)
+static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, OperatorControls *controls, char *note, size_t capacity, Faults *faults)
 {
     if (!open->mesh && open->tree)
         open->mesh = isosurface_of_tree(open->tree, live_cell(open->tree));
@@ -64,16 +64,16 @@ static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const
         faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", note);
         return NULL;
     }
-    *desk = mesh ? desk_create(views_scene(views), scene->tool_count, mesh->vertex_count, mesh->vertex) : desk_create(views_scene(views), scene->tool_count, pose->node_count, pose->position);
-    desk->patient = options.patient;
-    desk->xray.lao_deg = (float)scene->lao;
-    desk->xray.cra_deg = (float)scene->cra;
+    *controls = mesh ? controls_create(views_scene(views), scene->tool_count, mesh->vertex_count, mesh->vertex) : controls_create(views_scene(views), scene->tool_count, pose->node_count, pose->position);
+    controls->patient = options.patient;
+    controls->xray.lao_deg = (float)scene->lao;
+    controls->xray.cra_deg = (float)scene->cra;
     if (open->tree)
-        desk->contrast_ml_s = contrast_rate(open->tree);
+        controls->contrast_ml_s = contrast_rate(open->tree);
     return views;
 }
 
-Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note, size_t capacity, Faults *faults)
+Views *scene_views_create(Scene *scene, OpenVessel *open, OperatorControls *controls, char *note, size_t capacity, Faults *faults)
 {
     int before = faults->count;
     Volume *volume = scene->anatomy_path ? volume_load(scene->anatomy_path, faults) : NULL;
@@ -84,7 +84,7 @@ Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note
     *note = 0;
     if (pose && faults->count == before) {
         pose_take(pose, simulator, &(ToolCommands){0}, &xray);
-        views = create(scene, open, volume, pose, desk, note, capacity, faults);
+        views = create(scene, open, volume, pose, controls, note, capacity, faults);
     } else if (faults->count == before) {
         faults_add(faults, scene->path, 0, 0, "cannot be shown: no memory");
     }

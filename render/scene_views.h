@@ -2,12 +2,12 @@
 #ifndef SELDINGER_RENDER_SCENE_VIEWS_H
 #define SELDINGER_RENDER_SCENE_VIEWS_H
 
-#include "render/desk.h"
+#include "render/operator_controls.h"
 #include "render/views.h"
 #include "sim/open_vessel.h"
 
 // Everything visible: the wall, the volume behind it if the scene has one, the tool at the start. Needs a current GL context. NULL with faults.
 // `note` (capacity bytes): empty, or what is missing in the pictures.
-Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note, size_t capacity, Faults *faults);
+Views *scene_views_create(Scene *scene, OpenVessel *open, OperatorControls *controls, char *note, size_t capacity, Faults *faults);
 
 #endif

@@ -31,7 +31,7 @@ typedef struct Trainer {
     Window *window;
     Panel *panel;
     Views *views;
-    Desk desk;
+    OperatorControls controls;
     HandPort keyboard[2], pad[PADS][MAP_HANDS];  // of the keys: for the chosen tool and its partner
     bool pad_refused[PADS];
     Gamepad gamepad[PADS];
@@ -152,15 +152,15 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
         hand[count++] = &trainer->pad[i / MAP_HANDS][i % MAP_HANDS];
     for (int i = 0; trainer->hands && i < HANDS_MOST * MAP_HANDS; i++)
         hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
-    trainer->desk.grip = (HandGrip){.chosen = trainer->desk.grip.chosen};    // a new session: nothing is locked or let go
+    trainer->controls.grip = (HandGrip){.chosen = trainer->controls.grip.chosen};    // a new session: nothing is locked or let go
     session_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
-    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .trainee = trainer->trainee, .date = trainer->date, .hand_count = count, .hand = hand, .grip = trainer->desk.grip, .xray = trainer->desk.xray,
+    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .trainee = trainer->trainee, .date = trainer->date, .hand_count = count, .hand = hand, .grip = trainer->controls.grip, .xray = trainer->controls.xray,
                                   .resume = resume, .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S, .paused = trainer->is_paused,
                                   .progress = trainer->figures->frames > 0 ? show_progress : NULL, .progress_context = trainer};
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
         return false;
-    trainer->desk.grip.released = trainer->session.resumed_released;
-    memcpy(trainer->desk.grip.fitted, trainer->session.resumed_fitted, sizeof trainer->desk.grip.fitted);
+    trainer->controls.grip.released = trainer->session.resumed_released;
+    memcpy(trainer->controls.grip.fitted, trainer->session.resumed_fitted, sizeof trainer->controls.grip.fitted);
     trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
     trainer->has_told_end = false;
     for (int k = 0; k < TOOLS_MOST; k++)
@@ -213,13 +213,13 @@ static bool end_session(Trainer *trainer, Faults *faults)
 
 static void drive_by_keys(Trainer *trainer, const PanelActions *actions)
 {
-    const Command command[2] = {desk_command(&trainer->desk, actions), desk_partner_command(&trainer->desk, actions)};
+    const Command command[2] = {controls_command(&trainer->controls, actions), controls_partner_command(&trainer->controls, actions)};
     for (int i = 0; i < 2; i++) {
         atomic_store_explicit(&trainer->keyboard[i].push_mm_s, command[i].push_mm_s, memory_order_relaxed);
         atomic_store_explicit(&trainer->keyboard[i].twist_deg_s, command[i].twist_deg_s, memory_order_relaxed);
     }
     atomic_store_explicit(&trainer->keyboard[0].buttons, actions->held[ACTION_STOP] ? HAND_STOP : 0, memory_order_relaxed);
-    realtime_set_grip(trainer->session.realtime, &trainer->desk.grip);
+    realtime_set_grip(trainer->session.realtime, &trainer->controls.grip);
 }
 
 static const DeviceMap *map_for_pad(const Trainer *trainer, const WindowGamepad *pad)
@@ -282,7 +282,7 @@ static unsigned buttons_of_hands(const Trainer *trainer)
 
 static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActions *actions)
 {
-    const HandGrip *now = &trainer->desk.grip;
+    const HandGrip *now = &trainer->controls.grip;
     const SceneTool *tool = trainer->scene->tool;
     int count = trainer->scene->tool_count;
     char first[16], last[16];
@@ -320,7 +320,7 @@ static const char *library(const Trainer *trainer, char *text, size_t capacity)
 
 static void open_tray(Trainer *trainer, const Pose *pose)
 {
-    const int tool = trainer->desk.grip.chosen;
+    const int tool = trainer->controls.grip.chosen;
     char text[4200];
     int in;
     if (trainer->scene->tool_count < 2) {
@@ -350,7 +350,7 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
     char path[sizeof trainer->session.record_path];
     RealtimeFigures real;
     Scene *before = trainer->scene;
-    const HandGrip grip = trainer->desk.grip;
+    const HandGrip grip = trainer->controls.grip;
     const bool has_told_end = trainer->has_told_end;
     snprintf(path, sizeof path, "%s", trainer->session.record_path);
     trainer->progress = "Computing the session again with the new device";
@@ -366,7 +366,7 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
     }
     recorded_run_free(run);
     trainer->has_told_end = has_told_end;
-    trainer->desk.grip.locked = good ? grip.locked & ~(trainer->desk.grip.released | trainer->desk.grip.released << 1) : 0;
+    trainer->controls.grip.locked = good ? grip.locked & ~(trainer->controls.grip.released | trainer->controls.grip.released << 1) : 0;
     if (good && path[0])
         remove(path);            // all of it is in the new one
     return good;
@@ -374,9 +374,9 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
 
 static void show_new_scene(Trainer *trainer, Faults *faults)
 {
-    Desk desk;
+    OperatorControls controls;
     char note[512];
-    Views *views = scene_views_create(trainer->scene, trainer->open, &desk, note, sizeof note, faults);
+    Views *views = scene_views_create(trainer->scene, trainer->open, &controls, note, sizeof note, faults);
     if (views) {
         views_destroy(trainer->views);
         trainer->views = views;
@@ -431,7 +431,7 @@ static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
         which = lives && trainer->scene != before ? scene_device_count(trainer->scene, tool) - 1 : -1;
     }
     if (lives && which >= 0)
-        hand_grip_fit(&trainer->desk.grip, trainer->scene->tool_count, tool, which);
+        hand_grip_fit(&trainer->controls.grip, trainer->scene->tool_count, tool, which);
     close_tray(trainer);
     return lives;
 }
@@ -464,7 +464,7 @@ static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pr
 // Reports the outcome of an exchange and requests the inserted device from now on.
 static void tell_exchanges(Trainer *trainer, const Pose *pose)
 {
-    HandGrip *grip = &trainer->desk.grip;
+    HandGrip *grip = &trainer->controls.grip;
     bool is_refused = pose->refused_exchanges > trainer->refused;
     for (int k = 0; k < pose->tool_count; k++) {
         const SceneTool *device = scene_device(trainer->scene, k, pose->tool[k].fitted);
@@ -534,8 +534,8 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
             hands_pause(trainer->hands, trainer->is_paused);
     }
     if (actions->pressed[ACTION_BOOKMARK]) {
-        trainer->desk.xray.bookmark++;
-        say(trainer, MARK_GOOD, "bookmark %.0f", (double)trainer->desk.xray.bookmark);
+        trainer->controls.xray.bookmark++;
+        say(trainer, MARK_GOOD, "bookmark %.0f", (double)trainer->controls.xray.bookmark);
     }
     if (actions->pressed[ACTION_SAVE])
         say(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING, trainer->session.record_path[0] ? "recorded up to now in %s" : "this session is not recorded%s",
@@ -570,7 +570,7 @@ static void name_moved(const Trainer *trainer, const HandPort *port, int hand_co
 {
     size_t used = 0;
     for (int h = 0; h < hand_count && used < capacity; h++) {
-        int tool = hand_grip_tool(&trainer->desk.grip, trainer->scene->tool_count, atomic_load(&port[h].drives));
+        int tool = hand_grip_tool(&trainer->controls.grip, trainer->scene->tool_count, atomic_load(&port[h].drives));
         used += (size_t)snprintf(text + used, capacity - used, "%s%s", trainer->scene->tool[tool].name, h + 1 < hand_count ? ", " : ": ");
     }
 }
@@ -607,13 +607,13 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     const Pose *pose = moment->pose;
     pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
     ViewsFrame frame = {.pose = pose, .xray = xray,
-                        .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look, .scope_tool = trainer->desk.grip.chosen + 1};
+                        .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
     trainer_cine_frame(&trainer->cine, passed_s, lesson->concentration, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
-    trainer_panel_views(&trainer->shown, &trainer->desk, trainer->views, xray);
-    trainer_panel_grip(&trainer->shown, &trainer->desk.grip);
+    trainer_panel_views(&trainer->shown, &trainer->controls, trainer->views, xray);
+    trainer_panel_grip(&trainer->shown, &trainer->controls.grip);
     trainer_panel_injection(&trainer->shown, trainer->scene, lesson->contrast_tool, lesson->flow_ml_s, xray);
     state->now_s = since_begin(trainer);
     state->is_recording_cine = cine_is_recording(trainer->cine.cine);
@@ -662,25 +662,25 @@ static void run_window(Trainer *trainer, Faults *faults)
         bool visible = window_next_frame(trainer->window, &input);
         double now = since_begin(trainer);
         panel_take_input(trainer->panel, input, &actions);
-        PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
-        const HandGrip grip = trainer->desk.grip;
-        desk_obey(&trainer->desk, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
+        PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->controls.view, panel_has_panels(trainer->panel));
+        const HandGrip grip = trainer->controls.grip;
+        controls_obey(&trainer->controls, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
         unsigned buttons = buttons_of_hands(trainer);
         actions.pressed[ACTION_BOOKMARK] += (buttons & ~trainer->buttons & HAND_MARK) != 0;
         const unsigned pressed = buttons & ~trainer->buttons;
         if (trainer->has_tray)
             trainer->buttons = buttons;
-        hand_grip_obey(&trainer->desk.grip, trainer->desk.tool_count, buttons, &trainer->buttons);
+        hand_grip_obey(&trainer->controls.grip, trainer->controls.tool_count, buttons, &trainer->buttons);
         tell_grip(trainer, &grip, &actions);
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);
-        XrayControl xray = desk_xray(&trainer->desk, &actions, buttons_of_hands(trainer));
+        XrayControl xray = controls_xray(&trainer->controls, &actions, buttons_of_hands(trainer));
         realtime_set_xray(trainer->session.realtime, &xray);
         goes_on = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) && !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
         if (!goes_on || !visible)
             continue;
-        layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
+        layout = panel_layout(input->width, input->height, input->scale, trainer->controls.view, panel_has_panels(trainer->panel));
         draw(trainer, input, &layout, &xray, now - drawn);
         drawn = now;
         window_swap(trainer->window);
@@ -693,8 +693,8 @@ static void run_window(Trainer *trainer, Faults *faults)
 static bool open_views(Trainer *trainer, Faults *faults)
 {
     char note[512];
-    trainer->views = scene_views_create(trainer->scene, trainer->open, &trainer->desk, note, sizeof note, faults);
-    trainer->desk.view = trainer->options->view;
+    trainer->views = scene_views_create(trainer->scene, trainer->open, &trainer->controls, note, sizeof note, faults);
+    trainer->controls.view = trainer->options->view;
     if (*note)
         say(trainer, MARK_WARNING, "%s", note);
     return trainer->views != NULL;

@@ -161,7 +161,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
 }
 
 // Labels of the 3D view: targets with their distance from the tip, the sheath's mouth.
-static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene *scene)
+static void label_scene(TrainerPanel *panel, const OperatorControls *controls, const VesselScene *scene)
 {
     PanelState *state = &panel->state;
     VesselSceneLabel found[PANEL_LABELS];
@@ -170,7 +170,7 @@ static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene
     state->label = panel->label;
     for (int i = 0; i < count && i < PANEL_LABELS; i++) {
         const VesselSceneLabel *it = &found[i];
-        if (!it->is_in_view || (it->kind == LABEL_TIP && state->tool_count < 2) || (it->kind == LABEL_TARGET && !desk->look.show_targets))
+        if (!it->is_in_view || (it->kind == LABEL_TIP && state->tool_count < 2) || (it->kind == LABEL_TARGET && !controls->look.show_targets))
             continue;
         char *text = panel->label_text[state->label_count];
         if (it->kind == LABEL_TARGET && isfinite(it->distance_mm))
@@ -182,21 +182,21 @@ static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene
     ScaleBar bar = vessel_scene_scale_bar(scene, 140);
     state->bar_mm = bar.length_mm;
     state->bar_pixels = bar.pixels;
-    state->force_full_scale_n = desk->look.force_full_scale_n;
+    state->force_full_scale_n = controls->look.force_full_scale_n;
 }
 
-void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray)
+void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, Views *views, const XrayControl *xray)
 {
     PanelState *state = &panel->state;
     FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
-    label_scene(panel, desk, views_scene(views));
-    state->chosen_tool = desk->grip.chosen;
-    state->view = desk->view;
-    state->is_following = desk->look.follow_tip;
-    state->has_section = desk->look.section;
-    state->has_model = desk->look.show_model;
-    state->has_arrows = desk->look.show_arrows;
-    state->is_pedal_latched = desk->pedal_latched;
+    label_scene(panel, controls, views_scene(views));
+    state->chosen_tool = controls->grip.chosen;
+    state->view = controls->view;
+    state->is_following = controls->look.follow_tip;
+    state->has_section = controls->look.section;
+    state->has_model = controls->look.show_model;
+    state->has_arrows = controls->look.show_arrows;
+    state->is_pedal_latched = controls->pedal_latched;
     const char *line = fluoroscope.is_out_of_beam ? "Part of the vessel lies beside the beam: no contrast is drawn. Move the table or the C-arm back"
                        : xray->mode == XRAY_DSA && fluoroscope.mask_has_moved ? "C-arm, table or field have moved since the mask was taken: M takes a new one"
                                                                               : NULL;

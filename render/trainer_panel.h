@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_TRAINER_PANEL_H
 #define SELDINGER_RENDER_TRAINER_PANEL_H
 
-#include "render/desk.h"
+#include "render/operator_controls.h"
 #include "render/views.h"
 #include "sim/realtime.h"
 #include "sim/score.h"
@@ -29,7 +29,7 @@ void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *tr
 void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score,
                         const RealtimeFigures *figures, const XrayControl *xray);
 // Settings of the controls and the views; to be called after drawing them.
-void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray);
+void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, Views *views, const XrayControl *xray);
 // Actual flow of the requested contrast agent, and the tool (-1: none has a lumen); to be called after trainer_panel_views.
 void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray);
 // The present grip, in a session; to be called after trainer_panel_show. Locked tools share the sum of their reactions, which is shown.

@@ -228,57 +228,57 @@ static void ticks_are_round(void **unused)
 
 // ---- the mouse
 
-typedef struct Desk {            // a panel, what it is drawn into and what came out
+typedef struct OperatorControls {            // a panel, what it is drawn into and what came out
     Panel *panel;
     GlCanvas canvas;
     WindowInput input;
     PanelState state;
     PanelActions actions;
-} Desk;
+} OperatorControls;
 
-static Desk new_desk(int width, int height)
+static OperatorControls new_controls(int width, int height)
 {
-    Desk desk = {.panel = new_panel(), .canvas = new_canvas(width, height), .input = still_input(width, height, 1), .state = some_state()};
-    draw(desk.panel, &desk.canvas, &desk.input, &desk.state);
-    return desk;
+    OperatorControls controls = {.panel = new_panel(), .canvas = new_canvas(width, height), .input = still_input(width, height, 1), .state = some_state()};
+    draw(controls.panel, &controls.canvas, &controls.input, &controls.state);
+    return controls;
 }
 
-static void end_desk(Desk *desk)
+static void end_controls(OperatorControls *controls)
 {
-    panel_destroy(desk->panel);
-    gl_canvas_destroy(&desk->canvas);
+    panel_destroy(controls->panel);
+    gl_canvas_destroy(&controls->canvas);
 }
 
-static void frame(Desk *desk)
+static void frame(OperatorControls *controls)
 {
-    panel_take_input(desk->panel, &desk->input, &desk->actions);
-    draw(desk->panel, &desk->canvas, &desk->input, &desk->state);
-    desk->input.event_count = 0;
-    desk->input.close = WINDOW_OPEN;
+    panel_take_input(controls->panel, &controls->input, &controls->actions);
+    draw(controls->panel, &controls->canvas, &controls->input, &controls->state);
+    controls->input.event_count = 0;
+    controls->input.close = WINDOW_OPEN;
 }
 
-static void add_event(Desk *desk, WindowEvent event) { desk->input.event[desk->input.event_count++] = event; }
+static void add_event(OperatorControls *controls, WindowEvent event) { controls->input.event[controls->input.event_count++] = event; }
 
-static void tap(Desk *desk, int key)
+static void tap(OperatorControls *controls, int key)
 {
-    add_event(desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = key});
-    add_event(desk, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = key});
-    frame(desk);
+    add_event(controls, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = key});
+    add_event(controls, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = key});
+    frame(controls);
 }
 
 // Moves there, presses, lets go; adds what was asked for to `seen`, which has room for all actions.
-static void click(Desk *desk, double x, double y, bool *seen)
+static void click(OperatorControls *controls, double x, double y, bool *seen)
 {
-    desk->input.mouse_x = x;
-    desk->input.mouse_y = y;
+    controls->input.mouse_x = x;
+    controls->input.mouse_y = y;
     for (int i = 0; i < 3; i++) {
-        desk->input.mouse_buttons = i < 2 ? WINDOW_MOUSE_LEFT : 0;
-        frame(desk);
+        controls->input.mouse_buttons = i < 2 ? WINDOW_MOUSE_LEFT : 0;
+        frame(controls);
         for (int action = 0; action < ACTION_COUNT; action++)
-            seen[action] = seen[action] || desk->actions.held[action] || desk->actions.pressed[action] > 0;
+            seen[action] = seen[action] || controls->actions.held[action] || controls->actions.pressed[action] > 0;
         if (i == 2)   // let go: nothing is held, but for the speed that a click latches
             for (int action = 0; action < ACTION_COUNT; action++)
-                assert_true(!desk->actions.held[action] || action == ACTION_FAST || action == ACTION_SLOW);
+                assert_true(!controls->actions.held[action] || action == ACTION_FAST || action == ACTION_SLOW);
     }
 }
 
@@ -288,33 +288,33 @@ static void every_action_has_a_button_that_works(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1024, 600);
-    PanelRect right = desk.panel->layout.right;
-    float s = (float)desk.panel->layout.scale;
+    OperatorControls controls = new_controls(1024, 600);
+    PanelRect right = controls.panel->layout.right;
+    float s = (float)controls.panel->layout.scale;
     bool seen[ACTION_COUNT] = {false};
     int dialogues = 0, helps = 0, hidden = 0, xray_sets = 0;
-    desk.state.tool_count = PANEL_TOOLS;
+    controls.state.tool_count = PANEL_TOOLS;
     for (int tab = 0; tab < 5; tab++) {
         bool ignored[ACTION_COUNT] = {false};
-        click(&desk, right.x + 10 * s + (float)(tab + 0.35) * 45 * s, right.y + 16 * s, ignored);
+        click(&controls, right.x + 10 * s + (float)(tab + 0.35) * 45 * s, right.y + 16 * s, ignored);
         char name[32];
         snprintf(name, sizeof name, "tab%d", tab);
-        keep_picture(&desk.canvas, name);
+        keep_picture(&controls.canvas, name);
         for (float y = right.y + 40 * s; y < right.y + right.height; y += 20 * s)
             for (float x = right.x + 14 * s; x < right.x + right.width - 8 * s; x += 40 * s) {
-                click(&desk, x, y, seen);
-                xray_sets += desk.actions.xray_set;
+                click(&controls, x, y, seen);
+                xray_sets += controls.actions.xray_set;
                 // what opened is closed again
-                if (panel_is_asking(desk.panel)) {
-                    dialogues |= 1 << desk.panel->dialogue;
-                    tap(&desk, WINDOW_KEY_ESCAPE);
-                    assert_false(panel_is_asking(desk.panel));
-                    assert_int_equal(desk.actions.pressed[ACTION_QUIT], 0);
+                if (panel_is_asking(controls.panel)) {
+                    dialogues |= 1 << controls.panel->dialogue;
+                    tap(&controls, WINDOW_KEY_ESCAPE);
+                    assert_false(panel_is_asking(controls.panel));
+                    assert_int_equal(controls.actions.pressed[ACTION_QUIT], 0);
                 }
-                helps += desk.panel->has_help;
-                panel_show_help(desk.panel, false);
-                hidden += !desk.panel->has_panels;
-                desk.panel->has_panels = true;
+                helps += controls.panel->has_help;
+                panel_show_help(controls.panel, false);
+                hidden += !controls.panel->has_panels;
+                controls.panel->has_panels = true;
             }
     }
     seen[ACTION_QUIT] = seen[ACTION_QUIT] || (dialogues >> DIALOGUE_QUIT & 1);
@@ -324,7 +324,7 @@ static void every_action_has_a_button_that_works(void **unused)
             fail_msg("no button does \"%s\"", key_table[action].name);
     assert_true(dialogues >> DIALOGUE_TRAINEE & 1);
     assert_true(helps > 0 && hidden > 0);
-    end_desk(&desk);
+    end_controls(&controls);
 }
 
 // ---- the tray
@@ -355,19 +355,19 @@ static void the_tray_fits_at_any_size(void **unused)
     fill_tray();
     static const struct { int width, height; double scale; } size[] = {{800, 600, 1}, {1024, 600, 1}, {1280, 720, 1}, {1920, 1080, 1}, {2560, 1440, 2}};
     for (size_t i = 0; i < sizeof size / sizeof size[0]; i++) {
-        Desk desk = new_desk(size[i].width, size[i].height);
-        desk.input.scale = size[i].scale;
-        desk.state.tray = &some_tray;
-        panel_open_tray(desk.panel, 3, 0);
-        frame(&desk);
-        frame(&desk);
+        OperatorControls controls = new_controls(size[i].width, size[i].height);
+        controls.input.scale = size[i].scale;
+        controls.state.tray = &some_tray;
+        panel_open_tray(controls.panel, 3, 0);
+        frame(&controls);
+        frame(&controls);
         char name[40];
         snprintf(name, sizeof name, "tray-%dx%d", size[i].width, size[i].height);
-        keep_picture(&desk.canvas, name);
-        if (desk.panel->tray_over > 0)
-            fail_msg("%d x %d: the tray lacks %.0f pixels", size[i].width, size[i].height, (double)desk.panel->tray_over);
+        keep_picture(&controls.canvas, name);
+        if (controls.panel->tray_over > 0)
+            fail_msg("%d x %d: the tray lacks %.0f pixels", size[i].width, size[i].height, (double)controls.panel->tray_over);
         assert_int_equal(glGetError(), GL_NO_ERROR);
-        end_desk(&desk);
+        end_controls(&controls);
     }
 }
 
@@ -377,44 +377,44 @@ static void keys_choose_shape_and_take_from_the_tray(void **unused)
     if (!context)
         skip();
     fill_tray();
-    Desk desk = new_desk(1024, 600);
-    desk.state.tray = &some_tray;
-    tap(&desk, 'X');
-    assert_int_equal(desk.actions.pressed[ACTION_EXCHANGE], 1);      // the caller opens it, or says why not
-    assert_false(panel_is_asking(desk.panel));
-    panel_open_tray(desk.panel, 3, 0);
-    tap(&desk, WINDOW_KEY_DOWN);
-    assert_true(desk.actions.tray.is_open && desk.actions.tray.device == 1 && !desk.actions.held[ACTION_PULL]);
-    tap(&desk, WINDOW_KEY_UP);
+    OperatorControls controls = new_controls(1024, 600);
+    controls.state.tray = &some_tray;
+    tap(&controls, 'X');
+    assert_int_equal(controls.actions.pressed[ACTION_EXCHANGE], 1);      // the caller opens it, or says why not
+    assert_false(panel_is_asking(controls.panel));
+    panel_open_tray(controls.panel, 3, 0);
+    tap(&controls, WINDOW_KEY_DOWN);
+    assert_true(controls.actions.tray.is_open && controls.actions.tray.device == 1 && !controls.actions.held[ACTION_PULL]);
+    tap(&controls, WINDOW_KEY_UP);
     for (int i = 0; i < 2; i++)          // in one frame
-        add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = WINDOW_KEY_DOWN});
-    frame(&desk);
-    assert_int_equal(desk.actions.tray.device, 2);
-    tap(&desk, WINDOW_KEY_UP);
-    tap(&desk, WINDOW_KEY_UP);
-    tap(&desk, WINDOW_KEY_UP);
-    assert_int_equal(desk.actions.tray.device, 0);
-    assert_false(desk.actions.tray.is_shaped);
-    double angle = desk.actions.tray.angle_deg;
-    tap(&desk, 'S');
-    tap(&desk, WINDOW_KEY_RIGHT);
-    assert_true(desk.actions.tray.is_shaped && desk.actions.tray.angle_deg == angle + 5 && desk.actions.held[ACTION_TWIST_RIGHT] == 0);
-    tap(&desk, WINDOW_KEY_ENTER);
-    assert_true(desk.actions.tray.is_taken && desk.actions.tray.is_open && desk.actions.tray.device == 0 && desk.actions.tray.is_shaped);
-    frame(&desk);
-    assert_false(desk.actions.tray.is_taken);
-    tap(&desk, WINDOW_KEY_DOWN);
-    assert_false(desk.actions.tray.is_shaped);               // the other device is as it is
-    tap(&desk, 'S');
-    frame(&desk);
-    assert_false(desk.actions.tray.is_shaped);               // and cannot be shaped
-    tap(&desk, 'X');
-    assert_false(desk.actions.tray.is_open || panel_is_asking(desk.panel));
-    panel_open_tray(desk.panel, 3, 0);
-    tap(&desk, WINDOW_KEY_ESCAPE);
-    assert_false(desk.actions.tray.is_open || panel_is_asking(desk.panel));
-    assert_int_equal(desk.actions.pressed[ACTION_QUIT], 0);
-    end_desk(&desk);
+        add_event(&controls, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = WINDOW_KEY_DOWN});
+    frame(&controls);
+    assert_int_equal(controls.actions.tray.device, 2);
+    tap(&controls, WINDOW_KEY_UP);
+    tap(&controls, WINDOW_KEY_UP);
+    tap(&controls, WINDOW_KEY_UP);
+    assert_int_equal(controls.actions.tray.device, 0);
+    assert_false(controls.actions.tray.is_shaped);
+    double angle = controls.actions.tray.angle_deg;
+    tap(&controls, 'S');
+    tap(&controls, WINDOW_KEY_RIGHT);
+    assert_true(controls.actions.tray.is_shaped && controls.actions.tray.angle_deg == angle + 5 && controls.actions.held[ACTION_TWIST_RIGHT] == 0);
+    tap(&controls, WINDOW_KEY_ENTER);
+    assert_true(controls.actions.tray.is_taken && controls.actions.tray.is_open && controls.actions.tray.device == 0 && controls.actions.tray.is_shaped);
+    frame(&controls);
+    assert_false(controls.actions.tray.is_taken);
+    tap(&controls, WINDOW_KEY_DOWN);
+    assert_false(controls.actions.tray.is_shaped);               // the other device is as it is
+    tap(&controls, 'S');
+    frame(&controls);
+    assert_false(controls.actions.tray.is_shaped);               // and cannot be shaped
+    tap(&controls, 'X');
+    assert_false(controls.actions.tray.is_open || panel_is_asking(controls.panel));
+    panel_open_tray(controls.panel, 3, 0);
+    tap(&controls, WINDOW_KEY_ESCAPE);
+    assert_false(controls.actions.tray.is_open || panel_is_asking(controls.panel));
+    assert_int_equal(controls.actions.pressed[ACTION_QUIT], 0);
+    end_controls(&controls);
 }
 
 static void the_mouse_chooses_on_the_tray(void **unused)
@@ -423,28 +423,28 @@ static void the_mouse_chooses_on_the_tray(void **unused)
     if (!context)
         skip();
     fill_tray();
-    Desk desk = new_desk(800, 600);
-    desk.state.tray = &some_tray;
-    panel_open_tray(desk.panel, 3, 0);
-    frame(&desk);
+    OperatorControls controls = new_controls(800, 600);
+    controls.state.tray = &some_tray;
+    panel_open_tray(controls.panel, 3, 0);
+    frame(&controls);
     bool chosen[3] = {false}, taken = false, shaped = false, closed = false;
     for (float y = 130; y < 480; y += 14)
         for (float x = 180; x < 700; x += 200) {
-            if (!panel_is_asking(desk.panel))
-                panel_open_tray(desk.panel, 3, 0);
-            desk.input.mouse_x = x;
-            desk.input.mouse_y = y;
+            if (!panel_is_asking(controls.panel))
+                panel_open_tray(controls.panel, 3, 0);
+            controls.input.mouse_x = x;
+            controls.input.mouse_y = y;
             for (int i = 0; i < 3; i++) {
-                desk.input.mouse_buttons = i < 2 ? WINDOW_MOUSE_LEFT : 0;
-                frame(&desk);
-                taken |= desk.actions.tray.is_taken;
-                shaped |= desk.actions.tray.is_shaped;
-                chosen[desk.actions.tray.device] = true;
-                closed |= !panel_is_asking(desk.panel);
+                controls.input.mouse_buttons = i < 2 ? WINDOW_MOUSE_LEFT : 0;
+                frame(&controls);
+                taken |= controls.actions.tray.is_taken;
+                shaped |= controls.actions.tray.is_shaped;
+                chosen[controls.actions.tray.device] = true;
+                closed |= !panel_is_asking(controls.panel);
             }
         }
     assert_true(chosen[0] && chosen[1] && chosen[2] && taken && shaped && closed);
-    end_desk(&desk);
+    end_controls(&controls);
 }
 
 static void words_do_not_lie_on_words(void **unused)
@@ -477,17 +477,17 @@ static void the_newest_message_is_seen(void **unused)
     uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
     assert_true(rgb[0] && rgb[1]);
     for (int i = 0; i < 2; i++) {
-        Desk desk = new_desk(1024, 600);
+        OperatorControls controls = new_controls(1024, 600);
         for (int k = 0; k < 30; k++) {
-            panel_message(desk.panel, 90, MARK_NONE, k < 29 || i == 0 ? "one of many" : "the newest");
-            frame(&desk);
+            panel_message(controls.panel, 90, MARK_NONE, k < 29 || i == 0 ? "one of many" : "the newest");
+            frame(&controls);
         }
-        frame(&desk);
-        frame(&desk);
-        gl_canvas_read(&desk.canvas, rgb[i]);
+        frame(&controls);
+        frame(&controls);
+        gl_canvas_read(&controls.canvas, rgb[i]);
         if (i == 1)
-            keep_picture(&desk.canvas, "log");
-        end_desk(&desk);
+            keep_picture(&controls.canvas, "log");
+        end_controls(&controls);
     }
     assert_memory_not_equal(rgb[0], rgb[1], bytes);
     free(rgb[0]);
@@ -500,33 +500,33 @@ static void a_tooltip_names_the_key(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1280, 720);
-    PanelRect right = desk.panel->layout.right;
+    OperatorControls controls = new_controls(1280, 720);
+    PanelRect right = controls.panel->layout.right;
     size_t bytes = (size_t)1280 * 720 * 3;
     uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
     assert_true(rgb[0] && rgb[1]);
-    desk.input.mouse_x = right.x + right.width / 2;
-    desk.input.mouse_y = right.y + 42 * desk.panel->layout.scale;
+    controls.input.mouse_x = right.x + right.width / 2;
+    controls.input.mouse_y = right.y + 42 * controls.panel->layout.scale;
     for (int i = 0; i < 6; i++)   // hot, but not for long enough
-        frame(&desk);
-    gl_canvas_read(&desk.canvas, rgb[0]);
+        frame(&controls);
+    gl_canvas_read(&controls.canvas, rgb[0]);
     for (int i = 0; i < 15; i++)
-        frame(&desk);
-    keep_picture(&desk.canvas, "tooltip");
-    gl_canvas_read(&desk.canvas, rgb[1]);
+        frame(&controls);
+    keep_picture(&controls.canvas, "tooltip");
+    gl_canvas_read(&controls.canvas, rgb[1]);
     assert_memory_not_equal(rgb[0], rgb[1], bytes);
-    desk.input.mouse_x = desk.input.mouse_y = -1;
+    controls.input.mouse_x = controls.input.mouse_y = -1;
     for (int i = 0; i < 5; i++)
-        frame(&desk);
-    gl_canvas_read(&desk.canvas, rgb[1]);
+        frame(&controls);
+    gl_canvas_read(&controls.canvas, rgb[1]);
     for (size_t i = 0; i < bytes; i++)   // the button is no longer hot: all else is as it was
         if (rgb[0][i] != rgb[1][i]) {
             size_t x = i / 3 % 1280, y = i / 3 / 1280;
-            assert_true((float)x >= right.x && (float)y >= right.y && (float)y < right.y + 70 * (float)desk.panel->layout.scale);
+            assert_true((float)x >= right.x && (float)y >= right.y && (float)y < right.y + 70 * (float)controls.panel->layout.scale);
         }
     free(rgb[0]);
     free(rgb[1]);
-    end_desk(&desk);
+    end_controls(&controls);
 }
 
 static void views_are_chosen_turned_and_scrolled_by_mouse(void **unused)
@@ -534,40 +534,40 @@ static void views_are_chosen_turned_and_scrolled_by_mouse(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1280, 720);
-    PanelRect main = desk.panel->layout.view_rect[VIEW_FLUOROSCOPY], inset = desk.panel->layout.view_rect[VIEW_3D];
+    OperatorControls controls = new_controls(1280, 720);
+    PanelRect main = controls.panel->layout.view_rect[VIEW_FLUOROSCOPY], inset = controls.panel->layout.view_rect[VIEW_3D];
     bool seen[ACTION_COUNT] = {false};
-    click(&desk, inset.x + inset.width / 2, inset.y + inset.height / 2, seen);
+    click(&controls, inset.x + inset.width / 2, inset.y + inset.height / 2, seen);
     for (int i = 0; i < ACTION_COUNT; i++)
         assert_int_equal(seen[i], i == ACTION_VIEW_3D);
     // a drag that begins in a view stays with it, beyond its edge too
-    desk.input.mouse_x = main.x + 0.25 * main.width;
-    desk.input.mouse_y = main.y + 0.75 * main.height;
-    desk.input.mouse_buttons = WINDOW_MOUSE_RIGHT;
-    frame(&desk);
-    assert_int_equal(desk.actions.mouse.view, VIEW_FLUOROSCOPY);
-    assert_true(fabs(desk.actions.mouse.x - 0.25) < 1e-9 && fabs(desk.actions.mouse.y - 0.25) < 1e-6);
-    assert_int_equal(desk.actions.mouse.buttons, WINDOW_MOUSE_RIGHT);
-    assert_true(desk.actions.mouse.drag_x == 0 && desk.actions.mouse.drag_y == 0);
-    desk.input.mouse_x -= 0.5 * main.height;   // out into the left column
-    desk.input.mouse_y -= 0.1 * main.height;
-    frame(&desk);
-    assert_int_equal(desk.actions.mouse.view, VIEW_FLUOROSCOPY);
-    assert_true(fabs(desk.actions.mouse.drag_x + 0.5) < 1e-6 && fabs(desk.actions.mouse.drag_y - 0.1) < 1e-6);
-    desk.input.mouse_buttons = 0;
-    frame(&desk);
-    assert_int_equal(desk.actions.mouse.view, -1);
+    controls.input.mouse_x = main.x + 0.25 * main.width;
+    controls.input.mouse_y = main.y + 0.75 * main.height;
+    controls.input.mouse_buttons = WINDOW_MOUSE_RIGHT;
+    frame(&controls);
+    assert_int_equal(controls.actions.mouse.view, VIEW_FLUOROSCOPY);
+    assert_true(fabs(controls.actions.mouse.x - 0.25) < 1e-9 && fabs(controls.actions.mouse.y - 0.25) < 1e-6);
+    assert_int_equal(controls.actions.mouse.buttons, WINDOW_MOUSE_RIGHT);
+    assert_true(controls.actions.mouse.drag_x == 0 && controls.actions.mouse.drag_y == 0);
+    controls.input.mouse_x -= 0.5 * main.height;   // out into the left column
+    controls.input.mouse_y -= 0.1 * main.height;
+    frame(&controls);
+    assert_int_equal(controls.actions.mouse.view, VIEW_FLUOROSCOPY);
+    assert_true(fabs(controls.actions.mouse.drag_x + 0.5) < 1e-6 && fabs(controls.actions.mouse.drag_y - 0.1) < 1e-6);
+    controls.input.mouse_buttons = 0;
+    frame(&controls);
+    assert_int_equal(controls.actions.mouse.view, -1);
     // a press that began on the panel never becomes a drag in a view
-    desk.input.mouse_buttons = WINDOW_MOUSE_LEFT;
-    frame(&desk);
-    desk.input.mouse_x = main.x + 0.5 * main.width;
-    frame(&desk);
-    assert_int_equal(desk.actions.mouse.buttons, 0);
-    desk.input.mouse_buttons = 0;
-    add_event(&desk, (WindowEvent){.kind = WINDOW_SCROLL_EVENT, .scroll_y = -2});
-    frame(&desk);
-    assert_true(desk.actions.mouse.view == VIEW_FLUOROSCOPY && desk.actions.mouse.scroll == -2);
-    end_desk(&desk);
+    controls.input.mouse_buttons = WINDOW_MOUSE_LEFT;
+    frame(&controls);
+    controls.input.mouse_x = main.x + 0.5 * main.width;
+    frame(&controls);
+    assert_int_equal(controls.actions.mouse.buttons, 0);
+    controls.input.mouse_buttons = 0;
+    add_event(&controls, (WindowEvent){.kind = WINDOW_SCROLL_EVENT, .scroll_y = -2});
+    frame(&controls);
+    assert_true(controls.actions.mouse.view == VIEW_FLUOROSCOPY && controls.actions.mouse.scroll == -2);
+    end_controls(&controls);
 }
 
 static void a_button_lets_go_when_the_focus_goes(void **unused)
@@ -575,18 +575,18 @@ static void a_button_lets_go_when_the_focus_goes(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1280, 720);
-    PanelRect right = desk.panel->layout.right;
-    desk.input.mouse_x = right.x + right.width / 2;
-    desk.input.mouse_y = right.y + 42 * desk.panel->layout.scale;
-    desk.input.mouse_buttons = WINDOW_MOUSE_LEFT;
-    frame(&desk);
-    frame(&desk);
-    assert_true(desk.actions.held[ACTION_PUSH]);
-    desk.input.has_focus = false;
-    frame(&desk);
-    assert_false(desk.actions.held[ACTION_PUSH]);
-    end_desk(&desk);
+    OperatorControls controls = new_controls(1280, 720);
+    PanelRect right = controls.panel->layout.right;
+    controls.input.mouse_x = right.x + right.width / 2;
+    controls.input.mouse_y = right.y + 42 * controls.panel->layout.scale;
+    controls.input.mouse_buttons = WINDOW_MOUSE_LEFT;
+    frame(&controls);
+    frame(&controls);
+    assert_true(controls.actions.held[ACTION_PUSH]);
+    controls.input.has_focus = false;
+    frame(&controls);
+    assert_false(controls.actions.held[ACTION_PUSH]);
+    end_controls(&controls);
 }
 
 static void names_are_typed_and_trimmed(void **unused)
@@ -594,26 +594,26 @@ static void names_are_typed_and_trimmed(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1024, 600);
-    tap(&desk, WINDOW_KEY_F1 + 2);
-    assert_true(panel_is_asking(desk.panel));
-    frame(&desk);
+    OperatorControls controls = new_controls(1024, 600);
+    tap(&controls, WINDOW_KEY_F1 + 2);
+    assert_true(panel_is_asking(controls.panel));
+    frame(&controls);
     static const unsigned typed[] = {' ', 'J', 0xfc, 'r', 'g', ' ', 'f', ' '};   // Jürg f
     for (size_t i = 0; i < sizeof typed / sizeof typed[0]; i++) {
-        add_event(&desk, (WindowEvent){.kind = WINDOW_TEXT_EVENT, .character = typed[i]});
+        add_event(&controls, (WindowEvent){.kind = WINDOW_TEXT_EVENT, .character = typed[i]});
         if (typed[i] == 'f')
-            add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = 'F'});
-        frame(&desk);
-        assert_false(desk.actions.held[ACTION_PEDAL]);
+            add_event(&controls, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = 'F'});
+        frame(&controls);
+        assert_false(controls.actions.held[ACTION_PEDAL]);
     }
-    keep_picture(&desk.canvas, "trainee");
-    tap(&desk, WINDOW_KEY_ENTER);
-    for (int i = 0; i < 3 && !desk.actions.trainee_set; i++)
-        frame(&desk);
-    assert_true(desk.actions.trainee_set);
-    assert_string_equal(desk.actions.trainee, "J\u00fcrg f");
-    assert_false(panel_is_asking(desk.panel));
-    end_desk(&desk);
+    keep_picture(&controls.canvas, "trainee");
+    tap(&controls, WINDOW_KEY_ENTER);
+    for (int i = 0; i < 3 && !controls.actions.trainee_set; i++)
+        frame(&controls);
+    assert_true(controls.actions.trainee_set);
+    assert_string_equal(controls.actions.trainee, "J\u00fcrg f");
+    assert_false(panel_is_asking(controls.panel));
+    end_controls(&controls);
 }
 
 static void broken_lines_are_joined(void **unused)
@@ -636,33 +636,33 @@ static void instructions_are_shown_until_followed(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1280, 720);
-    desk.state.instructions = "Bring the tip into the aneurysm.\n1. Hold the pedal.\n2. Push the wire past the bend, which lies\nabout 40 mm in.\n";
-    Panel *panel = desk.panel;
-    draw(panel, &desk.canvas, &desk.input, &desk.state);
+    OperatorControls controls = new_controls(1280, 720);
+    controls.state.instructions = "Bring the tip into the aneurysm.\n1. Hold the pedal.\n2. Push the wire past the bend, which lies\nabout 40 mm in.\n";
+    Panel *panel = controls.panel;
+    draw(panel, &controls.canvas, &controls.input, &controls.state);
     assert_true(panel->briefing_at.width == 0);   // a film: nobody is there to close it
-    frame(&desk);
+    frame(&controls);
     assert_true(panel->briefing_at.width > 0);
-    keep_picture(&desk.canvas, "briefing");
+    keep_picture(&controls.canvas, "briefing");
     // no drag begins in the view below it
-    desk.input.mouse_x = panel->briefing_at.x + panel->briefing_at.width / 2;
-    desk.input.mouse_y = panel->briefing_at.y + 4;
-    desk.input.mouse_buttons = WINDOW_MOUSE_LEFT;
-    frame(&desk);
-    assert_int_equal(desk.actions.mouse.view, -1);
-    desk.input.mouse_buttons = 0;
+    controls.input.mouse_x = panel->briefing_at.x + panel->briefing_at.width / 2;
+    controls.input.mouse_y = panel->briefing_at.y + 4;
+    controls.input.mouse_buttons = WINDOW_MOUSE_LEFT;
+    frame(&controls);
+    assert_int_equal(controls.actions.mouse.view, -1);
+    controls.input.mouse_buttons = 0;
     // following it closes it
-    add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = 'F'});
+    add_event(&controls, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = 'F'});
     for (int i = 0; i < 20; i++)
-        frame(&desk);
+        frame(&controls);
     assert_true(panel->briefing_at.width == 0);
-    tap(&desk, 'O');
+    tap(&controls, 'O');
     assert_true(panel->briefing_at.width > 0);
-    tap(&desk, WINDOW_KEY_ESCAPE);
+    tap(&controls, WINDOW_KEY_ESCAPE);
     assert_true(panel->briefing_at.width == 0 && !panel_is_asking(panel));
-    tap(&desk, WINDOW_KEY_ESCAPE);
+    tap(&controls, WINDOW_KEY_ESCAPE);
     assert_true(panel_is_asking(panel));
-    end_desk(&desk);
+    end_controls(&controls);
 }
 
 // Doing what the hints say, one after the other, ends them; each names its keys and fits its place.
@@ -672,7 +672,7 @@ static void hints_lead_on_with_use(void **unused)
     if (!context)
         skip();
     for (int tools = 1; tools <= 2; tools++) {
-        Desk desk = new_desk(1024, 600);
+        OperatorControls controls = new_controls(1024, 600);
         static const ActionId follow[] = {ACTION_PEDAL, ACTION_PUSH, ACTION_TOOL_2, ACTION_OTHER_PUSH, ACTION_MAGNIFY, ACTION_CONTRAST, ACTION_ROADMAP,
                                           ACTION_TWIST_RIGHT, ACTION_LAO, ACTION_VIEW_3D, ACTION_HELP};
         int count = sizeof follow / sizeof follow[0];
@@ -681,19 +681,19 @@ static void hints_lead_on_with_use(void **unused)
             char text[256], key[32];
             if (tools == 1 && (i == 2 || i == 3))     // of several tools
                 continue;
-            assert_int_equal(panel_current_hint(desk.panel, tools), i);
+            assert_int_equal(panel_current_hint(controls.panel, tools), i);
             panel_hint_text(i, text, sizeof text);
             assert_non_null(strstr(text, key_table_text(follow[i], key, sizeof key)));
             assert_null(strchr(text, '%'));
             assert_in_range(strlen(text), 20, 120);   // two lines
-            add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = action->key});
+            add_event(&controls, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = action->key});
             for (int k = 0; k < (action->kind == ACTION_HOLD ? 40 : 1); k++)
-                panel_take_input(desk.panel, &desk.input, &desk.actions), desk.input.event_count = 0;
-            add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = action->key});
-            frame(&desk);
+                panel_take_input(controls.panel, &controls.input, &controls.actions), controls.input.event_count = 0;
+            add_event(&controls, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = action->key});
+            frame(&controls);
         }
-        assert_int_equal(panel_current_hint(desk.panel, tools), -1);
-        end_desk(&desk);
+        assert_int_equal(panel_current_hint(controls.panel, tools), -1);
+        end_controls(&controls);
     }
 }
 
@@ -702,19 +702,19 @@ static void strange_states_draw(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(640, 400);
-    desk.state = (PanelState){.time_s = NAN, .tool_count = 1, .tool = {{.inserted_mm = INFINITY, .force_n = NAN}}, .hold_needed_s = 1, .hold_s = NAN, .warning = "x",
+    OperatorControls controls = new_controls(640, 400);
+    controls.state = (PanelState){.time_s = NAN, .tool_count = 1, .tool = {{.inserted_mm = INFINITY, .force_n = NAN}}, .hold_needed_s = 1, .hold_s = NAN, .warning = "x",
                               .warnings = ~0u, .fluoro_s = -1, .contrast_ml = NAN, .step_median_us = NAN, .real_time_factor = NAN,
                               .xray = {.lao_deg = NAN, .field_mm = NAN}, .view = VIEW_ALL};
     static const PanelFigure nameless = {0};
-    desk.state.figure_count = 1;
-    desk.state.figure = &nameless;
+    controls.state.figure_count = 1;
+    controls.state.figure = &nameless;
     for (int i = 0; i < 300; i++)
-        panel_message(desk.panel, i, (PanelMark)(i % 4), i % 2 ? "" : "%s%n a message with a sign that is no format");
-    frame(&desk);
-    frame(&desk);
+        panel_message(controls.panel, i, (PanelMark)(i % 4), i % 2 ? "" : "%s%n a message with a sign that is no format");
+    frame(&controls);
+    frame(&controls);
     assert_int_equal(glGetError(), GL_NO_ERROR);
-    end_desk(&desk);
+    end_controls(&controls);
 }
 
 // Four tools are all listed, the chosen one with its own plots; nothing of it is lost in the smallest usual window.
@@ -726,35 +726,35 @@ static void several_tools_are_listed(void **unused)
     const int size[2][2] = {{1280, 800}, {1024, 600}};
     for (int s = 0; s < 2; s++) {
         int width = size[s][0], height = size[s][1];
-        Desk desk = new_desk(width, height);
+        OperatorControls controls = new_controls(width, height);
         size_t bytes = (size_t)width * (size_t)height * 3;
         uint8_t *before = malloc(bytes), *after = malloc(bytes);
         assert_true(before && after);
         static const char *const name[4] = {"guide", "catheter", "microcatheter", "wire"};
-        desk.state.tool_count = 4;
+        controls.state.tool_count = 4;
         for (int k = 0; k < 4; k++)
-            desk.state.tool[k] = (PanelTool){.name = name[k], .what = "catheter 0.70 mm x 1500 mm, curved tip", .color = {80, 160, 220, 255}, .inserted_mm = 100 + k,
+            controls.state.tool[k] = (PanelTool){.name = name[k], .what = "catheter 0.70 mm x 1500 mm, curved tip", .color = {80, 160, 220, 255}, .inserted_mm = 100 + k,
                                              .turned_deg = 20, .force_n = 0.1 * k, .torque_n_mm = 0.02 * k, .note = k == 1 ? "let go" : NULL,
                                              .mark = k == 1 ? MARK_WARNING : MARK_NONE};
         for (int i = 0; i < 8; i++)
-            frame(&desk);
-        keep_picture(&desk.canvas, s ? "four-tools-small" : "four-tools");
-        gl_canvas_read(&desk.canvas, before);
+            frame(&controls);
+        keep_picture(&controls.canvas, s ? "four-tools-small" : "four-tools");
+        gl_canvas_read(&controls.canvas, before);
         for (int what = 0; what < 5; what++) {
-            PanelState kept = desk.state;
+            PanelState kept = controls.state;
             if (what < 4)
-                desk.state.tool[what].inserted_mm = 55.5;
+                controls.state.tool[what].inserted_mm = 55.5;
             else
-                desk.state.chosen_tool = 3;
+                controls.state.chosen_tool = 3;
             for (int i = 0; i < 3; i++)
-                frame(&desk);
-            gl_canvas_read(&desk.canvas, after);
+                frame(&controls);
+            gl_canvas_read(&controls.canvas, after);
             assert_true(memcmp(before, after, bytes) != 0);
-            desk.state = kept;
+            controls.state = kept;
         }
         free(before);
         free(after);
-        end_desk(&desk);
+        end_controls(&controls);
     }
 }
 
@@ -764,35 +764,35 @@ static void kept_windows_show_what_a_new_panel_shows(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1280, 720);
+    OperatorControls controls = new_controls(1280, 720);
     size_t bytes = (size_t)1280 * 720 * 3;
     uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
     assert_true(rgb[0] && rgb[1]);
     for (int i = 0; i < 40; i++) {   // things change, come and go
-        desk.state.view = (PanelView)(i / 10);
-        desk.state.tool[0].inserted_mm += 1;
-        desk.state.error_count = i % 3;
-        desk.state.xray.lao_deg = (float)i;
-        panel_show_help(desk.panel, i % 7 == 3);
-        frame(&desk);
+        controls.state.view = (PanelView)(i / 10);
+        controls.state.tool[0].inserted_mm += 1;
+        controls.state.error_count = i % 3;
+        controls.state.xray.lao_deg = (float)i;
+        panel_show_help(controls.panel, i % 7 == 3);
+        frame(&controls);
     }
-    desk.state.view = VIEW_FLUOROSCOPY;
+    controls.state.view = VIEW_FLUOROSCOPY;
     for (int i = 0; i < 4; i++)   // the seldom ones catch up
-        frame(&desk);
-    gl_canvas_read(&desk.canvas, rgb[0]);
+        frame(&controls);
+    gl_canvas_read(&controls.canvas, rgb[0]);
     Panel *fresh = new_panel();
-    memcpy(fresh->force, desk.panel->force, sizeof fresh->force);
-    memcpy(fresh->torque, desk.panel->torque, sizeof fresh->torque);
-    fresh->wall = desk.panel->wall;
-    fresh->is_dense = desk.panel->is_dense;
+    memcpy(fresh->force, controls.panel->force, sizeof fresh->force);
+    memcpy(fresh->torque, controls.panel->torque, sizeof fresh->torque);
+    fresh->wall = controls.panel->wall;
+    fresh->is_dense = controls.panel->is_dense;
     for (int i = 0; i < 4; i++)
-        draw(fresh, &desk.canvas, &desk.input, &desk.state);
-    gl_canvas_read(&desk.canvas, rgb[1]);
+        draw(fresh, &controls.canvas, &controls.input, &controls.state);
+    gl_canvas_read(&controls.canvas, rgb[1]);
     assert_memory_equal(rgb[0], rgb[1], bytes);
     free(rgb[0]);
     free(rgb[1]);
     panel_destroy(fresh);
-    end_desk(&desk);
+    end_controls(&controls);
 }
 
 // Process CPU, the driver's threads with it.

@@ -28,7 +28,7 @@ static double live_injected_ml[STEPS / EACH_S + 1];
 
 static Command hand_at(int64_t step) { return (Command){step < 1200 ? 12 : step < 5000 ? 0.5 : -2 + (double)(step % 700) / 100, step % 900 < 300 ? 90 : 0}; }
 
-static XrayControl desk_at(int64_t step)
+static XrayControl controls_at(int64_t step)
 {
     XrayControl xray = xray_default_control();
     xray.pedal = step % 1730 > 200 && step % 1730 < 1311;
@@ -57,7 +57,7 @@ static RecordedRun *record(TrainerScene *it, int64_t steps, bool is_watched, con
         }
         if (i == steps)
             break;
-        XrayControl xray = desk_at(i);
+        XrayControl xray = controls_at(i);
         simulator_step(simulator, hand_at(i));
         lesson_step(lesson, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL);
         assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL));
@@ -157,7 +157,7 @@ static void a_moment_is_the_same_whichever_way_it_is_come_to(void **state)
         assert_int_equal(seen->step, step);
         assert_int_equal(seen->pulses, clock.count);
         assert_true(seen->pedal_s == clock.pedal_s);
-        XrayControl xray = desk_at(step - 1);
+        XrayControl xray = controls_at(step - 1);
         assert_memory_equal(&seen->xray, &xray, sizeof xray);
         assert_true(seen->command.push_mm_s == hand_at(step - 1).push_mm_s && seen->proximal_force == run->proximal[2 * (step - 1)]);
         for (int i = 0; i < trainer.open.tree->node_count; i++)

@@ -30,7 +30,7 @@ extern char **environ;
 static const char title[] = "Seldinger window test";
 static pid_t server;
 
-typedef struct Desk {
+typedef struct OperatorControls {
     Window *window;
     Panel *panel;
     PanelState state;
@@ -38,8 +38,8 @@ typedef struct Desk {
     const WindowInput *input;
     int pressed[ACTION_COUNT];   // summed since `forget`
     int device_events;
-} Desk;
-static Desk desk;
+} OperatorControls;
+static OperatorControls controls;
 
 static double now_s(void)
 {
@@ -132,20 +132,20 @@ static int keep_driver(struct dl_phdr_info *library, size_t size, void *unused)
 
 static void frame(void)
 {
-    bool is_drawn = window_next_frame(desk.window, &desk.input);
-    panel_take_input(desk.panel, desk.input, &desk.actions);
+    bool is_drawn = window_next_frame(controls.window, &controls.input);
+    panel_take_input(controls.panel, controls.input, &controls.actions);
     for (int i = 0; i < ACTION_COUNT; i++)
-        desk.pressed[i] += desk.actions.pressed[i];
-    for (int i = 0; i < desk.input->event_count; i++)
-        desk.device_events += desk.input->event[i].kind == WINDOW_DEVICE_EVENT;
+        controls.pressed[i] += controls.actions.pressed[i];
+    for (int i = 0; i < controls.input->event_count; i++)
+        controls.device_events += controls.input->event[i].kind == WINDOW_DEVICE_EVENT;
     if (!is_drawn)
         return;
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.3f, 0.3f, 0.3f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
-    desk.state.time_s += 1.0 / 30;
-    panel_draw(desk.panel, desk.input, &desk.state, 0);
-    window_swap(desk.window);
+    controls.state.time_s += 1.0 / 30;
+    panel_draw(controls.panel, controls.input, &controls.state, 0);
+    window_swap(controls.window);
 }
 
 // Frames until it is as expected; false after 5 s.
@@ -159,31 +159,31 @@ static bool comes_to(bool (*is_so)(void))
     return false;
 }
 
-static bool pushes(void) { return desk.actions.held[ACTION_PUSH]; }
+static bool pushes(void) { return controls.actions.held[ACTION_PUSH]; }
 static bool is_still(void)
 {
     for (int i = 0; i < ACTION_COUNT; i++)
-        if (desk.actions.held[i])
+        if (controls.actions.held[i])
             return false;
     return true;
 }
-static bool pushes_fast_with_xray(void) { return pushes() && desk.actions.held[ACTION_FAST] && desk.actions.held[ACTION_PEDAL]; }
-static bool orbits(void) { return desk.actions.held[ACTION_ORBIT_UP] && !pushes(); }
-static bool asked_for_help(void) { return desk.pressed[ACTION_HELP] > 0; }
-static bool magnified(void) { return desk.pressed[ACTION_MAGNIFY] > 0; }
-static bool paused(void) { return desk.pressed[ACTION_PAUSE] > 0; }
-static bool has_focus(void) { return desk.input->has_focus; }
-static bool lost_focus(void) { return !desk.input->has_focus; }
-static bool is_resized(void) { return desk.input->width == 1024 && desk.input->height == 600; }
-static bool fills_screen(void) { return desk.input->width == 1920 && desk.input->height == 1080; }
-static bool asks(void) { return panel_is_asking(desk.panel); }
+static bool pushes_fast_with_xray(void) { return pushes() && controls.actions.held[ACTION_FAST] && controls.actions.held[ACTION_PEDAL]; }
+static bool orbits(void) { return controls.actions.held[ACTION_ORBIT_UP] && !pushes(); }
+static bool asked_for_help(void) { return controls.pressed[ACTION_HELP] > 0; }
+static bool magnified(void) { return controls.pressed[ACTION_MAGNIFY] > 0; }
+static bool paused(void) { return controls.pressed[ACTION_PAUSE] > 0; }
+static bool has_focus(void) { return controls.input->has_focus; }
+static bool lost_focus(void) { return !controls.input->has_focus; }
+static bool is_resized(void) { return controls.input->width == 1024 && controls.input->height == 600; }
+static bool fills_screen(void) { return controls.input->width == 1920 && controls.input->height == 1080; }
+static bool asks(void) { return panel_is_asking(controls.panel); }
 static bool asks_no_more(void) { return !asks(); }
-static bool quits(void) { return desk.pressed[ACTION_QUIT] > 0; }
-static bool has_name(void) { return desk.actions.trainee_set; }
-static bool scrolls_in_main_view(void) { return desk.actions.mouse.view == VIEW_FLUOROSCOPY && desk.actions.mouse.scroll > 0; }
-static bool drags_up(void) { return desk.actions.mouse.view == VIEW_FLUOROSCOPY && desk.actions.mouse.buttons && desk.actions.mouse.drag_y > 0.02; }
+static bool quits(void) { return controls.pressed[ACTION_QUIT] > 0; }
+static bool has_name(void) { return controls.actions.trainee_set; }
+static bool scrolls_in_main_view(void) { return controls.actions.mouse.view == VIEW_FLUOROSCOPY && controls.actions.mouse.scroll > 0; }
+static bool drags_up(void) { return controls.actions.mouse.view == VIEW_FLUOROSCOPY && controls.actions.mouse.buttons && controls.actions.mouse.drag_y > 0.02; }
 
-static void forget(void) { memset(desk.pressed, 0, sizeof desk.pressed); }
+static void forget(void) { memset(controls.pressed, 0, sizeof controls.pressed); }
 
 static int start_all(void **unused)
 {
@@ -193,22 +193,22 @@ static int start_all(void **unused)
         return 0;
     }
     char message[256] = "";
-    desk.window = window_create(title, 1280, 720, 30, message, sizeof message);
+    controls.window = window_create(title, 1280, 720, 30, message, sizeof message);
     dl_iterate_phdr(keep_driver, NULL);
-    desk.panel = desk.window ? panel_create(message, sizeof message) : NULL;
-    if (!desk.panel) {
+    controls.panel = controls.window ? panel_create(message, sizeof message) : NULL;
+    if (!controls.panel) {
         print_message("%s\n", message);
         return -1;
     }
-    desk.state = (PanelState){.title = "Test", .xray = xray_default_control(), .view = VIEW_FLUOROSCOPY, .real_time_factor = 1};
+    controls.state = (PanelState){.title = "Test", .xray = xray_default_control(), .view = VIEW_FLUOROSCOPY, .real_time_factor = 1};
     return comes_to(has_focus) ? 0 : -1;
 }
 
 static int end_all(void **unused)
 {
     (void)unused;
-    panel_destroy(desk.panel);
-    window_destroy(desk.window);
+    panel_destroy(controls.panel);
+    window_destroy(controls.window);
     if (server > 0) {
         kill(server, SIGTERM);
         waitpid(server, NULL, 0);
@@ -230,7 +230,7 @@ static void without_a_display_it_says_so(void **unused)
 static void keys_are_held_and_let_go(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     assert_true(comes_to(is_still));
     hand("keydown Up");
@@ -258,7 +258,7 @@ static void keys_are_held_and_let_go(void **unused)
 static void signs_and_function_keys_are_pressed_once(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     forget();
     hand("key question");
@@ -266,18 +266,18 @@ static void signs_and_function_keys_are_pressed_once(void **unused)
     hand("key F1");
     for (int i = 0; i < 5; i++)
         frame();
-    assert_int_equal(desk.pressed[ACTION_HELP], 2);
+    assert_int_equal(controls.pressed[ACTION_HELP], 2);
     hand("key plus");
     assert_true(comes_to(magnified));
-    assert_int_equal(desk.pressed[ACTION_MAGNIFY], 1);
+    assert_int_equal(controls.pressed[ACTION_MAGNIFY], 1);
 }
 
 static void buttons_work_by_mouse(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
-    PanelLayout layout = panel_layout(desk.input->width, desk.input->height, desk.input->scale, VIEW_FLUOROSCOPY, true);
+    PanelLayout layout = panel_layout(controls.input->width, controls.input->height, controls.input->scale, VIEW_FLUOROSCOPY, true);
     forget();
     char line[128];
     // Pause is the first of three buttons at the right of the bar above
@@ -287,7 +287,7 @@ static void buttons_work_by_mouse(void **unused)
     frame();
     hand("click 1");
     assert_true(comes_to(paused));
-    assert_int_equal(desk.pressed[ACTION_PAUSE], 1);
+    assert_int_equal(controls.pressed[ACTION_PAUSE], 1);
     // the tool tab's first button pushes while the mouse is down
     snprintf(line, sizeof line, "mousemove %d %d", (int)(layout.right.x + 0.5 * layout.right.width), (int)(layout.right.y + 42 * layout.scale));
     hand(line);
@@ -306,7 +306,7 @@ static void buttons_work_by_mouse(void **unused)
 static void the_mouse_turns_and_scrolls_in_a_view(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     hand("mousemove 600 400");
     frame();
@@ -324,7 +324,7 @@ static void the_mouse_turns_and_scrolls_in_a_view(void **unused)
 static void loss_of_focus_stops_the_tool(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     hand("keydown Up keydown f");
     assert_true(comes_to(pushes));
@@ -351,7 +351,7 @@ static void loss_of_focus_stops_the_tool(void **unused)
 static void a_name_is_typed(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     forget();
     hand("key F3");
@@ -365,7 +365,7 @@ static void a_name_is_typed(void **unused)
     }
     hand("key Return");
     assert_true(comes_to(has_name));
-    assert_string_equal(desk.actions.trainee, "Eve f");
+    assert_string_equal(controls.actions.trainee, "Eve f");
     assert_true(comes_to(asks_no_more));
 }
 
@@ -376,15 +376,15 @@ static void print_cost(void)
     enum { FRAMES = 60 };
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[0]);
     for (int i = 0; i < FRAMES; i++) {
-        desk.state.time_s += 1.0 / 30;
-        desk.state.tool[0].force_n = 0.06 + 0.02 * sin(0.3 * i);
-        panel_draw(desk.panel, desk.input, &desk.state, 0);
+        controls.state.time_s += 1.0 / 30;
+        controls.state.tool[0].force_n = 0.06 + 0.02 * sin(0.3 * i);
+        panel_draw(controls.panel, controls.input, &controls.state, 0);
         glFinish();
     }
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[1]);
     double ms = 1e3 * (double)(t[1].tv_sec - t[0].tv_sec) + 1e-6 * (double)(t[1].tv_nsec - t[0].tv_nsec);
-    print_message("panel alone in a window of %dx%d: %.2f ms CPU a frame (%s)\n", desk.input->width, desk.input->height, ms / FRAMES,
-                  window_renderer(desk.window));
+    print_message("panel alone in a window of %dx%d: %.2f ms CPU a frame (%s)\n", controls.input->width, controls.input->height, ms / FRAMES,
+                  window_renderer(controls.window));
 }
 
 static void draw_fresh(unsigned framebuffer, const WindowInput *input)
@@ -396,7 +396,7 @@ static void draw_fresh(unsigned framebuffer, const WindowInput *input)
         glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
         glClearColor(0.2f, 0.4f, 0.6f, 1);
         glClear(GL_COLOR_BUFFER_BIT);
-        panel_draw(panel, input, &desk.state, framebuffer);
+        panel_draw(panel, input, &controls.state, framebuffer);
     }
     panel_destroy(panel);
 }
@@ -405,9 +405,9 @@ static void draw_fresh(unsigned framebuffer, const WindowInput *input)
 static void the_window_shows_what_is_drawn_off_screen(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
-    WindowInput input = {.width = desk.input->width, .height = desk.input->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
+    WindowInput input = {.width = controls.input->width, .height = controls.input->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
     size_t bytes = (size_t)input.width * (size_t)input.height * 3;
     uint8_t *window = malloc(bytes), *canvas = malloc(bytes);
     assert_true(window && canvas);
@@ -431,17 +431,17 @@ static void the_window_shows_what_is_drawn_off_screen(void **unused)
 static void it_is_resized_and_fills_the_screen(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     print_cost();
     hand("search --name Seldinger.window.test windowsize --sync 1024 600");
     assert_true(comes_to(is_resized));
     assert_int_equal(glGetError(), GL_NO_ERROR);
-    window_set_full_screen(desk.window, true);
+    window_set_full_screen(controls.window, true);
     assert_true(comes_to(fills_screen));
-    assert_true(window_is_full_screen(desk.window));
+    assert_true(window_is_full_screen(controls.window));
     print_cost();
-    window_set_full_screen(desk.window, false);
+    window_set_full_screen(controls.window, false);
     assert_true(comes_to(is_resized));
     assert_int_equal(glGetError(), GL_NO_ERROR);
 }
@@ -449,7 +449,7 @@ static void it_is_resized_and_fills_the_screen(void **unused)
 static void quitting_is_asked_back_and_a_signal_is_not(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     forget();
     hand("keydown Up");
@@ -462,13 +462,13 @@ static void quitting_is_asked_back_and_a_signal_is_not(void **unused)
     hand("keyup Up");
     hand("key Escape");
     assert_true(comes_to(asks));
-    assert_int_equal(desk.pressed[ACTION_QUIT], 0);
+    assert_int_equal(controls.pressed[ACTION_QUIT], 0);
     hand("key Return");
     assert_true(comes_to(quits));
     forget();
     raise(SIGTERM);
     frame();
-    assert_int_equal(desk.input->close, WINDOW_ENDED);
+    assert_int_equal(controls.input->close, WINDOW_ENDED);
     assert_true(quits());
     assert_false(asks());
 }
@@ -477,38 +477,38 @@ static void quitting_is_asked_back_and_a_signal_is_not(void **unused)
 static void frames_are_paced(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
-    window_next_frame(desk.window, &desk.input);
+    window_next_frame(controls.window, &controls.input);
     double begin = now_s();
     for (int i = 0; i < 12; i++)
-        window_next_frame(desk.window, &desk.input);
+        window_next_frame(controls.window, &controls.input);
     assert_true(now_s() - begin > 11.0 / 30);
-    int64_t skipped = window_frames_skipped(desk.window);
+    int64_t skipped = window_frames_skipped(controls.window);
     const struct timespec pause = {0, 250000000};
     nanosleep(&pause, NULL);
-    window_next_frame(desk.window, &desk.input);   // at once
-    assert_true(window_frames_skipped(desk.window) - skipped >= 6);
+    window_next_frame(controls.window, &controls.input);   // at once
+    assert_true(window_frames_skipped(controls.window) - skipped >= 6);
     begin = now_s();
     for (int i = 0; i < 6; i++)
-        window_next_frame(desk.window, &desk.input);
+        window_next_frame(controls.window, &controls.input);
     assert_true(now_s() - begin > 4.0 / 30);
 }
 
 static void no_joystick_is_no_joystick(void **unused)
 {
     (void)unused;
-    if (!desk.panel)
+    if (!controls.panel)
         skip();
     WindowGamepad gamepad;
-    assert_false(window_gamepad(desk.window, -1, &gamepad));
-    assert_false(window_gamepad(desk.window, WINDOW_GAMEPADS, &gamepad));
-    assert_string_equal(window_gamepad_name(desk.window, -1), "");
+    assert_false(window_gamepad(controls.window, -1, &gamepad));
+    assert_false(window_gamepad(controls.window, WINDOW_GAMEPADS, &gamepad));
+    assert_string_equal(window_gamepad_name(controls.window, -1), "");
     for (int i = 0; i < WINDOW_GAMEPADS; i++)
-        if (window_gamepad(desk.window, i, &gamepad)) {
+        if (window_gamepad(controls.window, i, &gamepad)) {
             assert_in_range(gamepad.axis_count, 0, WINDOW_AXES);
             assert_in_range(gamepad.button_count, 0, WINDOW_BUTTONS);
-            assert_true(desk.device_events > 0);
+            assert_true(controls.device_events > 0);
         }
 }
 

@@ -1,6 +1,6 @@
 // The operator's controls: how keys, buttons and mouse change the tool's speed, the X-ray system and the views. No window, no GL, no clock.
-#ifndef SELDINGER_RENDER_DESK_H
-#define SELDINGER_RENDER_DESK_H
+#ifndef SELDINGER_RENDER_OPERATOR_CONTROLS_H
+#define SELDINGER_RENDER_OPERATOR_CONTROLS_H
 
 #include "input/input.h"
 #include "render/c_arm.h"
@@ -8,8 +8,8 @@
 #include "render/vessel_scene.h"
 #include "sim/hand_grip.h"
 
-typedef struct Desk {
-    XrayControl xray;            // pedal and contrast of keys and panel; buttons of input devices are added by desk_xray
+typedef struct OperatorControls {
+    XrayControl xray;            // pedal and contrast of keys and panel; buttons of input devices are added by controls_xray
     PatientAxes patient;         // in the model's frame
     bool pedal_latched;
     PanelView view;
@@ -18,18 +18,18 @@ typedef struct Desk {
     double push_mm_s, twist_deg_s;   // of the keys at ordinary speed, default 10 and 120
     int tool_count;
     HandGrip grip;               // the selected tool, and which are locked or released
-} Desk;
+} OperatorControls;
 
 // Sets the isocentre to the middle of `points`, and the field around them.
-Desk desk_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
+OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
 
 // One frame of `seconds`: applies held and pressed actions. `layout`: positions of the views for the mouse.
-void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds);
+void controls_obey(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds);
 // The speeds that held keys request of the selected tool and of its partner (0 if there is none): fast is 3 times, slow a fifth of the ordinary
 // speed.
-Command desk_command(const Desk *desk, const PanelActions *actions);
-Command desk_partner_command(const Desk *desk, const PanelActions *actions);
+Command controls_command(const OperatorControls *controls, const PanelActions *actions);
+Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions);
 // The controls including input devices (HAND_ bits) and held keys: pedal, contrast through the selected tool.
-XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned hand_buttons);
+XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons);
 
 #endif

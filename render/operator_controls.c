@@ -1,4 +1,4 @@
-#include "render/desk.h"
+#include "render/operator_controls.h"
 
 // Speeds while a key is held.
 static const double arm_deg_s = 25, table_fields_s = 0.4, blade_s = 0.5, orbit_px_s = 220, section_mm_s = 15;
@@ -7,9 +7,9 @@ static const double field_step = 1.25;
 
 static float clamped(double value, double least, double most) { return (float)fmax(least, fmin(most, value)); }
 
-Desk desk_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point)
+OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point)
 {
-    Desk desk = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .contrast_ml_s = 3, .view = VIEW_FLUOROSCOPY,
+    OperatorControls controls = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .contrast_ml_s = 3, .view = VIEW_FLUOROSCOPY,
                  .look = vessel_scene_default_look(scene), .patient = patient_axes_lps(), .tool_count = tool_count};
     Vec3 low = vec3(0, 0, 0), high = low;
     for (int i = 0; i < count; i++)
@@ -19,10 +19,10 @@ Desk desk_create(const VesselScene *scene, int tool_count, int count, const Vec3
             (&high.x)[k] = i ? fmax((&high.x)[k], x) : x;
         }
     for (int k = 0; k < 3; k++)
-        desk.xray.table_mm[k] = (float)(((&low.x)[k] + (&high.x)[k]) / 2);
+        controls.xray.table_mm[k] = (float)(((&low.x)[k] + (&high.x)[k]) / 2);
     // the largest extent with a margin: whichever way the C-arm turns it is in the field
-    desk.xray.field_mm = clamped(1.15 * vec3_distance(low, high), 40, 400);
-    return desk;
+    controls.xray.field_mm = clamped(1.15 * vec3_distance(low, high), 40, 400);
+    return controls;
 }
 
 static double held(const PanelActions *actions, ActionId more, ActionId less) { return (double)actions->held[more] - (double)actions->held[less]; }
@@ -55,9 +55,9 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
         xray->collimator[i] = clamped((double)xray->collimator[i] + (i < 2 ? sides : ends), 0, 0.95);
 }
 
-static void obey_xray(Desk *desk, const PanelActions *actions)
+static void obey_xray(OperatorControls *controls, const PanelActions *actions)
 {
-    XrayControl *xray = &desk->xray;
+    XrayControl *xray = &controls->xray;
     for (int i = 0; i < actions->pressed[ACTION_MAGNIFY]; i++)
         xray->field_mm = clamped((double)xray->field_mm / field_step, 40, 400);
     for (int i = 0; i < actions->pressed[ACTION_DEMAGNIFY]; i++)
@@ -69,7 +69,7 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
         xray->pulses_s = xray->pulses_s >= pulse_rates[3] ? pulse_rates[0] : pulse_rates[next];
     }
     if (actions->pressed[ACTION_PEDAL_LATCH] & 1)
-        desk->pedal_latched = !desk->pedal_latched;
+        controls->pedal_latched = !controls->pedal_latched;
     if (actions->pressed[ACTION_DSA] & 1) {
         xray->mode = xray->mode == XRAY_DSA ? XRAY_LIVE : XRAY_DSA;
         xray->mask += xray->mode == XRAY_DSA;   // subtraction starts with a new mask
@@ -81,7 +81,7 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
     xray->mask += (float)actions->pressed[ACTION_MASK];
 }
 
-static void obey_mouse(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout)
+static void obey_mouse(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout)
 {
     const PanelMouse *mouse = &actions->mouse;
     if (mouse->view < 0 || mouse->view >= VIEW_COUNT)
@@ -89,13 +89,13 @@ static void obey_mouse(Desk *desk, const VesselScene *scene, const PanelActions 
     const ViewPort *port = &layout->view[mouse->view];
     double dx = mouse->drag_x * port->height, dy = -mouse->drag_y * port->height;
     if (mouse->view == VIEW_3D) {
-        FreeCamera *camera = &desk->look.camera;
+        FreeCamera *camera = &controls->look.camera;
         if (mouse->buttons & WINDOW_MOUSE_LEFT)
             free_camera_orbit(camera, dx, dy);
         else if (mouse->buttons && (mouse->drag_x != 0 || mouse->drag_y != 0)) {
-            if (desk->look.follow_tip)
+            if (controls->look.follow_tip)
                 *camera = vessel_scene_camera(scene);   // continues from the present view
-            desk->look.follow_tip = false;
+            controls->look.follow_tip = false;
             free_camera_pan(camera, dx, dy, port->width, port->height);
         }
         if (mouse->scroll != 0)
@@ -103,21 +103,21 @@ static void obey_mouse(Desk *desk, const VesselScene *scene, const PanelActions 
     } else if (mouse->view == VIEW_FLUOROSCOPY) {
         // dragging turns the C-arm as if holding the detector
         if (mouse->buttons & WINDOW_MOUSE_LEFT) {
-            desk->xray.lao_deg = clamped((double)desk->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
-            desk->xray.cra_deg = clamped((double)desk->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
+            controls->xray.lao_deg = clamped((double)controls->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
+            controls->xray.cra_deg = clamped((double)controls->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
         }
         if (mouse->scroll != 0)
-            desk->xray.field_mm = clamped((double)desk->xray.field_mm * pow(field_step, -mouse->scroll / 2), 40, 400);
+            controls->xray.field_mm = clamped((double)controls->xray.field_mm * pow(field_step, -mouse->scroll / 2), 40, 400);
     }
 }
 
-static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
+static void obey_views(OperatorControls *controls, const PanelActions *actions, double seconds)
 {
     static const ActionId view[] = {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL};
-    VesselSceneLook *look = &desk->look;
+    VesselSceneLook *look = &controls->look;
     for (int i = 0; i < 4; i++)
         if (actions->pressed[view[i]])
-            desk->view = (PanelView)i;
+            controls->view = (PanelView)i;
     if (actions->pressed[ACTION_CAMERA_RESET])
         free_camera_reset(&look->camera);
     look->follow_tip ^= actions->pressed[ACTION_CAMERA_FOLLOW] & 1;
@@ -132,53 +132,53 @@ static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
 }
 
 // The last selection of a frame counts; other presses apply to that tool.
-static void obey_grip(Desk *desk, const PanelActions *actions)
+static void obey_grip(OperatorControls *controls, const PanelActions *actions)
 {
-    for (int k = 0; k < desk->tool_count; k++)
+    for (int k = 0; k < controls->tool_count; k++)
         if (actions->pressed[ACTION_TOOL_1 + k])
-            hand_grip_choose(&desk->grip, desk->tool_count, k);
+            hand_grip_choose(&controls->grip, controls->tool_count, k);
     if (actions->pressed[ACTION_LOCK] & 1)
-        hand_grip_lock(&desk->grip, desk->tool_count);
+        hand_grip_lock(&controls->grip, controls->tool_count);
     if (actions->pressed[ACTION_LET_GO] & 1)
-        hand_grip_release(&desk->grip);
+        hand_grip_release(&controls->grip);
 }
 
-void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
+void controls_obey(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
 {
     // first: sliders hold all controls as shown, and keys are applied on top
     if (actions->xray_set)
-        obey_sliders(&desk->xray, actions);
-    obey_arm(&desk->xray, &desk->patient, actions, seconds);
-    obey_xray(desk, actions);
-    obey_grip(desk, actions);
-    obey_views(desk, actions, seconds);
-    obey_mouse(desk, scene, actions, layout);
+        obey_sliders(&controls->xray, actions);
+    obey_arm(&controls->xray, &controls->patient, actions, seconds);
+    obey_xray(controls, actions);
+    obey_grip(controls, actions);
+    obey_views(controls, actions, seconds);
+    obey_mouse(controls, scene, actions, layout);
 }
 
-static Command command_by(const Desk *desk, const PanelActions *actions, ActionId push, ActionId pull, ActionId left, ActionId right)
+static Command command_by(const OperatorControls *controls, const PanelActions *actions, ActionId push, ActionId pull, ActionId left, ActionId right)
 {
     if (actions->held[ACTION_STOP])
         return (Command){0, 0};
     double speed = actions->held[ACTION_FAST] ? 3 : actions->held[ACTION_SLOW] ? 0.2 : 1;
-    return (Command){speed * desk->push_mm_s * held(actions, push, pull), speed * desk->twist_deg_s * held(actions, right, left)};
+    return (Command){speed * controls->push_mm_s * held(actions, push, pull), speed * controls->twist_deg_s * held(actions, right, left)};
 }
 
-Command desk_command(const Desk *desk, const PanelActions *actions)
+Command controls_command(const OperatorControls *controls, const PanelActions *actions)
 {
-    return command_by(desk, actions, ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT);
+    return command_by(controls, actions, ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT);
 }
 
-Command desk_partner_command(const Desk *desk, const PanelActions *actions)
+Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions)
 {
-    return desk->tool_count < 2 ? (Command){0, 0}
-                                : command_by(desk, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
+    return controls->tool_count < 2 ? (Command){0, 0}
+                                : command_by(controls, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
 }
 
-XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned hand_buttons)
+XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons)
 {
-    XrayControl xray = desk->xray;
-    xray.pedal = desk->pedal_latched || actions->held[ACTION_PEDAL] || (hand_buttons & HAND_PEDAL);
-    xray.contrast_ml_s = actions->held[ACTION_CONTRAST] || (hand_buttons & HAND_CONTRAST) ? (float)desk->contrast_ml_s : 0;
-    xray.contrast_tool = (float)(desk->grip.chosen + 1);
+    XrayControl xray = controls->xray;
+    xray.pedal = controls->pedal_latched || actions->held[ACTION_PEDAL] || (hand_buttons & HAND_PEDAL);
+    xray.contrast_ml_s = actions->held[ACTION_CONTRAST] || (hand_buttons & HAND_CONTRAST) ? (float)controls->contrast_ml_s : 0;
+    xray.contrast_tool = (float)(controls->grip.chosen + 1);
     return xray;
 }
