@@ -338,7 +338,7 @@ static void read_serial(YamlValue value, DeviceMap *map)
         YamlValue name = yaml_item(counts, i);
         copy_name(name, out->count[i], sizeof out->count[i]);
         if (strpbrk(out->count[i], "+-0123456789 \t"))
-            yaml_fault(name, "'%s' stands before a number: letters without digits, signs and spaces", out->count[i]);
+            yaml_fault(name, "'%s' precedes a number; expected letters without digits, signs and spaces", out->count[i]);
         if (i && !strcmp(out->count[0], out->count[1]))
             yaml_fault(name, "'%s' stands twice", out->count[1]);
     }
@@ -397,7 +397,7 @@ DeviceMap *device_map_parse(const char *text, size_t length, const char *file, F
         snprintf(map->file, sizeof map->file, "%s", file);
         read_map(reader, map);
     } else {
-        faults_add(faults, file, 0, 0, "no memory for the device map");
+        faults_add(faults, file, 0, 0, "not enough memory for the device map");
     }
     yaml_reader_close(reader);
     if (faults->count > before) {

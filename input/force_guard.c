@@ -17,7 +17,7 @@ static const char *why_zero(ForceGuard *guard, const MapForce *map, const double
     if (paused)
         return "paused";
     if (now_us - guard->step_grew_us >= 1000 * (int64_t)map->stall_ms)
-        return "the simulation stands";
+        return "the simulation stalls";
     if (map->quiet_ms > 0 && now_us - report_us >= 1000 * (int64_t)map->quiet_ms)
         return "the device is silent";
     if (!isfinite(wanted[0]) || !isfinite(wanted[1]))

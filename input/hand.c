@@ -360,7 +360,7 @@ Hands *hands_open(const HandsOptions *options, Faults *faults)
         hands->shared.transport = *transport;
     hands->has_scanner = transport && copy_maps(hands, options) && start_scanner(hands);
     if (!hands->has_scanner) {
-        faults_add(faults, "devices", 0, 0, "%s", transport ? "no memory or no thread to look for them" : "hidapi cannot be started");
+        faults_add(faults, "devices", 0, 0, "%s", transport ? "not enough memory or no thread to look for them" : "hidapi cannot be started");
         hands_close(hands);
         return NULL;
     }

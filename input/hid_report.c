@@ -390,7 +390,7 @@ HidDescriptor *hid_descriptor_parse(const uint8_t *bytes, size_t length, const c
     Reading *reading = calloc(1, sizeof *reading);
     HidDescriptor *out = calloc(1, sizeof *out);
     if (!reading || !out) {
-        faults_add(faults, name, 0, 0, "no memory for the report descriptor");
+        faults_add(faults, name, 0, 0, "not enough memory for the report descriptor");
         free(reading);
         free(out);
         return NULL;

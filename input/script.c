@@ -175,7 +175,7 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
     if (script)
         script->row = calloc((size_t)table->row_count + 1, sizeof *script->row);
     if (!script || !script->row)
-        faults_add(faults, file, 0, 0, "no memory for its rows");
+        faults_add(faults, file, 0, 0, "not enough memory for its rows");
     else if (table->row_count == 0)
         faults_add(faults, file, 1, 1, "has no row; expected at least one '%s' (the last row's time ends the script)", columns.header);
     else

@@ -29,10 +29,10 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "take the third tool"},
     {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "take the fourth tool"},
     {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock", "lock the pair (tool and next inside, or around the last): they move as one"},
-    {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Let go", "let the tool go: only its valve holds it; again: take it"},
+    {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Release", "release the tool: only its valve holds it; again: hold it"},
     {ACTION_EXCHANGE, GROUP_TOOL, ACTION_PRESS, K('X'), "Exchange", "open the tray: another device for the tool, a tip to shape; again: close"},
 
-    {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
+    {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; the last image stays on release"},
     {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},
     {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent through the chosen tool; only X-ray shows it"},
     {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('T'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
@@ -78,7 +78,7 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_CAMERA_FARTHER, GROUP_VIEW, ACTION_HOLD, KEY(PAGE_DOWN), "Farther", "3D: camera farther while held; or the mouse wheel in the view"},
 
     {ACTION_PAUSE, GROUP_SESSION, ACTION_PRESS, K('P'), "Pause", "stop the simulation's time; again to go on"},
-    {ACTION_RESTART, GROUP_SESSION, ACTION_PRESS, F(4), "Restart", "begin the exercise anew (asks first)"},
+    {ACTION_RESTART, GROUP_SESSION, ACTION_PRESS, F(4), "Restart", "restart the exercise (asks first)"},
     {ACTION_BOOKMARK, GROUP_SESSION, ACTION_PRESS, K('B'), "Bookmark", "mark this moment in the recording, to come back to"},
     {ACTION_SAVE, GROUP_SESSION, ACTION_PRESS, F(5), "Save session", "save recording and score so far"},
     {ACTION_TRAINEE, GROUP_SESSION, ACTION_PRESS, F(3), "Trainee", "enter the trainee's name for the report"},

@@ -118,7 +118,7 @@ void panel_draw_dialogue(Panel *panel, const WindowInput *input)
     static const PanelQuestion own[] = {
         [DIALOGUE_QUIT] = {"End the session?", "The session is saved as it is now.", "End", "Go on"},
         [DIALOGUE_RESTART] = {"Begin anew?", "The exercise starts again from the beginning; this attempt is kept in the recording.", "Begin anew", "Go on"},
-        [DIALOGUE_TRAINEE] = {"Who is practising?", "The name stands in the report, and earlier sessions of the same name are compared.", "Take", "Leave it"}};
+        [DIALOGUE_TRAINEE] = {"Who is practising?", "The name is shown in the report, which compares earlier sessions of the same name.", "Take", "Leave it"}};
     const PanelQuestion *question = panel->dialogue == DIALOGUE_QUESTION ? &panel->question : &own[panel->dialogue];
     Gui *gui = panel->gui;
     float s = gui_scale(gui), width = floorf(fminf(420 * s, (float)input->width - 20 * s));

@@ -226,7 +226,7 @@ static void draw_bottom(Panel *panel, const PanelState *state)
         panel_hint_text(hint, text, sizeof text);
         if (state->is_finished) {
             char restart[16], quit[16];
-            snprintf(text, sizeof text, "The exercise is over. %s begins it anew, %s ends the session; its report compares it with earlier ones.",
+            snprintf(text, sizeof text, "The exercise is over. %s restarts it, %s ends the session; its report compares it with earlier ones.",
                      key_table_text(ACTION_RESTART, restart, sizeof restart), key_table_text(ACTION_QUIT, quit, sizeof quit));
         }
         gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, text);

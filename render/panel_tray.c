@@ -107,7 +107,7 @@ static void draw_sliders(Panel *panel)
     static const struct { const char *id, *format, *tip; float least, most; } slider[] = {
         {"tip length", "bend %.0f mm long", "from the tip back to where the bend begins", 1, 80},
         {"tip angle", "keeps %.0f\u00b0", "the angle that stays when the core has sprung back; keys: Left, Right", 5, 330},
-        {"tip mandrel", "mandrel R %.1f mm", "radius of what the tip is bent round: the thinner, the tighter the bend that stays", 0.3f, 10}};
+        {"tip mandrel", "mandrel R %.1f mm", "radius of the mandrel for bending the tip: the thinner, the tighter the final bend", 0.3f, 10}};
     Gui *gui = panel->gui;
     float gap = floorf(4 * gui_scale(gui)), width = floorf((gui_width(gui) - 2 * gap) / 3);
     for (int i = 0; i < 3; i++) {
@@ -141,7 +141,7 @@ static void draw_device(Panel *panel, const PanelTray *tray, GuiRect at)
     if (note[0])
         gui_text_wrapped(gui, GUI_NORMAL, shown->is_in ? gui_colors.dim : gui_colors.warning, note);
     float half = floorf((gui_width(gui) - gap) / 2);
-    if (gui_button(gui, "put in", panel->tray.is_shaped ? "Shape and put in" : "Put in", "Enter", half, false).pressed)
+    if (gui_button(gui, "put in", panel->tray.is_shaped ? "Shape and insert" : "Put in", "Enter", half, false).pressed)
         panel->answer = 1;
     gui_beside(gui, gap);
     if (gui_button(gui, "close tray", "Close", "Esc", half, false).pressed)

@@ -91,7 +91,7 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
 {
     static const struct { unsigned bit; const char *text; } warning[] = {
         {WARN_OUTSIDE, "The tool is outside the vessel: forces are not to be trusted"},
-        {WARN_STALLED, "The simulation stands still"},
+        {WARN_STALLED, "The simulation has stopped"},
         {WARN_DEVICE_LOST, "A device is lost: the tool stands still until it is back"},
         {WARN_NOT_CONVERGED, "Contact forces did not converge in the last step"},
         {WARN_SLOW, "Simulation slower than real time"},

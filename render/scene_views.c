@@ -86,7 +86,7 @@ Views *scene_views_create(Scene *scene, OpenVessel *open, OperatorControls *cont
         pose_take(pose, simulator, &(ToolCommands){0}, &xray);
         views = create(scene, open, volume, pose, controls, note, capacity, faults);
     } else if (faults->count == before) {
-        faults_add(faults, scene->path, 0, 0, "cannot be shown: no memory");
+        faults_add(faults, scene->path, 0, 0, "cannot be shown: out of memory");
     }
     pose_free(pose);
     simulator_destroy(simulator);

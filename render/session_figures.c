@@ -355,7 +355,7 @@ void session_path_figure(const SessionPage *page)
     double bar = page_tick_step(VIEW_WIDTH / map.mm, 5), foot = map.height + 44, end_s = run->time_s[run->step_count - 1];
     fprintf(out,
             "<figure id=\"figure-path\"><svg role=\"img\" aria-labelledby=\"path-t path-d\" viewBox=\"0 0 %d %.0f\" width=\"%d\" height=\"%.0f\">\n"
-            "<title id=\"path-t\">Path of the tip over the vessel</title><desc id=\"path-d\">The way of the tool's tip in %.1f s, seen in %s, over the "
+            "<title id=\"path-t\">Path of the tip over the vessel</title><desc id=\"path-d\">The path of the tool's tip in %.1f s, seen in %s, over the "
             "vessel's silhouette, with target and errors.</desc>\n<svg class=\"view\" width=\"%d\" height=\"%.0f\">\n",
             VIEW_WIDTH, foot, VIEW_WIDTH, foot, end_s, map.label, VIEW_WIDTH, map.height);
     if (page->tree)
@@ -375,7 +375,7 @@ void session_path_figure(const SessionPage *page)
             "x=\"12\" y=\"16\">%s</text>\n</svg>\n<figcaption>The tip's path by time, the tool at the end as a thin line, the target as a ring, the start as a "
             "dot, errors by their letters; the C-arm as it stood for most of the fluoroscopy.%s</figcaption></figure>\n",
             VIEW_WIDTH - 238, map.height + 22, VIEW_WIDTH - 46, map.height + 22, end_s, map.label,
-            page->tree ? "" : " The vessel is not drawn: it is no tree, or was not found.");
+            page->tree ? "" : " The vessel is not drawn: it is not a tree, or was not found.");
 }
 
 // --- earlier sessions ---

@@ -20,8 +20,8 @@ static const char own_style[] =
     "@media print{body{font-size:10pt}section{break-inside:auto}figure{max-width:100%}}\n";
 
 static const char *const part_words[PART_COUNT] = {"Time",           "Fluoroscopy time",   "Contrast agent",
-                                                   "Way of the tip", "Largest wall force", "Wall force over time"};
-static const char *const part_unit[PART_COUNT] = {"s", "s", "ml", "times the straight way", "N", "N s"};
+                                                   "Path of the tip", "Largest wall force", "Wall force over time"};
+static const char *const part_unit[PART_COUNT] = {"s", "s", "ml", "times the straight distance", "N", "N s"};
 
 static void figures_of(const ScoreFigures *f, double figure[PART_COUNT])
 {
@@ -88,7 +88,7 @@ static void print_parts(const SessionPage *page)
     if (f->state == SCORE_REACHED)
         fprintf(out, "in full since the target was held");
     else
-        fprintf(out, "times half of the part of the way that was covered (%.0f %%), since the target was not held",
+        fprintf(out, "times half of the share of the distance that was covered (%.0f %%), since the target was not held",
                 f->way_mm > 0 ? 100 * fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0);
     if (e && f->error_total > 0)
         fprintf(out, "; less %g points for each of %d error%s", e->error_points, f->error_total, f->error_total == 1 ? "" : "s");
@@ -100,7 +100,7 @@ static void print_figures(const SessionPage *page)
     FILE *out = page->out;
     const ScoreFigures *f = &page->session->figures;
     fprintf(out,
-            "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Way of the tip</dt><dd>%.0f mm; straight way to the target %.0f mm; efficiency %.0f %%</dd>\n"
+            "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Path of the tip</dt><dd>%.0f mm; straight distance to the target %.0f mm; efficiency %.0f %%</dd>\n"
             "<dt>%s</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
             "N (mean over 20 ms)</dd>\n",
             f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n, f->wall_impulse_n_s, f->tip_force_peak_n);
@@ -108,7 +108,7 @@ static void print_figures(const SessionPage *page)
         fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
                 (long long)f->pulses, f->dose_area_cm2, f->contrast_ml);
     else
-        fprintf(out, "<dt>X-rays</dt><dd>nobody watched: a run without a screen</dd>\n");
+        fprintf(out, "<dt>X-rays</dt><dd>none: a run without a screen</dd>\n");
     fprintf(out, "</dl></section>\n");
 }
 
@@ -182,7 +182,7 @@ static void print_earlier(const SessionPage *page)
     session_trend_figure(page);
     fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">No.</th><th scope=\"col\" class=\"words\">Date</th><th "
                  "scope=\"col\">Points</th><th scope=\"col\" class=\"words\">Target</th><th scope=\"col\">Time [s]</th><th scope=\"col\">X-rays [s]</th><th "
-                 "scope=\"col\">Contrast [ml]</th><th scope=\"col\">Way / straight</th>"
+                 "scope=\"col\">Contrast [ml]</th><th scope=\"col\">Path / straight</th>"
                  "<th scope=\"col\">Wall force [N]</th><th scope=\"col\">Errors</th></tr></thead><tbody>\n");
     for (int i = 0; i < page->earlier_count; i++) {
         const Session *s = &page->earlier[i];

@@ -13,7 +13,7 @@ Timeline *timeline_create(char *message, size_t capacity)
 {
     Timeline *timeline = calloc(1, sizeof *timeline);
     if (!timeline) {
-        message_fail(message, capacity, "no memory for the timeline");
+        message_fail(message, capacity, "not enough memory for the timeline");
         return NULL;
     }
     timeline->gui = gui_create(message, capacity);

@@ -124,9 +124,9 @@ static void offer_recovery(Trainer *trainer)
     Faults *faults = found.count > 0 ? calloc(1, sizeof *faults) : NULL;
     if (faults) {
         const char *slash = strrchr(found.path[found.count - 1], '/');
-        snprintf(text, sizeof text, found.count > 1 ? "%d sessions were cut off before their end, the last is %s. Their reports can still be made: they are simulated again." :
-                 "%d session was cut off before its end: %s. Its report can still be made: it is simulated again.", found.count, slash ? slash + 1 : "");
-        bool wanted = is_answered_yes(trainer, (PanelQuestion){"Recover what was cut off?", text, "Recover", "Not now"});
+        snprintf(text, sizeof text, found.count > 1 ? "%d sessions were interrupted, the last is %s. Their reports can still be made: the sessions are simulated again." :
+                 "%d session was interrupted: %s. Its report can still be made: the session is simulated again.", found.count, slash ? slash + 1 : "");
+        bool wanted = is_answered_yes(trainer, (PanelQuestion){"Recover interrupted sessions?", text, "Recover", "Not now"});
         trainer->progress = "Simulating the session again";
         for (int i = 0; wanted && i < found.count; i++) {
             faults_clear(faults);
@@ -152,7 +152,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
         hand[count++] = &trainer->pad[i / MAP_HANDS][i % MAP_HANDS];
     for (int i = 0; trainer->hands && i < HANDS_MOST * MAP_HANDS; i++)
         hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
-    trainer->controls.grip = (HandGrip){.chosen = trainer->controls.grip.chosen};    // a new session: nothing is locked or let go
+    trainer->controls.grip = (HandGrip){.chosen = trainer->controls.grip.chosen};    // a new session: nothing is locked or released
     session_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
     LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .trainee = trainer->trainee, .date = trainer->date, .hand_count = count, .hand = hand, .grip = trainer->controls.grip, .xray = trainer->controls.xray,
                                   .resume = resume, .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S, .paused = trainer->is_paused,
@@ -299,7 +299,7 @@ static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActio
         say(trainer, MARK_NONE, "the scene has one tool: there is none to lock it to");
     for (int k = 0; k < count; k++)
         if ((now->released ^ before->released) >> k & 1)
-            say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is let go: only its valve holds it" : "%s is in hand again", tool[k].name);
+            say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is in hand again", tool[k].name);
 }
 
 // --- the tray ---
@@ -333,7 +333,7 @@ static void open_tray(Trainer *trainer, const Pose *pose)
     if (trainer->has_tray)
         panel_open_tray(trainer->panel, trainer->tray.devices.count, in);
     else
-        say(trainer, MARK_BAD, "no memory for the tray");
+        say(trainer, MARK_BAD, "not enough memory for the tray");
 }
 
 static void close_tray(Trainer *trainer)
@@ -755,7 +755,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     Trainer *trainer = calloc(1, sizeof *trainer);
     int code = EXIT_BAD_INPUT;
     if (!trainer) {
-        faults_add(faults, scene->path, 0, 0, "no memory for a session");
+        faults_add(faults, scene->path, 0, 0, "not enough memory for a session");
         return code;
     }
     *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .keyboard = {[1] = {.drives = DRIVES_PARTNER}}, .begun_s = clock_s(CLOCK_MONOTONIC)};

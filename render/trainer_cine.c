@@ -18,7 +18,7 @@ bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *pa
     if (!path) {
         cine->cine = cine_create(shape, LOOP_IMAGES);
         if (!cine->cine)
-            faults_add(faults, "cine", 0, 0, "no memory for a loop of %d images", LOOP_IMAGES);
+            faults_add(faults, "cine", 0, 0, "not enough memory for a loop of %d images", LOOP_IMAGES);
         return cine->cine != NULL;
     }
     size_t length;

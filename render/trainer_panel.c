@@ -86,7 +86,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->hold_s = score->held_s;
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
-        snprintf(panel->instructions, sizeof panel->instructions, "%s: %.0f points in %.0f s with %d handling error%s. F4 begins anew; Esc ends.",
+        snprintf(panel->instructions, sizeof panel->instructions, "%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.",
                  score->state == SCORE_REACHED ? "Target reached and held" : "The time is over", score->points, score->time_s, score->error_total,
                  score->error_total == 1 ? "" : "s");
         state->instructions = panel->instructions;
@@ -106,7 +106,7 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
     if (report->flags & STEP_NOT_CONVERGED)
         state->warnings |= WARN_NOT_CONVERGED;
     const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: nothing is left to push"
-                       : report->flags & STEP_HAND_SLIPS   ? "The hand slips along the tool: it asks for more force than the hand holds"
+                       : report->flags & STEP_HAND_SLIPS   ? "The hand slips along the tool: the tool needs more force than the grip holds"
                        : report->flags & STEP_LIMITED      ? "The tool takes less than the hand feeds: it is jammed, or it snaps"
                                                            : NULL;
     if (figures) {
@@ -115,9 +115,9 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
         if (!figures->real_time_priority && pose->step > 0)
             state->warnings |= WARN_NO_FIFO;
         if (figures->state == REALTIME_DIVERGED)
-            line = "The simulation diverged: the session has ended with the last good state. F4 begins anew";
+            line = "The simulation diverged: the session has ended with the last good state. F4 restarts";
         else if (figures->state == REALTIME_UNRECORDED)
-            line = "The recording could not be written (disk full?): the session has ended. F4 begins anew";
+            line = "The recording could not be written (disk full?): the session has ended. F4 restarts";
     }
     if (line) {
         snprintf(panel->warning, sizeof panel->warning, "%s", line);
@@ -142,7 +142,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         tool->force_n = from->push_n;
         tool->torque_n_mm = from->torque_n_mm;
         bool is_in = from->node_count > 0 && from->inserted_mm >= from->node[from->node_count - 1].s - 1e-6;
-        tool->note = from->is_let_go ? "let go" : is_in && scene->wire.has_sheath ? "all of it is in" : NULL;
+        tool->note = from->is_let_go ? "released" : is_in && scene->wire.has_sheath ? "fully inserted" : NULL;
         tool->mark = tool->note ? MARK_WARNING : MARK_NONE;
     }
     state->wall_max_n = pose->report.wall_force_max;

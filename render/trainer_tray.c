@@ -122,7 +122,7 @@ static const char *why_still_in(char *text, const Scene *scene, const Pose *pose
     }
     if (way <= 0)
         return NULL;
-    snprintf(text, TRAY_WORDS, "'%s' is still in: draw it back %.0f mm, to %s, then another can be put in", scene->tool[tool].name, fmax(1, ceil(way)),
+    snprintf(text, TRAY_WORDS, "'%s' is still inserted: draw it back %.0f mm, to %s, then another can be inserted", scene->tool[tool].name, fmax(1, ceil(way)),
              tool > 0 ? "the hub" : "the sheath's mouth");
     return text;
 }
@@ -156,7 +156,7 @@ static const char *why_not(TrainerTray *tray, int index, const TrayDevice *devic
     if (!is_new && device->which == pose->tool[tool].fitted)
         return "it is the tool that you have now";
     if (is_new && scene_device_count(scene, tool) > EXCHANGES_MOST) {
-        snprintf(text, TRAY_WORDS, "a session has room for %d devices beside the first one of '%s'; those that are there can be put in again", EXCHANGES_MOST, scene->tool[tool].name);
+        snprintf(text, TRAY_WORDS, "a session has room for %d devices beside the first one of '%s'; the existing ones can be inserted again", EXCHANGES_MOST, scene->tool[tool].name);
         return text;
     }
     return why_too_long_or_short(text, scene, pose, tool, wire_length(&device->tool.wire));
@@ -241,7 +241,7 @@ const char *trainer_tray_obstacle(const TrainerTray *tray)
 {
     const PanelTrayChoice *choice = &tray->choice;
     if (choice->device >= tray->devices.count)
-        return "there is no such device";
+        return "unknown device";
     const char *note = choice->is_shaped ? tray->shaped_shown.note : tray->device[choice->device].note;
     return note ? note : tray->shown.note;
 }

@@ -200,7 +200,7 @@ static void print_page(const Report *report)
                  "<title>Vessel report: ");
     page_text(out, report->name);
     fprintf(out, "</title>\n<style>\n%s</style></head>\n<body><header><h1>Vessel %s report</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not "
-                 "a medical device:</strong> not for diagnosis or treatment. Everything here is measured by a program on a %s and was checked by nobody.</p></header>\n<main>\n",
+                 "a medical device:</strong> not for diagnosis or treatment. All values were measured automatically on a %s and have not been checked.</p></header>\n<main>\n",
             page_style, model ? "model" : "tree", model ? "fitted model" : "tracked tree");
     print_summary(report);
     print_tree(report);
@@ -231,7 +231,7 @@ bool tree_page_write(const char *path, const char *name, const VesselTree *tree,
         good = fclose(out) == 0 && good;
     }
     if (!good)
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
     good = good && output_write(path, bytes, length, faults);
     free(bytes);
     free(finding);

@@ -52,7 +52,7 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
         shown.frame_count = options->pose->node_count;
         shown.frame = options->pose->position;
     }
-    bool good = views && (tool_looks_make(&views->tools, scene) || message_fail(message, capacity, "no memory for the views")) &&
+    bool good = views && (tool_looks_make(&views->tools, scene) || message_fail(message, capacity, "not enough memory for the views")) &&
                 (views->scene = vessel_scene_create(&shown, message, capacity)) &&
                 (views->angioscope = angioscope_create(mesh, options->vessel, options->tree, message, capacity)) &&
                 (views->fluoroscope = create_fluoroscope(views, options, mesh, message, capacity));

@@ -110,7 +110,7 @@ ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Fau
     if (table)
         path->row = calloc((size_t)table->row_count + 1, sizeof *path->row);
     if (!path || (table && !path->row))
-        faults_add(faults, file, 0, 0, "no memory for its rows");
+        faults_add(faults, file, 0, 0, "not enough memory for its rows");
     if (table && path->row) {
         path->duration_s = comment_figure(text, length, "duration_s", -1);
         if (path->duration_s < 0 || path->duration_s > SCRIPT_LONGEST_S)

@@ -48,7 +48,7 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
     session->simulator = simulator_create(scene, open->vessel, faults);
     session->lesson = session->simulator ? lesson_create(session->simulator, open->tree) : NULL;
     if (session->simulator && !session->lesson)
-        faults_add(faults, scene->path, 0, 0, "no memory for a session");
+        faults_add(faults, scene->path, 0, 0, "not enough memory for a session");
     if (session->lesson && options->record_path) {
         RecordingOptions record = recording_session_options();
         record.trainee = options->trainee;

@@ -112,7 +112,7 @@ static bool open_source(const Scene *scene, const OpenVesselOptions *options, Op
     case SOURCE_PLANE:
         out->vessel = plane_vessel_create(scene->plane_point, scene->plane_normal);
         if (!out->vessel)
-            faults_add(faults, scene->path, 0, 0, "no memory for the plane");
+            faults_add(faults, scene->path, 0, 0, "not enough memory for the plane");
         return out->vessel != NULL;
     }
     return false;

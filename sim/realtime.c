@@ -169,7 +169,7 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
     }
     if (good)
         return realtime;
-    faults_add(faults, scene->path, 0, 0, "no memory or thread for a session");
+    faults_add(faults, scene->path, 0, 0, "not enough memory or thread for a session");
     if (realtime)
         realtime_free(realtime);
     return NULL;

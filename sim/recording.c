@@ -956,7 +956,7 @@ static Recording *create(const char *path, Simulator *simulator, const Recording
     const Scene *scene = simulator_scene(simulator);
     Recording *recording = calloc(1, sizeof *recording);
     if (!recording || !(recording->path = strdup(path))) {
-        faults_add(faults, path, 0, 0, "cannot be recorded: no memory");
+        faults_add(faults, path, 0, 0, "cannot be recorded: out of memory");
         if (recording)
             recording_free(recording);
         return NULL;

@@ -43,7 +43,7 @@ bool recording_export_rows(const RecordedRun *run, const char *path, Faults *fau
     OutputText text;
     bool several = run->tool_count > 1;
     if (!output_text_open(&text)) {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
         return false;
     }
     fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s%s\n", several ? "tool," : "", several ? ",carrier" : "", run->exchange ? ",exchange" : "");
@@ -123,7 +123,7 @@ static bool export_frame(const char *path, const RecordedRun *run, int64_t frame
 {
     OutputText text;
     if (!output_text_open(&text)) {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
         return false;
     }
     print_frame_vtp(text.stream, run, frame);
@@ -140,7 +140,7 @@ bool recording_export_series(const RecordedRun *run, const char *path, Faults *f
     OutputText list;
     bool good = file && output_text_open(&list);
     if (!good) {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
         free(file);
         return false;
     }

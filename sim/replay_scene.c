@@ -83,7 +83,7 @@ bool replay_write_scene(const RecordedRun *run, const Scene *scene, const char *
     if (good && run->contact < CONTACT_COUNT && scene->source != SOURCE_NONE)
         good = set_key(&text, "vessel.contact", contact_name[run->contact]);
     if (!good)
-        faults_add(faults, folder, 0, 0, "no memory for the scene");
+        faults_add(faults, folder, 0, 0, "not enough memory for the scene");
     good = good && rename_file(&text, "vessel.model", scene->model_path, whole, faults) && rename_file(&text, "vessel.mesh", scene->mesh_path, whole, faults) &&
            rename_file(&text, "vessel.tube.points", scene->tube_points_path, whole, faults) &&
            rename_file(&text, "fluoroscopy.volume", scene->anatomy_path, whole, faults);
@@ -107,7 +107,7 @@ bool replay_write_golden(const ToolPath *path, const char *folder, Faults *fault
     size_t length;
     char *text = tool_path_print(path, &length);
     if (!text)
-        faults_add(faults, folder, 0, 0, "no memory for the golden path");
+        faults_add(faults, folder, 0, 0, "not enough memory for the golden path");
     bool good = text && write_part(folder, "scene.golden.csv", text, length, faults);
     free(text);
     return good;

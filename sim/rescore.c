@@ -44,7 +44,7 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
         return rescore;
     }
     if (!rescore || (fits && !(rescore->kept && rescore->lesson)))
-        faults_add(faults, scene->path, 0, 0, "no memory to simulate it again");
+        faults_add(faults, scene->path, 0, 0, "not enough memory to simulate it again");
     rescore_free(rescore);
     return NULL;
 }

@@ -241,7 +241,7 @@ bool session_parse(const char *text, size_t length, const char *path, Session *s
     cJSON *root = cJSON_ParseWithLengthOpts(text, length, &end, false);
     for (size_t i = root ? (size_t)(end - text) : length; i < length && faults->count == before; i++)
         if (!strchr(" \t\r\n", text[i]) || !text[i])
-            faults_add_at_byte(faults, path, i, "something stands after the session");
+            faults_add_at_byte(faults, path, i, "unexpected text after the session");
     if (!root)
         faults_add_at_byte(faults, path, end ? (size_t)(end - text) : 0, "is not JSON");
     Session *read = root && faults->count == before ? calloc(1, sizeof *read) : NULL;

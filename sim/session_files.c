@@ -88,7 +88,7 @@ bool session_files_save(const Scene *scene, const char *trainee, const char *dev
     session_file_beside(recording, ".json", path, sizeof path);
     if (!text) {
         if (is_read)
-            faults_add(faults, path, 0, 0, "no session file could be made: no memory");
+            faults_add(faults, path, 0, 0, "no session file could be made: out of memory");
         return false;
     }
     bool good = output_write(path, text, strlen(text), faults);

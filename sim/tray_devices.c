@@ -230,7 +230,7 @@ Scene *tray_scene_with(const Scene *scene, int tool, const TrayDevice *device, c
 {
     char *entry = print_device(device, tip);
     if (!entry) {
-        faults_add(faults, scene->path, 0, 0, "no memory for a device");
+        faults_add(faults, scene->path, 0, 0, "not enough memory for a device");
         return NULL;
     }
     Scene *with = scene_with_entry(scene, tool, entry, faults);

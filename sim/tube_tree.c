@@ -114,7 +114,7 @@ VesselTree *tube_tree(const Vessel *tube, const TubeOptions *options, const char
     free(axis.point);
     bool good = vessel_tree_validate(tree, file, faults);
     if (good && !vessel_tree_link(tree)) {
-        faults_add(faults, file, 0, 0, "no memory for the tube's tree");
+        faults_add(faults, file, 0, 0, "not enough memory for the tube's tree");
         good = false;
     }
     if (!good) {

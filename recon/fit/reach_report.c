@@ -37,7 +37,7 @@ void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
     if (reach->sac_nodes > 0)
         fprintf(out, "aneurysm nodes %d of %d are reached by a point\n", reach->sac_nodes_reached, reach->sac_nodes);
     if (reach->stop_count > 0)
-        fprintf(out, "shut           %d places, those with most behind them first:\n", reach->stop_count);
+        fprintf(out, "closed         %d places, those with most behind them first:\n", reach->stop_count);
     for (int k = 0; k < reach->stop_count && k < STOPS_SHOWN; k++)
         print_stop(out, tree, reach, &reach->stop[k]);
     if (reach->stop_count > STOPS_SHOWN)
@@ -142,12 +142,12 @@ static void print_ghosts(FILE *out, const GhostLumens *ghosts)
         volume += ghosts->ghost[k].volume;
     }
     if (ghosts->count == 0) {
-        fprintf(out, "ghost lumens   none: all lumen hangs on the tree\n");
+        fprintf(out, "ghost lumens   none: all lumen is connected to the tree\n");
         return;
     }
-    fprintf(out, "ghost lumens   %d that hang on nothing, %.3g mm3", ghosts->count, volume);
+    fprintf(out, "ghost lumens   %d not connected, %.3g mm3", ghosts->count, volume);
     if (ghosts->drop_count > 0)
-        fprintf(out, "; without %d blobs that serve nothing else %d of them would go", ghosts->drop_count, dissolve);
+        fprintf(out, "; removing %d blobs that serve no other purpose would remove %d of them", ghosts->drop_count, dissolve);
     fprintf(out, "\n");
     for (int k = 0; k < ghosts->count && k < GHOSTS_SHOWN; k++) {
         const GhostLumen *g = &ghosts->ghost[k];

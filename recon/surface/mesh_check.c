@@ -416,7 +416,7 @@ SurfaceMesh *mesh_load_mended(const char *path, double scale, const char *option
         faults_add(faults, path, 0, 0, "is %g x %g x %g across, which cannot be the size of a vessel in mm; %s1000 takes metres, %s0.001 micrometres, %s1 takes it "
                    "as it is", e.x, e.y, e.z, option, option, option);
     } else if (check->one_sided_edges.count)
-        faults_add(faults, path, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be told", check->one_sided_edges.first);
+        faults_add(faults, path, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be distinguished", check->one_sided_edges.first);
     else if (mesh->triangle_count == 0 || !(check->area > 0))
         faults_add(faults, path, 0, 0, "has no triangle with an area");
     else

@@ -174,7 +174,7 @@ static void the_watchdog_takes_the_force_away_at_once(void **state)
     for (int i = 1; i < 50; i++)
         assert_true(near(tick(&clock, 3, false, true, false), 3));
     assert_true(tick(&clock, 3, false, true, false) == 0);
-    assert_non_null(strstr(clock.guard.why_zero, "simulation stands"));
+    assert_non_null(strstr(clock.guard.why_zero, "simulation stalls"));
     assert_true(near(tick(&clock, 3, true, true, false), 0.2));    // and grows again by the slew
     for (int i = 0; i < 50; i++)
         tick(&clock, 3, true, true, false);

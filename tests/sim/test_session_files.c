@@ -142,7 +142,7 @@ static void the_session_file_is_of_its_recording(void **state)
     assert_int_equal(system(report), 0);
     expect_cut_off(0);
     assert_true(session_load(in_folder("bend.json"), &session, &faults));
-    assert_string_equal(session.device, "not known: the session was cut off");
+    assert_string_equal(session.device, "not known: the session was interrupted");
     memcpy(session.device, saved.device, sizeof saved.device);
     assert_true(strstr(session.scene_path, saved.scene_path) > session.scene_path);      // named from anywhere
     memcpy(session.scene_path, saved.scene_path, sizeof saved.scene_path);
