@@ -154,7 +154,9 @@ static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent
         hit.gap = z - bell;
         hit.normal = tangent;
     } else {
-        Vec3 out = rho > 1e-9 * r ? vec3_scale(radial, 1 / rho) : vec3_negate(tube->segment[tube->count - 1].normal);
+        const Segment *last = &tube->segment[tube->count - 1];
+        Vec3 side = last->arc_radius > 0 ? vec3_scale(vec3_sub(last->center, last->end), 1 / last->arc_radius) : last->normal;
+        Vec3 out = rho > 1e-9 * r ? vec3_scale(radial, 1 / rho) : vec3_negate(side);
         hit.gap = far - bell;
         hit.normal = vec3_add_scaled(vec3_scale(tangent, z / far), -aside / far, out);
         sym3_add_outer(&hit.hessian, 1 / far, vec3_add_scaled(vec3_scale(tangent, aside / far), z / far, out));

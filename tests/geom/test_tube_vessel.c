@@ -192,6 +192,7 @@ static void ends(void **state)
     assert_true(after.flags == VESSEL_OPEN_END && after.gap == HUGE_VAL && vec3_norm(after.normal) == 0);
     assert_true(ask(open, vec3(17, 5.5, 0), -1).flags == VESSEL_BEYOND);
     assert_near(ask(open, vec3(17, 5.5, 0), -1).gap, hypot(0.5, 1) - 0.5, 1e-12);
+    assert_near(vec3_norm(ask(open, vec3(17, 5.5, 0), -1).normal), 1, 1e-12);        // on the axis too, behind an arc
     assert_near(ask(open, vec3(17.9, 5.5, 0), -1).gap, hypot(0.5, 0.1) - 0.5, 1e-12);
     assert_true(ask(open, vec3(18.3, 5.2, 0), -1).flags == VESSEL_BEYOND);   // beside the flange
     assert_near(ask(open, vec3(2, 0.2, 0), -1).gap, 0.3, 1e-12);
