@@ -2,12 +2,15 @@
 // half space alone lets a few more cells pass than the ball meets; for the agreement of near cells more is as good.
 #include "geom/blob_flood.h"
 
+#include "base/assert.h"
+
 #include "geom/power_walk.h"
 
 #include <stdlib.h>
 
 bool blob_flood_create(BlobFlood *flood, int node_count)
 {
+    SEL_ASSERT(node_count > 0, "a tree has a root");
     *flood = (BlobFlood){.node_count = node_count};
     flood->mark = calloc((size_t)node_count, sizeof *flood->mark);
     flood->node = calloc((size_t)node_count, sizeof *flood->node);
@@ -26,6 +29,7 @@ void blob_flood_free(BlobFlood *flood)
 
 static bool meets_cell(const VesselTree *tree, int node, Vec3 c, double reach)
 {
+    SEL_ASSERT(node >= 0 && node < tree->node_count, "a cell belongs to a node of the tree");
     double own = power_distance(c, tree->center[node], tree->radius[node]), far = 2 * (reach + BLOB_FLOOD_MARGIN * tree->radius[node]);
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
         int other = tree->near[k];
@@ -39,6 +43,9 @@ static bool meets_cell(const VesselTree *tree, int node, Vec3 c, double reach)
 int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 center, double reach)
 {
     int count = 1, stamp = ++flood->stamp;
+    SEL_REQUIRE(flood->node_count == tree->node_count, "the flood has room for each node once");
+    SEL_ASSERT(owner >= 0 && owner < tree->node_count, "a blob belongs to a node of the tree");
+    SEL_ASSERT(reach > 0, "a blob has a radius of support");
     flood->node[0] = owner;
     flood->mark[owner] = stamp;
     for (int i = 0; i < count; i++) {
@@ -52,6 +59,7 @@ int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 c
                 flood->node[count++] = next;
         }
     }
+    SEL_ASSERT(count <= tree->node_count, "a node sees a blob once");
     return count;
 }
 
@@ -98,6 +106,8 @@ static bool flood_all(const VesselTree *tree, Sightings *s)
 
 bool blob_flood_list(VesselTree *tree)
 {
+    SEL_ASSERT(tree->near_offset && tree->near, "near nodes are known before blobs are listed");
+    SEL_ASSERT(tree->blob_count <= INT32_MAX, "lists name blobs by 32 bits");
     Sightings s = {.offset = calloc((size_t)tree->blob_count + 1, sizeof *s.offset)};
     int64_t *offset = calloc((size_t)tree->node_count + 1, sizeof *offset);
     int32_t *seen = NULL;
@@ -112,6 +122,7 @@ bool blob_flood_list(VesselTree *tree)
             offset[i + 1] = sum;
             sum += own;
         }
+        SEL_REQUIRE(sum == s.count, "each sighting is of a node of the tree");
         for (int64_t b = 0; b < tree->blob_count; b++)
             for (int64_t k = s.offset[b]; k < s.offset[b + 1]; k++)
                 seen[offset[s.node[k] + 1]++] = (int32_t)b;

@@ -2,6 +2,8 @@
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/field_lanes.h"
 
+#include "base/assert.h"
+
 #include "base/same_math.h"
 #include "base/simd.h"
 
@@ -20,6 +22,7 @@ _Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) 
 
 void field_directions(Vec3 *way, int count)
 {
+    SEL_ASSERT(count > 0, "at least one direction is asked for");
     for (int k = 0; k < count; k++) {
         double z = 1 - (2 * k + 1) / (double)count, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
         way[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
@@ -74,6 +77,7 @@ static const FieldKernels avx512 = KERNEL_TABLE(avx512);
 const FieldKernels *field_kernels(int isa)
 {
     static const FieldKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
+    SEL_ASSERT(isa >= 0 && isa <= SIMD_COUNT, "instruction sets are 0 to 3");
     int wanted = isa > 0 ? isa - 1 : (int)simd_level(), widest = (int)simd_widest();
     return of[wanted < widest ? wanted : widest];
 }

@@ -14,6 +14,7 @@
 // asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
 // section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
 #include "geom/blob_flood.h"
+#include "base/assert.h"
 #include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/field_lanes.h"
@@ -132,6 +133,7 @@ static void sample(const FieldVessel *field, FieldBlock *b)
 static int cell_of(const FieldVessel *field, Vec3 q, int node)
 {
     const VesselTree *tree = field->tree;
+    SEL_ASSERT(node >= 0 && node < tree->node_count, "a walk starts at a node of the tree");
     double best = power_distance(q, tree->center[node], tree->radius[node]);
     for (int from = -1; from != node;) {
         from = node;
@@ -171,6 +173,7 @@ typedef struct BlobList {
 // Those of a list that reach to within `skin` of q; returns their number, of which at most `most` are listed.
 static int pick_blobs(const FieldVessel *field, const int32_t *seen_blob, int seen_count, Vec3 q, double skin, int most, int32_t *list)
 {
+    SEL_ASSERT(seen_count >= 0 && most > 0 && skin >= 0, "a list, room for some of it and a distance");
     enum { PART = 512 };
     uint8_t bits[PART / FOOT_BLOCK];
     int count = 0;
@@ -200,6 +203,7 @@ static void pick_list(const FieldVessel *field, const int32_t *seen, int seen_co
 // A node's blobs that reach to within `far` of x. Near the inlet all: the field is asked elsewhere there.
 static void list_blobs(const FieldVessel *field, int node, Vec3 x, double far, BlobList *list)
 {
+    SEL_ASSERT(node >= 0 && node < field->tree->node_count, "lists belong to nodes of the tree");
     const FieldNode *n = &field->node[node];
     pick_list(field, n->seen, n->seen_count, x, n->carried ? HUGE_VAL : far, list);
 }
@@ -210,6 +214,7 @@ static const double LOOK = 0.5;
 // Makes the list of a memory for feet about q, of those that reach there: a little ahead, where the last motion is going.
 static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, const BlobList *list)
 {
+    SEL_ASSERT(m->node >= 0 && m->node < field->tree->node_count, "a memory that holds blobs has a node");
     double skin = field->node[m->node].skin;
     Vec3 way = vec3_unit_or(m->step, vec3(0, 0, 0));
     int count = VESSEL_BLOBS + 1;
@@ -230,6 +235,7 @@ static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec
     m->bound_at = x;
     m->bound_for = fabs(gap) + fmin(BOUND * n->radius, BOUND_MOST);
     field->kernels->bends(field->row, list->blob, list->count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
+    SEL_ASSERT(m->down >= 0 && m->up >= 0, "bounds of bends are no less than 0");
 }
 
 // The field of a list at q, and its gradient.
@@ -273,6 +279,8 @@ typedef struct Foot {
 
 static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node, bool carried)
 {
+    SEL_ASSERT(i >= 0 && i < FOOT_BLOCK, "a lane is one of the block");
+    SEL_ASSERT(node >= 0 && node < field->tree->node_count, "a lane asks a node of the tree");
     const FieldNode *n = &field->node[node];
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
     b->foot.at.carried[i] = carried, b->foot.at.any_carried |= carried;
@@ -316,6 +324,7 @@ enum { ROUNDS = 16, FEW_ROUNDS = 8 };
 // are equally near and Newton's steps go round for ever: any of them is right to second order in what is left along the wall.
 static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, int rounds, Foot *foot)
 {
+    SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "starts fit into a block");
     static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
     FieldBlock b;
     NearLists lists;
@@ -460,6 +469,7 @@ typedef struct Sheets {
 
 static void add_sheet(Sheets *s, const Foot *foot)
 {
+    SEL_ASSERT(isfinite(foot->gap), "a foot that was found has a distance");
     static const double SAME = 1e-4;         // [mm]
     if (!s->found || fabs(foot->gap) < fabs(s->foot.gap)) {
         if (s->found && vec3_distance(foot->at, s->foot.at) > SAME) {
@@ -492,6 +502,7 @@ static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double 
         if (at[best] == HUGE_VAL)
             break;
         start[count] = vec3_add_scaled(x, at[best], field->way[best]);
+        SEL_ASSERT(at[best] >= near && at[best] <= far, "a crossing lies between the two looks");
         count++;
         for (int k = 0; k < WAYS; k++)
             if (vec3_dot(field->way[k], field->way[best]) > ASIDE)
@@ -664,6 +675,7 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const Blo
 // A gap is as long as the shortest way to the wall: it changes by no more than x moves, or the wall is another. `before`: the gap at the last place.
 static void compare_gaps(VesselMemory *m, double before, double travel, VesselHit *hit)
 {
+    SEL_ASSERT(travel >= 0, "a travel is a length");
     static const double GIVES_WAY = 0.2;     // per mm of travel
     if (m->contradicted) {
         m->credible -= GIVES_WAY * travel;
@@ -870,6 +882,7 @@ typedef struct Batch {
 
 static void put(Queue *queue, int point, Vec3 start)
 {
+    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point waits in a queue once");
     queue->start[queue->count] = start;
     queue->point[queue->count++] = point;
 }
@@ -885,6 +898,7 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
     static const double REACH = 1.25;        // of the radius: 0.2 and two steps of a half
     VesselMemory *m = &batch->memory[point];
     const FieldNode *n = &field->node[m->node];
+    SEL_ASSERT(m->blobs <= VESSEL_BLOBS, "a memory holds no more blobs than it has room for");
     set_lane(field, b, i, m->node, n->carried && (seek || inlet_height(field, m->foot) < inlet_zone(field) + REACH * n->radius));
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
@@ -947,6 +961,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
     double spare[MEMORY_WRITTEN], no_hit[HIT_ROW];
     const int *point = queue->point + first, count = queue->count - first < FOOT_BLOCK ? queue->count - first : FOOT_BLOCK;
     const bool seek = queue == &batch->sought;
+    SEL_ASSERT(count > 0, "a block has a point");
     unsigned all = (1u << count) - 1, done = 0;
     b.row = field->row;
     b.slots = VESSEL_BLOBS;
@@ -1009,6 +1024,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
 
 static void query_batch(const FieldVessel *field, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
+    SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
     Batch batch;
     batch.point = point, batch.memory = memory, batch.hit = hit;
     batch.followed.count = batch.sought.count = batch.afresh.count = 0;
@@ -1065,6 +1081,7 @@ static void fill_rows(FieldVessel *field)
     for (int64_t j = 0; j < tree->blob_count; j++) {
         Vec3 c = tree->blob_center[j];
         double width = tree->blob_width[j];
+        SEL_ASSERT(width > 0, "a shared blob has a radius of support");
         field->row[j] = (FieldRow){c.x, c.y, c.z, 1 / (width * width), tree->blob_amplitude[j], width, {0}};
     }
     field->row[tree->blob_count] = (FieldRow){0};
@@ -1087,10 +1104,12 @@ static void fill_nodes(FieldVessel *field)
         FieldNode *n = &field->node[i];
         n->center = tree->center[i];
         n->radius = tree->radius[i];
+        SEL_ASSERT(n->radius > 0, "nodes have a radius");
         n->bend = 1 / n->radius;
         n->skin = fmin(SKIN * n->radius, SKIN_MOST);
         n->seen = tree->seen + tree->seen_offset[i];
         n->seen_count = (int)(tree->seen_offset[i + 1] - tree->seen_offset[i]);
+        SEL_ASSERT(n->seen_count >= 0, "offsets never fall");
     }
     for (int k = tree->near_offset[0] - 1; k < tree->near_offset[1] && field->inlet_open; k++) {
         int node = k < tree->near_offset[0] ? 0 : tree->near[k];
@@ -1106,6 +1125,8 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     FieldVessel *field = tree && vessel_tree_is_shared(tree) && vessel_tree_is_model(tree) ? calloc(1, sizeof *field) : NULL;
     if (!field)
         return NULL;
+    SEL_ASSERT(tree->near_offset && tree->near && tree->seen_offset, "the tree is linked (vessel_tree_link)");
+    SEL_ASSERT(tree->blob_count < INT32_MAX, "memories name blobs by 32 bits, and the one without weight");
     field->vessel = (Vessel){.kind = "field", .query = field_query, .locate = field_locate, .inlet = field_inlet, .destroy = field_destroy,
                              .primitives = tree->blob_count};
     field->tree = tree;

@@ -2,6 +2,8 @@
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/foot_lanes.h"
 
+#include "base/assert.h"
+
 #include "base/simd.h"
 
 #include <string.h>
@@ -40,6 +42,7 @@ static const LaneKernels avx512 = KERNEL_TABLE(avx512);
 const LaneKernels *lane_kernels(int isa)
 {
     static const LaneKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
+    SEL_ASSERT(isa >= 0 && isa <= SIMD_COUNT, "instruction sets are 0 to 3");
     int wanted = isa > 0 ? isa - 1 : (int)simd_level(), widest = (int)simd_widest();
     return of[wanted < widest ? wanted : widest];
 }

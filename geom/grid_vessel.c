@@ -6,6 +6,8 @@
 // thirds: those that may be next to a block, of those the ones that may be next to each 3 x 3 x 3 of its points, of those the next.
 #include "geom/grid_vessel.h"
 
+#include "base/assert.h"
+
 #include "geom/key_map.h"
 
 #include <stdlib.h>
@@ -37,6 +39,8 @@ typedef struct GridVessel {
 
 static uint64_t key_of(int64_t i, int64_t j, int64_t k)
 {
+    SEL_ASSERT(i >= -BLOCK_MAX - 2 && i <= BLOCK_MAX + 2 && j >= -BLOCK_MAX - 2 && j <= BLOCK_MAX + 2 && k >= -BLOCK_MAX - 2 && k <= BLOCK_MAX + 2,
+               "blocks lie within what a key counts");
     int64_t offset = (int64_t)1 << (KEY_BITS - 1);
     return (uint64_t)(i + offset) << (2 * KEY_BITS) | (uint64_t)(j + offset) << KEY_BITS | (uint64_t)(k + offset);
 }
@@ -48,6 +52,7 @@ static int point_index(int i, int j, int k) { return (i * SIDE + j) * SIDE + k; 
 // Trilinear value at (u, v, w) in [0, 8] of a block, in units of its samples, and its gradient by u, v, w.
 static double interpolate(const float *value, double u, double v, double w, Vec3 *gradient)
 {
+    SEL_ASSERT(u >= 0 && u <= BLOCK && v >= 0 && v <= BLOCK && w >= 0 && w <= BLOCK, "the point lies in the block");
     int i = u < BLOCK - 1 ? (int)u : BLOCK - 1, j = v < BLOCK - 1 ? (int)v : BLOCK - 1, k = w < BLOCK - 1 ? (int)w : BLOCK - 1;
     const float *a = value + point_index(i, j, k), *b = a + SIDE, *c = a + SIDE * SIDE, *d = c + SIDE;
     u -= i, v -= j, w -= k;
@@ -221,6 +226,7 @@ static bool hold_block(Making *m, int i, int j, int k, int vertex)
             return false;
         m->capacity = capacity;
     }
+    SEL_REQUIRE(grid->block_count < m->capacity, "the list of blocks was made longer");
     memcpy(m->base[grid->block_count], (int[3]){i, j, k}, sizeof *m->base);
     m->vertex[grid->block_count++] = vertex;
     return grid->block_count < BLOCKS_MAX;
@@ -294,6 +300,7 @@ static bool push_near(Making *m, int count, int v)
         m->near = near;
         m->near_capacity = capacity;
     }
+    SEL_ASSERT(count >= 0 && count < m->near_capacity, "the list was made longer");
     m->near[count] = v;
     return true;
 }
@@ -331,6 +338,7 @@ static int gather_vertices(Making *m, int b)
 
 static int next_to(const Making *m, int first, int count, Vec3 x)
 {
+    SEL_ASSERT(count > 0, "some vertex is near each lattice point");
     int best = m->near[first];
     double least = HUGE_VAL;
     for (int n = first; n < first + count; n++) {
@@ -404,6 +412,7 @@ static bool learn_block(Making *m, const int at[3], int vertex)
             return false;
         m->sought_capacity = capacity;
     }
+    SEL_REQUIRE(m->sought_count < m->sought_capacity, "the list of blocks was made longer");
     memcpy(m->sought[m->sought_count], at, sizeof *m->sought);
     m->sought_vertex[m->sought_count++] = vertex;
     return true;
@@ -422,6 +431,7 @@ static bool learn_around(Making *m, const int at[3], int vertex)
 
 static bool flood(Making *m)
 {
+    SEL_ASSERT(m->grid->block_count > 0, "a surface with triangles has blocks");
     GridVessel *grid = m->grid;
     for (int a = 0; a < 3; a++) {
         grid->low[a] = grid->high[a] = m->base[0][a];

@@ -23,6 +23,7 @@
 // a prediction with the gap's change in it (nothing: what remains is the wall's own waviness), memories and hits turned over in registers (AVX2 slower),
 // lanes in the order of their models' size, blobs fetched ahead, cell tests of a whole batch in one call (nothing, 1 %), second steps side by side (1 %).
 #include "geom/foot_lanes.h"
+#include "base/assert.h"
 #include "base/same_math.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
@@ -90,6 +91,7 @@ static Sym3 lane_hessian(const FootBatch *b, int i) { return (Sym3){b->axx[i], b
 
 static Blobby blobs_of(const LimVessel *lim, int node)
 {
+    SEL_ASSERT(node >= 0 && node < lim->tree->node_count, "models belong to nodes of the tree");
     return blobby_of(lim->tree, lim->model[node].source);
 }
 
@@ -114,6 +116,7 @@ static double carried_height(double z, double h, double *slope, double *bend)
 // Sums of the fields, those near the inlet as they go on upstream.
 static void sample(const LimVessel *lim, FootSample *s, const int *lane, int count, bool hessian)
 {
+    SEL_ASSERT(count >= 0 && count <= FOOT_BATCH, "a batch has no more lanes than samples");
     void (*kernel)(FootSample *, const int *, int, double) = hessian ? lim->kernels->hessian : lim->kernels->gradient;
     if (!s->any_carried) {
         kernel(s, lane, count, lim->tree->iso_level);
@@ -150,6 +153,8 @@ static void sample(const LimVessel *lim, FootSample *s, const int *lane, int cou
 
 static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec3 x)
 {
+    SEL_ASSERT(node >= 0 && node < lim->tree->node_count, "a lane asks a node of the tree");
+    SEL_ASSERT(i >= 0 && i < FOOT_BATCH, "a lane is one of the batch");
     const NodeModel *m = &lim->model[node];
     s->group[i] = m->group;
     s->groups[i] = m->groups;
@@ -166,6 +171,7 @@ static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9;
 // Lanes are computed in whole blocks: those beyond the last in use hold numbers.
 static void fill_block(FootBatch *b, int count)
 {
+    SEL_ASSERT(count > 0 && count <= FOOT_BATCH, "a batch has no more lanes than room");
     for (int i = count; i % FOOT_BLOCK != 0; i++) {
         FootSample *s = &b->at;
         s->x[i] = s->y[i] = s->z[i] = s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
@@ -585,11 +591,13 @@ static bool collect_partners(const LimVessel *lim, const NodeModel *m, int group
         own &= better == 0;
         for (in = mixed ? in : 0; in != 0 && found < PARTNERS_MAX; in &= in - 1) {
             int k = __builtin_ctz(in);
+            SEL_ASSERT(m->near[g].node[k] >= 0, "an empty plane has no mixed zone");
             of->partner[found] = m->near[g].node[k];
             of->weight[found++] = better >> k & 1 ? 1 : weight[k];
         }
     }
     of->partners = found;
+    SEL_ASSERT(found <= PARTNERS_MAX, "a lane has room for its partners");
     return own;
 }
 
@@ -611,6 +619,7 @@ static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
             return node;
     }
     int next = walk(lim, x, node, lim->options.hops);
+    SEL_ASSERT(next >= 0 && next < tree->node_count, "a walk ends at a node of the tree");
     if (next != node)
         collect_partners(lim, &lim->model[next], lim->model[next].all_near, vec3_sub(x, lim->model[next].center), of);
     return next;
@@ -649,6 +658,7 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
 // What a lane is asked, and what is remembered: kernels->predict makes the start of it.
 static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, const VesselMemory *memory)
 {
+    SEL_ASSERT(i >= 0 && i < FOOT_BATCH && node >= 0 && node < lim->tree->node_count, "a lane of the batch asks a node of the tree");
     const NodeModel *m = &lim->model[node];
     b->at.group[i] = m->group, b->at.groups[i] = m->groups;
     b->at.carried[i] = m->carried, b->at.any_carried |= m->carried;
@@ -695,12 +705,14 @@ static void order_lanes(LaneBatch *batch, const int *with)
         place[k] = at;
         at += with[k];
     }
+    SEL_REQUIRE(at == batch->count, "each lane is counted once by its partners");
     for (int i = 0; i < batch->count; i++)
         batch->of[place[batch->lane[i].partners]++] = &batch->lane[i];
 }
 
 static void query_batch(const LimVessel *lim, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
+    SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
     LaneBatch batch;
     FootBatch *b = &batch.foot;
     int n = 0, with[PARTNERS_MAX + 1] = {0};
@@ -783,11 +795,13 @@ static void lim_destroy(Vessel *vessel)
 // A node without blobs answers with those of its nearest ancestor that has some, else of the first node that has.
 static void choose_sources(const VesselTree *tree, NodeModel *model)
 {
+    SEL_ASSERT(tree->blob_count == tree->blob_offset[tree->node_count] && tree->blob_count > 0, "some node has blobs");
     int first = 0;
     while (tree->blob_offset[first + 1] == tree->blob_offset[first])
         first++;
     for (int i = 0; i < tree->node_count; i++) {
         bool own = tree->blob_offset[i + 1] > tree->blob_offset[i];
+        SEL_ASSERT(tree->parent[i] < i, "parents stand before children");
         model[i].source = own ? i : i > 0 ? model[tree->parent[i]].source : first;
     }
 }
@@ -843,6 +857,7 @@ static int fill_near(const VesselTree *tree, int i, double ball, NearGroup *grou
             if (covered != (pass == 1))
                 continue;
             NearGroup *g = &group[at / NEAR_GROUP];
+            SEL_ASSERT(at < count, "a near node has one plane");
             int lane = at++ % NEAR_GROUP;
             g->node[lane] = p.node;
             g->base[lane] = (float)p.base;
@@ -857,6 +872,7 @@ static int fill_near(const VesselTree *tree, int i, double ball, NearGroup *grou
         g->node[lane] = -1;
         g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // nowhere in its band
     }
+    SEL_ASSERT(kept <= count, "the planes that count are some of all");
     return (kept + NEAR_GROUP - 1) / NEAR_GROUP;
 }
 
@@ -913,7 +929,7 @@ static double measure_room(const LimVessel *lim, int node)
     return 0.6 * ball;
 }
 
-static void fill_models(LimVessel *lim)
+static void fill_models(LimVessel *lim, size_t groups, size_t nears)
 {
     const VesselTree *tree = lim->tree;
     BlobGroup *group = lim->group;
@@ -932,6 +948,7 @@ static void fill_models(LimVessel *lim)
         }
         m->center = tree->center[i];
         m->radius = tree->radius[i];
+        SEL_ASSERT(m->radius > 0, "nodes have a radius");
         m->bend = 1 / m->radius;
         m->ball2 = 1.44 * m->radius * m->radius;
         m->least = lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0;
@@ -944,6 +961,7 @@ static void fill_models(LimVessel *lim)
         m->near_groups = fill_near(tree, i, sqrt(m->ball2), near);
         near += m->all_near;
     }
+    SEL_REQUIRE((size_t)(near - lim->near) == nears && (size_t)(group - lim->group) <= groups, "groups and planes fill what was allocated for them");
     for (int i = 0; i < tree->node_count; i++)
         lim->model[i].group = lim->model[lim->model[i].source].group;
 }
@@ -955,6 +973,7 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     if (!tree || !vessel_tree_is_model(tree) || vessel_tree_is_shared(tree))
         return NULL;
     size_t groups = 0, near = 0;
+    SEL_ASSERT(tree->near_offset && tree->near, "the tree is linked (vessel_tree_link)");
     for (int i = 0; i < tree->node_count; i++) {
         groups += (size_t)blob_groups_needed(tree->blob_offset[i + 1] - tree->blob_offset[i]);
         near += (size_t)near_groups_of(tree, i);
@@ -965,6 +984,7 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     lim->vessel = (Vessel){.kind = "lim", .query = lim_query, .locate = lim_locate, .inlet = lim_inlet, .destroy = lim_destroy, .primitives = tree->blob_count};
     lim->tree = tree;
     lim->options = *options;
+    SEL_ASSERT(options->field == LIM_SWITCH || options->field == LIM_BLEND, "the field is one of the two kinds");
     lim->options.hops = options->hops > 0 ? options->hops : 1;
     lim->kernels = lane_kernels(options->isa);
     lim->group = aligned_alloc(BLOB_GROUP_ALIGNMENT, groups * sizeof *lim->group);
@@ -979,7 +999,7 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     for (int level = 0; level < lim->blocks.levels; level++)
         lim->vessel.bytes += (size_t)lim->blocks.count[level] * sizeof(PowerBox);
     lim->vessel.bytes += sizeof *lim + groups * sizeof *lim->group + near * sizeof *lim->near + (size_t)tree->node_count * of_node + links * sizeof *tree->near;
-    fill_models(lim);
+    fill_models(lim, groups, near);
     lim->inlet_open = vessel_tree_root_is_open(tree);
     carry_inlet(lim);
     return &lim->vessel;

@@ -114,6 +114,7 @@ static inline void sym3_add_outer(Sym3 *s, double factor, Vec3 v)
 static inline double sym3_trace(const Sym3 *s) { return s->xx + s->yy + s->zz; }
 
 static inline Quat quat_identity(void) { return (Quat){1, 0, 0, 0}; }
+static inline bool quat_is_unit(Quat q) { return fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-9; }
 static inline Quat quat_conjugate(Quat q) { return (Quat){q.w, -q.x, -q.y, -q.z}; }
 static inline Quat quat_mul(Quat a, Quat b)
 {

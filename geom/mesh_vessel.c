@@ -33,6 +33,7 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
 
 #else
 
+#include "base/assert.h"
 #include "base/disjoint_sets.h"
 #include "geom/tree_surface.h"
 #include "geom/triangle_groups.h"
@@ -136,6 +137,7 @@ static float widened(const Search *s)
 
 static bool look_at(Search *s, int group)
 {
+    SEL_ASSERT(group >= 0 && group < s->mesh->group_count, "the group is one of the mesh's");
     const TriangleGroup *g = &s->mesh->group[group];
     double d2[GROUP_TRIANGLES];
     bool closer = false;
@@ -197,6 +199,7 @@ static bool search_around(Search *s, int own)
         if (is_proven(around, s))
             return true;
         int next = s->triangle >= 0 ? m->group_of[s->triangle] : own;
+        SEL_ASSERT(next >= 0 && next < m->group_count, "each triangle is in a group");
         if (next == own)
             return false;
         own = next;
@@ -207,6 +210,7 @@ static bool search_around(Search *s, int own)
 // The triangle that stands for a feature: the lowest of those that share it. Which of them is the closest is a matter of rounding.
 static int keeper_of(const MeshVessel *m, int triangle, int feature)
 {
+    SEL_ASSERT(feature >= ON_EDGE && feature <= ON_FACE, "a foot lies on an edge, a vertex or the face");
     if (feature == ON_FACE)
         return triangle;
     if (feature >= ON_VERTEX)
@@ -226,9 +230,11 @@ static int closest_triangle(const MeshVessel *m, Vec3 x, int from, double limit,
     if (s.triangle < 0)
         return -1;
     closest_of_triangle(m, s.triangle, x, foot);
+    SEL_ASSERT(isfinite(foot->distance2), "a triangle with an area has a closest point");
     int keeper = keeper_of(m, s.triangle, foot->feature);
     if (keeper != s.triangle)
         closest_of_triangle(m, keeper, x, foot);
+    SEL_ASSERT(keeper >= 0 && keeper < m->triangle_count, "features belong to triangles of the mesh");
     return keeper;
 }
 
@@ -494,6 +500,7 @@ static bool link_triangles(MeshVessel *m)
     for (size_t i = 0; good && i < sides; i++) {
         const int *c = m->corner[i / 3];
         int a = c[i % 3], b = c[(i + 1) % 3], low = a < b ? a : b;
+        SEL_ASSERT(low >= 0 && a < m->vertex_count && b < m->vertex_count, "corners are vertices of the mesh");
         side[first[low + 1]++] = (Side){a < b ? b : a, (int)(i / 3), (int)(i % 3)};
         m->across[i / 3][i % 3] = -1;
     }
@@ -508,6 +515,7 @@ static bool link_triangles(MeshVessel *m)
                 continue;
             }
             m->across[s[i].triangle][s[i].k] = s[i + 1].triangle;
+            SEL_ASSERT(s[i].triangle != s[i + 1].triangle, "an edge has two different triangles");
             m->across[s[i + 1].triangle][s[i + 1].k] = s[i].triangle;
             i++;
         }
@@ -695,6 +703,7 @@ typedef struct Ring {        // groups about one, itself first, the nearest by t
 
 static void add_to_ring(Ring *ring, int group, const GroupMiddle *middle)
 {
+    SEL_ASSERT(ring->count > 0 && ring->count <= GROUP_NEAR, "a ring holds its own group first");
     int k = 0;
     while (k < ring->count && ring->group[k] != group)
         k++;
@@ -749,6 +758,7 @@ static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurr
             look_at(&s, m->group_of[before]);
         search_tree(&s);
         before = s.triangle;
+        SEL_ASSERT(around->balls < GROUP_BALLS, "there is room for a ball");
         double radius = sqrt(s.distance2) * (1 - 1e-9) - 1e-9 * m->size;
         if (!(radius > touching))
             return;          // larger ones would have to hold this one

@@ -1,6 +1,8 @@
 // A half space: gap = (x - point) . normal, exact everywhere, no node, no inlet. For friction tests (incline, stick, slip).
 #include "geom/vessel.h"
 
+#include "base/assert.h"
+
 #include <stdlib.h>
 
 typedef struct PlaneVessel {
@@ -47,5 +49,6 @@ Vessel *plane_vessel_create(Vec3 point, Vec3 normal)
                              .primitives = 1, .bytes = sizeof *plane};
     plane->point = point;
     plane->normal = vec3_scale(normal, 1 / length);
+    SEL_ASSERT(fabs(vec3_norm2(plane->normal) - 1) < 1e-12, "normals are unit vectors");
     return &plane->vessel;
 }

@@ -1,4 +1,5 @@
 #include "geom/power_blocks.h"
+#include "base/assert.h"
 #include "geom/power_walk.h"
 
 #include <stdlib.h>
@@ -8,6 +9,7 @@ static Vec3 most(Vec3 a, Vec3 b) { return vec3(fmax(a.x, b.x), fmax(a.y, b.y), f
 
 static PowerBox box_of(const PowerBlocks *blocks, int level, int i)
 {
+    SEL_ASSERT(level < blocks->levels && i >= 0 && i < (level >= 0 ? blocks->count[level] : blocks->tree->node_count), "the box is one of its level");
     if (level >= 0)
         return blocks->box[level][i];
     const VesselTree *tree = blocks->tree;
@@ -18,11 +20,13 @@ bool power_blocks_create(PowerBlocks *blocks, const VesselTree *tree)
 {
     *blocks = (PowerBlocks){.tree = tree};
     size_t all = 0;
+    SEL_ASSERT(tree->node_count > 0, "a tree has a root");
     for (int n = tree->node_count; n > 1 && blocks->levels < POWER_LEVELS; blocks->levels++) {
         n = (n - 1) / POWER_BLOCK + 1;
         blocks->count[blocks->levels] = n;
         all += (size_t)n;
     }
+    SEL_ASSERT(blocks->levels == 0 || blocks->count[blocks->levels - 1] == 1, "one box holds all nodes");
     PowerBox *box = calloc(all + 1, sizeof *box);
     blocks->box[0] = box;
     if (!box)
@@ -38,6 +42,7 @@ bool power_blocks_create(PowerBlocks *blocks, const VesselTree *tree)
             *box++ = b;
         }
     }
+    SEL_REQUIRE(blocks->levels == 0 || (size_t)(box - blocks->box[0]) == all, "the boxes of all levels are one piece");
     return true;
 }
 
@@ -95,5 +100,6 @@ int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x)
         look(blocks, 0, at, x, &best);
         look(blocks, blocks->levels - 1, 0, x, &best);
     }
+    SEL_ASSERT(best.node >= 0 && best.node < tree->node_count, "the nearest node is one of the tree");
     return best.node;
 }

@@ -7,6 +7,8 @@
 // ball that it is inside of.
 #include "geom/power_walk.h"
 
+#include "base/assert.h"
+
 enum { WAYS_MAX = 64 };
 
 typedef struct Way {
@@ -16,6 +18,7 @@ typedef struct Way {
 
 static int look_around(const VesselTree *tree, Vec3 x, int node)
 {
+    SEL_ASSERT(node >= 0 && node < tree->node_count, "ways start at a node of the tree");
     Way way[WAYS_MAX] = {{node, -1, 0}};
     int known = 1, best_node = node;
     double longest = 2.5 * vec3_distance(x, tree->center[node]), best = 0;   // only inside a ball
@@ -28,6 +31,7 @@ static int look_around(const VesselTree *tree, Vec3 x, int node)
         }
         for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
             int next = tree->neighbour[k];
+            SEL_ASSERT(next >= 0 && next < tree->node_count, "neighbours are nodes of the tree");
             double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
             if (next != at.from && length < longest)
                 way[known++] = (Way){next, at.node, length};
@@ -46,6 +50,7 @@ static bool is_nearer_in_radii(const VesselTree *tree, Vec3 x, int node, int nex
 
 int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
 {
+    SEL_ASSERT(tree->near_offset && tree->near, "the tree is linked (vessel_tree_link)");
     if (node < 0 || node >= tree->node_count)
         return power_nearest(tree, x);
     double best = power_distance(x, tree->center[node], tree->radius[node]);
@@ -53,6 +58,7 @@ int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
         int here = node;
         for (int k = tree->near_offset[here]; k < tree->near_offset[here + 1]; k++) {
             int next = tree->near[k];
+            SEL_ASSERT(next >= 0 && next < tree->node_count && next != here, "near nodes are other nodes of the tree");
             double d = power_distance(x, tree->center[next], tree->radius[next]);
             if (d < best && is_nearer_in_radii(tree, x, here, next)) {
                 best = d;
@@ -68,6 +74,7 @@ int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
 
 int power_nearest(const VesselTree *tree, Vec3 x)
 {
+    SEL_ASSERT(tree->node_count > 0, "a tree has a root");
     int node = 0;
     double best = power_distance(x, tree->center[0], tree->radius[0]);
     for (int i = 1; i < tree->node_count; i++) {
@@ -77,5 +84,6 @@ int power_nearest(const VesselTree *tree, Vec3 x)
             node = i;
         }
     }
+    SEL_ASSERT(node >= 0 && node < tree->node_count, "the nearest node is one of the tree");
     return node;
 }

@@ -15,6 +15,7 @@
 // at points that happen to lie in its plane. So a wire that leaves at an angle leans on the bell, tangent at first. There gap = D - L with D the distance
 // to the circle of radius (radius + L) in the end plane. Two radii beyond the end, where the bell is further than any tool's radius, there is no wall.
 #include "geom/vessel.h"
+#include "base/assert.h"
 #include "base/same_math.h"
 
 #include <stdlib.h>
@@ -85,6 +86,7 @@ static bool is_past(const Segment *s, Vec3 x) { return vec3_dot(vec3_sub(x, s->e
 // Walks to ever closer neighbours; ends, since the distance falls strictly.
 static int walk(const TubeVessel *tube, Vec3 x, int segment, CentrePoint *closest)
 {
+    SEL_ASSERT(segment >= 0 && segment < tube->count, "a walk starts on a segment of the tube");
     const Segment *s = tube->segment;
     *closest = closest_on_segment(&s[segment], x);
     for (int way = -1; way <= 1; way += 2)
@@ -103,6 +105,7 @@ static int walk(const TubeVessel *tube, Vec3 x, int segment, CentrePoint *closes
 
 static int nearest_overall(const TubeVessel *tube, Vec3 x)
 {
+    SEL_ASSERT(tube->count > 0, "a tube has a segment");
     int best = 0;
     double least = HUGE_VAL;
     for (int i = 0; i < tube->count; i++) {
@@ -119,6 +122,7 @@ static int nearest_overall(const TubeVessel *tube, Vec3 x)
 // where a contact may sit, and both are held to what they are at a tenth of the radius.
 static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePoint *c, Vec3 normal, double distance)
 {
+    SEL_ASSERT(distance >= 0, "a distance is a length");
     Sym3 h = {0, 0, 0, 0, 0, 0};
     double least = 0.1 * tube->radius, d = distance > least ? distance : least;
     if (c->end != 0) {
@@ -144,6 +148,7 @@ static VesselHit open_end(VesselMemory *memory, int node)
 // Beyond the last end's plane by z > 0: the bell.
 static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent, double z, VesselMemory *memory)
 {
+    SEL_ASSERT(z > 0, "the bell begins beyond the last plane");
     double r = tube->radius, bell = r;
     Vec3 radial = vec3_add_scaled(vec3_sub(x, end), -z, tangent);
     double rho = vec3_norm(radial), aside = r + bell - rho, far = same_hypot(z, aside);
@@ -312,6 +317,7 @@ static int add_arc(Segment *out, Vec3 *p, Vec3 *t, Vec3 *n, double arc_radius, d
     parts = parts < 1 ? 1 : parts;
     double part = angle / parts, cs = same_cos(part), sn = same_sin(part), half_cs = same_cos(0.5 * part), half_sn = same_sin(0.5 * part);
     for (int k = 0; k < parts; k++) {
+        SEL_ASSERT(part > 0 && part < 0.51 * PI && arc_radius > 0, "an arc is cut into parts of 90 degrees at most");
         Segment s = {.start = *p, .tangent = *t, .normal = *n, .arc_radius = arc_radius, .angle = part,
                      .cosine = cs, .sine = sn, .half_cosine = half_cs, .half_sine = half_sn};
         s.binormal = vec3_cross(*t, *n);
@@ -327,6 +333,7 @@ static int add_arc(Segment *out, Vec3 *p, Vec3 *t, Vec3 *n, double arc_radius, d
 
 static int add_line(Segment *out, Vec3 *p, Vec3 t, Vec3 n, double length)
 {
+    SEL_ASSERT(length > 0 && fabs(vec3_norm2(t) - 1) < 1e-12, "a line has a length and a unit direction");
     Segment s = {.start = *p, .tangent = t, .end_tangent = t, .normal = n, .binormal = vec3_cross(t, n), .length = length};
     *p = s.end = vec3_add_scaled(*p, length, t);
     *out = s;
@@ -345,6 +352,7 @@ static int lay_pieces(const TubeOptions *o, Segment *out)
         } else
             count += add_line(out + count, &p, t, n, piece->length);
     }
+    SEL_ASSERT(count > 0, "a path has a line or an arc");
     return count;
 }
 
@@ -383,6 +391,7 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
     tube->closed_ends = options->closed_ends;
     tube->segment = segment;
     tube->count = pieces ? lay_pieces(options, segment) : lay_polyline(options, segment);
+    SEL_REQUIRE(tube->count > 0 && (size_t)tube->count <= capacity, "lines and parts of arcs fit into what was counted");
     tube->vessel.primitives = tube->count;
     tube->vessel.bytes = sizeof *tube + (size_t)tube->count * sizeof *segment;
     for (int i = 0; i + 1 < tube->count; i++)

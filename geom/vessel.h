@@ -8,6 +8,7 @@
 #ifndef SELDINGER_GEOM_VESSEL_H
 #define SELDINGER_GEOM_VESSEL_H
 
+#include "base/assert.h"
 #include "geom/linear.h"
 #include "geom/vessel_tree.h"
 
@@ -70,9 +71,15 @@ struct Vessel {
     size_t bytes;            // that queries read, of whatever owner; both for tables
 };
 
+// Does a hit keep what is promised above: a gap that is a number, a unit normal where there is a wall?
+bool vessel_hit_is_sound(const VesselHit *hit);
+
 static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
+    SEL_ASSERT(count >= 0 && !isnan(reach), "a vessel is asked about a number of points, as far as a reach");
     v->query(v, count, point, reach, memory, hit);
+    for (int i = 0; SELDINGER_ASSERTS && i < count; i++)
+        SEL_ASSERT(vessel_hit_is_sound(&hit[i]), "a gap is a number and a wall's normal a unit vector");
 }
 
 // --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. NULL where the tree has no model. ---

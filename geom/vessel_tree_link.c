@@ -1,5 +1,6 @@
 // The tree's derived lists: neighbours, near nodes, who sees which blob. See vessel_tree.h.
 #include "geom/vessel_tree.h"
+#include "base/assert.h"
 
 #include "geom/blob_flood.h"
 
@@ -25,6 +26,7 @@ static void link_neighbours(VesselTree *tree)
         offset[i + 1] = sum;
         sum += own;
     }
+    SEL_REQUIRE(sum <= 2 * (n - 1), "each node but the root has one link up, so the list of 2 (N - 1) neighbours holds all");
     // a node's own parent comes before any of its children do, because parents stand before children
     for (int i = 1; i < n; i++) {
         int p = tree->parent[i];
@@ -65,6 +67,7 @@ static bool add_near(NearSearch *s, int node)
         s->near = more;
         s->capacity = capacity;
     }
+    SEL_ASSERT(node >= 0 && node < s->tree->node_count, "near nodes are nodes of the tree");
     s->near[s->count++] = node;
     return true;
 }
@@ -109,8 +112,10 @@ static bool collect_near(NearSearch *s, int node)
         for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1]; k++) {
             int next = tree->neighbour[k];
             Way way = {next, at.node, next < at.node ? next : at.top};
-            if (next != at.from && (w == 0 || way_length(s, node, way) < farthest))
+            if (next != at.from && (w == 0 || way_length(s, node, way) < farthest)) {
+                SEL_REQUIRE(known < tree->node_count, "a tree has one way to each node");
                 s->way[known++] = way;
+            }
         }
     }
     return true;
@@ -118,6 +123,7 @@ static bool collect_near(NearSearch *s, int node)
 
 static bool link_near(VesselTree *tree, NearSearch *s)
 {
+    SEL_ASSERT(tree->near_offset[0] == 0, "the first list starts at 0");
     int n = tree->node_count;
     for (int i = 0; i < n; i++) {
         s->largest = fmax(s->largest, tree->radius[i]);
@@ -131,6 +137,7 @@ static bool link_near(VesselTree *tree, NearSearch *s)
         for (; i < n && (s->part == 0 || (s->visits < VISITS_MAX && s->count < NEAR_MAX)); i++) {
             if (!collect_near(s, i))
                 return false;
+            SEL_REQUIRE(s->count <= INT_MAX, "entries of the near list are counted by int");
             tree->near_offset[i + 1] = (int)s->count;
         }
         if (i == n)
@@ -140,6 +147,7 @@ static bool link_near(VesselTree *tree, NearSearch *s)
 
 bool vessel_tree_link(VesselTree *tree)
 {
+    SEL_ASSERT(tree->node_count > 0, "a tree has a root");
     size_t n = (size_t)tree->node_count;
     link_neighbours(tree);
     free(tree->near_offset);

@@ -1,6 +1,8 @@
 #define _GNU_SOURCE   // locks of an open file, not of a process
 #include "sim/ordered_file.h"
 
+#include "base/assert.h"
+
 #include "base/heap.h"
 
 #include <errno.h>
@@ -307,6 +309,7 @@ OrderedFile *ordered_file_open(const char *path, int half_fan, hsize_t ahead)
     if (!file)
         return NULL;
     file->fan = 2 * half_fan;
+    SEL_ASSERT(half_fan > 0, "a node has children");
     file->ahead = ahead;
     file->node = calloc(1, NODE_HEAD + (size_t)file->fan * (MOST_KEY + WORD) + MOST_KEY);
     file->descriptor = open(path, O_RDWR | O_NOFOLLOW | O_CLOEXEC);
@@ -324,6 +327,7 @@ OrderedFile *ordered_file_open(const char *path, int half_fan, hsize_t ahead)
 
 static Page *page_of(OrderedFile *file, haddr_t address)
 {
+    SEL_ASSERT(address > 0 && address != HADDR_UNDEF, "an address in the file");
     haddr_t start = address / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE;
     for (int i = 0; i < file->page_count; i++)
         if (file->page[i].start == start)
@@ -346,9 +350,11 @@ static Page *page_of(OrderedFile *file, haddr_t address)
 // address in a layout of version 3.
 int ordered_file_add(OrderedFile *file, haddr_t header, int rank, hsize_t chunk_rows)
 {
+    SEL_ASSERT(rank > 0 && chunk_rows > 0, "a dataset grows by chunks of rows");
     enum { DATASPACE = 1, LAYOUT = 8, CHUNKED = 2, HEAD = 16, MESSAGE = 8 };
     unsigned char bytes[MOST_HEADER];
     Set set = {.rank = rank, .chunk_rows = chunk_rows};
+    SEL_REQUIRE(key_bytes(&set) <= MOST_KEY, "the scratch has room for a key of each dimension");
     if (file->set_count == ORDERED_FILE_MOST_SETS || !read_all(file->descriptor, bytes, sizeof bytes, header) || bytes[0] != 1)
         return -1;
     size_t size = HEAD + little_endian(bytes + 8, 4);
@@ -386,6 +392,7 @@ static bool state_end(OrderedFile *file, haddr_t end)
 // The address of new space, 0 if there is none.
 static haddr_t take_space(OrderedFile *file, size_t bytes)
 {
+    SEL_ASSERT(bytes > 0 && file->end <= file->stated, "what is used lies before the end that the superblock states");
     haddr_t address = (file->end + WORD - 1) / WORD * WORD;
     if (address + bytes > file->stated && !state_end(file, address + bytes + file->ahead) && !state_end(file, address + bytes))
         return 0;
@@ -395,6 +402,7 @@ static haddr_t take_space(OrderedFile *file, size_t bytes)
 
 static void put_key(const Set *set, unsigned char *key, uint64_t bytes, hsize_t row)
 {
+    SEL_ASSERT(bytes <= UINT32_MAX, "a chunk's size is a number of 32 bits");
     memset(key, 0, key_bytes(set));
     put_little_endian(key, bytes, 4);
     put_little_endian(key + WORD, row, WORD);
@@ -411,6 +419,7 @@ static size_t put_entry(const Set *set, unsigned char *at, uint64_t bytes, hsize
 
 static void put_node_head(unsigned char *node, int level, uint64_t count)
 {
+    SEL_ASSERT(count <= UINT16_MAX && level >= 0 && level < 2, "an index has two levels");
     memcpy(node, "TREE", 4);
     node[4] = 1;      // of chunks
     node[5] = (unsigned char)level;
@@ -434,6 +443,7 @@ static haddr_t make_node(OrderedFile *file, const Set *set, int level, haddr_t l
 // Entry `i` of a node that has as many.
 static bool add_entry(OrderedFile *file, const Set *set, haddr_t node, int level, uint64_t i, uint64_t bytes, hsize_t row, haddr_t child, hsize_t next_row)
 {
+    SEL_REQUIRE(i > 0 && i < (uint64_t)file->fan, "a node has room for another child");
     unsigned char entry[2 * MOST_KEY + WORD], head[WORD];
     size_t size = put_entry(set, entry, bytes, row, child, next_row);
     put_node_head(head, level, i + 1);
@@ -479,9 +489,11 @@ static bool add_leaf(OrderedFile *file, Set *set, uint64_t leaf, size_t bytes, h
 
 bool ordered_file_append(OrderedFile *file, int number, const void *chunk, size_t bytes)
 {
+    SEL_REQUIRE(number >= 0 && number < file->set_count, "the dataset was added");
     Set *set = &file->set[number];
     uint64_t fan = (uint64_t)file->fan, leaf = set->chunks / fan, i = set->chunks % fan;
     hsize_t row = set->chunks * set->chunk_rows;
+    SEL_ASSERT(bytes > 0, "a packed chunk has bytes");
     if (file->fault)
         return false;
     if (leaf == fan)
@@ -498,8 +510,12 @@ bool ordered_file_append(OrderedFile *file, int number, const void *chunk, size_
 
 void ordered_file_set_rows(OrderedFile *file, int number, hsize_t rows)
 {
+    SEL_REQUIRE(number >= 0 && number < file->set_count, "the dataset was added");
     const Set *set = &file->set[number];
     Page *page = page_of(file, set->extent);
+    SEL_REQUIRE(page, "the extent's page was read when the dataset was added");
+    SEL_ASSERT(rows <= set->chunks * set->chunk_rows, "no more rows are stated than were appended");
+    SEL_ASSERT(set->extent % ORDERED_FILE_PAGE + WORD <= ORDERED_FILE_PAGE, "an extent lies in one page");
     put_little_endian(page->wanted + set->extent % ORDERED_FILE_PAGE, rows, WORD);
 }
 

@@ -1,5 +1,6 @@
 // Reading a recording back (recon/hdf5_reader.h checks what it holds). Rows that one dataset has more than another (a file still being written) are left out.
 #include "sim/recording.h"
+#include "base/assert.h"
 
 #include "recon/hdf5_reader.h"
 
@@ -571,6 +572,7 @@ bool recorded_run_was_watched(const RecordedRun *run)
 
 ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step)
 {
+    SEL_REQUIRE(step >= 0 && step < run->step_count, "the step is one of the run's");
     ToolCommands commands = {0};
     for (int k = 0; k < run->tool_count; k++) {
         const RecordedTool *tool = &run->tool[k];
@@ -587,6 +589,7 @@ ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step)
 
 RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame)
 {
+    SEL_REQUIRE(frame >= 0 && frame < run->frame_count, "the frame is one of the run's");
     size_t nodes = (size_t)run->node_count, first = (size_t)frame * nodes;
     RecordedFrame at = {.node_count = run->frame_nodes ? run->frame_nodes[frame] : run->node_count, .s = run->s, .radius = run->radius,
                         .position = run->position + first, .quaternion = run->quaternion + first, .force = run->force + 3 * first, .gap = run->gap + first,
@@ -600,11 +603,13 @@ RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame)
 
 int recorded_run_fitted(const RecordedRun *run, int tool, int64_t step)
 {
+    SEL_ASSERT(tool >= 0 && tool < run->tool_count, "the tool is one of the run's");
     return run->exchange ? run->exchange[2 * (step * run->tool_count + tool) + 1] : 0;
 }
 
 RecordedToolFrame recorded_run_tool_frame(const RecordedRun *run, int tool, int64_t frame)
 {
+    SEL_REQUIRE(tool >= 0 && tool < run->tool_count && frame >= 0 && frame < run->frame_count, "tool and frame are the run's");
     const RecordedTool *t = &run->tool[tool];
     int device = recorded_run_fitted(run, tool, run->frame_step[frame]);
     size_t profile = (size_t)device * (size_t)t->node_count, first = (size_t)frame * (size_t)t->node_count;

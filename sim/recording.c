@@ -1,5 +1,7 @@
 #include "sim/recording.h"
 
+#include "base/assert.h"
+
 #include "base/heap.h"
 #include "base/part_file.h"
 #include "base/sha256.h"
@@ -50,8 +52,17 @@ enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, ONE_TOOL_COLUM
 enum { OWN_POSITION, OWN_QUATERNION, OWN_CARRIER, TOOL_FRAME_COLUMNS };      // … these
 enum { MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS + 1, MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS };
 
-static int step_column_of(int tool, int which) { return tool == 0 ? which : STEP_COLUMNS + (tool - 1) * TOOL_STEP_COLUMNS + which; }
-static int frame_column_of(int tool, int which) { return FRAME_COLUMNS + tool * TOOL_FRAME_COLUMNS + which; }
+static int step_column_of(int tool, int which)
+{
+    SEL_ASSERT(tool >= 0 && tool <= STEP_TOOLS_MAX && which >= 0 && which < TOOL_STEP_COLUMNS, "a tool has columns of its own, and what is exchanged stands behind all");
+    return tool == 0 ? which : STEP_COLUMNS + (tool - 1) * TOOL_STEP_COLUMNS + which;
+}
+
+static int frame_column_of(int tool, int which)
+{
+    SEL_ASSERT(tool >= 0 && tool <= STEP_TOOLS_MAX && which >= 0 && which < TOOL_FRAME_COLUMNS, "a tool has columns of its own");
+    return FRAME_COLUMNS + tool * TOOL_FRAME_COLUMNS + which;
+}
 
 // Rows of all columns of one kind: written by the simulation thread at `head`, drained by the writer at `tail`; both only grow.
 typedef struct Ring {
@@ -102,9 +113,11 @@ void recording_prepare_process(void)
 static Column column_of(const char *group, const char *name, hid_t type, int rank, hsize_t first, hsize_t second)
 {
     Column column = {.type = type, .rank = rank, .shape = {first, second}, .dataset = -1};
-    snprintf(column.name, sizeof column.name, "%s/%s", group, name);
+    int length = snprintf(column.name, sizeof column.name, "%s/%s", group, name);
+    SEL_REQUIRE(length > 0 && length < (int)sizeof column.name, "a dataset's name fits");
     column.value_bytes = H5Tget_size(type);
     column.row_bytes = column.value_bytes * (size_t)first * (size_t)second;
+    SEL_ASSERT(column.row_bytes > 0, "a row has values");
     return column;
 }
 
@@ -193,6 +206,7 @@ static void describe_motion(Recording *recording)
 
 static bool make_ring(Ring *ring, int length, int column_count, Column *column)
 {
+    SEL_ASSERT(length > 0 && column_count > 0 && column_count <= MOST_FRAME_COLUMNS + MOST_STEP_COLUMNS, "a ring has rows and columns");
     ring->length = length;
     ring->column_count = column_count;
     ring->column = column;
@@ -207,6 +221,7 @@ static bool make_chunks(Recording *recording, Column *column, int count, hsize_t
     bool good = true;
     for (int i = 0; good && i < count; i++) {
         size_t bytes = column[i].row_bytes * chunk_rows;
+        SEL_ASSERT(bytes > 0, "a chunk has rows");
         column[i].chunk_rows = chunk_rows;
         column[i].chunk = calloc(1, bytes);
         column[i].before = calloc(column[i].row_bytes / column[i].value_bytes, sizeof *column->before);
@@ -295,6 +310,7 @@ static bool write_profiles(const Recording *recording, const Scene *scene, int t
         const WireOptions options = scene_device_wire(scene, tool, i);
         if (!(good = wire_create(&wire, &options, why, (int)sizeof why)))
             break;
+        SEL_REQUIRE(wire.node_count <= count, "the profile has room for the longest device");
         memcpy(s + i * count, wire.s, (size_t)wire.node_count * sizeof *s);
         memcpy(s + values + i * count, wire.radius, (size_t)wire.node_count * sizeof *s);
         wire_destroy(&wire);
@@ -371,6 +387,7 @@ static bool write_scene(Recording *recording, const Scene *scene)
     for (int i = 0; i < scene->exchange_count; i++)
         if (scene->exchange[i].device.device_path)
             file[count++] = scene->exchange[i].device.device_path;
+    SEL_REQUIRE(count <= MOST_FILES, "there is room for the files that a scene names");
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
         file[count++] = recording->options.file[i];
     char *paths = NULL, *sums = NULL, *path = whole_path(scene->path);
@@ -505,6 +522,7 @@ static void shuffle(const unsigned char *from, size_t count, size_t value_bytes,
 static bool pack_chunk(Recording *recording, const Column *column)
 {
     size_t bytes = column->chunk_rows * column->row_bytes;
+    SEL_REQUIRE(bytes <= recording->packed_bytes, "the scratch has room for the largest chunk");
     uLongf length = compressBound(recording->packed_bytes);
     shuffle(column->chunk, bytes / column->value_bytes, column->value_bytes, recording->shuffled);
     return compress2(recording->packed, &length, recording->shuffled, bytes, recording->key_every > 0 ? LEVEL_OF_SESSIONS : LEVEL_OF_RUNS) == Z_OK &&
@@ -537,6 +555,7 @@ static bool end_row(Recording *recording, Column *column) { return ++column->row
 
 static bool take_row(Recording *recording, Column *column, const unsigned char *row)
 {
+    SEL_ASSERT(column->chunk && column->chunk_rows > 0, "the column has a chunk");
     unsigned char *to = next_row(column);
     memcpy(to, row, column->row_bytes);
     if (column->grid != 0)
@@ -559,6 +578,7 @@ static int32_t in_units(const Column *column, const unsigned char *row, size_t i
 static bool take_motion(Recording *recording, const Column *from, Column *to, const unsigned char *row)
 {
     uint32_t *change = (uint32_t *)(void *)next_row(to);
+    SEL_ASSERT(to->row_bytes / to->value_bytes == from->row_bytes / from->value_bytes, "motion has a value for each of the frame's");
     size_t parts = from->rank == 2 ? from->shape[1] : 1, nodes = from->rank == 0 ? 1 : from->shape[0];
     for (size_t part = 0; part < parts; part++) {
         uint32_t neighbours = 0;
@@ -576,6 +596,7 @@ static bool take_motion(Recording *recording, const Column *from, Column *to, co
 
 static const unsigned char *row_in_ring(const Ring *ring, const Column *column, long long row)
 {
+    SEL_ASSERT(row >= 0 && column->ring, "the row was put into the ring");
     return column->ring + (size_t)(row % ring->length) * column->row_bytes;
 }
 
@@ -607,6 +628,7 @@ static void set_tail(Ring *ring, long long tail) { atomic_store_explicit(&ring->
 
 static bool drain(Recording *recording, long long steps, long long frames)
 {
+    SEL_REQUIRE(steps - atomic_load(&recording->steps.tail) <= STEP_RING && frames - atomic_load(&recording->frames.tail) <= FRAME_RING, "no row was overwritten before it was taken");
     bool good = true;
     for (long long i = atomic_load_explicit(&recording->steps.tail, memory_order_relaxed); good && i < steps; i++) {
         good = take_steps(recording, i);
@@ -633,6 +655,7 @@ static hsize_t whole_rows(const Column *column, int64_t every, hsize_t steps)
 
 static void state_rows(const Recording *recording, const Column *column, int count, hsize_t rows)
 {
+    SEL_ASSERT(recording->ordered && count >= 0, "the file is open");
     for (int i = 0; i < count; i++)
         ordered_file_set_rows(recording->ordered, column[i].set, rows);
 }
@@ -643,6 +666,7 @@ static bool end_chunks(Recording *recording, Column *column, int count)
     bool good = true;
     for (int i = 0; good && i < count; i++) {
         size_t used = column[i].rows % column[i].chunk_rows * column[i].row_bytes;
+        SEL_ASSERT(used < column[i].chunk_rows * column[i].row_bytes, "a chunk that has begun has room");
         memset(column[i].chunk + used, 0, column[i].chunk_rows * column[i].row_bytes - used);
         good = used == 0 || pack_chunk(recording, &column[i]);
     }
@@ -720,6 +744,8 @@ static void *write_rings(void *argument)
 static void *slot_of(Ring *ring, int column)
 {
     long long head = atomic_load_explicit(&ring->head, memory_order_relaxed);
+    SEL_ASSERT(column >= 0 && column < ring->column_count, "the column is one of the ring's");
+    SEL_ASSERT(head - atomic_load(&ring->tail) < ring->length, "wait_for_room() was called");
     return ring->column[column].ring + (size_t)(head % ring->length) * ring->column[column].row_bytes;
 }
 
@@ -745,7 +771,9 @@ static void put_tool_frame(Recording *recording, const Stepper *stepper, int too
     Quat *quaternion = slot_of(ring, frame_column_of(tool, OWN_QUATERNION));
     int8_t *carrier = slot_of(ring, frame_column_of(tool, OWN_CARRIER));
     static const ToolNode unused = {.position = {NAN, NAN, NAN}, .orientation = {NAN, NAN, NAN, NAN}, .carrier = -1};
-    for (int j = stepper_tool_nodes(stepper, tool, recording->own); j < recording->tool_nodes[tool]; j++)
+    int nodes = stepper_tool_nodes(stepper, tool, recording->own);
+    SEL_REQUIRE(nodes <= recording->tool_nodes[tool], "there is room for the longest device");
+    for (int j = nodes; j < recording->tool_nodes[tool]; j++)
         recording->own[j] = unused;
     for (int j = 0; j < recording->tool_nodes[tool]; j++) {
         position[j] = recording->own[j].position;
@@ -776,7 +804,9 @@ static bool push_frame(Recording *recording, Simulator *simulator)
     Stepper *stepper = simulator_stepper(simulator);
     Ring *ring = &recording->frames;
     int nodes = state->node_count;
+    SEL_REQUIRE(nodes <= recording->node_count, "a frame has room for all nodes");
     int64_t row = simulator_totals(simulator)->steps - 1;
+    SEL_ASSERT(row >= 0 && row > recording->last_frame_step, "frames follow steps, in their order");
     stepper_node_report(stepper, recording->node);
     put(ring, FRAME_STEP, &row);
     Vec3 *position = slot_of(ring, POSITION);
@@ -808,6 +838,7 @@ static void put_exchange(Recording *recording, const Stepper *stepper, const Too
 {
     uint8_t *row = slot_of(&recording->steps, exchange_column(recording));
     for (int k = 0; k < recording->tool_count; k++) {
+        SEL_ASSERT(commands->fitted[k] >= 0 && commands->fitted[k] <= UINT8_MAX, "a device has a number of one byte");
         row[2 * k] = (uint8_t)commands->fitted[k];
         row[2 * k + 1] = (uint8_t)stepper_fitted(stepper, k);
     }
@@ -845,6 +876,7 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
     put(ring, XRAY, xray ? xray : &unseen);
     publish(ring);
     int64_t step = simulator_totals(simulator)->steps;
+    SEL_ASSERT(step > 0, "a step has been made");
     return step % recording->frame_every != 0 && step != 1 ? true : push_frame(recording, simulator);
 }
 
@@ -931,6 +963,7 @@ static void size_chunks(Recording *recording, int64_t expected_steps, double dt,
         *step_rows = 2 * expected / most_chunks + 1;
     *frame_rows = *step_rows / (hsize_t)recording->frame_every;
     *frame_rows = *frame_rows > 0 ? *frame_rows : 1;
+    SEL_ASSERT(*step_rows > 0, "a chunk has a row");
     hsize_t chunks = expected / *step_rows + 1, frames = expected / (hsize_t)recording->frame_every / *frame_rows + 2;
     chunks = frames > chunks ? frames : chunks;
     int i = expected > 0 ? 0 : 3;
@@ -968,6 +1001,7 @@ static Recording *create(const char *path, Simulator *simulator, const Recording
     int most_own = 0;
     recording->node_count = stepper_node_capacity(stepper);
     recording->tool_count = stepper_tool_count(stepper);
+    SEL_REQUIRE(recording->tool_count > 0 && recording->tool_count <= STEP_TOOLS_MAX && recording->node_count > 1, "the simulator has a tool of some nodes");
     recording->has_exchanges = scene->exchange_count > 0;
     for (int k = 0; k < recording->tool_count; k++) {
         recording->tool_nodes[k] = scene_most_nodes(scene, k);

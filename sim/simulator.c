@@ -1,6 +1,9 @@
 // One step follows the paper's loop: feed the sheath, detect, assemble, factor, solve the contact, correct.
 #include "sim/simulator.h"
 
+#include "base/assert.h"
+#include "solver/validate.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -26,6 +29,7 @@ struct Simulator {
 static void measure_targets(Simulator *simulator)
 {
     const WireState *state = stepper_state(simulator->stepper);
+    SEL_ASSERT(state->node_count > 1, "a tool has a tip");
     for (int i = 0; i < simulator->scene->target_count; i++) {
         const SceneTarget *target = &simulator->scene->target[i];
         TargetReach *reach = &simulator->target[i];
@@ -48,6 +52,7 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
         StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options, .self_contact = scene->self_contact, .follows_touch = scene->follows_touch,
                                   .dt = scene->dt};
         WireOptions inner[TOOLS_MOST];
+        SEL_REQUIRE(scene->tool_count <= TOOLS_MOST && scene->exchange_count <= TOOLS_MOST * EXCHANGES_MOST, "a scene was checked for its number of tools and devices");
         for (int k = 1; k < scene->tool_count; k++)
             inner[k - 1] = scene_tool_wire(scene, k), options.inner_friction[k - 1] = scene->tool[k - 1].friction_inside;
         options.inner_count = scene->tool_count > 1 ? scene->tool_count - 1 : 0;
@@ -138,6 +143,7 @@ static void balance_energy(Simulator *simulator)
 {
     EnergyBalance *sum = &simulator->energy;
     StepEnergy e = stepper_energy(simulator->stepper);
+    SEL_ASSERT(isfinite(e.elastic) && isfinite(e.kinetic), "a state has an energy");
     double elastic = e.elastic - simulator->before.elastic, kinetic = e.kinetic - simulator->before.kinetic;
     double numerical = e.hand + e.load - e.friction - e.damping - elastic - kinetic, contact = e.wall - e.friction;
     double by_end = -numerical - e.wall, by_mean = by_end + 0.5 * (e.hand + contact - e.hand_start - e.contact_start), gained = fmin(by_end, by_mean);
@@ -224,6 +230,8 @@ void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
     StepCommand command[STEP_TOOLS_MAX];
     for (int k = 0; k < STEP_TOOLS_MAX; k++)
         command[k] = (StepCommand){.advance = commands->tool[k].push_mm_s * seconds, .twist = commands->tool[k].twist_deg_s * seconds * PI / 180};
+    for (int k = 0; k < STEP_TOOLS_MAX; k++)
+        SEL_ASSERT(isfinite(command[k].advance) && isfinite(command[k].twist), "commands are finite: devices and scripts were checked");
     step_feed_tools(stepper, command, commands->released);
     lap(&clock, STAGE_FEED);
     for (unsigned needs = STEP_NEEDS_ALL; needs != 0;) {
@@ -243,6 +251,7 @@ void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
         lap(&clock, STAGE_JUDGE);
     }
     step_correct(stepper);
+    SEL_VALIDATE(!stepper_broken(stepper), stepper_broken(stepper));
     lap(&clock, STAGE_CORRECT);
 
     keep_times(simulator, &clock);
@@ -267,6 +276,7 @@ typedef struct HashLanes {
 
 static void hash_doubles(HashLanes *hash, const void *data, size_t count)
 {
+    SEL_ASSERT(count > 0, "a state has numbers");
     const unsigned char *byte = data;
     for (size_t i = 0; i < count; i++) {
         uint64_t word;

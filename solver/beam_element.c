@@ -1,9 +1,12 @@
 // One element: the equations of beam_equations.h, and what the chain and the sheath take from a length.
 #include "solver/beam_equations.h"
+#include "base/assert.h"
 #include "base/same_math.h"
 
 void beam_element(const BeamInput *in, BeamOutput *out)
 {
+    SEL_ASSERT(in->length > 0, "an element has a length");
+    SEL_ASSERT(quat_is_unit(in->q1) && quat_is_unit(in->q2), "frames are unit quaternions");
     element(in, in->half_w < 1, out);
 }
 
@@ -16,6 +19,7 @@ void beam_tangent(const BeamInput *in, const BeamOutput *out, double scale, Beam
 
 void beam_bending(double length, double bending, double shear, double *near, double *far)
 {
+    SEL_ASSERT(length > 0 && bending > 0 && shear > 0, "a beam has a length and stiffness");
     double sum = 6 * bending * shear * length / (shear * length * length + 12 * bending), difference = 2 * bending / length;
     *near = 0.5 * (sum + difference);
     *far = 0.5 * (sum - difference);
@@ -23,6 +27,7 @@ void beam_bending(double length, double bending, double shear, double *near, dou
 
 void beam_bending_slope(double length, double bending, double shear, double *near, double *far)
 {
+    SEL_ASSERT(length > 0 && bending > 0 && shear > 0, "a beam has a length and stiffness");
     double q = shear * length * length + 12 * bending;
     double sum = 6 * bending * shear * (12 * bending - shear * length * length) / (q * q), difference = -2 * bending / (length * length);
     *near = 0.5 * (sum + difference);
@@ -31,6 +36,7 @@ void beam_bending_slope(double length, double bending, double shear, double *nea
 
 double beam_arc_rest(double length, double curvature, double *slope)
 {
+    SEL_ASSERT(length > 0 && curvature >= 0, "an arc has a length, and its sign lies in its plane");
     // chord = 2/k sin(kL/2); bow = k^2 L^3 / 24: what is left is k^4 L^5 / 1920 ...
     double half = 0.5 * curvature * length, q = half * half;
     if (half < 0.02) {

@@ -11,6 +11,8 @@
 // Pivots stay scalar: multiplying with explicit inverses of 6x6 blocks is faster by a third but loses the square root of the condition.
 #include "solver/block_chain.h"
 
+#include "base/assert.h"
+
 #include "base/simd.h"
 #include "solver/block_lanes.h"
 
@@ -21,7 +23,7 @@
 
 // Per node: T and Z by columns (size x BLOCK_COLUMN(size); z lane `size`: d^-1 y of the fused solve), and 1/d.
 struct BlockFactor {
-    int count, size;
+    int count, capacity, size;
     double *t, *z, *inverse;
 };
 
@@ -65,7 +67,7 @@ BlockFactor *block_factor_create(int count, int size)
     if (!f)
         return NULL;
     size_t m = (size_t)count;
-    f->count = count;
+    f->count = f->capacity = count;
     f->size = size;
     f->t = aligned_zeros(m * (size_t)BLOCK_PANEL(size));
     f->z = aligned_zeros(m * (size_t)BLOCK_PANEL(size));
@@ -99,12 +101,15 @@ static void (*const forward_substitute_on[BLOCK_SIZES][SIMD_COUNT])(const BlockF
 
 bool block_chain_factor(const BlockChain *chain, BlockFactor *factor)
 {
+    SEL_REQUIRE(chain->count > 0 && chain->count <= factor->capacity, "a factor has room for the nodes of its chain");
     factor->count = chain->count;
     return chain->size == factor->size && eliminate_on[block_size_index(chain->size)][simd_level()](chain, factor, NULL);
 }
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
+    SEL_ASSERT(b != x, "the right-hand side is read after x is written");
+    SEL_REQUIRE(chain->count > 0 && chain->count <= factor->capacity, "a factor has room for the nodes of its chain");
     int size = chain->size, form = block_size_index(size);
     factor->count = chain->count;
     if (size != factor->size || !eliminate_on[form][simd_level()](chain, factor, b))
@@ -115,6 +120,7 @@ bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, cons
 
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 {
+    SEL_ASSERT(factor->count > 0 && block_size_is_known(factor->size), "a chain was factored");
     int size = factor->size, form = block_size_index(size);
     if (x != b)
         memcpy(x, b, (size_t)(factor->count * size) * sizeof *x);
@@ -191,6 +197,7 @@ INLINE void multiply(const BlockChain *chain, const double *x, double *y, const 
 // Loops over a size that is a constant are faster.
 void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
 {
+    SEL_ASSERT(block_size_is_known(factor->size), "there are kernels for the size");
     switch (factor->size) {
     case 6: inverse_diagonal(factor, inverse, 6); break;
     case 8: inverse_diagonal(factor, inverse, 8); break;
@@ -201,6 +208,7 @@ void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
 
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y)
 {
+    SEL_ASSERT(block_size_is_known(chain->size) && x != y, "there are kernels for the size, and x is read after y is written");
     switch (chain->size) {
     case 6: multiply(chain, x, y, 6); break;
     case 8: multiply(chain, x, y, 8); break;

@@ -6,6 +6,8 @@
 // Interleaved as in block_chain.c, and for the same reason.
 #include "solver/block_condense.h"
 
+#include "base/assert.h"
+
 #include "base/simd.h"
 #include "solver/block_lanes.h"
 
@@ -33,7 +35,7 @@ static size_t node_doubles(int size)
 static size_t inverse_at(int size) { return node_doubles(size) - (size == 6 ? (size_t)BLOCK_COLUMN(6) : (size_t)((size + 7) / 8 * 8)); }
 
 struct BlockCondenser {
-    int count, size, middle;
+    int count, capacity, size, middle;
     bool *keep;
     int *place;                  // (M) in the small chain, -1: eliminated …
     unsigned char *live;         // … where so many unknowns come first, the others behind them have unit rows
@@ -50,7 +52,7 @@ BlockCondenser *block_condenser_create(int count, int size)
     if (!k)
         return NULL;
     size_t m = (size_t)count, bytes = m * node_doubles(size) * sizeof *k->node;
-    k->count = count;
+    k->count = k->capacity = count;
     k->size = size;
     k->keep = calloc(m, sizeof *k->keep);
     k->place = calloc(m, sizeof *k->place);
@@ -85,7 +87,11 @@ void block_condenser_destroy(BlockCondenser *k)
 bool *block_condenser_keep(BlockCondenser *k) { return k->keep; }
 double *block_condenser_side(BlockCondenser *k) { return k->side; }
 const unsigned char *block_condenser_live(const BlockCondenser *k) { return k->live; }
-int block_condenser_place(const BlockCondenser *k, int node) { return k->place[node]; }
+int block_condenser_place(const BlockCondenser *k, int node)
+{
+    SEL_ASSERT(node >= 0 && node < k->count && k->place[node] >= 0, "the node was kept");
+    return k->place[node];
+}
 
 // One end: the node it is at, and the kept one behind it.
 typedef struct Walk {
@@ -226,6 +232,7 @@ INLINE void find_shapes(BlockCondenser *k, const BlockChain *a, const int size)
 
 void block_condenser_survey(BlockCondenser *k, const BlockChain *chain)
 {
+    SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser has room for the chain");
     switch (k->size) {
     case 8: find_shapes(k, chain, 8); break;
     case 10: find_shapes(k, chain, 10); break;
@@ -236,6 +243,7 @@ void block_condenser_survey(BlockCondenser *k, const BlockChain *chain)
 
 const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, const double *b)
 {
+    SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser has room for the chain");
     const size_t n = (size_t)k->size, block = n * n;
     k->count = chain->count;
     choose_middle(k);
@@ -251,6 +259,7 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
         k->live[p] = (unsigned char)(k->size == 6 || s->is_scattered ? k->size : s->count);
         k->keep[i] = false;
     }
+    SEL_ASSERT(k->small.count > 0, "some node is kept");
     eliminate_on[block_size_index(k->size)][simd_level()](k, chain, b);
     const size_t stride = node_doubles(k->size);
     const double *inverse = k->node + inverse_at(k->size);
@@ -263,6 +272,7 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
 
 void block_condenser_turn_to(BlockCondenser *k, const double *b)
 {
+    SEL_ASSERT(k->small.count > 0 && k->count <= k->capacity, "a chain was condensed");
     const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
         if (k->place[i] >= 0)
@@ -272,6 +282,7 @@ void block_condenser_turn_to(BlockCondenser *k, const double *b)
 
 void block_condenser_expand(const BlockCondenser *k, const double *kept, double *x)
 {
+    SEL_ASSERT(k->small.count > 0 && kept != x, "a chain was condensed");
     const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
         if (k->place[i] >= 0)

@@ -5,6 +5,8 @@
 // The right-hand side travels as one more column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
 #include "solver/block_lu.h"
 
+#include "base/assert.h"
+
 #include "base/simd.h"
 #include "solver/block_lanes.h"
 
@@ -23,7 +25,7 @@
 static size_t node_doubles(int size) { return (size_t)(4 * BLOCK_PANEL(size) + 2 * BLOCK_COLUMN(size)); }
 
 struct BlockLu {
-    int count, size;
+    int count, capacity, size;
     unsigned char *live;         // (M) unknowns of each node that come before its unit rows
     double *node;
     double *rest, *change;       // (M, n) of the refinement
@@ -35,7 +37,7 @@ BlockLu *block_lu_create(int count, int size)
     if (!lu)
         return NULL;
     size_t m = (size_t)count, bytes = m * node_doubles(size) * sizeof *lu->node;
-    lu->count = count;
+    lu->count = lu->capacity = count;
     lu->size = size;
     lu->node = aligned_alloc(64, bytes);
     lu->live = calloc(m, 1);
@@ -90,6 +92,7 @@ static void take_off(const double *block, const double *x, double *r, int size)
 
 static void refine(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
 {
+    SEL_ASSERT(lu->count > 0 && lu->count <= lu->capacity, "a chain was factored");
     const int size = lu->size;
     const size_t n = (size_t)size, block = n * n;
     memcpy(lu->rest, b, (size_t)lu->count * n * sizeof *b);
@@ -109,6 +112,8 @@ static void refine(BlockLu *lu, const double *diag, const double *lower, const d
 bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const double *lower, const double *upper, const double *b, double *x,
                            const unsigned char *live, bool *exact)
 {
+    SEL_REQUIRE(count > 0 && count <= lu->capacity, "a factor has room for the nodes of its chain");
+    SEL_ASSERT(b != x, "the right-hand side is read after x is written");
     lu->count = count;
     if (live)
         memcpy(lu->live, live, (size_t)count);
@@ -125,6 +130,7 @@ bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const dou
 
 void block_lu_solve(const BlockLu *lu, const double *b, double *x)
 {
+    SEL_ASSERT(lu->count > 0 && b != x, "a chain was factored");
     forward_on[block_size_index(lu->size)][simd_level()](lu, b);
     back_on[block_size_index(lu->size)][simd_level()](lu, x);
 }

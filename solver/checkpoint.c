@@ -1,6 +1,7 @@
 // Checkpoints: everything that the next step depends on. Restored, a run repeats bit for bit.
 // The hash is FNV-1a taken word by word (8 bytes) in four lanes, with a shift that carries high bits down; bytes would cost 100 us.
 #include "solver/self_contact.h"
+#include "base/assert.h"
 #include "solver/tools_internal.h"
 
 #include <stdlib.h>
@@ -66,6 +67,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c->tool_inserted[k] = s->tool[k].inserted;
         c->tool_twist[k] = s->tool[k].twist;
     }
+    SEL_REQUIRE(s->point_count <= c->point_capacity, "a checkpoint has room for all contact points");
     memcpy(c->place, s->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
     self_contact_save(s, c->self);
@@ -74,6 +76,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
 
 void stepper_restore(Stepper *s, const Checkpoint *c)
 {
+    SEL_ASSERT(c->first_free >= 0, "a checkpoint holds a state");
     if (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity || c->self_bytes != self_contact_bytes(s))
         return;
     s->first_free = c->first_free;
@@ -96,6 +99,7 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
     memcpy(s->place, c->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
     self_contact_restore(s, c->self);
+    SEL_ASSERT(s->first_free <= s->state.node_count, "the sheath holds nodes of the chain");
 }
 
 typedef struct Hash {

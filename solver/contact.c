@@ -6,6 +6,8 @@
 // follows their turns with its levers.
 #include "solver/contact.h"
 
+#include "base/assert.h"
+
 #include "solver/block_chain.h"
 
 #include <stddef.h>
@@ -29,6 +31,7 @@ static void clamp_positive(double *xx, double *xy, double *yy)
 
 bool contact_is_free(const BlockChain *chain, int node, int r)
 {
+    SEL_ASSERT(node >= 0 && node < chain->count && r >= 0 && r < chain->size, "an unknown is one of the chain's");
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
     const double *d = chain->diag + block * (size_t)node, *before = chain->lower + block * (size_t)(node > 0 ? node - 1 : 0), *after = chain->lower + block * (size_t)node;
@@ -115,10 +118,14 @@ static void add_roll(const ContactPoint *p, double force, const unsigned mask[2]
 
 void contact_add_curvature(const ContactSet *set, BlockChain *chain, double *b)
 {
+    SEL_ASSERT(set->count >= 0 && set->count <= set->capacity, "a set holds no more contacts than it has room for");
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
+        SEL_REQUIRE(p->node >= 0 && p->node < chain->count, "a contact is at a node of the chain");
+        SEL_ASSERT(p->xi >= 0 && p->xi < 1, "a contact lies at its node or before the next");
+        SEL_ASSERT(p->friction >= 0 && p->roll >= 0, "friction and roll are no less than 0");
         double force = vec3_dot(p->force, p->normal);
         if (!(force > 0))
             continue;

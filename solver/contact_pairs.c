@@ -4,6 +4,8 @@
 // with f0 the forces that r has already. W takes three solves of the chain a pair; then there are three equations a pair, eliminated with row pivoting.
 #include "solver/contact_forms.h"
 
+#include "base/assert.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,6 +23,7 @@ struct ContactPairs {
 
 ContactPairs *contact_pairs_create(int node_count, int size, int capacity)
 {
+    SEL_ASSERT(node_count > 0 && size > 0 && capacity >= 0, "there is a chain and room for some pairs");
     ContactPairs *p = calloc(1, sizeof *p);
     if (!p)
         return NULL;
@@ -63,6 +66,7 @@ static Vec3 axis_of(int k) { return vec3(k == 0, k == 1, k == 2); }
 void contact_pairs_compliance(ContactSolver *s, const BlockFactor *factor, ContactSolve solve, const int *list, int count)
 {
     ContactPairs *p = s->pairs;
+    SEL_REQUIRE(p && count >= 0 && count <= p->capacity, "there is room for all pairs that press");
     const size_t n = 3 * (size_t)count, bytes = (size_t)(s->matrix.count * s->matrix.size) * sizeof(double);
     p->count = count;
     for (size_t k = 0; k < n; k++) {
@@ -79,6 +83,7 @@ void contact_pairs_compliance(ContactSolver *s, const BlockFactor *factor, Conta
 
 Mat3 contact_pairs_block(const ContactPairs *p, int k, int l)
 {
+    SEL_ASSERT(k >= 0 && k < p->count && l >= 0 && l < p->count, "the pairs are of the list");
     Mat3 m;
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
@@ -108,6 +113,7 @@ static void fill_matrix(ContactSolver *s)
 static bool eliminate(ContactPairs *p)
 {
     const int n = 3 * p->count;
+    SEL_ASSERT(p->count <= p->capacity, "there is room for all pairs that press");
     double *a = p->matrix;
     for (int k = 0; k < n; k++) {
         int best = k;
@@ -156,8 +162,10 @@ bool contact_pairs_step(ContactSolver *s, int count, bool reuse, bool whole, Con
     if (!reuse) {
         int active = 0;
         for (int i = s->banded; i < count; i++)
-            if (s->law[i].state != 0)
+            if (s->law[i].state != 0) {
+                SEL_REQUIRE(active < p->capacity, "there is room for all pairs that press");
                 p->list[active++] = i;
+            }
         contact_pairs_compliance(s, s->factor, solve, p->list, active);
         fill_matrix(s);
         if (!eliminate(p))
@@ -168,6 +176,7 @@ bool contact_pairs_step(ContactSolver *s, int count, bool reuse, bool whole, Con
     for (int k = 0; k < p->count; k++) {
         int i = p->list[k];
         const ContactLaw *law = &s->law[i];
+        SEL_ASSERT(s->row[i].far, "a pair has a second end");
         Vec3 r = vec3_sub(law->force, mat3_mul_vec(&law->c, contact_row_motion(&s->row[i], s->delta)));
         if (!whole)
             r = vec3_sub(r, s->row[i].force);

@@ -11,6 +11,7 @@
 #ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
 #define SELDINGER_SOLVER_CONTACT_ROWS_H
 
+#include "base/assert.h"
 #include "solver/block_chain.h"
 
 #include <stdbool.h>
@@ -47,12 +48,15 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slide
 // Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
 static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
 {
+    SEL_ASSERT(e >= 0 && e < c->nodes, "a contact has the arms of its nodes");
     Vec3 arm = vec3_scale(c->normal, c->weight[e] * c->radius);
     return c->nodes == 1 ? arm : vec3_sub(arm, c->lever[e]);
 }
 
 static inline Vec3 contact_end_motion(const ContactRow *c, const double *u)
 {
+    SEL_ASSERT(c->node >= 0 && (c->nodes == 1 || c->nodes == 2), "a contact is at a node or between two");
+    SEL_ASSERT(c->slide == 0 || (c->slide >= 6 && c->slide + 1 < c->stride), "a slide's unknowns stand behind the first six");
     const double *v = u + (size_t)c->stride * (size_t)c->node;
     if (c->slide)
         return vec3(c->mask[0] & 1 ? v[c->slide] : 0, c->mask[0] & 2 ? c->radius * v[c->slide + 1] : 0, 0);
@@ -75,6 +79,7 @@ static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
 // y += J^T f
 static inline void contact_end_push(const ContactRow *c, Vec3 f, double *y)
 {
+    SEL_ASSERT(c->node >= 0 && (c->nodes == 1 || c->nodes == 2), "a contact is at a node or between two");
     if (c->slide) {
         double *v = y + (size_t)c->stride * (size_t)c->node + c->slide;
         v[0] += c->mask[0] & 1 ? f.x : 0;
@@ -124,6 +129,7 @@ static inline bool contact_row_is_idle(const ContactRow *c, Vec3 motion)
 // What the tangential force has more than it may, as a share of its normal force or of its bound.
 static inline double contact_row_excess(const ContactRow *c)
 {
+    SEL_ASSERT(!c->slide || c->bound > 0, "a slide that bears has a bound");
     double fn = vec3_dot(c->force, c->normal), ft = vec3_norm(contact_tangential(c->force, c->normal));
     return c->slide ? ft / c->bound - 1 : ft / fn - c->friction;
 }

@@ -1,6 +1,8 @@
 // The two forms of a contact solve behind one call, and their work space.
 #include "solver/contact_solve.h"
 
+#include "base/assert.h"
+
 #include "solver/contact_forms.h"
 
 #include <stdlib.h>
@@ -49,6 +51,7 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
 
 bool contact_solver_reserve_pairs(ContactSolver *s, int pairs)
 {
+    SEL_ASSERT(pairs >= 0, "a number of pairs");
     size_t k = (size_t)s->capacity + (size_t)pairs + 1;
     free(s->row), free(s->motion), free(s->law), free(s->best), free(s->flag), free(s->wall);
     pointwise_work_destroy(s->pointwise);
@@ -100,6 +103,9 @@ bool contact_needs_factor(const ContactSet *set, const ContactOptions *options)
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u)
 {
+    SEL_REQUIRE(set->count + set->slide_count <= solver->capacity, "the solver has room for all contacts and slides");
+    SEL_REQUIRE(chain->count <= solver->node_count && chain->size == solver->matrix.size, "the solver was made for such a chain");
+    SEL_ASSERT(options->max_iterations > 0 && options->tolerance > 0, "a solve may iterate");
     bool by_points = options->form == CONTACT_POINTWISE;
     int count = contact_rows_fill(set, chain, !by_points, solver->row, contact_pairs_far(solver->pairs)), all = set->count + set->slide_count + set->pair_count;
     solver->banded = count - set->pair_count;

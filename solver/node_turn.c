@@ -1,6 +1,8 @@
 // exp(r/2) = (cos(a/2), sin(a/2) r/a), a = |r|, by series in (a/2)^2: what is cut is below 1e-16 at 2.5 rad.
 #include "solver/node_turn.h"
 
+#include "base/assert.h"
+
 #include "base/simd.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
@@ -46,4 +48,8 @@ static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, co
 static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, const double *, Quat *) = {turn_sse2, turn_sse2, turn_sse2};
 #endif
 
-void node_turn(int count, const double *rx, const double *ry, const double *rz, Quat *q) { turn_on[simd_level()](count, rx, ry, rz, q); }
+void node_turn(int count, const double *rx, const double *ry, const double *rz, Quat *q)
+{
+    SEL_ASSERT(count >= 0, "a number of nodes is turned");
+    turn_on[simd_level()](count, rx, ry, rz, q);
+}

@@ -11,6 +11,8 @@
 // whole. It is taken at the length of the step's end and at the curvature of its start, because curvature is what stays.
 #include "solver/sheath.h"
 
+#include "base/assert.h"
+
 #include "base/same_math.h"
 
 // Unit, in the node's frame: the axis about which rest curvature turns, e3 turned about e1; half_y and half_z hold it times a sine.
@@ -42,6 +44,7 @@ static double straightening(const BeamRest *rest, int index) { return 0.5 * rest
 
 double sheath_straightening(const BeamRest *rest, int index, double coordinate)
 {
+    SEL_ASSERT(index >= 0 && index < rest->count, "the element at the mouth is one of the chain's");
     double sum, share = share_behind(rest, index, coordinate, &sum), own = straightening(rest, index);
     return share > 0 ? own + share * (straightening(rest, index - 1) - own) : own;
 }
@@ -51,6 +54,9 @@ double sheath_outside(double length, double coordinate) { return fmax(length + c
 void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
                     double ahead, SheathElement *element)
 {
+    SEL_ASSERT(index >= 0 && index < rest->count, "the element at the mouth is one of the chain's");
+    SEL_ASSERT(fabs(vec3_norm2(direction) - 1) < 1e-9, "the sheath's direction is a unit vector");
+    SEL_ASSERT(quat_is_unit(q1) && quat_is_unit(q2), "frames are unit quaternions");
     double length = rest->length[index], outside = sheath_outside(length, coordinate + ahead), now = sheath_outside(length, coordinate);
     double bending = rest->bending[index], own = straightening(rest, index), stored = own * (length - outside), border = 0, sum, slope, near_slope, far_slope;
     double past = outside - length, share = share_behind(rest, index, past, &sum), softer = 0;
@@ -105,6 +111,7 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
 void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent,
                     double *length_column)
 {
+    SEL_ASSERT(element->outside > 0 && scale > 0, "some of the element is outside, and its stiffness counts");
     BeamTangent full;
     const BeamOutput *out = &element->out;
     double ka = rest->axial[index] * scale, d[3] = {direction.x, direction.y, direction.z};

@@ -4,6 +4,8 @@
 // 3 mm. Elements longer than 10 mm would want more than 15, but bend no tool round so narrow a corner anyway.
 #include "solver/slot.h"
 
+#include "base/assert.h"
+
 static const double SPACING = 0.6;       // [mm] between contact points, at most
 enum { SLOTS_MAX = 15 };                 // of an element
 // Of the part outside the sheath: nearer to its mouth than this the wire cannot leave the line by anything that matters.
@@ -17,6 +19,7 @@ int slot_count_of(double length)
 
 static void set_shape(Slot *s, double xi, double length)
 {
+    SEL_ASSERT(xi >= 0 && xi <= 1 && length > 0, "a slot lies on its element");
     s->xi = xi;
     s->weight = xi * xi * (3 - 2 * xi);
     s->near = length * xi * (1 - xi) * (1 - xi);
@@ -25,6 +28,7 @@ static void set_shape(Slot *s, double xi, double length)
 
 Slot slot_make(int element, double length, int k, int count, double radius, double friction)
 {
+    SEL_ASSERT(k >= 0 && k < count && count <= SLOTS_MAX, "a slot is one of its element's");
     Slot s = {.element = element, .radius = radius, .friction = friction};
     set_shape(&s, (double)(k + 1) / (count + 1), length);
     return s;
@@ -39,6 +43,7 @@ Slot slot_shifted(const Slot *slot, double length, double xi)
 
 SlotPlace slot_place(const Slot *s, double length, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2)
 {
+    SEL_ASSERT(length > 0, "an element has a length");
     SlotPlace p = {.weight = s->weight, .lever = {vec3_scale(t1, s->near), vec3_scale(t2, s->far)}};
     Vec3 chord = vec3_sub(x2, x1);
     p.position = vec3_add(vec3_add_scaled(x1, s->weight, chord), vec3_add(p.lever[0], p.lever[1]));

@@ -1,10 +1,12 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
 #include "solver/self_contact.h"
+#include "base/assert.h"
 #include "solver/tools_internal.h"
 #include "base/same_math.h"
 
 static double element_energy(const Stepper *s, int i, int held)
 {
+    SEL_ASSERT(held >= 0 && held <= s->state.node_count, "the sheath holds nodes of the chain");
     const BeamRest *r = &s->beam.rest;
     const WireState *w = &s->state;
     if (i + 1 < held) {
@@ -51,6 +53,7 @@ double stepper_kinetic_energy(const Stepper *s)
 // What a node has done in this step, translation or turn, in space.
 static Vec3 done_in_space(const Stepper *s, int node, int from)
 {
+    SEL_ASSERT(from == 0 || from == 3, "a node moves and turns");
     const double *u = s->linearised + row_of(s, node) + from;
     return node < s->first_free ? vec3_scale(s->axis[0], u[0]) : vec3(u[0], u[1], u[2]);
 }

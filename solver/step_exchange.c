@@ -2,6 +2,8 @@
 // All that a step needs of the spare tools is made at the start, so that an exchange allocates nothing.
 #include "solver/tools_internal.h"
 
+#include "base/assert.h"
+
 #include <string.h>
 
 static const double AT_HUB = 1;          // [mm] from its hub: a tip that can be taken out …
@@ -22,6 +24,7 @@ int stepper_fitted(const Stepper *s, int k) { return s->fitted[k]; }
 
 static void fit(Stepper *s, int k, int which)
 {
+    SEL_REQUIRE(k >= 0 && k < s->tool_count && which >= 0 && which <= s->spare_count[k], "the tool and its spare exist");
     Tool *t = &s->tool[k];
     Tool was = *t;
     *t = *s->device[k][which];

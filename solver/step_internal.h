@@ -2,6 +2,7 @@
 #ifndef SELDINGER_SOLVER_STEP_INTERNAL_H
 #define SELDINGER_SOLVER_STEP_INTERNAL_H
 
+#include "base/assert.h"
 #include "solver/beam.h"
 #include "solver/coaxial.h"
 #include "solver/sheath.h"
@@ -174,11 +175,16 @@ struct Stepper {
 };
 
 // Where a node's unknowns begin in a vector, and its block in the matrix.
-static inline size_t row_of(const Stepper *s, int node) { return (size_t)s->chain.size * (size_t)node; }
+static inline size_t row_of(const Stepper *s, int node)
+{
+    SEL_ASSERT(node >= 0 && node <= s->chain.count, "a node of the chain, or its end");
+    return (size_t)s->chain.size * (size_t)node;
+}
 static inline size_t block_of(const Stepper *s, int node) { return (size_t)s->chain.size * row_of(s, node); }
 
 static inline bool stepper_presses(const Stepper *s, int point)
 {
+    SEL_ASSERT(point >= 0 && point < s->point_count, "the point is a node or a slot of the tool");
     Vec3 f = s->force[point];
     return f.x != 0 || f.y != 0 || f.z != 0;
 }

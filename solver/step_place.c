@@ -1,6 +1,8 @@
 // Where a point of a tool is, how it moves, and what the wall does to the tool's end: for whoever watches a run step by step. No question to the vessel.
 #include "solver/tools_internal.h"
 
+#include "base/assert.h"
+
 static bool is_carrier(const Stepper *s, int c, int k) { return s->tool_count == 1 || s->carrier[c] == k; }
 static double material_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) ? s->wire.s[c] : slide_at(s, c, k); }
 static bool lies_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) || c < s->tool[k].inside; }
@@ -8,6 +10,7 @@ static bool lies_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k)
 // The first element whose far node lies at `at` of tool k or beyond; the last one that the tool reaches into.
 static int element_of(const Stepper *s, int k, double at)
 {
+    SEL_ASSERT(k >= 0 && k < s->tool_count && s->state.node_count > 1, "a tool of the chain is asked about");
     int c = 0;
     while (c + 2 < s->state.node_count && lies_at(s, c + 1, k) && material_at(s, c + 1, k) <= at)
         c++;
@@ -17,6 +20,7 @@ static int element_of(const Stepper *s, int k, double at)
 // Of tool k's material at node c: the node's own velocity but along the line, where the tool slides.
 static Vec3 velocity_at(const Stepper *s, int c, int k, Vec3 along)
 {
+    SEL_ASSERT(c >= 0 && c < s->state.node_count, "the node is one of the chain's");
     Vec3 v = s->state.velocity[c];
     if (is_carrier(s, c, k) || !lies_at(s, c, k))
         return v;
@@ -30,6 +34,7 @@ ToolPlace stepper_tool_place(const Stepper *s, int k, double at)
     // a tool that ends inside the element is as long there as what is around it; one that ends just beyond a tip has no node there yet
     bool ends = !lies_at(s, end, k);
     double from = material_at(s, c, k), span = ends ? tools_span_length(s, c) : material_at(s, end, k) - from;
+    SEL_ASSERT(span > 0, "an element has a length");
     double part = (at - from) / span;
     ToolPlace place = {.along = vec3_unit(vec3_sub(w->position[end], w->position[c]))};
     Vec3 near = velocity_at(s, c, k, place.along), far = ends ? near : velocity_at(s, end, k, place.along);
@@ -46,12 +51,14 @@ ToolPlace stepper_tool_place(const Stepper *s, int k, double at)
 
 double stepper_tool_length(const Stepper *s, int k)
 {
+    SEL_ASSERT(k >= 0 && k < s->tool_count, "a tool of the chain is asked about");
     const Wire *own = s->tool_count > 1 ? &s->tool[k].wire : &s->wire;
     return own->s[own->node_count - 1];
 }
 
 Vec3 stepper_tool_wall_force(const Stepper *s, int k, double from)
 {
+    SEL_ASSERT(k >= 0 && k < s->tool_count, "a tool of the chain is asked about");
     Vec3 sum = {0, 0, 0};
     int count = s->state.node_count;
     for (int c = 0; c < count; c++) {

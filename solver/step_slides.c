@@ -4,6 +4,7 @@
 // M' over it, less T times the turn. Tools with clearance do not follow a jump of curvature at once: M is averaged over l = 7.3 sqrt(c / kappa), which the two
 // rods in contact give; else a couple at the end of a bend would bear a friction that grows without bound as elements shrink.
 
+#include "base/assert.h"
 #include "solver/tools_internal.h"
 #include "base/same_math.h"
 
@@ -25,6 +26,7 @@ static Vec3 moment_at(const Stepper *s, int k, double place, int *c)
 // `turn`: of the line at node c, before x after.
 static double pressure_at(const Stepper *s, int c, int k, double window, Vec3 turn, int at[2])
 {
+    SEL_ASSERT(c > 0 && c + 1 < s->state.node_count, "tools press on each other between two elements");
     double h = s->middle[c] - s->middle[c - 1], l = fmax(window, h), half = 0.5 * l;
     Vec3 right = vec3_sub(moment_at(s, k, s->middle[c] + half, &at[1]), moment_at(s, k, s->middle[c] - half, &at[0]));
     Vec3 left = vec3_sub(moment_at(s, k, s->middle[c - 1] + half, &at[1]), moment_at(s, k, s->middle[c - 1] - half, &at[0]));
@@ -37,6 +39,7 @@ static double pressure_at(const Stepper *s, int c, int k, double window, Vec3 tu
 // The tool that is next around tool k at node c and is an unknown there too; 0: none.
 int tools_around(const Stepper *s, int c, int k)
 {
+    SEL_ASSERT(k > 0 && k < s->tool_count, "an inner tool has one around it");
     for (k--; k > 0 && !is_inside(s, c, k); k--)
         ;
     return k;
@@ -84,6 +87,8 @@ void tools_slides(Stepper *s)
             double slip[2], radius = t->wire.radius[0];
             last_slip(s, c, k, tangent, slip);
             double force[2] = {change * last[0], change * last[1]};
+            SEL_REQUIRE(s->set.slide_count < s->capacity * s->state.inner_count, "there is room for a slide of each inner tool at each node");
+            SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a bound, and a radius at which tools touch");
             s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c, .unknown = unknown_of(k), .radius = radius, .bound = bound, .give = GIVE,
                                                                  .slip = {slip[0], radius * slip[1]}, .held = {force[0], force[1]}, .force = {force[0], force[1]}};
         }
@@ -127,6 +132,7 @@ void tools_keep_slides(Stepper *s)
 {
     for (int i = 0; i < s->set.slide_count; i++) {
         const ContactSlide *slide = &s->set.slide[i];
+        SEL_ASSERT(slide->node >= 0 && slide->node < s->state.node_count && slide->unknown >= 6, "a slide belongs to an inner tool at a node");
         double *force = s->state.slide_force + 3 * (slide->node * s->state.inner_count + (slide->unknown - 6) / 2);
         force[0] = slide->force[0], force[1] = slide->force[1], force[2] = slide->bound;
     }

@@ -11,6 +11,8 @@
 // All is at the step's end: the tool slides by `slides`, so the point of the tool that will be there is as much behind.
 #include "solver/step_internal.h"
 
+#include "base/assert.h"
+
 #include <string.h>
 
 static const double STIFF = 0.02;        // [1/mm] bend of the weak spring …
@@ -49,6 +51,7 @@ static int points_on(const Stepper *s, int element) { return 1 + s->slot_start[e
 // The cubic's second derivative; `at` of its rest length.
 static Vec3 bend_of(const Stepper *s, int e, double at)
 {
+    SEL_ASSERT(e >= 0 && e + 1 < s->state.node_count, "the element is one of the chain's");
     double l = s->wire.length[e];
     Vec3 bend = vec3_scale(vec3_sub(s->state.position[e + 1], s->state.position[e]), (6 - 12 * at) / (l * l));
     return vec3_add(bend, vec3_add_scaled(vec3_scale(own_tangent(s, e), (6 * at - 4) / l), (6 * at - 2) / l, own_tangent(s, e + 1)));
@@ -67,6 +70,7 @@ static Vec3 bend_at(const Stepper *s, const Touch *t)
 
 bool touch_at(const Stepper *s, int point, double offset, Touch *t)
 {
+    SEL_ASSERT(point >= 0 && point < s->point_count, "the point is a node or a slot of the tool");
     int nodes = s->state.node_count, e = point < nodes ? point : s->slot[point - nodes].element;
     // the mouth's element and the last one are left out: the line ends there
     if (s->tool_count > 1 || e <= s->first_free || e + 2 >= nodes)
@@ -82,6 +86,7 @@ bool touch_at(const Stepper *s, int point, double offset, Touch *t)
         xi = 1 + offset / length[e];
     }
     *t = (Touch){.element = e, .xi = xi, .offset = offset, .half = half, .own1 = own_tangent(s, e), .own2 = own_tangent(s, e + 1)};
+    SEL_ASSERT(e >= 0 && xi >= 0 && xi <= 1, "a contact stays in the cell of its point");
     Slot slot = slot_shifted(&(Slot){.element = e}, length[e], xi);
     t->place = slot_place(&slot, length[e], s->state.position[e], t->own1, s->state.position[e + 1], t->own2);
     t->bend = bend_at(s, t);
@@ -182,6 +187,7 @@ static int neighbour(const Stepper *s, int point, int way)
 
 static void go_over(Stepper *s, int from, int to, double offset)
 {
+    SEL_ASSERT(from != to && to >= 0 && to < s->point_count, "a contact goes over to the next point");
     s->touch[to] = offset;
     s->force[to] = s->force[from];
     s->place[to] = s->place[from];

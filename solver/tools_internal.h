@@ -2,6 +2,7 @@
 #ifndef SELDINGER_SOLVER_TOOLS_INTERNAL_H
 #define SELDINGER_SOLVER_TOOLS_INTERNAL_H
 
+#include "base/assert.h"
 #include "solver/step_internal.h"
 
 #include <stdio.h>
@@ -14,12 +15,28 @@ void tools_place(Stepper *s);
 // The chain anew, after a tool's `first` has changed.
 void tools_chain(Stepper *s);
 // Tool k >= 1 at node c: does it lie inside another there, and then where [mm], how it is turned [rad], and its two unknowns' place among the node's.
-static inline bool is_inside(const Stepper *s, int c, int k) { return k > s->carrier[c] && c < s->tool[k].inside; }
-static inline double slide_at(const Stepper *s, int c, int k) { return s->state.slide[c * s->state.inner_count + k - 1]; }
-static inline double angle_at(const Stepper *s, int c, int k) { return s->state.angle[c * s->state.inner_count + k - 1]; }
+static inline bool is_inside(const Stepper *s, int c, int k)
+{
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k >= 0 && k < s->tool_count, "a tool of the chain is looked for at one of its nodes");
+    return k > s->carrier[c] && c < s->tool[k].inside;
+}
+static inline double slide_at(const Stepper *s, int c, int k)
+{
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "an inner tool has its place at each node");
+    return s->state.slide[c * s->state.inner_count + k - 1];
+}
+static inline double angle_at(const Stepper *s, int c, int k)
+{
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "an inner tool has its place at each node");
+    return s->state.angle[c * s->state.inner_count + k - 1];
+}
 static inline bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }    // another tool carries the next node
 static inline int unknown_of(int k) { return 6 + 2 * (k - 1); }
-static inline bool tools_carries(const Tool *t) { return t->first < t->wire.node_count; }
+static inline bool tools_carries(const Tool *t)
+{
+    SEL_ASSERT(t->first >= 0 && t->first <= t->wire.node_count, "a tool carries the chain from one of its nodes on, or nowhere");
+    return t->first < t->wire.node_count;
+}
 
 // The tool that is next around tool k at node c and is an unknown there too; 0: none.
 int tools_around(const Stepper *s, int c, int k);

@@ -5,6 +5,8 @@
 // about the axis), which is small but keeps the rotational blocks positive definite.
 #include "solver/wire.h"
 
+#include "base/assert.h"
+
 #include "base/same_math.h"
 #include "solver/beam.h"
 
@@ -171,6 +173,7 @@ bool wire_divide(const WireOptions *options, int *elements)
         for (int i = 1; i < sections; i++)
             if (wanted(&options->section[i], per_mm) / elements[i] > wanted(&options->section[most], per_mm) / elements[most] * (1 + 1e-12))
                 most = i;
+        SEL_ASSERT(most < sections, "an element goes to a section");
         elements[most]++;
     }
     return true;
@@ -199,11 +202,13 @@ static void fill(Wire *wire, const WireOptions *options, const int *elements)
         }
         start += section->length;
     }
+    SEL_REQUIRE(e == wire->element_count, "the sections share all elements");
     wire->total_length = start;
 }
 
 bool wire_reserve(Wire *wire, int nodes)
 {
+    SEL_ASSERT(nodes > 1, "a wire has an element");
     size_t m = (size_t)nodes, e = m - 1;
     wire_destroy(wire);
     wire->section = calloc(e, sizeof *wire->section);
@@ -250,8 +255,10 @@ void wire_rest(const Wire *wire, const WireOptions *options, BeamRest *rest)
     rest->count = wire->element_count;
     for (int i = 0; i < wire->element_count; i++) {
         const WireSection *section = &options->section[wire->section[i]];
+        SEL_ASSERT(wire->section[i] >= 0 && wire->section[i] < options->section_count, "an element belongs to a section");
         WireStiffness stiffness = wire_stiffness(section);
         double length = wire->length[i], curvature = section->rest_curvature, plane = section->rest_plane;
+        SEL_ASSERT(length > 0, "an element has a length");
         if (curvature < 0)
             curvature = -curvature, plane += PI;
         rest->length[i] = length;
@@ -278,6 +285,7 @@ void wire_rest(const Wire *wire, const WireOptions *options, BeamRest *rest)
 
 Quat wire_start_frame(const WireOptions *options)
 {
+    SEL_ASSERT(vec3_norm2(options->direction) > 0.5, "the direction was checked to be a unit vector");
     Vec3 e1 = vec3_unit(options->direction);
     Vec3 e2 = vec3_add_scaled(options->normal, -vec3_dot(options->normal, e1), e1);
     e2 = vec3_norm(e2) > 1e-9 * (1 + vec3_norm(options->normal)) ? vec3_unit(e2) : vec3_normal_to(e1);
