@@ -53,6 +53,7 @@ static void assert_near_number(double value, double wanted) { assert_true(fabs(v
 static void tools_table(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     assert_int_equal(run("bench step --tools --quick --json /tmp/seldinger-bench-tools.json > /tmp/seldinger-bench-tools.txt"), 0);
     cJSON *root = load("/tmp/seldinger-bench-tools.json"), *at;
     unlink("/tmp/seldinger-bench-tools.txt");
@@ -72,6 +73,7 @@ static void tools_table(void **state)
 static void step_tables(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     assert_int_equal(run("bench step --quick --json /tmp/seldinger-bench-step.json > /tmp/seldinger-bench-step.txt"), 0);
     cJSON *root = load("/tmp/seldinger-bench-step.json"), *at;
     unlink("/tmp/seldinger-bench-step.txt");

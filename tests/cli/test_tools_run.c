@@ -73,7 +73,7 @@ static void two_tools_in_a_model_repeat(void **state)
     char *hash[2];
     for (int i = 0; i < 2; i++) {
         char more[60];
-        snprintf(more, sizeof more, "--duration-s %g%s", WHOLE_OR_SHORT(1.8, 0.6), i ? " --threads 2" : "");
+        snprintf(more, sizeof more, "--duration-s %g%s", WHOLE_OR_SHORT(1.8, 0.2), i ? " --threads 2" : "");
         cJSON *root = summary("phantom.yaml", more);
         hash[i] = strdup(cJSON_GetObjectItem(root, "state_hash")->valuestring);
         assert_true(value(root, "penetration_mm", "max") < 0.05);

@@ -17,6 +17,8 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
+
 static SimdLevel level_given;
 static bool exact;
 
@@ -381,7 +383,7 @@ static void condensed_solves_as_whole(void **state)
     const int sizes[] = {1, 2, 3, 7, 40, 121};
     for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++)
         for (int every = 1; every < 50; every += every < 4 ? 1 : 11)
-            for (int offset = 0; offset < 3; offset++) {
+            for (int offset = 0; offset < WHOLE_OR_SHORT(3, 1); offset++) {
                 int m = sizes[t];
                 size_t n = (size_t)m * N;
                 BlockChain a;
@@ -458,7 +460,7 @@ static void condensed_with_unknowns_left_out(void **state)
     BlockFactor *f = block_factor_create(M, N);
     BlockCondenser *k = block_condenser_create(M, N);
     static double b[M * N], x[M * N], small[M * N], y[SIMD_COUNT][M * N];
-    for (int trial = 0; trial < 60; trial++) {
+    for (int trial = 0; trial < WHOLE_OR_SHORT(60, 18); trial++) {
         random_chain(&a, 2);
         int parts = 1 + (N - 6) / 2;
         for (int i = 0; i < M; i++) {
@@ -585,6 +587,7 @@ static void mirrored_signs_to_the_bit(void **state)
 static void prints_timings(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     const int sizes[] = {51, 101, 201, 401, 801, 201, 201};
     for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++) {
         int m = sizes[t];

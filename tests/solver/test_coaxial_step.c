@@ -154,7 +154,7 @@ static void a_bend_leaves_the_catheter(void **state)
     start(&c, 1, false);
     move_tool(c.stepper, 1, 0, 0, 1, 400);
     Vec3 first = {0};
-    for (int round = 0; round < WHOLE_OR_SHORT(3, 2); round++) {
+    for (int round = 0; round < WHOLE_OR_SHORT(3, 1); round++) {
         static const struct {
             double at, push;
         } stop[] = {{45, 0}, {52.41, 0}, {59, 0}, {61, -0.075}, {66.3, -0.075}, {74, -0.075}, {77, 0}, {79, 0}};

@@ -8,6 +8,8 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -197,7 +199,7 @@ static void random_hands_on_random_tools(void **state)
 {
     (void)state;
     int made = 0, limited = 0, stuck = 0;
-    for (int seed = 0; seed < 12; seed++) {
+    for (int seed = 0; seed < WHOLE_OR_SHORT(12, 4); seed++) {
         Outcome out;
         if (!run_seed(seed, &out, true))
             continue;
@@ -209,7 +211,7 @@ static void random_hands_on_random_tools(void **state)
         assert_true(is_good(&out));
     }
     print_message("%d scenes of %d steps: %d motions cut, %d steps not converged\n", made, STEPS, limited, stuck);
-    assert_true(made > 5);
+    assert_true(made > WHOLE_OR_SHORT(5, 0));
 }
 
 int main(int argc, char **argv)

@@ -151,8 +151,8 @@ static void capstan_pull(void **state)
 static void capstan_push(void **state)
 {
     (void)state;
-    for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 3))
-        for (double mu = 0.1; mu < 0.25; mu += 0.1) {
+    for (int k = WHOLE_OR_SHORT(0, 3); k < 4; k++)
+        for (double mu = WHOLE_OR_SHORT(0.1, 0.2); mu < 0.25; mu += 0.1) {
             const Pulley *p = PULLEYS[k];
             double tension = 20 * EI_STANDARD / (p->radius * p->radius), exact = tension * exp(mu * p->angle);
             Drag d = draw(p, 0.1, mu, tension, 0.01, 1.5, 0.5, QUASI_STATIC), coarse = draw(p, 0.1, mu, tension, 0.01, 2, 1, QUASI_STATIC);
@@ -168,8 +168,8 @@ static void capstan_push(void **state)
 static void friction_does_not_depend_on_speed(void **state)
 {
     (void)state;
-    for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 3))
-        for (int way = -1; way <= 1; way += 2) {
+    for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 4))
+        for (int way = -1; way <= WHOLE_OR_SHORT(1, -1); way += 2) {
             const Pulley *p = PULLEYS[k];
             double tension = 20 * EI_STANDARD / (p->radius * p->radius), c = way < 0 ? p->radius / 40 : 0.1;
             Drag slow = draw(p, c, 0.2, tension, way * 0.001, 2, 1, 1), fast = draw(p, c, 0.2, tension, way * 0.05, 3, 1, 1);
@@ -188,8 +188,8 @@ static void turning_takes_friction_away(void **state)
     const Pulley *p = &QUARTER;
     double a = 40, tension = a * EI_STANDARD / (p->radius * p->radius), c = p->radius / 2 / a, R = p->radius - c, e = EI_STANDARD / (2 * R * R);
     static const double friction[] = {0.1, 0.3}, turn[] = {0, 1, 3};
-    for (int m = 0; m < 2; m++)
-        for (int k = 0; k < 4; k++) {
+    for (int m = WHOLE_OR_SHORT(0, 1); m < 2; m++)
+        for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 3)) {
             double mu = friction[m], way = 1 - 0.18 / R, gamma = k < 3 ? atan2(turn[k], way) : PI / 2;
             double less = sqrt(1 + mu * mu * sin(gamma) * sin(gamma)), left = mu * cos(gamma) / less;
             double force = (tension - e) * exp(left * p->angle * way) + e, torque = 0.18 * mu * (tension - e) * p->angle / sqrt(1 + mu * mu);
@@ -229,7 +229,7 @@ static Rest leave(Stepper *s)
     Vec3 *place = calloc((size_t)nodes, sizeof *place);
     settle(s, 500, 500, 0);          // the motion's own end
     memcpy(place, stepper_state(s)->position, (size_t)nodes * sizeof *place);
-    settle(s, 10000, 10000, 0);
+    settle(s, WHOLE_OR_SHORT(10000, 500), WHOLE_OR_SHORT(10000, 500), 0);
     Rest r = {0, wall_of(s).sum};
     for (int i = 0; i < nodes; i++)
         r.creep = fmax(r.creep, vec3_distance(place[i], stepper_state(s)->position[i]));
@@ -241,7 +241,7 @@ static void rest_is_rest(void **state)
 {
     (void)state;
     Vessel *tube = bent_tube(10, 15, PI / 2, 60, 0.5);
-    for (int k = 0; k < 4; k++) {
+    for (int k = WHOLE_OR_SHORT(0, 1); k < 4; k += WHOLE_OR_SHORT(1, 2)) {
         static const char *what[] = {"pushed in", "pushed in, turned", "pulled back", "vertical"};
         Bench b;
         bench_in_tube(&b, tube, 0.2, 50, 50, 10, 1);

@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
+
 static uint64_t seed_state = 1;
 static double uniform(void) // [-1, 1)
 {
@@ -336,7 +338,7 @@ static void survives_random_problems(void **state)
     const double youngs[] = {50, 1000, 80000, 100000}, frictions[] = {0, 0.2, 0.5, 1};
     const int sizes[] = {0, 1, 5, 40, 200};
     int solved = 0, all = 0, hard = 0, solved_hard = 0;
-    for (int t = 0; t < 320; t++) {
+    for (int t = 0; t < 320; t += WHOLE_OR_SHORT(1, 7)) {
         double young = youngs[t % 4], friction = frictions[t / 4 % 4], length = t / 16 % 2 ? 1.5 : 0.5;
         int contacts = sizes[t / 32 % 5], nodes = t % 3 || contacts > 40 ? 201 : 31;
         Problem p;
@@ -414,7 +416,7 @@ static void both_forms_agree(void **state)
         {.name = "capsule, 100 GPa, mu 0", .young = 1e5, .length = 0.5, .elements = 120, .push = 500, .tube = 1.25, .capsule = true},
         {.name = "capsule, 100 GPa, mu 0.2", .young = 1e5, .length = 0.5, .friction = 0.2, .elements = 120, .push = 500, .tube = 1.25, .capsule = true},
     };
-    for (size_t n = 0; n < sizeof scenes / sizeof *scenes; n++) {
+    for (size_t n = WHOLE_OR_SHORT(0, 1); n < sizeof scenes / sizeof *scenes; n += WHOLE_OR_SHORT(1, 3)) {
         ChainScene w;
         Vessel *vessel;
         scene_create(&scenes[n], &w, &vessel);
@@ -488,7 +490,7 @@ static void wire_in_tubes(void **state)
         {.name = "spiral 0.2 mm 0.05 GPa mu 0.2", .young = 50, .length = 0.2, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
         {.name = "straight, J tip, twisting", .young = 8e4, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .tube = 0.6, .twist = 0.05, .straight = true, .tip_curvature = 0.1},
     };
-    for (size_t n = 0; n < sizeof scenes / sizeof *scenes; n++) {
+    for (size_t n = WHOLE_OR_SHORT(0, 2); n < sizeof scenes / sizeof *scenes; n += WHOLE_OR_SHORT(1, 5)) {
         enum { STEPS = 800 };
         static double us[STEPS], iterations[STEPS];
         ChainScene w;

@@ -7,6 +7,8 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -78,7 +80,7 @@ static JamFigures force_in(double friction)
 static void a_jammed_tool_costs_little(void **state)
 {
     (void)state;
-    for (double friction = 0.3; friction < 0.6; friction += 0.1) {
+    for (double friction = 0.3; friction < 0.6; friction += WHOLE_OR_SHORT(0.1, 0.4)) {
         JamFigures f = force_in(friction);
         print_message("friction %.1f: push up to %.0f N; a step %.0f us (free %.0f us), %.0f contact iterations, at most %.0f; deepest %.4f mm\n", friction, f.push, f.jammed_us,
                       f.free_us, f.iterations, f.most_iterations, f.deepest);
