@@ -24,8 +24,6 @@ void stepper_hold(Stepper *s, int node)
     double along = stepper_sheath_coordinate(s, node);
     w->position[node] = vec3_add_scaled(s->mouth, along, s->axis[0]);
     w->orientation[node] = on_line(s, w->orientation[node]);
-    w->velocity[node] = vec3_scale(s->axis[0], vec3_dot(w->velocity[node], s->axis[0]));
-    w->spin[node] = vec3_scale(s->axis[0], vec3_dot(w->spin[node], s->axis[0]));
 }
 
 static Vec3 mouth_curvature(const Stepper *s, int node)
