@@ -257,7 +257,7 @@ static bool extend(Tracker *t, Branch *branch)
     return true;
 }
 
-// The hypothesis one step below the root on the way to another.
+// The hypothesis one step below the root on the path to another.
 static int first_towards(const Branch *branch, int hypothesis)
 {
     while (branch->tried.node[hypothesis].parent != branch->root)
@@ -346,7 +346,7 @@ static bool track_branch(Tracker *t, const MhtTemplate *start, const MhtLimits *
 
 // --- the tree ---
 
-// Least brightness on the straight way between two points over that at its darker end, above the volume's minimum.
+// Least brightness on the line between two points over that at its darker end, above the volume's minimum.
 static double link_brightness(const Tracker *t, Vec3 a, Vec3 b)
 {
     double base = (double)t->volume->minimum, least = HUGE_VAL, ends = HUGE_VAL;
@@ -402,8 +402,8 @@ static double gap_to_tree(const Tracker *t, const MhtTemplate *template)
     return least - template->radius;
 }
 
-// Appends a branch's nodes: those of the return path reversed, then those of the way out. A return path that missed its parent is joined where it
-// came nearest, and what lies beyond is a limb of its own there: by a link from its far end it would cross the background.
+// Appends a branch's nodes: those of the return path reversed, then those of the outgoing path. A return path that missed its parent is joined where
+// it came nearest, and what lies beyond is a limb of its own there: by a link from its far end it would cross the background.
 static bool adopt(Tracker *t, const Chain *out, const Chain *back, int number)
 {
     bool is_first = t->tree.count == 0, good = true;

@@ -89,7 +89,8 @@ static bool click_of(const Kind *kind, const VesselTree *truth, const TrackBranc
     return true;
 }
 
-// Share of the trunk's centreline that lies within one true radius of the tracked one, sampled at the true nodes; those of the first two radii are not asked for.
+// Share of the trunk's centreline that lies within one true radius of the tracked one, sampled at the true nodes; those of the first two radii are
+// not scored.
 static double trunk_share(const TrackBranch *trunk, const VesselTree *truth, const VesselTree *tracked)
 {
     int asked = 0, met = 0;

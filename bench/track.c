@@ -243,7 +243,7 @@ static void run_trial(void *context, long index)
     free(faults);
 }
 
-// `skip`: the first part of the branch was not asked for.
+// `skip`: the first part of the branch is not scored.
 static void tally_branch(Tally *tally, const TrackBranch *branch, double skip)
 {
     tally->branches++;

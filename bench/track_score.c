@@ -14,7 +14,7 @@ typedef enum Zone { IN_VESSEL, PAST_END, IN_SAC, IN_NEIGHBOUR, IN_BONE, IN_BACKG
 typedef struct Place {           // on a true tree
     int node;                    // the nearest
     int link;                    // the child of the nearest link
-    double arc, radius, away;    // way from the root, radius there, distance from the centreline
+    double arc, radius, away;    // path length from the root, radius there, distance from the centreline
     bool beyond;                 // off a tip's or the root's end
 } Place;
 
@@ -25,7 +25,7 @@ typedef struct Ball {
 
 typedef struct Map {             // of a true tree
     const VesselTree *tree;
-    double *arc;                 // (N) way from the root
+    double *arc;                 // (N) path length from the root
     int *branch;                 // (N) of the link to the parent
     int *depth;                  // (N)
     int *vessel_children;        // (N)
@@ -43,8 +43,8 @@ typedef struct Step {            // of a tracked node
     Place place;
     Zone zone;
     int run;                     // -1: good
-    int furthest;                // true node furthest along on the way here
-    double since;                // way since the run began
+    int furthest;                // true node furthest along on the path to here
+    double since;                // path length since the run began
     bool jumped;
 } Step;
 
@@ -111,7 +111,7 @@ static Place locate(const Map *map, Vec3 x)
     return best;
 }
 
-// The node where the ways from the root to a and b part.
+// The node where the paths from the root to a and b diverge.
 static int meeting(const Map *map, int a, int b)
 {
     while (a != b) {
@@ -248,7 +248,7 @@ static void judge_node(Judge *j, int i)
         step->jumped = true;
         return;
     }
-    // back on the same way by more than three radii; a sister branch is no return path
+    // back along the same path by more than three radii; a sister branch does not count
     int m = meeting(&j->map, before->furthest, step->place.node);
     if (m == step->place.node && j->map.arc[before->furthest] - step->place.arc > 3 * fmax(step->place.radius, j->truth->tree->radius[before->furthest])) {
         begin_run(j, step, before, true);

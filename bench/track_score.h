@@ -28,7 +28,7 @@ typedef struct TrackBranch {
     int first_node, last_node;   // of the true tree: the bifurcation (or root) where it begins and the one (or tip) where it ends
     double radius;               // [mm] mean
     double length, covered;      // [mm] true length, and how much of it was tracked
-    double skip;                 // [mm] of its way that is not asked for, two radii: the bifurcation's, or before the start in the root's branch
+    double skip;                 // [mm] of its length that is not scored, two radii: the bifurcation's, or before the start in the root's branch
     TrackLabel label;
     bool hangs_wrong;            // it was tracked, but attached to a vessel that it does not come from
 } TrackBranch;
@@ -48,7 +48,7 @@ typedef struct TrackScore {
     TrackSample *sample;
     int invented[TRACK_LABELS];      // KV, KB, KA, LB, BT: runs of at least two radii that are not in the truth
     double invented_mm[TRACK_LABELS];
-    int links, background_links;     // of the tracked tree between vessel nodes, and those of them that leave the lumen on their way
+    int links, background_links;     // of the tracked tree between vessel nodes, and those of them that leave the lumen
     int wrong_attachments;           // links between places that are far apart in the true tree
     int false_sacs;                  // aneurysm nodes outside all vessels and sacs
     double true_mm, covered_mm, tracked_mm;

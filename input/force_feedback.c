@@ -185,7 +185,7 @@ bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, siz
     layout->start = in_report(descriptor, EFFECT_OPERATION_REPORT, OP_START, true);
     layout->stop = in_report(descriptor, EFFECT_OPERATION_REPORT, OP_STOP, true);
     layout->loop_count = in_report(descriptor, EFFECT_OPERATION_REPORT, LOOP_COUNT, false);
-    // the control collection stands within a report's or alone, so it is looked for everywhere
+    // the control collection may be inside a report's or separate, so search everywhere
     layout->reset = find_choice(descriptor, PID(DEVICE_RESET), 0);
     layout->enable = find_choice(descriptor, PID(ENABLE_ACTUATORS), 0);
     layout->stop_all = find_choice(descriptor, PID(STOP_ALL), 0);

@@ -37,7 +37,7 @@ typedef struct EncoderLine {
     bool fresh[ENCODER_COUNTS];
 } EncoderLine;
 
-// Names and whole numbers in any order, "A12 R-3" or "R=7,A=-2": false if something else stands in it, a name twice, a number beyond +-2^32, or none.
+// Names and whole numbers in any order, "A12 R-3" or "R=7,A=-2": false if the line has anything else, a name twice, a number beyond +-2^32, or none.
 bool encoder_parse_line(const MapSerial *serial, const char *line, size_t length, EncoderLine *out);
 
 // Decodes one bulk transfer: packets of `packet_size` bytes (64, or 512 of high-speed chips), the first two of each status. Each complete line is

@@ -25,7 +25,7 @@ typedef struct HidTransport {
     int (*read)(void *context, void *device, uint8_t *bytes, int capacity, int timeout_ms);   // one input report; 0: none in time
     int (*write)(void *context, void *device, const uint8_t *bytes, int length);         // an output report; byte 0 is its id, 0 for none
     int (*send_feature)(void *context, void *device, const uint8_t *bytes, int length);  // the same
-    int (*get_feature)(void *context, void *device, uint8_t *bytes, int capacity);       // byte 0: the id asked for
+    int (*get_feature)(void *context, void *device, uint8_t *bytes, int capacity);       // byte 0: the requested id
     void (*close)(void *context, void *device);
 } HidTransport;
 

@@ -132,7 +132,7 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
     return faults->count == before;
 }
 
-// The columns of a text; those of the first tool alone where no name stands in the header.
+// The columns of a text; only those of the first tool if the header has no names.
 static bool find_columns(const char *text, size_t length, const char *file, const ToolNames *tools, Columns *columns, Faults *faults)
 {
     NumberColumn field[NUMBER_TABLE_COLUMNS];

@@ -314,7 +314,7 @@ static int tool_around(const Angioscope *scope, const Pose *pose, int tool, doub
     return -1;
 }
 
-// Gap and inward normal at a point; false if there is no wall near, or none that is known.
+// Gap and inward normal at a point; false if no wall is near or known.
 static bool wall_at(const Angioscope *scope, Vec3 x, int node, double reach, double *gap, Vec3 *normal)
 {
     if (!scope->vessel)

@@ -74,7 +74,7 @@ static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, const RibbonPoint *
     return true;
 }
 
-// Along the tool's nodes: a curve through them (Catmull and Rom's), so that a bend seen edge-on is no row of corners.
+// Along the tool's nodes: a curve through them (Catmull and Rom's), so that a bend seen edge-on is smooth.
 static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
 {
     Vec3 p[4];

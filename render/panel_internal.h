@@ -33,7 +33,7 @@ struct Panel {
     // mouse in a view
     int drag_view;
     unsigned drag_buttons;
-    double mouse_x, mouse_y, dragged;   // dragged: way since the press [pixel]
+    double mouse_x, mouse_y, dragged;   // dragged distance since the press [pixel]
     // open boxes
     Dialogue dialogue;
     bool dialogue_is_new;

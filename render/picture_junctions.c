@@ -66,7 +66,7 @@ static int nearest_node(const JunctionCell *cell, Vec3 x)
     return best;
 }
 
-// What a point at (u, v) of the plane is answered; below 0 if there is no node around.
+// The field at (u, v) of the plane; below 0 if there is no node around.
 static double field_in_plane(const JunctionCell *cell, double u, double v)
 {
     Vec3 x = vec3_add_scaled(vec3_add_scaled(cell->center, u, cell->along), v, cell->across);

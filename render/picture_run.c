@@ -472,7 +472,7 @@ static int emptiest_corner(const RunDrawing *drawing, const Camera *camera, cons
         int weight = is_tool ? 50 : 1;
         hidden[0] += weight * (left && upper);
         hidden[1] += weight * (right && upper);
-        hidden[2] += weight * (left && lower) + (left && lower);   // the scale bar stands there
+        hidden[2] += weight * (left && lower) + (left && lower);   // the scale bar is there
         hidden[3] += weight * (right && lower);
     }
     int best = 3;

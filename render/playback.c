@@ -17,7 +17,7 @@ struct Playback {
     const RecordedRun *run;
     const Scene *scene;
     const VesselTree *tree;
-    XrayControl unseen, control;     // control: of the step that was asked for last
+    XrayControl unseen, control;     // control: of the step requested last
     float *concentration;            // of the moment: at the tree's nodes, then at the tools'
     bool is_seen;
     Pose *pose;

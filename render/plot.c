@@ -22,7 +22,7 @@ void plot_add(RunningPlot *plot, double time_s, double value)
     plot->time_s = time_s;
     plot->value = value;
     float *least = &plot->least[place(bin)], *most = &plot->most[place(bin)];
-    *least = fminf(*least, (float)value);   // NaN gives way
+    *least = fminf(*least, (float)value);   // NaN is replaced
     *most = fmaxf(*most, (float)value);
 }
 
@@ -77,7 +77,7 @@ static void draw_line(const RunningPlot *plot, Gui *gui, GuiRect at, double low,
     float thick = fmaxf(1.5f, floorf(1.6f * gui_scale(gui))), scale = at.height / (float)(high - low), before = NAN;
     for (int i = plot->count - 1; i >= 0; i--) {
         int from = place(plot->last - i);
-        bool is_empty = isnan(plot->most[from]);   // a frame that came late: the value before stands
+        bool is_empty = isnan(plot->most[from]);   // after a late frame the previous value is kept
         float least = is_empty ? before : plot->least[from], most = is_empty ? before : plot->most[from];
         if (isnan(most))
             continue;

@@ -11,7 +11,7 @@
 
 typedef struct LinePoint {     // of the line that all tools lie on
     int node;                  // after this one …
-    double part;               // … by this part of the way to the next
+    double part;               // … at this fraction of the distance to the next
     double at;                 // both together
     double length;             // [mm] from the line's first point
     double half;               // [pixel] of the tool that was added last …

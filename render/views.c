@@ -11,7 +11,7 @@
 // Triangles of the wall at rest, and while camera or C-arm turn: what llvmpipe draws in time (docs/design.md, "Fluoroscopy").
 enum { FINE_TRIANGLES = 90000, COARSE_TRIANGLES = 25000 };
 
-// A view beside the main one is kept as a picture and drawn again in every second frame, the two in turn: nobody looks at both at once.
+// A view beside the main one is cached as a picture and redrawn in every second frame, the two in turn: users do not look at both at once.
 
 struct Views {
     ToolLooks tools;
@@ -93,7 +93,7 @@ static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, Vie
     }
 }
 
-// A view beside the main one is kept as a picture and drawn again in every second frame, the two in turn: nobody looks at both at once.
+// A view beside the main one is cached as a picture and redrawn in every second frame, the two in turn: users do not look at both at once.
 static void draw_inset(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
 {
     GlCanvas *inset = &views->inset[view];

@@ -13,7 +13,7 @@ typedef struct Views Views;
 typedef struct ViewsOptions {        // borrowed during create, but for scene, vessel and tree, which must outlive the views
     const Scene *scene;
     const Vessel *vessel;            // NULL: none
-    const VesselTree *tree;          // NULL: the vessel is no tree
+    const VesselTree *tree;          // NULL: the vessel is not a tree
     const TriangleMesh *mesh;        // the wall, NULL: none
     const Pose *pose;                // any pose of the scene's tools, for numbers of nodes and arc lengths
     int anatomy_size[3];             // a volume behind the vessel, see FluoroscopeOptions; value NULL: none

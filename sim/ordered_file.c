@@ -462,7 +462,7 @@ static bool write_word(OrderedFile *file, haddr_t address, uint64_t value)
     return write_all(file->descriptor, word, WORD, address);
 }
 
-// The index of a dataset without chunks: a root, a leaf, and the address in the header. Of a file that nobody reads yet.
+// The index of a dataset without chunks: a root, a leaf, and the address in the header. For a file without readers.
 static bool make_index(OrderedFile *file, Set *set, size_t bytes, haddr_t chunk)
 {
     const hsize_t leaf_rows = (hsize_t)file->fan * set->chunk_rows;

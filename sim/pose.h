@@ -48,7 +48,7 @@ void pose_copy(Pose *to, const Pose *from);   // made for the same tools
 void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 // Copies the only tool's nodes from the shared centreline, with which they coincide.
 void pose_fill_single_tool(Pose *pose);
-// Where a tool's tip lies on the shared centreline: a node's index and the part of the way to the next.
+// Where a tool's tip lies on the shared centreline: a node's index and the fraction of the distance to the next.
 double pose_tool_end(const Pose *pose, int tool);
 // [mm] from the proximal end of `tool`: where it passes the tip of `other`; its own length if `other` reaches further.
 double pose_tool_passes(const Pose *pose, int tool, int other);

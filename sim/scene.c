@@ -1,4 +1,4 @@
-// What a scene holds, asked for and freed; scene_read.c makes it.
+// Accessors and destruction of a scene; scene_read.c creates it.
 #include "sim/scene.h"
 
 #include "base/heap.h"

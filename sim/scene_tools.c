@@ -398,7 +398,7 @@ static void check_lumen(const ToolReading *read, const SceneTool *inner, const T
                    inner_name, thickest, outer_name, narrowest);
 }
 
-// The inner tool's proximal end stands behind the outer one's hub.
+// The inner tool's proximal end lies behind the outer one's hub.
 static void check_hub(const ToolReading *read, const SceneTool *inner, const ToolReading *around, const SceneTool *outer, double outer_inserted)
 {
     const char *inner_name = called(inner, read), *outer_name = called(outer, around);

@@ -31,7 +31,7 @@ struct Score {
     double since_look;           // [ms]
     Vec3 path_from;              // where the last chord of the tip's path ended
     double wall_force;           // [N] mean
-    ScoreEpisode episode[ERROR_COUNT];       // of what is no single tool's
+    ScoreEpisode episode[ERROR_COUNT];       // of what concerns no single tool
     double pulse_phase;          // of the next X-ray pulse, 1: now
     bool had_pedal;
     int64_t held_steps, stood_steps;         // within the target; the tool that stays within its own

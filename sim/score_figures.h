@@ -32,7 +32,7 @@ typedef struct ScoreToolFigures {
     double spare_mm;             // its proximal end lies so far behind that one's hub, >= 0
     double strayed_mm;           // of the tool that must stay: largest distance of its tip from its target
     int tip_node;                // node of the tree at which its tip is; -1 without tree
-    double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
+    double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the path
 } ScoreToolFigures;
 
 typedef struct ScoreFigures {

@@ -23,7 +23,7 @@ struct Simulator {
     StepEnergy before;       // of the previous state
     TargetReach *target;
     double dt;               // [ms]
-    int asked[TOOLS_MOST];   // which tools the last commands asked for
+    int asked[TOOLS_MOST];   // devices requested by the last commands
 };
 
 static void measure_targets(Simulator *simulator)

@@ -61,7 +61,7 @@ static bool trace_axis(const Vessel *tube, const TubeOptions *options, Axis *axi
     return axis->count >= 3;
 }
 
-// The surface's point beyond x in direction out; false if that is no wall.
+// The surface's point beyond x in direction out; false if that is not wall.
 static bool sample(const Vessel *tube, Vec3 x, Vec3 out, double r, VesselMemory *memory, Vec3 *surface)
 {
     Vec3 probe = vec3_add_scaled(x, 0.9 * r, out);

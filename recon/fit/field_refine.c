@@ -10,7 +10,7 @@
 
 #include <stdlib.h>
 
-// A blob's centre stands this share of its reach inside the wall, and no two of a level nearer than this share.
+// A blob's centre lies this share of its reach inside the wall; no two of a level are nearer than this share.
 static const double INSIDE = 0.25, APART = 0.8;
 // With fewer points than this per blob, more blobs would only fit the noise.
 static const double POINTS_A_BLOB = 3;

@@ -88,7 +88,7 @@ static void add_guard(Draft *d, Vec3 x, double low, double high)
     d->bound[d->guards++][1] = (float)high;
 }
 
-// Distance of x from the axis of node's link to its parent (its own centre, where that is no lumen), as a share of the radius there.
+// Distance of x from the axis of node's link to its parent (from its own centre if the link is not lumen), as a share of the radius there.
 static double share_of_tube(const VesselTree *tree, int node, Vec3 x)
 {
     int parent = tree->parent[node];
@@ -112,7 +112,7 @@ static bool is_in_lumen(const VesselTree *tree, int node, Vec3 x)
     return false;
 }
 
-// Whether a sac's wall, seen from its centre, lies behind x: a vessel's guards reach far into a sac that stands on it.
+// Whether a sac's wall, seen from its centre, lies behind x: a vessel's guards reach far into an aneurysm on it.
 static bool is_between(Vec3 x, Vec3 wall)
 {
     double along = vec3_dot(x, wall), x2 = vec3_norm2(x), wall2 = vec3_norm2(wall);

@@ -12,7 +12,7 @@
 #include "recon/fit/lim_model.h"
 
 LimFitOptions lim_fit_default_options(void);
-LimFitOptions lim_fit_paper_options(void);   // as published: Table 1, Taubin's distance, no mends
+LimFitOptions lim_fit_paper_options(void);   // as published: Table 1, Taubin's distance, no extensions
 
 // A new tree: the input's nodes and points with a model. NULL with faults (options out of range, a node whose neighbourhood has
 // too few points).

@@ -596,7 +596,7 @@ static double split_width(double rho, double c)
 
 double lim_split_width(double width, double level) { return level < width ? split_width(width, level) : 0.5 * width; }
 
-// Replaces blob j by two; the new one stands last, shifted by a tenth of the width towards p.
+// Replaces blob j by two; the new one comes last, shifted by a tenth of the width towards p.
 static void split_blob(Fit *fit, int j, Vec3 p)
 {
     LimBlob *old = &fit->model.blob[j], *new = &fit->model.blob[fit->model.count++];

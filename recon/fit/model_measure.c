@@ -46,7 +46,7 @@ typedef struct Job {
 
 static void mark_around(const VesselTree *tree, int from, double reach, int place, uint8_t *mark, int *stack, double *path)
 {
-    // depth first; the tree has no loops, so remembering where a way came from is enough
+    // depth first; the tree has no loops, so storing the predecessor is enough
     int depth = 0;
     int *came = stack + tree->node_count;
     stack[depth] = from, came[depth] = -1, path[depth++] = 0;

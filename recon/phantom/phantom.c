@@ -53,7 +53,7 @@ static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
     return true;
 }
 
-// Flat, or rising out of its plane at a nearly even slope: u grows with the length of the way but for 1 to 5 %.
+// Flat, or rising out of its plane at a nearly even slope: u grows with arc length within 1 to 5 %.
 static bool build_spiral(Shape *shape, const ShapeOptions *o)
 {
     enum { N = 64 };

@@ -41,7 +41,7 @@ const char *shape_names(void);
 // NULL with a fault for each unknown key, value out of range or unknown name; `file` is the prefix of messages.
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 void shape_free(Shape *shape);
-// The voxel size that stands for the samples' accuracy when a shape is fitted (LimFitOptions.voxel_mm): 0.05 mm, or twice the noise.
+// The voxel size that represents the samples' accuracy when a shape is fitted (LimFitOptions.voxel_mm): 0.05 mm, or twice the noise.
 double shape_voxel_mm(const Shape *shape);
 // The same from a scene's text options, before or without a shape (unknown or bad values count as absent).
 double shape_options_voxel_mm(int option_count, const char (*option)[2][64]);

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// --- Brightness along the way ---
+// --- Brightness along the vessel ---
 
 typedef struct Layer {       // the shape, or its neighbour
     const Shape *shape;
@@ -277,7 +277,7 @@ VolumeOptions volume_default_options(void)
 
 static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *faults)
 {
-    // about an axis that is no axis of the grid
+    // about an axis oblique to the grid
     Vec3 about = vec3_unit(vec3(1, 2, 3)), unit[3];
     double turn = o->rotate_deg * PI / 180, total = 1, grow = 0;
     for (int k = 0; k < 3; k++) {

@@ -128,7 +128,7 @@ static bool back_into_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 
     if (!isfinite(off) || fabs(vec3_dot(vec3_sub(foot, *p), tangent)) > 0.7 * off)
         return false;
     Vec3 inward = vec3_negate(normal_of(mesh, t));
-    if (fabs(vec3_dot(inward, tangent)) > 0.7)   // it stands on a lid
+    if (fabs(vec3_dot(inward, tangent)) > 0.7)   // it lies on a lid
         return false;
     double chord = mesh_tree_ray(tree, vec3_add_scaled(foot, 1e-4 * radius, inward), inward, 4 * radius, NULL);
     if (!isfinite(chord))

@@ -301,7 +301,7 @@ static void find_owners(void *context, long chunk)
             double length = vec3_norm(to);
             if (length > SEEN_REACH * s->nodes->radius[node[k]])
                 continue;
-            // the wall is seen where nothing stands clearly before it
+            // the wall is visible unless something lies clearly in front
             double hit = length > 0 ? mesh_tree_ray(s->wall->tree, from, vec3_scale(to, 1 / length), length, NULL) : INFINITY;
             if (!(hit < length - 0.1 * s->nodes->radius[node[k]]))
                 s->owner[i] = node[k];
@@ -507,7 +507,7 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
     return tree;
 }
 
-// Nodes on the links, then owners once more; points where a tool passes are no wall.
+// Nodes on the links, then owners once more; points in a tool's path are not wall.
 static bool open_ostia(Nodes *nodes, const Skeleton *skeleton, Sampling *s, int threads, ImportReport *report)
 {
     if (!nodes_open_ostia(nodes, skeleton, s->wall, report))

@@ -27,7 +27,7 @@ typedef struct Finding {
     const int *component;    // (V) of each voxel …
     int wanted;              // … and the one that is looked at
     float *cost, *length;    // (V) from the start; length [mm]
-    int *from;               // (V) -1 at the start and where there is no way
+    int *from;               // (V) -1 at the start and where there is no path
     int *owner;              // (V) the curve point in whose inscribed sphere the voxel lies, relatively deepest; -1
     float *depth;            // (V) distance to that point in its radii
     PathHeap heap;
@@ -420,7 +420,7 @@ static bool path_end_at(const Finding *f, Path *path, int point)
     return true;
 }
 
-// From the joint of a tip's way through the loop that closes there to the joint on the other side.
+// From the joint of a tip's path through the loop that closes there to the joint on the other side.
 static bool path_through(const Finding *f, Path *path, int tip, int join, int other)
 {
     Path back = {0};
@@ -433,7 +433,7 @@ static bool path_through(const Finding *f, Path *path, int tip, int join, int ot
     return good && path_end_at(f, path, f->owner[there]);
 }
 
-// Whether two vessels only touch: beyond the spheres that it hangs on the curve is far narrower somewhere than on both sides of it.
+// Whether two vessels only touch: beyond the spheres of its parent curve it is somewhere far narrower than on both sides.
 static bool is_pinched(const Path *path, Vec3 *place)
 {
     Vec3 first = path->point[0], last = path->point[path->count - 1];
@@ -578,7 +578,7 @@ static int label(const Lumen *l, const ImportOptions *options, int *component, i
     return widest < 0 ? -1 : wanted;
 }
 
-// The voxel at the end that is nearest to the root that was asked for, else at the widest.
+// The voxel at the end nearest to the requested root, else at the widest end.
 static int choose_start(const Finding *f, const ImportOptions *options)
 {
     int best = f->end[0];

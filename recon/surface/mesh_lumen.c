@@ -92,7 +92,7 @@ static int compare_probes(const void *a, const void *b)
     return x->radius != y->radius ? (x->radius > y->radius) - (x->radius < y->radius) : (x->length > y->length) - (x->length < y->length);
 }
 
-// Half the chord across the lumen from a triangle's middle is a radius, and area / radius the length of vessel that the triangle stands for.
+// Half the chord across the lumen from a triangle's middle is a radius, and area / radius the length of vessel that the triangle represents.
 static double smallest_radius(const SurfaceMesh *mesh, const MeshTree *tree, double size)
 {
     int stride = mesh->triangle_count / PROBES + 1, count = 0;

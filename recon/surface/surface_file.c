@@ -319,7 +319,7 @@ static void ply_header_property(Growing *g, Cursor *c, PlyElement *e)
     e->property[e->property_count++] = p;
 }
 
-// Number of elements; the cursor then stands on the line behind end_header.
+// Number of elements; leaves the cursor on the line after end_header.
 static int ply_header(Growing *g, Cursor *c, PlyElement *element, int *format)
 {
     int count = 0;

@@ -1,4 +1,4 @@
-// See vtp_file.h. Appended data may be raw bytes, which are no XML: expat gets the text up to its `_` only. Array bodies:
+// See vtp_file.h. Appended data may be raw bytes, which are not XML: expat gets the text up to its `_` only. Array bodies:
 //   plain       [bytes] data                              one base64 text
 //   compressed  [blocks, block size, last size, sizes …]  a base64 text of its own, then the blocks as another
 // with header words of header_type (UInt32 unless said otherwise).

@@ -71,8 +71,8 @@ static double voxel_value(const Volume *v, Vec3 voxel)
     return (double)v->value[((size_t)voxel.z * (size_t)v->size[1] + (size_t)voxel.y) * (size_t)v->size[0] + (size_t)voxel.x];
 }
 
-// From `start` to `end`, or with `paint` to the nearest tube of a node before `before` whose centre is in sight; the places to way[0 … count-1],
-// start first, and the node met. Returns the count, 0 if there is no way, -1 if memory runs out.
+// From `start` to `end`, or with `paint` to the nearest tube of a node below `before` whose centre is in line of sight; writes the voxels to way[0 …
+// count-1], start first, and the node reached. Returns the count, 0 if there is no way, -1 if memory runs out.
 static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 start, Vec3 end, const Light *light, Vec3 *way, int *met)
 {
     const Volume *v = t->volume;

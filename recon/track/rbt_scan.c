@@ -164,7 +164,7 @@ bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylind
 
 // --- the search ---
 
-// Trilinear: on a smoothed copy as good as the spline, and several times cheaper. Outside stands the last voxel.
+// Trilinear: on a smoothed copy as good as the spline, and several times cheaper. Outside the last voxel is repeated.
 static double smooth_value(const Volume *v, Vec3 x)
 {
     Vec3 c = volume_voxel_of(v, x);

@@ -101,7 +101,7 @@ static Vec3 axis_of(const Tracker *t, const Chords *c)
     return t->ray[best];
 }
 
-// … and the one of the longest chord, where the lumen is no tube.
+// … and the one of the longest chord, where the lumen is not a tube.
 static Vec3 longest_of(const Tracker *t, const Chords *c)
 {
     int best = 0;

@@ -31,7 +31,7 @@ int tracker_attachment(const Tracker *t, Vec3 x, int node_count)
     return best >= 0 ? best : brightest;
 }
 
-// Appends a branch's nodes: those of the return path reversed, then those of the way out.
+// Appends a branch's nodes: those of the return path reversed, then those of the outgoing path.
 bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number)
 {
     int before = t->tree.count;

@@ -6,7 +6,7 @@
 
 // Where to attach a subtree that starts at x to the first `node_count` nodes of the tree.
 int tracker_attachment(const Tracker *t, Vec3 x, int node_count);
-// Appends a branch's nodes: those of the return path reversed, then those of the way out. False: out of memory.
+// Appends a branch's nodes: those of the return path reversed, then those of the outgoing path. False: out of memory.
 bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number);
 // Tracks from a cylinder both ways into the empty tree; nodes follow each other from the root on. False if nothing was found, or out of memory.
 bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number);

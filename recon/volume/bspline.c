@@ -101,7 +101,7 @@ INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start,
     for (int a = 0; a < 3; a++) {
         double most = volume->size[a];
         for (int s = 0; s < LINE_BLOCK; s++) {
-            double x = begin[a] + (first + s) * along[a], held = x > 0 ? x : 0;   // held where a cast to int is sound: what is beyond is no cell
+            double x = begin[a] + (first + s) * along[a], held = x > 0 ? x : 0;   // clamped to the range where a cast to int is defined; there is no cell beyond
             held = held < most ? held : most;
             base[a][s] = (int)(held + 4) - 5;
             block->place[a][s] = x;
