@@ -364,7 +364,7 @@ typedef struct Hand {
 
 // One step and its measurements; false if the run is over.
 static bool loop_step(Simulator *simulator, const Scene *scene, const LoopOptions *o, int64_t i, Command command, Judge *judge, Hand *hand, CollisionLoop *out,
-                      bool *memory_lacks)
+                      bool *out_of_memory)
 {
     const WireState *state = simulator_state(simulator);
     if (o->without_friction)
@@ -397,7 +397,7 @@ static bool loop_step(Simulator *simulator, const Scene *scene, const LoopOption
         judge_work(judge, state, first);
     }
     if (o->record && !motion_add(o->record, first, reach_at(scene, state, command, judge, first), state->position)) {
-        *memory_lacks = true;
+        *out_of_memory = true;
         return false;
     }
     return true;
@@ -445,16 +445,16 @@ bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth,
     Scene own = scene_for(scene, o, section);
     Simulator *simulator = simulator_create(&own, wall, faults);
     Judge judge = {.wall = wall, .truth = truth, .truth_gap = truth_gap};
-    bool lacks = simulator && !judge_create(&judge, simulator_state(simulator)->node_count);
-    if (simulator && !lacks) {
+    bool out_of_memory = simulator && !judge_create(&judge, simulator_state(simulator)->node_count);
+    if (simulator && !out_of_memory) {
         stepper_node_report(simulator_stepper(simulator), judge.node);
-        lacks = o->record && !start_record(o->record, &judge);
+        out_of_memory = o->record && !start_record(o->record, &judge);
     }
-    if (simulator && !lacks) {
+    if (simulator && !out_of_memory) {
         Hand hand = {.length = judge.node[judge.node_count - 1].s, .fed = simulator_state(simulator)->inserted};
         int cursor = 0;
         for (int64_t i = 0; i < out->wanted; i++)
-            if (!loop_step(simulator, &own, o, i, bench_command(&own, i, &cursor), &judge, &hand, out, &lacks))
+            if (!loop_step(simulator, &own, o, i, bench_command(&own, i, &cursor), &judge, &hand, out, &out_of_memory))
                 break;
         read_profile(simulator, out);
         out->fed_mm = hand.travel;
@@ -465,13 +465,13 @@ bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth,
         out->work_n = judge.work / fmax(hand.travel, 1e-9);
         out->work_mu = judge.normal_work > 0 ? judge.work / judge.normal_work : 0;
     }
-    if (lacks)
+    if (out_of_memory)
         faults_add(faults, scene->path, 0, 0, "no memory for the run");
     judge_free(&judge);
     if (simulator)
         simulator_destroy(simulator);
     free(section);
-    return simulator && !lacks;
+    return simulator && !out_of_memory;
 }
 
 PushFigures collision_push(const double *push_n, int64_t steps, const double *reference_n, int64_t reference_steps)
