@@ -1,5 +1,5 @@
-// A mesh as the vessel (`vessel: {mesh: F}`) and vessels turned into meshes and grids (`--contact`): what is wrong with a mesh is told and repaired
-// or refused, and the wire lies where it lies in the exact tube.
+// A mesh as the vessel (`vessel: {mesh: F}`) and vessels turned into meshes and grids (`--contact`): defects of a mesh are reported and repaired, or
+// the mesh is refused, and the wire lies where it lies in the exact tube.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

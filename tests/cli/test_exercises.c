@@ -1,5 +1,5 @@
-// The exercises can be done: the hand beside each scene holds the target without an error and without leaving the vessel, and the one that errs is told
-// so. Skipped by name where a scene's model is not made, and under sanitizers, where a fit and minutes of steps would take too long.
+// The exercises can be done: the hand beside each scene holds the target without an error and without leaving the vessel, and the one with errors is
+// scored accordingly. Skipped by name where a scene's model is not made, and under sanitizers, where a fit and minutes of steps would take too long.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -131,7 +131,7 @@ static void the_microcatheter_is_exchanged_over_its_wire(void **state)
     errs("over-the-wire", NULL, "tip_moved");
 }
 
-// The soft wire goes and the stiff one comes while the catheter keeps its place; where nobody holds the catheter it does not.
+// The soft wire is exchanged for the stiff one while the catheter stays in place; a released catheter does not stay.
 static void the_wire_is_exchanged_for_a_stiff_one(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// A disk that is full: whoever asked for a file that does not exist learns it by the exit code and a message.
+// A full disk: a file that could not be written is reported by the exit code and a message.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -77,7 +77,7 @@ static void standard_output_that_is_full(void **state)
         if (code == 0 || (!strstr(output, "cannot be written") && !strstr(output, "cannot write to standard output")))
             fail_msg("`%s` to a full device ended with %d and said: %s", arguments[i], code, output);
     }
-    // closed: fine where nothing is said, and what is said goes into no other file
+    // closed: allowed if nothing is printed, and printed text must not go into another file
     char command[1000];
     snprintf(command, sizeof command, "cd '%s' && %s run tube.yaml --duration-s 0.01 --record closed.h5 --quiet >&- 2>/dev/null", folder, SELDINGER_PROGRAM);
     assert_int_equal(system(command), 0);

@@ -125,7 +125,7 @@ static void a_curved_tip_is_drawn_into_the_sheath(void **state)
     cJSON_Delete(holds((HardCase){"withdrawn", 0.767 * 1.002, 0.002, 0, 0, true}));
 }
 
-// The element across the mouth is as long as the tool has moved, not as the hand was told to move it: 17 mJ in a step before.
+// The element across the mouth has the length that the tool has moved, not the commanded length: 17 mJ in a step before.
 static void a_hand_that_slips_makes_no_energy(void **state)
 {
     (void)state;

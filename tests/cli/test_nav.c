@@ -109,7 +109,7 @@ static int run(const char *format, ...)
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-// The same, and what it said where it does not end with `code`.
+// The same; prints the output if it does not end with `code`.
 #define RUNS(code, ...)                                                                                                                            \
     do {                                                                                                                                           \
         int ended = run(__VA_ARGS__);                                                                                                              \

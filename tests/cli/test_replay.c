@@ -33,7 +33,7 @@ static const char model_scene[] = "seldinger: 1\n"
                                   "sheath: {entry_mm: [0, 0, 0], direction: [0, 0, 1], inserted_mm: 1}\n"
                                   "script: [[0, 10, 0], [0.2, 0, 90], [0.25, 0, 0]]\n";
 
-// What it says is in `said`; $S in a command is the program.
+// Its output is in `said`; $S in a command is the program.
 static int run(const char *format, ...)
 {
     char command[2000], text[1500];

@@ -342,7 +342,7 @@ static void golden_paths_of_the_scenes_hold(void **state)
     ends(0, "same", "check scenes/coaxial");
 }
 
-// A device moves one of the scene's tools, or it is told which there are.
+// A device moves one of the scene's tools, or the message lists them.
 static void a_map_names_a_tool_of_the_scene(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// The exact tube: derivatives of the gap by central differences, distances against sampled centrelines, ends, frames, rigid motion and
-// mirroring, coils that cross, and what a bad tube is told.
+// The exact tube: derivatives of the gap by central differences, distances against sampled centrelines, ends, frames, rigid motion and mirroring,
+// coils that cross, and the messages about bad tubes.
 #include "geom/vessel.h"
 #include "random_numbers.h"
 

@@ -125,7 +125,7 @@ static void the_reaction_comes_from_where_the_stick_goes(void **state)
 
 static const MapForce limits = {.is_wanted = true, .full_scale_n = 8, .max_n = 4, .slew_n_s = 200, .full_scale_n_mm = 40, .stall_ms = 50, .quiet_ms = 200};
 
-// A millisecond after another, the simulation and the device alive unless told otherwise.
+// One millisecond after another; simulation and device are alive by default.
 typedef struct Clock {
     ForceGuard guard;
     int64_t now, step, report;

@@ -1,4 +1,4 @@
-// What a hand may feel of a device that fails: no force that was not asked for now, none that stays.
+// The force on the hand when a device fails: no force that is not requested now, none that stays.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -63,7 +63,7 @@ static bool start(Bench *bench)
     return force_start(&bench->force, bench->map, bench->stick, &bench->transport, &bench->device, bench->device.now_us);
 }
 
-// A millisecond later the force is looked at again; the simulation went on unless told otherwise.
+// One millisecond later the force is updated; the simulation advances by default.
 static void tick(Bench *bench, double force_n, bool steps)
 {
     bench->device.now_us += 1000;

@@ -1,4 +1,4 @@
-// What the steps of a recording were told, as runs of equal commands, one per line: `PUSH_MM_S STEPS`, the push rounded to 0.001 mm/s; then `inserted
+// The commands of a recording's steps, as runs of equal commands, one per line: `PUSH_MM_S STEPS`, the push rounded to 0.001 mm/s; then `inserted
 // FIRST_MM LAST_MM twisted DEG`. The recording may still be written. usage: show_commands RECORDING
 #include "sim/recording.h"
 

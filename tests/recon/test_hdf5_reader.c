@@ -1,5 +1,5 @@
-// The guarded reader of HDF5: a dataset as ours are is read; whatever lies elsewhere, is packed otherwise than by deflate, is no number or promises
-// what does not exist is refused by name.
+// The guarded reader of HDF5: datasets like ours are read; data stored elsewhere, compressed by other filters than deflate, of another type, or
+// missing in the file are refused with a message.
 #include "recon/hdf5_reader.h"
 
 #include <setjmp.h>

@@ -297,7 +297,7 @@ static void test_wrong_radii(void **state)
     }
 }
 
-// A thin vessel aside of the only one that has a centreline, and a piece far off: both are left out, and told.
+// A thin vessel aside of the only one that has a centreline, and a piece far off: both are left out and reported.
 static void test_no_centreline(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// A closed box of 12 triangles, spoilt one way at a time: what is told, and that the repaired mesh has the box's volume again.
+// A closed box of 12 triangles, damaged in one way at a time: the report, and that the repaired mesh has the box's volume again.
 #include "recon/surface/mesh_check.h"
 
 #include <setjmp.h>
@@ -29,7 +29,7 @@ static MeshCheck mended(SurfaceMesh *mesh)
     MeshCheck first, second;
     assert_true(mesh_repair(mesh, &first));
     assert_true(mesh_check(mesh, &second));
-    // mending once is enough
+    // repairing once is enough
     assert_int_equal(second.flipped_triangles.count + second.inside_out_count + second.duplicate_triangles.count + second.duplicate_vertices.count +
                          second.unreferenced_vertices.count, 0);
     surface_free(mesh);

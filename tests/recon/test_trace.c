@@ -1,4 +1,4 @@
-// Trace files: what is read, and that every fault is told with its line and column in one pass.
+// Trace files: what is read, and that every fault is reported with its line and column in one pass.
 #include "recon/track/trace.h"
 
 #include <setjmp.h>

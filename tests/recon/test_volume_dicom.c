@@ -362,7 +362,7 @@ static void what_is_refused(void **state)
     volume = load("other4");
     assert_true_volume(volume, &s);
     volume_free(volume);
-    // a damaged file of the series is told, one of another series is not
+    // a damaged file of the series is reported, one of another series is not
     build_slice(&d, &s, 3);
     write_file("other1", &d, d.length - 1);
     assert_null(load("other0"));

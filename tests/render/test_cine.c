@@ -1,4 +1,4 @@
-// The cine loop: a ring that keeps what it is told to, replay at the pulses' times, files that come back the same and refuse what is damaged.
+// The cine loop: a ring buffer of images, replay at the pulses' times, files that come back the same and refuse what is damaged.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

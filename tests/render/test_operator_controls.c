@@ -199,7 +199,7 @@ static void pedal_and_contrast_come_from_latch_keys_and_hands(void **state)
     assert_true(controls_xray(&controls, &pedal, HAND_PEDAL).pedal == 1);
     press(&controls, ACTION_PEDAL_LATCH, 1);
     assert_true(controls_xray(&controls, &none, 0).pedal == 0);
-    // what is asked for is not kept: all else is the controls's
+    // what is asked for is not kept: everything else is unchanged
     controls.xray.lao_deg = 12;
     xray = controls_xray(&controls, &pedal, HAND_CONTRAST);
     assert_true(xray.lao_deg == 12 && controls.xray.pedal == 0 && controls.xray.contrast_ml_s == 0);

@@ -596,7 +596,7 @@ static double cpu_s(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-// 10,000 nodes: 20 us of CPU per ms of simulated time are the budget; told here, and held with room for a slow or instrumented build.
+// 10,000 nodes: 20 us of CPU per ms of simulated time are the budget; printed here, and checked with a margin for slow or instrumented builds.
 static void the_cost_is_told(void **state)
 {
     (void)state;

@@ -365,7 +365,7 @@ static void all_faults_come_in_one_pass(void **state)
             fail_msg("no fault says '%s'", words[i]);
 }
 
-// A rule that ties one tool to another speaks where both are known, and not where one of them is what is wrong.
+// A rule relating two tools applies only if both are valid.
 static void a_fault_hides_no_other_and_makes_none(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-// Sessions as files: what is written is read back, every fault is told, a folder gives a trainee's own in order; a digest is of one recording only.
+// Sessions as files: what is written is read back, every fault is reported, a folder gives a trainee's own in order; a digest is of one recording
+// only.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

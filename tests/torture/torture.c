@@ -752,7 +752,7 @@ static long torture_by_limits(const Case *c, const Reference *reference)
     for (size_t i = 0; i < sizeof limits / sizeof *limits; i++) {
         const struct Limit *limit = &limits[i];
         if (c->traits & WINDOW && limit->set == address_space)
-            continue;        // the drivers that draw take much, and end by signals where that lacks
+            continue;        // the drawing drivers need much memory and crash without it
         long values = 0, skipped;
         for (long v = limit->from; v <= limit->to; v = next_value(limit, v))
             values++;
