@@ -1,11 +1,13 @@
 #include "base/simd.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 const char *const simd_name[SIMD_COUNT] = {"sse2", "avx2", "avx512"};
 
-static int forced = -1;
+// Threads of offline work may ask first together; each finds the same.
+static atomic_int forced = -1;
 
 SimdLevel simd_widest(void)
 {
@@ -21,18 +23,20 @@ SimdLevel simd_widest(void)
 void simd_force(SimdLevel level)
 {
     SimdLevel widest = simd_widest();
-    forced = (int)(level < widest ? level : widest);
+    atomic_store_explicit(&forced, (int)(level < widest ? level : widest), memory_order_relaxed);
 }
 
 SimdLevel simd_level(void)
 {
-    if (forced < 0) {
+    int known = atomic_load_explicit(&forced, memory_order_relaxed);
+    if (known < 0) {
         const char *name = getenv("SELDINGER_SIMD");
         SimdLevel level = simd_widest();
         for (int i = 0; name && i < SIMD_COUNT; i++)
             if (!strcmp(name, simd_name[i]))
                 level = (SimdLevel)i;
         simd_force(level);
+        known = atomic_load_explicit(&forced, memory_order_relaxed);
     }
-    return (SimdLevel)forced;
+    return (SimdLevel)known;
 }
