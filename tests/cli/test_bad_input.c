@@ -99,7 +99,7 @@ static void traces(void **state)
         {"branches: [{start_mm: [0, 3, 3], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "lies on background"},
         {"branches: [{start_cm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:23: unknown key 'start_cm'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 0}]\n", "t.yaml:1:67: radius_mm '0'"},
-        {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\nbanana: 1\n", "t.yaml:2:9: 'banana'"},
+        {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\nbanana: 1\n", "t.yaml:2:9: unknown key 'banana'"},
         {"branches: [{start_mm: [0, 0, 0]}]\nforbid: [{center_mm: [0, 0, 0], radius_mm: 2}]\n",
          "t.yaml:1:12: the start of branch 1 lies in a region of `forbid`"},
         {"branches: []\n", "t.yaml:1:1: there is no branch"},
