@@ -26,7 +26,7 @@ static const char *broken_state(const WireState *w)
 
 static const char *broken_elements(const Stepper *s)
 {
-    for (int i = s->first_free; i + 1 < s->state.node_count; i++) {
+    for (int i = s->first_free; s->tool_count == 1 && i + 1 < s->state.node_count; i++) {    // of several tools ends of the chain come and go
         double chord = vec3_distance(s->state.position[i], s->state.position[i + 1]), rest = s->wire.length[i];
         if (!(chord < TORN * rest && chord > CRUSHED * rest))
             return "elements are about as long as at rest";
