@@ -62,9 +62,9 @@ typedef struct OptionTable {
     void (*set_defaults)(void *structure);       // which comes zeroed; NULL: zeros are the defaults
     const char *(*check)(void *structure);       // after all options: NULL, or what is wrong with them together; NULL: nothing can be
     // Arguments that are no options: const char * at `argument`, or with `argument_count` (an int's offset) any number, as a char **.
-    bool takes_argument, may_lack;
+    bool takes_argument, may_be_missing;
     size_t argument, argument_count;
-    const char *lacks;       // message where there is none
+    const char *missing;     // message if there is none
     const char *too_many;    // message before one too many; ends with a blank where that shall follow
 } OptionTable;
 

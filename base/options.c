@@ -179,7 +179,7 @@ static int take_option(Parse *parse, const Option *option, const char *value)
     }
     if (has_value(option) && !value) {
         if (parse->at == parse->argc)
-            return options_refuse(parse->table, "--%s lacks its value %s", option->name, option->metavar);
+            return options_refuse(parse->table, "--%s is missing its value %s", option->name, option->metavar);
         value = parse->argv[parse->at++];
     }
     int code = take(parse, option, value);
@@ -223,7 +223,7 @@ static int take_arguments(Parse *parse)
         return options_refuse(table, "%s%s", table->too_many, *end == ' ' ? first[most] : "");
     }
     if (parse->arguments == 0)
-        return table->takes_argument && !table->may_lack ? options_refuse(table, "%s", table->lacks) : -1;
+        return table->takes_argument && !table->may_be_missing ? options_refuse(table, "%s", table->missing) : -1;
     if (table->argument_count) {
         *(char ***)(void *)(structure + table->argument) = first;
         *(int *)(void *)(structure + table->argument_count) = parse->arguments;

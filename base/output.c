@@ -68,7 +68,7 @@ bool output_write_line(const char *path, char *text, Faults *faults)
     char *line = text ? realloc(text, length + 2) : NULL;
     if (!line) {
         free(text);
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
         return false;
     }
     memcpy(line + length, "\n", 2);
@@ -99,7 +99,7 @@ bool output_text_write(OutputText *text, const char *path, Faults *faults)
 {
     bool whole = !ferror(text->stream) && fclose(text->stream) == 0;
     if (!whole)
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
     whole = whole && output_write(path, text->bytes, text->length, faults);
     free(text->bytes);
     return whole;

@@ -186,7 +186,7 @@ bool bench_write_json(const BenchOptions *options, const cJSON *root, Faults *fa
         return true;
     char *text = cJSON_Print(root);
     if (!text)
-        faults_add(faults, options->json, 0, 0, "cannot be written: no memory");
+        faults_add(faults, options->json, 0, 0, "cannot be written: out of memory");
     bool good = text && output_write(options->json, text, strlen(text), faults);
     free(text);
     return good;

@@ -40,7 +40,7 @@ static const OptionTable table = {
     CLI_OPTIONS(rows, CheckOptions),
     .set_defaults = set_defaults,
     .takes_argument = true, .argument = offsetof(CheckOptions, path), .argument_count = offsetof(CheckOptions, path_count),
-    .lacks = "lacks the scenes or folders to check",
+    .missing = "missing the scenes or folders to check",
 };
 
 static void gather(const CheckOptions *options, SceneList *list, Faults *faults)

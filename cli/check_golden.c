@@ -75,7 +75,7 @@ int check_golden(const char *path, const GoldenOptions *options, Faults *faults)
     Scene *scene = scene_load(path, faults);
     const char *needed = scene ? scene_needed_file(scene) : NULL;
     if (!golden_path) {
-        faults_add(faults, path, 0, 0, "no memory");
+        faults_add(faults, path, 0, 0, "out of memory");
     } else if (needed && access(needed, F_OK) != 0) {
         printf("%-44s skipped   %s is not there\n", path, needed);
         code = EXIT_DONE;

@@ -121,7 +121,7 @@ int check_verify(int count, char *const *path, int threads, bool quiet, Faults *
     }
     VerifyRun *run = scene ? calloc((size_t)runs + 1, sizeof *run) : NULL;
     if (!run)
-        faults_add(faults, "seldinger check", 0, 0, "no memory");
+        faults_add(faults, "seldinger check", 0, 0, "out of memory");
     for (int i = 0, k = 0; run && i < scenes; i++)
         for (int n = 0; n < runs_of(scene[i].scene); n++, k++) {
             const VerifyPlan *plan = &scene[i].scene->verify;

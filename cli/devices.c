@@ -60,7 +60,7 @@ static int call(void *structure, Faults *faults)
     DeviceList *list = calloc(1, sizeof *list);
     HidTransport *transport = hid_transport_hidapi();
     if (!list) {
-        faults_add(faults, "devices", 0, 0, "no memory");
+        faults_add(faults, "devices", 0, 0, "out of memory");
     } else if (plan_files(command, faults) && device_list_load_maps(list, command->map_count, command->map, faults)) {
         device_list_look(list, transport);
         if (command->json)

@@ -60,7 +60,7 @@ static const OptionTable table = {
     CLI_OPTIONS(rows, ExportOptions),
     .set_defaults = set_defaults, .check = check,
     .takes_argument = true, .argument = offsetof(ExportOptions, in),
-    .lacks = "one file and `-o OUT` are needed", .too_many = "one file and `-o OUT` are needed, not also ",
+    .missing = "one file and `-o OUT` are needed", .too_many = "one file and `-o OUT` are needed, not also ",
 };
 
 static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
@@ -80,7 +80,7 @@ static bool export_surface(const ExportOptions *options, const char *extension, 
         print(text.stream, &surface);
         good = output_text_write(&text, options->out, faults);
     } else if (good) {
-        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
+        faults_add(faults, options->out, 0, 0, "cannot be written: out of memory");
         good = false;
     }
     model_surface_free(&surface);

@@ -65,7 +65,7 @@ static const char *check(void *structure)
 {
     const FitCommand *command = structure;
     bool is_local = command->fit.preset != FIT_DEFAULT;
-    return !command->output && !command->measure       ? "lacks -o MODEL.h5"
+    return !command->output && !command->measure       ? "missing -o MODEL.h5"
            : command->has_alpha && !is_local           ? "--preset local or paper is needed for --alpha"
            : command->has_beta && !is_local            ? "--preset local or paper is needed for --beta"
            : command->has_max_blobs && !is_local       ? "--preset local or paper is needed for --max-blobs"
@@ -83,5 +83,5 @@ const OptionTable fit_options = {
     CLI_OPTIONS(options, FitCommand),
     .set_defaults = set_defaults, .check = check,
     .takes_argument = true, .argument = offsetof(FitCommand, tree),
-    .lacks = "lacks the tree to fit", .too_many = "one tree at a time, not also ",
+    .missing = "missing the tree to fit", .too_many = "one tree at a time, not also ",
 };

@@ -108,7 +108,7 @@ static int call(void *structure, Faults *faults)
     plan_files(command, faults);
     double start = seconds();
     SurfaceMesh *mesh =
-        faults->count == 0 ? mesh_load_mended(command->surface, command->has_scale ? command->scale : 0, "--scale ", &found.check, faults) : NULL;
+        faults->count == 0 ? mesh_load_repaired(command->surface, command->has_scale ? command->scale : 0, "--scale ", &found.check, faults) : NULL;
     bool good = mesh && import(command, mesh, &found, faults);
     found.seconds = seconds() - start;
     if (good)

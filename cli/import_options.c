@@ -26,7 +26,7 @@ static void set_defaults(void *structure) { *(ImportCommand *)structure = (Impor
 static const char *check(void *structure)
 {
     const ImportCommand *command = structure;
-    return !command->surface ? "lacks --surface F" : !command->output ? "lacks -o TREE.h5" : NULL;
+    return !command->surface ? "missing --surface F" : !command->output ? "missing -o TREE.h5" : NULL;
 }
 
 const OptionTable import_options = {
@@ -37,7 +37,7 @@ const OptionTable import_options = {
              "than 10 % of the surface is refused. Narrow branches that no centreline runs into are left out.\n"
              "Surface: STL, PLY, OBJ or VTK PolyData (.vtp), open or closed; flat lids over the ends of a closed one are taken off.\n"
              "Centrelines: VTK PolyData (.vtp), 3D Slicer Markups (.mrk.json), SWC; several files and overlapping curves make one tree.\n"
-             "What is wrong with the surface is named and mended.\n"
+             "Reports defects of the surface and repairs them.\n"
              "A branch whose link to its parent has no path inside the surface hangs on another vessel in plain sight, or is left out; the summary names it.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, ImportCommand),

@@ -48,7 +48,7 @@ static const OptionTable table = {
     CLI_OPTIONS(options, InfoCommand),
     .set_defaults = set_defaults,
     .takes_argument = true, .argument = offsetof(InfoCommand, file),
-    .lacks = "one file is needed", .too_many = "one file is needed, not also ",
+    .missing = "one file is needed", .too_many = "one file is needed, not also ",
 };
 
 static bool add_reach(cJSON *object, const VesselTree *tree, InfoCommand *command, Faults *faults)

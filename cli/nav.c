@@ -63,7 +63,7 @@ static const OptionTable table = {
     CLI_OPTIONS(rows, NavOptions),
     .set_defaults = set_defaults, .check = check,
     .takes_argument = true, .argument = offsetof(NavOptions, scene),
-    .lacks = "lacks the scene to steer in", .too_many = "one scene at a time, not also ",
+    .missing = "missing the scene to steer in", .too_many = "one scene at a time, not also ",
 };
 
 static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, const RecordedRun *resume, Faults *faults)

@@ -28,7 +28,7 @@ static const Option options[] = {
 static const char *check(void *structure)
 {
     const QueryOptions *query = structure;
-    return !query->points ? "lacks --points F.csv" : !query->output ? "lacks -o F.csv" : NULL;
+    return !query->points ? "missing --points F.csv" : !query->output ? "missing -o F.csv" : NULL;
 }
 
 // --- answers ---
@@ -134,7 +134,7 @@ static const OptionTable table = {
     .check = check,
     .takes_argument = true,
     .argument = offsetof(QueryOptions, model),
-    .lacks = "lacks the model",
+    .missing = "missing the model",
     .too_many = "one model at a time, not also ",
 };
 

@@ -47,5 +47,5 @@ const OptionTable replay_options = {
     CLI_OPTIONS(options, ReplayOptions),
     .set_defaults = set_defaults,
     .takes_argument = true, .argument = offsetof(ReplayOptions, recording),
-    .lacks = "lacks the recording to show", .too_many = "one recording at a time, not also ",
+    .missing = "missing the recording to show", .too_many = "one recording at a time, not also ",
 };

@@ -55,7 +55,7 @@ static const OptionTable table = {
     CLI_OPTIONS(rows, ReportOptions),
     .check = check,
     .takes_argument = true, .argument = offsetof(ReportOptions, session),
-    .lacks = "takes one session file or recording", .too_many = "takes one session file or recording, not also ",
+    .missing = "takes one session file or recording", .too_many = "takes one session file or recording, not also ",
 };
 
 // Of a recording: the session file beside it, which may have to be made first.

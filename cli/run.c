@@ -51,7 +51,7 @@ static bool begin(Run *run, const RunOptions *wanted, Faults *faults)
     run->headless.watch = watch_step;
     run->headless.context = run;
     if (wanted->files.chart && !(run->chart = run_chart_create(headless_steps(&wanted->headless, run->scene))))
-        faults_add(faults, run->scene->path, 0, 0, "no memory");
+        faults_add(faults, run->scene->path, 0, 0, "out of memory");
     else if (wanted->device_count)
         run->hands = run_hands_open(wanted->device_count, wanted->device, run->scene, faults);
     return faults->count == 0;

@@ -6,7 +6,7 @@
 
 typedef struct RunChart RunChart;
 
-// NULL where memory lacks. `expected_steps`: at most as many are added, more are left out.
+// NULL: out of memory. `expected_steps`: at most as many are added, more are left out.
 RunChart *run_chart_create(int64_t expected_steps);
 void run_chart_free(RunChart *chart);
 // After a step. Allocates nothing. Of a long run, least and greatest of several steps are kept, so that no spike is lost.

@@ -76,7 +76,7 @@ RunHands *run_hands_open(int map_count, const char *const *map, const Scene *sce
     RunHands *hands = calloc(1, sizeof *hands);
     const ToolNames tools = scene_tool_names(scene);
     if (!hands) {
-        faults_add(faults, "--device", 0, 0, "no memory");
+        faults_add(faults, "--device", 0, 0, "out of memory");
         return NULL;
     }
     hands->dt = scene->dt;

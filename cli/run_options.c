@@ -22,7 +22,7 @@ static const Option options[] = {
     {"summary", "F.json", OPTION_FILE, OPTION_AT(RunOptions, files.summary), "figures of the run; - is standard output (also: --json)"},
     {"json", "F.json", OPTION_FILE, OPTION_AT(RunOptions, files.summary), NULL},
     {"score", "F.json", OPTION_FILE, OPTION_AT(RunOptions, files.score),
-     "what the hand was worth: times, ways, forces, handling errors, points (`exercise:` of the scene)"},
+     "the score of the hand: times, path lengths, forces, handling errors, points (`exercise:` of the scene)"},
     {"final", "F.csv", OPTION_FILE, OPTION_AT(RunOptions, files.final), "the last state, one row a node"},
     {"picture", "F.png", OPTION_FILE, OPTION_AT(RunOptions, files.picture), "vessel and tool at the end"},
     {"picture-at", "S", OPTION_NUMBER, OPTION_AT(RunOptions, headless.moment_s), "instead of the end, this moment; up to 6 of them stand side by side",
@@ -67,5 +67,5 @@ const OptionTable run_options = {
              "be written to its end",
     CLI_OPTIONS(options, RunOptions), .set_defaults = set_defaults, .check = check,
     .takes_argument = true, .argument = offsetof(RunOptions, scene),
-    .lacks = "lacks the scene to run", .too_many = "one scene at a time, not also ",
+    .missing = "missing the scene to run", .too_many = "one scene at a time, not also ",
 };

@@ -38,7 +38,7 @@ static void set_defaults(void *structure) { *(SegmentCommand *)structure = (Segm
 static const char *check(void *structure)
 {
     const SegmentCommand *command = structure;
-    return !command->out                            ? "-o TREE.h5 is needed"
+    return !command->out                            ? "missing -o TREE.h5"
            : !command->trace == !command->start     ? "either --trace F.yaml or --start X,Y,Z is needed"
                                                     : NULL;
 }
@@ -84,5 +84,5 @@ const OptionTable segment_options = {
     CLI_OPTIONS(options, SegmentCommand),
     .set_defaults = set_defaults, .check = check,
     .takes_argument = true, .argument = offsetof(SegmentCommand, volume),
-    .lacks = "no volume is named", .too_many = "one volume, not also ",
+    .missing = "missing the volume", .too_many = "one volume, not also ",
 };

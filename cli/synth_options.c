@@ -108,11 +108,11 @@ static const char *check(void *structure)
 {
     SynthCommand *command = structure;
     VolumeOptions *volume = &command->files.volume;
-    static char lacks[400];
+    static char missing[400];
     double seed = 1;
     if (!command->shape) {
-        snprintf(lacks, sizeof lacks, "lacks a shape: %s", shape_names());
-        return lacks;
+        snprintf(missing, sizeof missing, "missing a shape: %s", shape_names());
+        return missing;
     }
     if (!command->output == !command->measure)
         return "give either -o F or --measure MODEL.h5";
@@ -146,5 +146,5 @@ const OptionTable synth_options = {
     CLI_OPTIONS(options, SynthCommand),
     .set_defaults = set_defaults, .check = check,
     .takes_argument = true, .argument = offsetof(SynthCommand, shape),
-    .may_lack = true, .too_many = "one shape at a time, not also ",
+    .may_be_missing = true, .too_many = "one shape at a time, not also ",
 };

@@ -339,7 +339,7 @@ Hands *hands_open(const HandsOptions *options, Faults *faults)
     Hands *hands = calloc(1, sizeof *hands);
     pthread_condattr_t attributes;
     if (!hands) {
-        faults_add(faults, "devices", 0, 0, "no memory");
+        faults_add(faults, "devices", 0, 0, "out of memory");
         return NULL;
     }
     // waits must not depend on the wall clock being set

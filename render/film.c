@@ -106,7 +106,7 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
         return true;
     }
     if (faults->count == before)
-        faults_add(faults, path, 0, 0, "nothing can be drawn: %s", *message ? message : "no memory");
+        faults_add(faults, path, 0, 0, "nothing can be drawn: %s", *message ? message : "out of memory");
     film_close(film);
     return false;
 }

@@ -489,7 +489,7 @@ static void take_screenshot(Trainer *trainer, const WindowInput *input)
     if (rgb && png_file_write(path, input->width, input->height, rgb, message, sizeof message))
         say(trainer, MARK_GOOD, "picture %s", path);
     else
-        say(trainer, MARK_BAD, "no picture: %s", rgb ? message : "no memory");
+        say(trainer, MARK_BAD, "no picture: %s", rgb ? message : "out of memory");
     free(rgb);
 }
 

@@ -135,6 +135,6 @@ bool trainer_cine_save(TrainerCine *cine, Views *views, const char *stem, char *
     if (good)
         snprintf(told, capacity, film ? "cine %.200s.cine and .mp4%s" : "cine %.200s.cine; no film: %s", stem, film ? "" : message);
     else
-        snprintf(told, capacity, "the cine could not be saved: %.200s", faults->count ? faults->text[0] : "no memory");
+        snprintf(told, capacity, "the cine could not be saved: %.200s", faults->count ? faults->text[0] : "out of memory");
     return good;
 }

@@ -171,7 +171,7 @@ static void add_normals(TriangleMesh *mesh)
 TriangleMesh *contact_surface_load(const char *path, double scale, NoteFunction note, Faults *faults)
 {
     MeshCheck check;
-    SurfaceMesh *surface = mesh_load_mended(path, scale, "mesh_scale: ", &check, faults);
+    SurfaceMesh *surface = mesh_load_repaired(path, scale, "mesh_scale: ", &check, faults);
     if (!surface)
         return NULL;
     char text[4096];

@@ -57,6 +57,6 @@ void golden_save(const char *path, const ToolPath *run, Faults *faults)
     if (text)
         output_write(path, text, length, faults);
     else
-        faults_add(faults, path, 0, 0, "no memory");
+        faults_add(faults, path, 0, 0, "out of memory");
     free(text);
 }

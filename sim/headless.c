@@ -22,7 +22,7 @@ bool headless_open(HeadlessRun *run, const HeadlessOptions *options, const Scene
     if (options->scores)
         good = (run->lesson = lesson_create(run->simulator, open->tree)) && good;
     if (!good)
-        faults_add(faults, scene->path, 0, 0, "no memory");
+        faults_add(faults, scene->path, 0, 0, "out of memory");
     simulator_watch_energy(run->simulator);
     return good;
 }

@@ -506,9 +506,9 @@ static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
         read_run(&reader, run, with_frames);
         read_scene(&reader, run);
         if (faults->count == before && !sum_turns(run))
-            faults_add(faults, path, 0, 0, "no memory");
+            faults_add(faults, path, 0, 0, "out of memory");
     } else if (reader.file) {
-        faults_add(faults, path, 0, 0, "no memory");
+        faults_add(faults, path, 0, 0, "out of memory");
     }
     hdf5_reader_close(reader.file);
     if (faults->count > before) {

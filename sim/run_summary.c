@@ -314,7 +314,7 @@ bool run_write_final(const char *path, Simulator *simulator, const NodeReport *n
     size_t length;
     char *text = run_final_csv(simulator, node, &length);
     if (!text)
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
     bool good = text && output_write(path, text, length, faults);
     free(text);
     return good;

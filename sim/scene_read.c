@@ -519,7 +519,7 @@ Scene *scene_parse(const char *text, size_t length, const char *path, Faults *fa
         scene->text = malloc(length + 1);
     }
     if (!scene || !scene->path || !scene->text) {
-        faults_add(faults, path, 0, 0, "no memory");
+        faults_add(faults, path, 0, 0, "out of memory");
     } else {
         memcpy(scene->text, text, length);
         scene->text[length] = 0;

@@ -8,7 +8,7 @@ void *scene_zeroed(Reading *reading, int count, size_t size)
 {
     void *memory = calloc((size_t)count + 1, size);
     if (!memory)
-        faults_add(reading->faults, reading->path, 0, 0, "no memory");
+        faults_add(reading->faults, reading->path, 0, 0, "out of memory");
     return memory;
 }
 
@@ -16,7 +16,7 @@ char *scene_resolved(Reading *reading, const char *name)
 {
     char *path = text_file_beside(reading->path, name);
     if (!path)
-        faults_add(reading->faults, reading->path, 0, 0, "no memory");
+        faults_add(reading->faults, reading->path, 0, 0, "out of memory");
     return path;
 }
 

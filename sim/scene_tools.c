@@ -97,7 +97,7 @@ static void read_rest(Reading *reading, YamlValue list, SceneTool *tool, double 
         free((void *)wire->section);
         wire->section = cut;
         if (!cut)
-            faults_add(reading->faults, reading->path, 0, 0, "no memory");
+            faults_add(reading->faults, reading->path, 0, 0, "out of memory");
     }
     free(piece);
 }

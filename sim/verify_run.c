@@ -31,7 +31,7 @@ static void drive(VerifyRun *run, const Scene *scene, Simulator *simulator)
     const VerifyPlan *plan = &scene->verify;
     Watch watch = {.measure = verify_measure_create(plan, simulator), .plan = plan, .step_s = scene->dt / 1000};
     if (!watch.measure) {
-        faults_add(&run->faults, scene->path, 0, 0, "no memory");
+        faults_add(&run->faults, scene->path, 0, 0, "out of memory");
         return;
     }
     watch.hold_s = fmax(rest_hold_s, REST_HOLD_STEPS * watch.step_s) - watch.step_s / 2;

@@ -163,13 +163,13 @@ bool centreline_write_file(const char *path, const char *extension, const Vessel
 {
     OutputText text;
     if (!output_text_open(&text)) {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
         return false;
     }
     bool good = !strcmp(extension, ".vtp")   ? centreline_print_vtp(text.stream, tree)
                 : !strcmp(extension, ".swc") ? centreline_print_swc(text.stream, tree)
                                              : centreline_print_markups(text.stream, tree, frame);
     if (!good)
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
     return good ? output_text_write(&text, path, faults) : output_text_forget(&text);
 }

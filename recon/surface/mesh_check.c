@@ -402,7 +402,7 @@ bool mesh_check(const SurfaceMesh *mesh, MeshCheck *check)
     return good;
 }
 
-SurfaceMesh *mesh_load_mended(const char *path, double scale, const char *option, MeshCheck *check, Faults *faults)
+SurfaceMesh *mesh_load_repaired(const char *path, double scale, const char *option, MeshCheck *check, Faults *faults)
 {
     SurfaceMesh *mesh = surface_load(path, faults);
     if (!mesh)

@@ -35,7 +35,7 @@ bool mesh_repair(SurfaceMesh *mesh, MeshCheck *check);
 bool mesh_check(const SurfaceMesh *mesh, MeshCheck *check);
 // Read (surface_file.h), scaled to mm and repaired. `scale` 0: not given; the file must be in mm. `option` is the user's option for a scale, for
 // messages: "--scale ", "mesh_scale: ". NULL with faults: unreadable, not millimetres, one side only, no triangle with an area.
-SurfaceMesh *mesh_load_mended(const char *path, double scale, const char *option, MeshCheck *check, Faults *faults);
+SurfaceMesh *mesh_load_repaired(const char *path, double scale, const char *option, MeshCheck *check, Faults *faults);
 // The findings, one line each with a newline; empty if the mesh is sound. Open meshes have a line on openings. `mended`: tell what was repaired.
 // NUL-terminated, truncated at `capacity`; returns the number of lines.
 int mesh_check_text(const MeshCheck *check, bool mended, char *text, size_t capacity);

@@ -1,4 +1,4 @@
-// What a library does where memory lacks: the call is broken off, on whichever of its threads, and the program goes on.
+// What a library does when it runs out of memory: the call is broken off, on whichever of its threads, and the program goes on.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -55,7 +55,7 @@ static const char *check(void *structure) { return ((Values *)structure)->width 
 static const OptionTable table = {.program = "seldinger try", .does = "tries - what is written", .usage = "SCENE [options]\nSCENE --quiet", .intro = "One paragraph.\n  as it is",
                                   .exits = "0 done; 2 wrong usage", .option = options, .option_count = sizeof options / sizeof *options, .size = sizeof(Values),
                                   .set_defaults = set_defaults, .check = check, .takes_argument = true, .argument = offsetof(Values, scene),
-                                  .lacks = "lacks the scene", .too_many = "one scene at a time, not also "};
+                                  .missing = "missing the scene", .too_many = "one scene at a time, not also "};
 
 static char said[4096];
 
@@ -110,7 +110,7 @@ static void what_is_wrong_is_named(void **state)
 {
     (void)state;
     static const char *const lines[][2] = {
-        {"", "seldinger try: lacks the scene; see `seldinger try --help`\n"},
+        {"", "seldinger try: missing the scene; see `seldinger try --help`\n"},
         {"a b", "one scene at a time, not also b; see"},
         {"a --quite", "unknown option '--quite'; did you mean '--quiet'?; see"},
         {"a --banana", "unknown option '--banana'; see"},
@@ -118,7 +118,7 @@ static void what_is_wrong_is_named(void **state)
         {"a --", ""},
         {"a --k 1", "several options begin with '--k'"},
         {"a --quiet=yes", "--quiet takes no value"},
-        {"a --seed", "--seed lacks its value N"},
+        {"a --seed", "--seed is missing its value N"},
         {"a --voxel-mm 0", "--voxel-mm: '0' is not valid; a number from 0.01 to 10"},
         {"a --voxel-mm nan", "a number from 0.01 to 10"},
         {"a --voxel-mm 1x", "a number from 0.01 to 10"},
@@ -152,7 +152,7 @@ static void any_number_of_arguments(void **state)
     } Paths;
     static const Option quiet[] = {{"quiet", NULL, OPTION_FLAG, OPTION_AT(Paths, quiet), "no summary"}};
     OptionTable many = {.program = "seldinger many", .does = "many", .usage = "PATH...", .exits = "0", .option = quiet, .option_count = 1, .size = sizeof(Paths),
-                        .takes_argument = true, .argument = offsetof(Paths, path), .argument_count = offsetof(Paths, count), .lacks = "lacks a path"};
+                        .takes_argument = true, .argument = offsetof(Paths, path), .argument_count = offsetof(Paths, count), .missing = "missing a path"};
     Paths p;
     assert_int_equal(parse(&many, "a --quiet b c", &p), -1);
     assert_true(p.quiet && p.count == 3);

@@ -91,7 +91,7 @@ static void bad_input_ends_with_2_and_says_where(void **state)
     expect_bad(GOOD, "run bad.yaml --settle-s soon", "--settle-s: 'soon' is not valid");
     expect_bad(GOOD, "run bad.yaml --banana", "see `seldinger run --help`");
     expect_bad(GOOD, "run bad.yaml other.yaml", "one scene at a time");
-    expect_bad(NULL, "run", "lacks the scene");
+    expect_bad(NULL, "run", "missing the scene");
     expect_bad(NULL, "run nowhere.yaml", "nowhere.yaml: cannot be opened");
     expect_bad(NULL, "run .", "is not a regular file");
     expect_bad("", "run bad.yaml", "bad.yaml:1:1: is empty");

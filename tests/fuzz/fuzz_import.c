@@ -28,7 +28,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     options.points_per_node = 8;     // as quick as it goes
     faults_clear(&faults);
     given_files(data, size, names);
-    SurfaceMesh *mesh = mesh_load_mended(given_path("surface"), 1, "--scale ", &check, &faults);
+    SurfaceMesh *mesh = mesh_load_repaired(given_path("surface"), 1, "--scale ", &check, &faults);
     if (!mesh != (faults.count > 0))
         abort();
     bool is_small = mesh && check.triangle_count <= MOST_TRIANGLES;
