@@ -211,7 +211,7 @@ static void what_is_no_recording_is_refused(void **state)
 static void wrong_options_are_refused(void **state)
 {
     (void)state;
-    static const char *const lines[][2] = {{"", "lacks the recording"},
+    static const char *const lines[][2] = {{"", "missing the recording"},
                                            {"bend.h5 capsule.h5 --verify", "one recording at a time, not also capsule.h5"},
                                            {"bend.h5 --banana", "replay --help"},
                                            {"bend.h5 --picture", "replay --help"},
