@@ -124,13 +124,35 @@ void options_manual(const OptionTable *table, const char *version, FILE *out)
     free(defaults);
 }
 
-// --- completion ---
-
 static const char *verb_of(const OptionTable *table)
 {
     const char *blank = strrchr(table->program, ' ');
     return blank ? blank + 1 : table->program;
 }
+
+void options_overview(const OptionTable *program, const OptionTable *const *verb, const char *version, FILE *out)
+{
+    print_head(program, version, out);
+    print_synopsis(program, out);
+    fputs(".SH DESCRIPTION\n", out);
+    print_paragraphs(out, program->intro);
+    fputs(".SH VERBS\n", out);
+    for (int i = 0; verb[i]; i++) {
+        fprintf(out, ".TP\n\\fB%s\\fR ", verb_of(verb[i]));
+        print_text(out, verb[i]->usage, strcspn(verb[i]->usage, "\n"));
+        fputc('\n', out);
+        print_line(out, verb[i]->does);
+    }
+    fputs(".SH NOTES\n", out);
+    print_paragraphs(out, program->notes);
+    fputs(".SH EXIT STATUS\n", out);
+    print_line(out, program->exits);
+    fputs(".SH SEE ALSO\n", out);
+    for (int i = 0; verb[i]; i++)
+        fprintf(out, ".BR %s\\-%s (1)%s\n", program->program, verb_of(verb[i]), verb[i + 1] ? "," : "");
+}
+
+// --- completion ---
 
 // What completes an option's value, as a case of bash.
 static void print_value_case(FILE *out, const OptionTable *table, const Option *option)

@@ -1,5 +1,7 @@
 #include "base/simd.h"
 
+#include "base/assert.h"
+
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +13,7 @@ static atomic_int forced = -1;
 
 SimdLevel simd_widest(void)
 {
-#if defined(__x86_64__) && defined(__GNUC__)
+#if SIMD_HAS_AVX
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
         return SIMD_AVX512;
     if (__builtin_cpu_supports("avx2"))
@@ -39,4 +41,11 @@ SimdLevel simd_level(void)
         known = atomic_load_explicit(&forced, memory_order_relaxed);
     }
     return (SimdLevel)known;
+}
+
+SimdLevel simd_choose(int number)
+{
+    SEL_ASSERT(number >= 0 && number <= SIMD_COUNT, "instruction sets are numbered 1 to 3, and 0 leaves the choice open");
+    SimdLevel widest = simd_widest(), wanted = number > 0 ? (SimdLevel)(number - 1) : simd_level();
+    return wanted < widest ? wanted : widest;
 }

@@ -2,6 +2,13 @@
 #ifndef SELDINGER_BASE_SIMD_H
 #define SELDINGER_BASE_SIMD_H
 
+// Are kernels compiled for more than the compiler's default target (base/simd_kernel.h)?
+#if defined(__x86_64__) && defined(__GNUC__)
+#define SIMD_HAS_AVX 1
+#else
+#define SIMD_HAS_AVX 0
+#endif
+
 typedef enum { SIMD_SSE2, SIMD_AVX2, SIMD_AVX512, SIMD_COUNT } SimdLevel;
 extern const char *const simd_name[SIMD_COUNT];      // "sse2", "avx2", "avx512": the baseline is the compiler's default target
 
@@ -9,6 +16,8 @@ extern const char *const simd_name[SIMD_COUNT];      // "sse2", "avx2", "avx512"
 SimdLevel simd_level(void);
 // The widest that the CPU has.
 SimdLevel simd_widest(void);
+// By number: 0 what simd_level() says, 1 SSE2, 2 AVX2, 3 AVX-512; the widest there is where that is absent.
+SimdLevel simd_choose(int number);
 // Not while another thread computes. Levels above simd_widest() are clamped.
 void simd_force(SimdLevel level);
 

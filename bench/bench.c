@@ -3,7 +3,6 @@
 
 #include "base/output.h"
 
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,7 +34,7 @@ Spread bench_spread(const TimeHistogram *histogram, double unit)
                     (double)histogram->largest / unit};
 }
 
-void bench_add_spread(cJSON *object, const char *name, Spread s)
+static void bench_add_spread(cJSON *object, const char *name, Spread s)
 {
     cJSON *at = cJSON_AddObjectToObject(object, name);
     cJSON_AddNumberToObject(at, "median", s.median);
@@ -144,38 +143,6 @@ void bench_close(BenchScene *scene)
     open_vessel_close(&scene->open);
     scene_free(scene->scene);
     *scene = (BenchScene){0};
-}
-
-int bench_take(int choice, const char *table, const char *table_help, BenchOptions *options)
-{
-    double number;
-    switch (choice) {
-    case 'j': options->json = optarg; return -1;
-    case 'q': options->quick = true; return -1;
-    case 't':
-        if (!cli_whole_number("--threads", optarg, 0, 256, &number))
-            return EXIT_BAD_INPUT;
-        options->threads = (int)number;
-        return -1;
-    case 'h': fputs(table_help, stdout); return EXIT_DONE;
-    default: fprintf(stderr, "seldinger bench %s: unknown option or lacking value; see --help\n", table); return EXIT_BAD_INPUT;
-    }
-}
-
-int bench_parse(int argc, char **argv, const char *table, const char *table_help, BenchOptions *options)
-{
-    static const struct option list[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
-                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    *options = (BenchOptions){0};
-    optind = 1;
-    for (int choice, code; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;)
-        if ((code = bench_take(choice, table, table_help, options)) >= 0)
-            return code;
-    if (optind < argc) {
-        fprintf(stderr, "seldinger bench %s: takes no '%s'; see --help\n", table, argv[optind]);
-        return EXIT_BAD_INPUT;
-    }
-    return -1;
 }
 
 FILE *bench_text(const BenchOptions *options) { return options->json && !strcmp(options->json, "-") ? stderr : stdout; }

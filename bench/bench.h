@@ -7,7 +7,7 @@
 
 #include <cJSON.h>
 
-VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing;
+extern const Verb bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing;
 
 typedef struct Spread {
     double median, p99, p999, max;
@@ -31,7 +31,6 @@ int64_t bench_cpu_ns(void);
 // Figures at the end of a run, all but `crowded_step` and `stalled_mm`. cpu_s: CPU time of the run.
 void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures);
 Spread bench_spread(const TimeHistogram *histogram, double unit);
-void bench_add_spread(cJSON *object, const char *name, Spread s);
 cJSON *bench_figures_json(const StepFigures *figures);
 // The command of step i, from the scene's script.
 Command bench_command(const Scene *scene, int64_t step, int *cursor);
@@ -57,16 +56,18 @@ void bench_close(BenchScene *scene);
 // The processor's name for the head of a table.
 const char *bench_processor(void);
 
-// What all tables take: --quick, --threads N, --json F, --help.
+// What all tables take.
 typedef struct BenchOptions {
     bool quick;
     int threads;
     const char *json;
 } BenchOptions;
-// One of these (or an unknown one) in a table's own getopt loop. -1: continue; otherwise the exit code.
-int bench_take(int choice, const char *table, const char *help, BenchOptions *options);
-// Parses all options if a table has no others. -1: continue; otherwise the exit code.
-int bench_parse(int argc, char **argv, const char *table, const char *help, BenchOptions *options);
+// Their rows of an option table; `member`: the BenchOptions in the structure. `quick_text`: what --quick changes.
+#define BENCH_OPTIONS(structure, member, quick_text)                                                                                                           \
+    {"quick", NULL, OPTION_FLAG, OPTION_AT(structure, member.quick), quick_text}, CLI_THREADS(structure, member.threads),                                      \
+    {                                                                                                                                                          \
+        "json", "F.json", OPTION_FILE, OPTION_AT(structure, member.json), "the figures too; - is standard output, the tables then go to standard error"        \
+    }
 // The stream for text: standard error if the JSON goes to standard output.
 FILE *bench_text(const BenchOptions *options);
 // No effect without --json.

@@ -14,7 +14,6 @@
 #include "cli/output_plan.h"
 #include "geom/mesh_vessel.h"
 
-#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -83,7 +82,9 @@ typedef struct Verdict {
 typedef struct CollisionBench {
     BenchOptions common;
     const char *chart;
-    bool given;              // scenes on the command line
+    char **scene;            // on the command line
+    int scene_count;
+    bool given;
     int case_count;
     CollisionCase list[SCENES_MOST];     // of the command line, or `cases`
     FILE *out;
@@ -94,60 +95,12 @@ typedef struct CollisionBench {
     Verdict *verdict;
 } CollisionBench;
 
-static const char help[] =
-    "Usage: seldinger bench collision [SCENE...] [--quick] [--threads N] [--json F] [--chart F.svg]\n\n"
-    "Implicit models (LIM: one field of blobs, and local models) against triangle meshes searched by Embree, the exact wall and a sampled distance, in\n"
-    "one run: the surfaces of Kerrien 2017, Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop,\n"
-    "artificial friction, clamped contact iterations, growth. Run it from the project's folder. Times are CPU times.\n\n"
-    "  SCENE        instead of those: the vessel of this scene (tube, shape or model) as about 100,000 triangles, with its own tool and script\n"
-    "  --quick      capsule and spiral; 300 steps, meshes to 12,000 triangles, fewer clamps; of a SCENE too\n"
-    "  --threads N  threads for fitting; default 0: all cores. Figures but times do not depend on it\n"
-    "  --json F     all figures as JSON; - is standard output, the tables then go to standard error\n"
-    "  --chart F    a chart of them as SVG\n\n"
-    "Exit codes: 0 done; 1 the model missed a verdict; 2 wrong usage or bad input.\n";
-
 static bool is_listed(const char *name, const char *const *list, size_t count)
 {
     for (size_t i = 0; i < count; i++)
         if (!strcmp(name, list[i]))
             return true;
     return false;
-}
-
-static int parse(int argc, char **argv, CollisionBench *bench)
-{
-    static const struct option list[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'}, {"threads", required_argument, NULL, 't'},
-                                         {"chart", required_argument, NULL, 'c'}, {"help", no_argument, NULL, 'h'}, {0}};
-    int code;
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
-        switch (choice) {
-        case 'c': bench->chart = optarg; break;
-        default:
-            if ((code = bench_take(choice, "collision", help, &bench->common)) >= 0)
-                return code;
-        }
-    }
-    for (; optind < argc; optind++) {
-        if (bench->case_count == SCENES_MOST) {
-            fprintf(stderr, "seldinger bench collision: more than %d scenes\n", SCENES_MOST);
-            return EXIT_BAD_INPUT;
-        }
-        bench->list[bench->case_count++] = (CollisionCase){.name = argv[optind], .scene = argv[optind], .mesh_count = 1, .triangles = {SCENE_TRIANGLES},
-                                                             .pointwise_steps = POINTWISE_STEPS};
-    }
-    bench->given = bench->case_count > 0;
-    for (int i = 0; !bench->given && i < CASES; i++)
-        if (!bench->common.quick || is_listed(cases[i].name, in_quick, sizeof in_quick / sizeof in_quick[0]))
-            bench->list[bench->case_count++] = cases[i];
-    for (int i = 0; bench->common.quick && i < bench->case_count; i++) {
-        CollisionCase *of = &bench->list[i];
-        while (of->mesh_count > 1 && of->triangles[of->mesh_count - 1] > QUICK_TRIANGLES)
-            of->mesh_count--;
-        if (of->triangles[of->mesh_count - 1] > QUICK_TRIANGLES)
-            of->triangles[of->mesh_count - 1] = QUICK_TRIANGLES;
-    }
-    return -1;
 }
 
 // A further element of a growing array, zeroed; NULL with a fault.
@@ -774,45 +727,84 @@ static bool run_all(CollisionBench *bench, Faults *faults)
     return true;
 }
 
-int bench_collision(int argc, char **argv)
+static int call(void *options, Faults *faults)
 {
-    static CollisionBench bench;
-    static Faults faults;
-    int code = parse(argc, argv, &bench);
-    if (code >= 0)
-        return code;
-    OutputPlan plan = {.faults = &faults};
-    output_plan_write(&plan, "--json", bench.common.json);
-    output_plan_write(&plan, "--chart", bench.chart);
-    if (faults.count > 0)
-        return cli_bad_input(&faults);
-    bench.out = bench_text(&bench.common);
-    fprintf(bench.out, "%s\n%s", bench_processor(), legend);
+    CollisionBench *bench = options;
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "--json", bench->common.json);
+    output_plan_write(&plan, "--chart", bench->chart);
+    if (faults->count > 0)
+        return EXIT_BAD_INPUT;
+    bench->out = bench_text(&bench->common);
+    fprintf(bench->out, "%s\n%s", bench_processor(), legend);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "processor", bench_processor());
     cJSON_AddBoolToObject(root, "embree", mesh_vessel_available());
-    bool good = run_all(&bench, &faults);
+    bool good = run_all(bench, faults);
     if (good) {
-        print_clamps(bench.out, &bench);
-        print_paper(bench.out, &bench);
-        fflush(bench.out);
-        good = bench.given || collision_growth(bench.out, root, bench.common.quick, bench.common.threads, &faults);
+        print_clamps(bench->out, bench);
+        print_paper(bench->out, bench);
+        fflush(bench->out);
+        good = bench->given || collision_growth(bench->out, root, bench->common.quick, bench->common.threads, faults);
     }
-    good = good && judge(&bench, root, &faults);
+    good = good && judge(bench, root, faults);
     if (good) {
-        print_verdicts(bench.out, &bench);
-        add_lists(root, &bench);
-        good = (!bench.chart || collision_chart(root, bench.chart, &faults)) && bench_write_json(&bench.common, root, &faults);
+        print_verdicts(bench->out, bench);
+        add_lists(root, bench);
+        good = (!bench->chart || collision_chart(root, bench->chart, faults)) && bench_write_json(&bench->common, root, faults);
     }
     cJSON_Delete(root);
     bool missed = false;
-    for (int i = 0; i < bench.verdict_count; i++)
-        missed |= !bench.verdict[i].good;
-    free(bench.row);
-    free(bench.clamp);
-    free(bench.equal);
-    free(bench.verdict);
+    for (int i = 0; i < bench->verdict_count; i++)
+        missed |= !bench->verdict[i].good;
+    free(bench->row);
+    free(bench->clamp);
+    free(bench->equal);
+    free(bench->verdict);
     if (!good)
-        return cli_bad_input(&faults);
+        return EXIT_BAD_INPUT;
     return missed ? EXIT_DIFFERENT : EXIT_DONE;
 }
+
+static const char *check(void *structure)
+{
+    CollisionBench *bench = structure;
+    if (bench->scene_count > SCENES_MOST)
+        return "at most 16 scenes";
+    for (int i = 0; i < bench->scene_count; i++)
+        bench->list[bench->case_count++] = (CollisionCase){.name = bench->scene[i], .scene = bench->scene[i], .mesh_count = 1, .triangles = {SCENE_TRIANGLES},
+                                                             .pointwise_steps = POINTWISE_STEPS};
+    bench->given = bench->case_count > 0;
+    for (int i = 0; !bench->given && i < CASES; i++)
+        if (!bench->common.quick || is_listed(cases[i].name, in_quick, sizeof in_quick / sizeof in_quick[0]))
+            bench->list[bench->case_count++] = cases[i];
+    for (int i = 0; bench->common.quick && i < bench->case_count; i++) {
+        CollisionCase *of = &bench->list[i];
+        while (of->mesh_count > 1 && of->triangles[of->mesh_count - 1] > QUICK_TRIANGLES)
+            of->mesh_count--;
+        if (of->triangles[of->mesh_count - 1] > QUICK_TRIANGLES)
+            of->triangles[of->mesh_count - 1] = QUICK_TRIANGLES;
+    }
+    return NULL;
+}
+
+static const Option rows[] = {
+    BENCH_OPTIONS(CollisionBench, common, "capsule and spiral; 300 steps, meshes to 12,000 triangles, fewer clamps; of a SCENE too"),
+    {"chart", "F.svg", OPTION_FILE, OPTION_AT(CollisionBench, chart), "a chart of them"},
+};
+
+static const OptionTable table = {
+    .program = "seldinger bench collision",
+    .does = "local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, spurious friction",
+    .usage = "[SCENE...] [options]",
+    .intro = "Implicit models (LIM: one field of blobs, and local models) against triangle meshes searched by Embree, the exact wall and a sampled distance, in one run: the "
+             "surfaces of Kerrien 2017, Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop, artificial "
+             "friction, clamped contact iterations, growth. Run it from the project's folder. Times are CPU times.\n"
+             "SCENE, instead of those: its vessel (tube, shape or model) as about 100,000 triangles, with its own tool and script.",
+    .exits = "0 done; 1 the model missed a verdict; 2 wrong usage or bad input",
+    CLI_OPTIONS(rows, CollisionBench),
+    .check = check,
+    .takes_argument = true, .may_be_missing = true, .argument = offsetof(CollisionBench, scene), .argument_count = offsetof(CollisionBench, scene_count),
+};
+
+const Verb bench_collision = {.options = &table, .call = call};

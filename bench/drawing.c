@@ -8,20 +8,8 @@
 #include "sim/clock.h"
 #include "sim/live_session.h"
 
-#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const char help[] =
-    "Usage: seldinger bench drawing [SCENE] [options]\n\n"
-    "Draws the trainer off screen (EGL), views and panels together, from moments of the scene's script: CPU time of all drawing threads for a picture, with\n"
-    "C-arm and camera still and turning. Then the 1 kHz thread beside 30 pictures a second and beside none, in turns: how late it wakes, what a step costs.\n"
-    "SCENE: default scenes/phantom/scene.yaml.\n\n"
-    "  --seconds S  of each turn of the second table; default 10\n"
-    "  --quick      a third of the pictures, turns of 3 s\n"
-    "  --threads N  threads of fitting a shape; default 0: all cores\n"
-    "  --json F     all figures; - is standard output\n\n"
-    "Exit codes: 0 done; 2 wrong usage, bad input, or no EGL.\n";
 
 enum { MOMENTS = 60, PICTURES = 90, WARM_UP = 10, TURNS = 4 };
 
@@ -268,41 +256,26 @@ static bool set_studio(Studio *studio, const char *path, Faults *faults)
     return take_moments(studio, faults);
 }
 
-int bench_drawing(int argc, char **argv)
+typedef struct DrawingBench {
+    BenchOptions common;
+    const char *scene;
+    double seconds;
+} DrawingBench;
+
+static int call(void *options, Faults *faults)
 {
-    enum { SECONDS = 600 };
-    static const struct option table[] = {{"seconds", required_argument, NULL, SECONDS}, {"quick", no_argument, NULL, 'q'}, {"threads", required_argument, NULL, 't'},
-                                          {"json", required_argument, NULL, 'j'},        {"help", no_argument, NULL, 'h'},  {0}};
-    BenchOptions options = {0};
-    double seconds = 0;
-    static Faults faults;
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
-        if (choice == SECONDS) {
-            if (!cli_number("--seconds", optarg, 1, 3600, &seconds))
-                return EXIT_BAD_INPUT;
-            continue;
-        }
-        int code = bench_take(choice, "drawing", help, &options);
-        if (code >= 0)
-            return code;
-    }
-    if (optind < argc - 1) {
-        fprintf(stderr, "seldinger bench drawing: one scene at a time, not also %s\n", argv[optind + 1]);
-        return EXIT_BAD_INPUT;
-    }
-    Studio studio = {.options = &options};
+    const DrawingBench *bench = options;
+    Studio studio = {.options = &bench->common};
     cJSON *root = cJSON_CreateObject();
-    FILE *text = bench_text(&options);
-    const char *path = optind < argc ? argv[optind] : "scenes/phantom/scene.yaml";
-    faults_clear(&faults);
-    bool good = set_studio(&studio, path, &faults);
+    FILE *text = bench_text(&bench->common);
+    const char *path = bench->scene ? bench->scene : "scenes/phantom/scene.yaml";
+    bool good = set_studio(&studio, path, faults);
     if (good) {
         fprintf(text, "%s, %s, %s\n", path, bench_processor(), gl_context_renderer(studio.context));
         cJSON_AddStringToObject(root, "scene", path);
         cJSON_AddStringToObject(root, "renderer", gl_context_renderer(studio.context));
-        good = measure_pictures(&studio, text, root, &faults) &&
-               measure_disturbance(&studio, seconds > 0 ? seconds : options.quick ? 3 : 10, text, root, &faults) && bench_write_json(&options, root, &faults);
+        good = measure_pictures(&studio, text, root, faults) &&
+               measure_disturbance(&studio, bench->seconds > 0 ? bench->seconds : bench->common.quick ? 3 : 10, text, root, faults) && bench_write_json(&bench->common, root, faults);
     }
     cJSON_Delete(root);
     for (int i = 0; i < MOMENTS; i++)
@@ -315,5 +288,24 @@ int bench_drawing(int argc, char **argv)
         gl_canvas_destroy(&studio.canvas);
     gl_context_destroy(studio.context);
     bench_close(&studio.scene);
-    return good && faults.count == 0 ? EXIT_DONE : cli_bad_input(&faults);
+    return good ? EXIT_DONE : EXIT_BAD_INPUT;
 }
+
+static const Option rows[] = {
+    {"seconds", "S", OPTION_NUMBER, OPTION_AT(DrawingBench, seconds), "of each turn of the second table", .least = 1, .most = 3600, .otherwise = "10"},
+    BENCH_OPTIONS(DrawingBench, common, "a third of the pictures, turns of 3 s"),
+};
+
+static const OptionTable table = {
+    .program = "seldinger bench drawing",
+    .does = "the trainer's pictures: CPU time, and the 1 kHz thread with and without them",
+    .usage = "[SCENE] [options]",
+    .intro = "Draws the trainer off screen (EGL), views and panels together, from moments of the scene's script: CPU time of all drawing threads for a picture, with C-arm "
+             "and camera still and turning. Then the 1 kHz thread beside 30 pictures a second and beside none, in turns: how late it wakes, what a step costs.\n"
+             "SCENE: default scenes/phantom/scene.yaml.",
+    .exits = "0 done; 2 wrong usage, bad input, or no EGL",
+    CLI_OPTIONS(rows, DrawingBench),
+    .takes_argument = true, .may_be_missing = true, .argument = offsetof(DrawingBench, scene), .too_many = "one scene at a time, not also ",
+};
+
+const Verb bench_drawing = {.options = &table, .call = call};

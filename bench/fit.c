@@ -12,7 +12,6 @@
 #include "recon/tree_file.h"
 #include "recon/volume/volume_file.h"
 
-#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -20,68 +19,13 @@
 
 enum { LEVELS = 10, MOST_TREES = 8, TARGETS = 3, LIMITS = 3 };
 
-static const char help[] =
-    "Usage: seldinger bench fit --table3 [--quick] [--threads N] [--json F]\n"
-    "       seldinger bench fit --tables45 [--tree TREE.h5]... [--quick] [--threads N] [--json F]\n\n"
-    "  --table3       one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with what least squares\n"
-    "                 could reach; exit code 1 where a median of blobs, the share that meets t_g or d against the noise misses its limit\n"
-    "  --tables45     whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs a node, triangles a blob, time;\n"
-    "                 the angiogram of scenes/aneurism, segmented first (where ../shared/data has it), a random tree and the phantom; and what one\n"
-    "                 local model of 540 points and 10 blobs takes\n"
-    "  --tree F.h5    for --tables45, instead: a tree of points (`segment`, `synth`); may be given several times\n"
-    "  --preset NAME  default, or paper: the published values and method\n"
-    "  --quick        6 runs a level; t_g of 1.5 voxels and N_s of 100 alone\n"
-    "  --threads N    default 0: all cores; figures but times do not depend on it\n"
-    "  --json F       figures as JSON; - is standard output\n\n"
-    "Exit codes: 0 done; 1 a limit is missed; 2 wrong usage or bad input.\n";
-
 typedef struct FitBench {
     BenchOptions common;
     bool table3, tables45;
     const char *tree[MOST_TREES];
-    int tree_count;
+    int tree_count, preset;
     LimFitOptions options;
 } FitBench;
-
-static int parse(int argc, char **argv, FitBench *bench)
-{
-    enum { TABLE3 = 256, TABLES45, TREE, PRESET };
-    static const struct option list[] = {{"table3", no_argument, NULL, TABLE3}, {"tables45", no_argument, NULL, TABLES45},
-                                         {"tree", required_argument, NULL, TREE}, {"preset", required_argument, NULL, PRESET},
-                                         {"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
-                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    int code;
-    *bench = (FitBench){.options = lim_fit_default_options()};
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
-        switch (choice) {
-        case TABLE3: bench->table3 = true; break;
-        case TABLES45: bench->tables45 = true; break;
-        case TREE:
-            if (bench->tree_count == MOST_TREES) {
-                fprintf(stderr, "seldinger bench fit: --tree more than %d times\n", MOST_TREES);
-                return EXIT_BAD_INPUT;
-            }
-            bench->tree[bench->tree_count++] = optarg;
-            break;
-        case PRESET:
-            if (strcmp(optarg, "paper") && strcmp(optarg, "default")) {
-                fprintf(stderr, "seldinger bench fit: no preset '%s'; valid: default, paper\n", optarg);
-                return EXIT_BAD_INPUT;
-            }
-            bench->options = strcmp(optarg, "paper") ? lim_fit_default_options() : lim_fit_paper_options();
-            break;
-        default:
-            if ((code = bench_take(choice, "fit", help, &bench->common)) >= 0)
-                return code;
-        }
-    }
-    if (optind < argc || bench->table3 == bench->tables45) {
-        fputs("seldinger bench fit: one of --table3 and --tables45 must be given, and nothing but options; see --help\n", stderr);
-        return EXIT_BAD_INPUT;
-    }
-    return -1;
-}
 
 typedef struct Range {
     double least, median, most;
@@ -395,25 +339,54 @@ static int tables_45(const FitBench *bench, FILE *text, cJSON *root, Faults *fau
     return !good ? EXIT_BAD_INPUT : kept ? EXIT_DONE : EXIT_DIFFERENT;
 }
 
-int bench_fit(int argc, char **argv)
+static int call(void *options, Faults *faults)
 {
-    FitBench bench;
-    int code = parse(argc, argv, &bench);
-    if (code >= 0)
-        return code;
-    Faults faults;
-    faults_clear(&faults);
-    OutputPlan plan = {.faults = &faults};
-    output_plan_write(&plan, "--json", bench.common.json);
-    for (int i = 0; i < bench.tree_count; i++)
-        output_plan_read(&plan, "--tree", bench.tree[i]);
-    if (faults.count > 0)
-        return cli_bad_input(&faults);
+    FitBench *bench = options;
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "--json", bench->common.json);
+    for (int i = 0; i < bench->tree_count; i++)
+        output_plan_read(&plan, "--tree", bench->tree[i]);
+    if (faults->count > 0)
+        return EXIT_BAD_INPUT;
     cJSON *root = cJSON_CreateObject();
-    FILE *text = bench_text(&bench.common);
-    code = bench.table3 ? table_3(&bench, text, root, &faults) : tables_45(&bench, text, root, &faults);
-    if (code != EXIT_BAD_INPUT && !bench_write_json(&bench.common, root, &faults))
+    FILE *text = bench_text(&bench->common);
+    int code = bench->table3 ? table_3(bench, text, root, faults) : tables_45(bench, text, root, faults);
+    if (code != EXIT_BAD_INPUT && !bench_write_json(&bench->common, root, faults))
         code = EXIT_BAD_INPUT;
     cJSON_Delete(root);
-    return code == EXIT_BAD_INPUT ? cli_bad_input(&faults) : code;
+    return code;
 }
+
+static const char *const presets[] = {"default", "paper", NULL};
+static const Option options[] = {
+    {"table3", NULL, OPTION_FLAG, OPTION_AT(FitBench, table3),
+     "one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with what least squares could reach; exit code 1 where a "
+     "median of blobs, the share that meets t_g or d against the noise misses its limit"},
+    {"tables45", NULL, OPTION_FLAG, OPTION_AT(FitBench, tables45),
+     "whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs a node, triangles a blob, time; the angiogram of scenes/aneurism, "
+     "segmented first (where ../shared/data has it), a random tree and the phantom; and what one local model of 540 points and 10 blobs takes"},
+    {"tree", "F.h5", OPTION_FILE, OPTION_AT(FitBench, tree), "for --tables45, instead: a tree of points (`segment`, `synth`); may be given several times",
+     .count = offsetof(FitBench, tree_count), .times = MOST_TREES},
+    {"preset", "NAME", OPTION_CHOICE, OPTION_AT(FitBench, preset), "default, or paper: the published values and method", .choices = presets, .otherwise = ""},
+    BENCH_OPTIONS(FitBench, common, "6 runs a level; t_g of 1.5 voxels and N_s of 100 alone"),
+};
+
+static const char *check(void *structure)
+{
+    FitBench *bench = structure;
+    bench->options = bench->preset == 0 ? lim_fit_default_options() : lim_fit_paper_options();
+    return bench->table3 == bench->tables45 ? "give either --table3 or --tables45" : NULL;
+}
+
+static const OptionTable table = {
+    .program = "seldinger bench fit",
+    .does = "local models: the paper's tables 3, 4 and 5 beside its figures",
+    .intro = "Tables 3, 4 and 5 of Kerrien et al. 2017 beside the paper's figures.",
+    .usage = "--table3 [options]\n--tables45 [--tree TREE.h5]... [options]",
+    .exits = "0 done; 1 a limit is missed; 2 wrong usage or bad input",
+    CLI_OPTIONS(options, FitBench),
+    .check = check,
+    .too_many = "unexpected argument ",
+};
+
+const Verb bench_fit = {.options = &table, .call = call};

@@ -49,15 +49,6 @@ typedef struct Row {
     WindowFigures window[WINDOWS];
 } Row;
 
-static const char help[] =
-    "Usage: seldinger bench peer [--quick] [--threads N] [--json F]\n\n"
-    "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube,\n"
-    "on local models fitted to it and on a mesh of it, beside the peer's figures. Run it from the project's folder, after scenes/peer/prepare. CPU times.\n\n"
-    "  --quick      the first 400 of 2,000 steps\n"
-    "  --threads N  threads for fitting the tubes; default 0: all cores\n"
-    "  --json F     the same figures as JSON; - is standard output, the table then goes to standard error\n\n"
-    "Exit codes: 0 done; 1 a run on tube or models ended early, stalled, or had a node more than 0.05 mm outside the wall; 2 wrong usage or bad input.\n";
-
 static int ascending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -187,25 +178,40 @@ static bool run_all(FILE *out, int64_t most_steps, int threads, cJSON *list, boo
     return true;
 }
 
-int bench_peer(int argc, char **argv)
-{
-    static Faults faults;
+typedef struct PeerBench {
     BenchOptions options;
-    int code = bench_parse(argc, argv, "peer", help, &options);
-    if (code >= 0)
-        return code;
-    if (!output_check(options.json, &faults))
-        return cli_bad_input(&faults);
-    FILE *out = bench_text(&options);
+} PeerBench;
+
+static int call(void *taken, Faults *faults)
+{
+    const BenchOptions *options = &((PeerBench *)taken)->options;
+    if (!output_check(options->json, faults))
+        return EXIT_BAD_INPUT;
+    FILE *out = bench_text(options);
     fprintf(out, "%s\n                CPU ms median (p99)   contacts with force, deepest um\n", bench_processor());
     cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "rows");
     cJSON_AddStringToObject(root, "processor", bench_processor());
-    bool contained = true, good = run_all(out, options.quick ? 400 : INT64_MAX, options.threads, rows, &contained, &faults);
-    good = good && bench_write_json(&options, root, &faults);
+    bool contained = true, good = run_all(out, options->quick ? 400 : INT64_MAX, options->threads, rows, &contained, faults);
+    good = good && bench_write_json(options, root, faults);
     cJSON_Delete(root);
     if (!good)
-        return cli_bad_input(&faults);
+        return EXIT_BAD_INPUT;
     if (!contained)
         fprintf(stderr, "seldinger bench peer: a run on tube or models left the wall by more than %.0f um, or did not finish\n", contained_um);
     return contained ? EXIT_DONE : EXIT_DIFFERENT;
 }
+
+static const Option rows[] = {BENCH_OPTIONS(PeerBench, options, "the first 400 of 2,000 steps")};
+
+static const OptionTable table = {
+    .program = "seldinger bench peer",
+    .does = "the scenes on which SOFA with BeamAdapter was measured, beside its figures",
+    .usage = "[options]",
+    .intro = "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube, on local models "
+             "fitted to it and on a mesh of it, beside the peer's figures. Run it from the project's folder, after scenes/peer/prepare. CPU times.",
+    .exits = "0 done; 1 a run on tube or models ended early, stalled, or had a node more than 0.05 mm outside the wall; 2 wrong usage or bad input",
+    CLI_OPTIONS(rows, PeerBench),
+    .too_many = "unexpected argument ",
+};
+
+const Verb bench_peer = {.options = &table, .call = call};

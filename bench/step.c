@@ -13,7 +13,6 @@
 #include "base/simd.h"
 #include "solver/block_chain.h"
 
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,6 +45,7 @@ typedef struct Kernels {                 // [us]
 
 typedef struct StepBench {
     BenchOptions options;
+    bool tools;
     int64_t most_steps;
     bool present[CASES];
     StepFigures run[SIMD_COUNT][CASES];
@@ -54,16 +54,6 @@ typedef struct StepBench {
     Kernels kernels[SIMD_COUNT];
     bool same_hash;
 } StepBench;
-
-static const char help[] =
-    "Usage: seldinger bench step [--tools] [--quick] [--threads N] [--json F]\n\n"
-    "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level.\n"
-    "Run it from the project's folder. Times are CPU times of the simulation's thread.\n\n"
-    "  --tools      coaxial tools instead: one to four of them with 50 to 400 nodes, in the phantom, the arch and the angiogram\n"
-    "  --quick      200 steps of each scene, fewer samples\n"
-    "  --threads N  threads of offline work such as fitting the shapes; default 0: all cores\n"
-    "  --json F     the same figures as JSON; - is standard output, the tables then go to standard error\n\n"
-    "Exit codes: 0 done; 1 state hashes differ between SIMD levels or repetitions; 2 wrong usage or bad input.\n";
 
 // --- force error ---
 
@@ -506,82 +496,77 @@ static bool write_json(const StepBench *bench, SimdLevel widest, Faults *faults)
 
 // --- the verb ---
 
-static int parse(int argc, char **argv, BenchOptions *options, bool *tools)
-{
-    enum { TOOLS = 256 };
-    static const struct option list[] = {{"tools", no_argument, NULL, TOOLS},          {"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
-                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'},       {0}};
-    optind = 1;
-    for (int choice, code; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;)
-        if (choice == TOOLS)
-            *tools = true;
-        else if ((code = bench_take(choice, "step", help, options)) >= 0)
-            return code;
-    if (optind < argc) {
-        fprintf(stderr, "seldinger bench step: takes no '%s'; see --help\n", argv[optind]);
-        return EXIT_BAD_INPUT;
-    }
-    return -1;
-}
-
 static int tools_table(const BenchOptions *options, Faults *faults)
 {
     static ToolsBench bench;
     FILE *out = bench_text(options);
     fprintf(out, "%s, %s\n", bench_processor(), simd_name[simd_level()]);
     if (!bench_tools(options, &bench, faults))
-        return cli_bad_input(faults);
+        return EXIT_BAD_INPUT;
     bench_tools_print(out, &bench);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "processor", bench_processor());
     bench_tools_json(cJSON_AddArrayToObject(root, "tools"), &bench);
     bool good = bench_write_json(options, root, faults);
     cJSON_Delete(root);
-    return good ? EXIT_DONE : cli_bad_input(faults);
+    return good ? EXIT_DONE : EXIT_BAD_INPUT;
 }
 
-int bench_step(int argc, char **argv)
+static int call(void *options, Faults *faults)
 {
-    static StepBench bench;
-    static Faults faults;
-    bool tools = false;
-    int code = parse(argc, argv, &bench.options, &tools);
-    if (code >= 0)
-        return code;
-    if (!output_check(bench.options.json, &faults))
-        return cli_bad_input(&faults);
-    if (tools)
-        return tools_table(&bench.options, &faults);
-    FILE *out = bench_text(&bench.options);
-    bench.most_steps = bench.options.quick ? 200 : INT64_MAX;
+    StepBench *bench = options;
+    if (!output_check(bench->options.json, faults))
+        return EXIT_BAD_INPUT;
+    if (bench->tools)
+        return tools_table(&bench->options, faults);
+    FILE *out = bench_text(&bench->options);
+    bench->most_steps = bench->options.quick ? 200 : INT64_MAX;
     SimdLevel widest = simd_level();
-    bench.same_hash = true;
+    bench->same_hash = true;
     fprintf(out, "%s, %s\n", bench_processor(), simd_name[widest]);
     for (int c = 0; c < CASES; c++) {
-        bench.present[c] = !cases[c].needs || access(cases[c].needs, R_OK) == 0;
-        if (!bench.present[c])
+        bench->present[c] = !cases[c].needs || access(cases[c].needs, R_OK) == 0;
+        if (!bench->present[c])
             fprintf(out, "%s: skipped, %s is not here\n", cases[c].name, cases[c].needs);
     }
-    bool good = run_cases(&bench, widest, widest, &faults);
+    bool good = run_cases(bench, widest, widest, faults);
     for (int c = 0; good && c < CASES; c++)
-        if (bench.present[c]) {
-            print_scene(out, cases[c].name, &bench.run[widest][c], &bench.error[c]);
-            print_stall(out, &bench.run[widest][c]);
+        if (bench->present[c]) {
+            print_scene(out, cases[c].name, &bench->run[widest][c], &bench->error[c]);
+            print_stall(out, &bench->run[widest][c]);
         }
     if (good)
-        print_growth(out, &bench);
+        print_growth(out, bench);
     fflush(out);
     for (int level = (int)widest - 1; good && level >= SIMD_SSE2; level--)
-        good = run_cases(&bench, (SimdLevel)level, widest, &faults);
+        good = run_cases(bench, (SimdLevel)level, widest, faults);
     simd_force(widest);
     if (good) {
-        print_levels(out, &bench, widest);
-        print_budgets(out, &bench, widest);
-        if (!bench.same_hash)
+        print_levels(out, bench, widest);
+        print_budgets(out, bench, widest);
+        if (!bench->same_hash)
             fprintf(out, "\nSTATE HASHES DIFFER\n");
-        good = write_json(&bench, widest, &faults);
+        good = write_json(bench, widest, faults);
     }
     if (!good)
-        return cli_bad_input(&faults);
-    return bench.same_hash ? EXIT_DONE : EXIT_DIFFERENT;
+        return EXIT_BAD_INPUT;
+    return bench->same_hash ? EXIT_DONE : EXIT_DIFFERENT;
 }
+
+static const Option rows[] = {
+    {"tools", NULL, OPTION_FLAG, OPTION_AT(StepBench, tools), "coaxial tools instead: one to four of them with 50 to 400 nodes, in the phantom, the arch and the angiogram"},
+    BENCH_OPTIONS(StepBench, options, "200 steps of each scene, fewer samples"),
+};
+
+static const OptionTable table = {
+    .program = "seldinger bench step",
+    .does = "a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets; --tools: coaxial tools",
+    .usage = "[options]",
+    .intro = "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level. Run it from the "
+             "project's folder. Times are CPU times of the simulation's thread.",
+    .exits = "0 done; 1 state hashes differ between SIMD levels or repetitions; 2 wrong usage or bad input",
+    CLI_OPTIONS(rows, StepBench),
+    .too_many = "unexpected argument ",
+};
+
+const Verb bench_step = {.options = &table, .call = call};

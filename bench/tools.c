@@ -17,7 +17,7 @@ static const struct {
 } stack[TOOLS_VESSELS] = {{"scenes/coaxial/siphon.yaml", NULL, 90, 20},
                           {"scenes/coaxial/arch.yaml", "scenes/arch/arch.h5", 300, 48},
                           {"scenes/coaxial/angiogram.yaml", "scenes/aneurism/aneurism.h5", 100, 20}};
-const int tools_bench_nodes[TOOLS_NODES] = {50, 100, 200, 400};
+static const int tools_bench_nodes[TOOLS_NODES] = {50, 100, 200, 400};
 static const double margin_mm = 15, hub_mm = 25;     // of the outermost tool, in the sheath at the end; by which the hub of each inner one is further back
 // Limits for the cost by number of tools and nodes: median and p99.9.
 static const double must_us[2] = {300, 1000};

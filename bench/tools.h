@@ -5,7 +5,6 @@
 #include "bench/bench.h"
 
 enum { TOOLS_VESSELS = 3, TOOLS_NODES = 4 };
-extern const int tools_bench_nodes[TOOLS_NODES];
 
 typedef struct ToolsRow {
     int tools, chain_nodes;              // at the end

@@ -9,7 +9,6 @@
 #include "recon/tree_file.h"
 #include "sim/drive.h"
 
-#include <getopt.h>
 #include <limits.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -21,23 +20,6 @@ static const double outside_mm = 0.2;     // deeper in the true wall than this: 
 static const double unreported_mm = 0.05; // or by this much deeper than the program says
 static const double kink_rad = 1;         // an element that turns by more is outside beam theory: such runs are counted, and their energy is not judged
 static const double stuck_mm = 10;        // [mm] fed but not inserted, though inserted with steps and elements half as long
-
-static const char help[] =
-    "Usage: seldinger bench torture [options]\n\n"
-    "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four in each\n"
-    "other), vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is judged by the true wall, not\n"
-    "by what the contact saw: a node more than 0.2 mm outside, or outside without being reported; a number that is none; single steps that gain more than 1e-3\n"
-    "of the work (where no element is bent by more than a radian: a kink); a tool that is stuck where a finer run is not. The scene of each run that fails is kept and can be replayed.\n\n"
-    "  --runs N         default 200\n"
-    "  --first N        the first seed; default 1\n"
-    "  --steps N        of each run; default 2000\n"
-    "  --finer N        every N-th run again with half the step and half the elements' length; default 20, 0: never\n"
-    "  --model F        a model file as one of the vessels, up to 8; default: scenes/aneurism/aneurism.h5 and scenes/arch/arch.h5 where they are here\n"
-    "  --keep FOLDER    for the scenes of runs that fail: torture-SEED.yaml; default: the working folder\n"
-    "  --quick          40 runs\n"
-    "  --threads N      default 0: all cores; figures do not depend on it\n"
-    "  --json F         the table as JSON; - is standard output\n\n"
-    "Exit codes: 0 done; 1 a run failed; 2 wrong usage or bad input.\n";
 
 typedef enum { FAILED_DEEP = 1, FAILED_UNREPORTED = 2, FAILED_NUMBER = 4, FAILED_ENERGY = 8, FAILED_STUCK = 16, FAILED_REFUSED = 32 } Failure;
 static const char *const failure_name[] = {"outside the wall", "outside and not reported", "diverged or not a number", "gained energy", "stuck", "refused"};
@@ -57,7 +39,7 @@ typedef struct Outcome {
 
 typedef struct Torture {
     BenchOptions common;
-    int64_t first, runs, steps, finer;
+    double first, runs, steps, finer;    // whole numbers
     const char *keep;
     int model_count;
     const char *model[MODELS_MOST];
@@ -233,8 +215,8 @@ static void run_seed(void *context, long index)
     Torture *torture = context;
     Outcome *outcome = &torture->outcome[index];
     char name[64];
-    int64_t seed = torture->first + index;
-    TortureScene scene = torture_scene((uint64_t)seed, torture->steps, torture->model_count, torture->model, torture->lumen);
+    int64_t seed = (int64_t)torture->first + index;
+    TortureScene scene = torture_scene((uint64_t)seed, (int64_t)torture->steps, torture->model_count, torture->model, torture->lumen);
     snprintf(name, sizeof name, "torture-%lld.yaml", (long long)seed);
     *outcome = (Outcome){.vessel = scene.vessel, .tool = scene.tool};
     if (!scene.text) {
@@ -242,9 +224,9 @@ static void run_seed(void *context, long index)
         return;
     }
     run_text(torture, scene.text, name, outcome);
-    if (torture->finer > 0 && seed % torture->finer == 0 && outcome->failed == 0) {
+    if (torture->finer > 0 && seed % (int64_t)torture->finer == 0 && outcome->failed == 0) {
         Outcome finer = {0};
-        char *text = torture_scene_finer((uint64_t)seed, torture->steps, torture->model_count, torture->model, torture->lumen);
+        char *text = torture_scene_finer((uint64_t)seed, (int64_t)torture->steps, torture->model_count, torture->model, torture->lumen);
         if (text)
             run_text(torture, text, name, &finer);
         free(text);
@@ -313,7 +295,7 @@ static bool print_table(const Torture *torture, cJSON *list)
 {
     static Row row[TORTURE_VESSELS][TORTURE_TOOLS], all;
     FILE *out = bench_text(&torture->common);
-    for (int64_t i = 0; i < torture->runs; i++) {
+    for (int64_t i = 0; i < (int64_t)torture->runs; i++) {
         add_run(&row[torture->outcome[i].vessel][torture->outcome[i].tool], &torture->outcome[i]);
         add_run(&all, &torture->outcome[i]);
     }
@@ -335,54 +317,6 @@ static bool print_table(const Torture *torture, cJSON *list)
 
 // --- the verb ---
 
-static int parse(int argc, char **argv, Torture *torture)
-{
-    enum { RUNS = 256, FIRST, STEPS, FINER, MODEL, KEEP };
-    static const struct option list[] = {{"runs", required_argument, NULL, RUNS},   {"first", required_argument, NULL, FIRST}, {"steps", required_argument, NULL, STEPS},
-                                         {"finer", required_argument, NULL, FINER}, {"model", required_argument, NULL, MODEL}, {"keep", required_argument, NULL, KEEP},
-                                         {"json", required_argument, NULL, 'j'},    {"quick", no_argument, NULL, 'q'},         {"threads", required_argument, NULL, 't'},
-                                         {"help", no_argument, NULL, 'h'},          {0}};
-    double runs = 200, first = 1, steps = 2000, finer = 20;
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
-        bool good = true;
-        switch (choice) {
-        case RUNS: good = cli_whole_number("--runs", optarg, 1, 1e7, &runs); break;
-        case FIRST: good = cli_whole_number("--first", optarg, 0, 1e15, &first); break;
-        case STEPS: good = cli_whole_number("--steps", optarg, 10, 1e7, &steps); break;
-        case FINER: good = cli_whole_number("--finer", optarg, 0, 1e9, &finer); break;
-        case KEEP: torture->keep = optarg; break;
-        case MODEL:
-            if (torture->model_count == MODELS_MOST) {
-                fprintf(stderr, "seldinger bench torture: --model at most %d times\n", MODELS_MOST);
-                return EXIT_BAD_INPUT;
-            }
-            torture->model[torture->model_count++] = optarg;
-            break;
-        default: {
-            int code = bench_take(choice, "torture", help, &torture->common);
-            if (code >= 0)
-                return code;
-        }
-        }
-        if (!good)
-            return EXIT_BAD_INPUT;
-    }
-    if (optind < argc) {
-        fprintf(stderr, "seldinger bench torture: takes no '%s'; see --help\n", argv[optind]);
-        return EXIT_BAD_INPUT;
-    }
-    torture->runs = torture->common.quick ? 40 : (int64_t)runs;
-    torture->first = (int64_t)first;
-    torture->steps = (int64_t)steps;
-    torture->finer = (int64_t)finer;
-    static const char *const own[] = {"scenes/aneurism/aneurism.h5", "scenes/arch/arch.h5"};
-    for (int i = 0; torture->model_count == 0 && i < 2; i++)
-        if (access(own[i], R_OK) == 0)
-            torture->model[torture->model_count++] = own[i];
-    return -1;
-}
-
 // The radius of each model at its root, and its absolute path.
 static bool look_at_models(Torture *torture, Faults *faults)
 {
@@ -401,29 +335,77 @@ static bool look_at_models(Torture *torture, Faults *faults)
     return true;
 }
 
-int bench_torture(int argc, char **argv)
+static int call(void *options, Faults *faults)
 {
-    static Torture torture;
-    static Faults faults;
+    Torture *torture = options;
     ProgressBar bar;
-    torture = (Torture){.keep = ".", .files = PTHREAD_MUTEX_INITIALIZER};
-    int code = parse(argc, argv, &torture);
-    if (code >= 0)
-        return code;
-    faults_clear(&faults);
-    torture.outcome = calloc((size_t)torture.runs, sizeof *torture.outcome);
-    if (!torture.outcome)
-        faults_add(&faults, "bench torture", 0, 0, "no memory for %lld runs", (long long)torture.runs);
-    if (!torture.outcome || !look_at_models(&torture, &faults)) {
-        free(torture.outcome);
-        return cli_bad_input(&faults);
+    torture->outcome = calloc((size_t)torture->runs, sizeof *torture->outcome);
+    if (!torture->outcome)
+        faults_add(faults, "bench torture", 0, 0, "no memory for %.0f runs", torture->runs);
+    if (!torture->outcome || !look_at_models(torture, faults)) {
+        free(torture->outcome);
+        return EXIT_BAD_INPUT;
     }
+    pthread_mutex_init(&torture->files, NULL);
     Progress progress = progress_bar(&bar, "torture", false);
-    parallel_for(torture.common.threads, (long)torture.runs, run_seed, &torture, &progress);
+    parallel_for(torture->common.threads, (long)torture->runs, run_seed, torture, &progress);
     cJSON *root = cJSON_CreateObject();
-    bool good = print_table(&torture, cJSON_AddArrayToObject(root, "rows"));
-    bool written = bench_write_json(&torture.common, root, &faults);
+    bool good = print_table(torture, cJSON_AddArrayToObject(root, "rows"));
+    bool written = bench_write_json(&torture->common, root, faults);
     cJSON_Delete(root);
-    free(torture.outcome);
-    return !written ? cli_bad_input(&faults) : good ? EXIT_DONE : EXIT_DIFFERENT;
+    pthread_mutex_destroy(&torture->files);
+    free(torture->outcome);
+    return !written ? EXIT_BAD_INPUT : good ? EXIT_DONE : EXIT_DIFFERENT;
 }
+
+#define NUMBER(member, low, high, text) OPTION_WHOLE, OPTION_AT(Torture, member), text, .least = low, .most = high
+static const Option rows[] = {
+    {"runs", "N", NUMBER(runs, 1, 1e7, "random runs")},
+    {"first", "N", NUMBER(first, 0, 1e15, "the first seed")},
+    {"steps", "N", NUMBER(steps, 10, 1e7, "of each run")},
+    {"finer", "N", NUMBER(finer, 0, 1e9, "every N-th run again with half the step and half the elements' length; 0: never")},
+    {"model", "F", OPTION_FILE, OPTION_AT(Torture, model), "a model file as one of the vessels, up to 8", .count = offsetof(Torture, model_count), .times = MODELS_MOST,
+     .otherwise = "scenes/aneurism/aneurism.h5 and scenes/arch/arch.h5 where they are here"},
+    {"keep", "FOLDER", OPTION_FOLDER, OPTION_AT(Torture, keep), "for the scenes of runs that fail: torture-SEED.yaml", .otherwise = "the working folder"},
+    BENCH_OPTIONS(Torture, common, "40 runs"),
+};
+
+static void set_defaults(void *structure)
+{
+    Torture *torture = structure;
+    torture->runs = 200;
+    torture->first = 1;
+    torture->steps = 2000;
+    torture->finer = 20;
+    torture->keep = ".";
+}
+
+static const char *check(void *structure)
+{
+    static const char *const own[] = {"scenes/aneurism/aneurism.h5", "scenes/arch/arch.h5"};
+    Torture *torture = structure;
+    if (torture->common.quick)
+        torture->runs = 40;
+    bool given = torture->model_count > 0;
+    for (int i = 0; !given && i < 2; i++)
+        if (access(own[i], R_OK) == 0)
+            torture->model[torture->model_count++] = own[i];
+    return NULL;
+}
+
+static const OptionTable table = {
+    .program = "seldinger bench torture",
+    .does = "random hands, tools and vessels, judged by the true wall",
+    .usage = "[options]",
+    .intro = "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four in each other), "
+             "vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is judged by the true wall, not by what "
+             "the contact saw: a node more than 0.2 mm outside, or outside without being reported; a number that is none; single steps that gain more than 1e-3 of the "
+             "work (where no element is bent by more than a radian: a kink); a tool that is stuck where a finer run is not. The scene of each run that fails is kept and "
+             "can be replayed.",
+    .exits = "0 done; 1 a run failed; 2 wrong usage or bad input",
+    CLI_OPTIONS(rows, Torture),
+    .set_defaults = set_defaults, .check = check,
+    .too_many = "unexpected argument ",
+};
+
+const Verb bench_torture = {.options = &table, .call = call};

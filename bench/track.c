@@ -10,30 +10,15 @@
 #include "base/parallel.h"
 #include "bench/mht_track.h"
 #include "bench/track_score.h"
+#include "recon/track/ransac_cylinder.h"
 #include "recon/volume/blurred_edge.h"
 
-#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { CLICK, STARTS, PAPER, MHT, MHT_PAPER, METHODS };
 static const char *const method_name[METHODS] = {"RBT from one click", "RBT, a start a branch", "RBT, the paper's values", "MHT at its best",
                                                  "MHT, the paper's values"};
-
-static const char help[] =
-    "Usage: seldinger bench track [--quick] [--trees N] [--click] [--starts N] [--only-starts] [--threads N] [--json F]\n\n"
-    "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least 200\n"
-    "branches of two voxels' radius or more at each of 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms;\n"
-    "anisotropic, fading, clipped volumes. Then what a millimetre of vessel costs in trees of two sizes, and clicks in volumes as noisy as VascuSynth's\n"
-    "(contrast 12 to 15 of 255, noise 11 to 21, a bright band), refusals and warnings counted.\n\n"
-    "  --quick      one small tree at 5 % noise and one of each trouble\n"
-    "  --trees N    random trees (51 branches each) at a level of noise, 1 to 24; default 5\n"
-    "  --click      whole trees from one click alone, without the other trackers\n"
-    "  --starts N   clicks in noisy volumes of each kind, 1 to 100; default 8\n"
-    "  --only-starts  these alone\n"
-    "  --threads N  default 0: all cores; figures but times do not depend on them\n"
-    "  --json F     the same figures as JSON; - is standard output, the table then goes to standard error\n\n"
-    "Exit codes: 0 done; 1 a figure that must be reached is not; 2 wrong usage or bad input.\n";
 
 // --- Cases ---
 
@@ -233,6 +218,7 @@ static void run_trial(void *context, long index)
             parameters.automatic = 1;
         else
             parameters.max_length_mm = 1.3 * branch->length + 4 * branch->radius;
+        parameters.powell *= cylinder_refine_has_powell();   // or Gauss-Newton: the same minimum
         known.blur_mm = blur_of(image, &parameters);
         tracked = faults ? rbt_track(image->volume, &parameters, &seed, 1, NULL, 0, 1, NULL, NULL, "bench", faults) : NULL;
     }
@@ -504,68 +490,19 @@ typedef struct TrackBench {
     int trees;                   // random ones at a level of noise
 } TrackBench;
 
-static int parse(int argc, char **argv, TrackBench *bench)
+static int call(void *structure, Faults *faults)
 {
-    enum { TREES = 256, CLICK_ONLY, STARTS_OF_A_KIND, ONLY_STARTS };
-    static const struct option list[] = {{"trees", required_argument, NULL, TREES},
-                                         {"click", no_argument, NULL, CLICK_ONLY},
-                                         {"starts", required_argument, NULL, STARTS_OF_A_KIND},
-                                         {"only-starts", no_argument, NULL, ONLY_STARTS},
-                                         {"json", required_argument, NULL, 'j'},
-                                         {"quick", no_argument, NULL, 'q'},
-                                         {"threads", required_argument, NULL, 't'},
-                                         {"help", no_argument, NULL, 'h'},
-                                         {0}};
-    double number;
-    int code;
-    *bench = (TrackBench){0};
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
-        switch (choice) {
-        case TREES:
-            if (!cli_whole_number("--trees", optarg, 1, MOST_TREES, &number))
-                return EXIT_BAD_INPUT;
-            bench->trees = (int)number;
-            break;
-        case CLICK_ONLY: bench->click_only = true; break;
-        case ONLY_STARTS: bench->only_starts = true; break;
-        case STARTS_OF_A_KIND:
-            if (!cli_whole_number("--starts", optarg, 1, 100, &number))
-                return EXIT_BAD_INPUT;
-            bench->starts = (int)number;
-            break;
-        default:
-            if ((code = bench_take(choice, "track", help, &bench->common)) >= 0)
-                return code;
-        }
-    }
-    if (optind < argc) {
-        fprintf(stderr, "seldinger bench track: takes no '%s'; see --help\n", argv[optind]);
+    const TrackBench *bench = structure;
+    BenchOptions options = bench->common;
+    int group_count = 0;
+    if (!output_check(options.json, faults))
         return EXIT_BAD_INPUT;
-    }
-    if (bench->trees == 0)
-        bench->trees = bench->common.quick ? 1 : 5;
-    if (bench->starts == 0)
-        bench->starts = bench->common.quick ? 1 : 8;
-    return -1;
-}
-
-int bench_track(int argc, char **argv)
-{
-    static Faults faults;
-    TrackBench bench;
-    int code = parse(argc, argv, &bench), group_count = 0;
-    if (code >= 0)
-        return code;
-    BenchOptions options = bench.common;
-    if (!output_check(options.json, &faults))
-        return cli_bad_input(&faults);
     Case *cases = calloc(MOST_CASES, sizeof *cases);
     Group *groups = calloc(MOST_GROUPS, sizeof *groups);
     bool good = cases && groups, kept = true;
-    int count = good && !bench.only_starts ? make_cases(options.quick, bench.trees, cases, groups, &group_count) : 0;
+    int count = good && !bench->only_starts ? make_cases(options.quick, bench->trees, cases, groups, &group_count) : 0;
     for (int i = 0; i < count && good; i++)
-        good = run_case(&cases[i], groups, bench.click_only || groups[cases[i].group].is_size, options.threads, &faults);
+        good = run_case(&cases[i], groups, bench->click_only || groups[cases[i].group].is_size, options.threads, faults);
     if (good) {
         FILE *out = bench_text(&options);
         fprintf(out, "bench track on %s\n", bench_processor());
@@ -583,12 +520,46 @@ int bench_track(int argc, char **argv)
             }
         }
         cJSON *root = json_of(groups, group_count);
-        good = bench_starts(out, bench.starts, options.threads, root, &kept, &faults) && bench_write_json(&options, root, &faults);
+        good = bench_starts(out, bench->starts, options.threads, root, &kept, faults) && bench_write_json(&options, root, faults);
         cJSON_Delete(root);
-    } else if (faults.count == 0) {
-        faults_add(&faults, "bench track", 0, 0, "not enough memory");
+    } else if (faults->count == 0) {
+        faults_add(faults, "bench track", 0, 0, "not enough memory");
     }
     free(cases);
     free(groups);
-    return !good ? cli_bad_input(&faults) : kept ? EXIT_DONE : 1;
+    return !good ? EXIT_BAD_INPUT : kept ? EXIT_DONE : EXIT_DIFFERENT;
 }
+
+static const Option options[] = {
+    {"trees", "N", OPTION_INT, OPTION_AT(TrackBench, trees), "random trees (51 branches each) at a level of noise", .least = 1, .most = MOST_TREES, .otherwise = "5"},
+    {"click", NULL, OPTION_FLAG, OPTION_AT(TrackBench, click_only), "whole trees from one click alone, without the other trackers"},
+    {"starts", "N", OPTION_INT, OPTION_AT(TrackBench, starts), "clicks in noisy volumes of each kind", .least = 1, .most = 100, .otherwise = "8"},
+    {"only-starts", NULL, OPTION_FLAG, OPTION_AT(TrackBench, only_starts), "these alone"},
+    BENCH_OPTIONS(TrackBench, common, "one small tree at 5 % noise and one of each trouble"),
+};
+
+static const char *check(void *structure)
+{
+    TrackBench *bench = structure;
+    if (bench->trees == 0)
+        bench->trees = bench->common.quick ? 1 : 5;
+    if (bench->starts == 0)
+        bench->starts = bench->common.quick ? 1 : 8;
+    return NULL;
+}
+
+static const OptionTable table = {
+    .program = "seldinger bench track",
+    .does = "trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times",
+    .usage = "[options]",
+    .intro = "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least 200 branches of "
+             "two voxels' radius or more at each of 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms; anisotropic, fading, "
+             "clipped volumes. Then what a millimetre of vessel costs in trees of two sizes, and clicks in volumes as noisy as VascuSynth's (contrast 12 to 15 of 255, "
+             "noise 11 to 21, a bright band), refusals and warnings counted.",
+    .exits = "0 done; 1 a figure that must be reached is not; 2 wrong usage or bad input",
+    CLI_OPTIONS(options, TrackBench),
+    .check = check,
+    .too_many = "unexpected argument ",
+};
+
+const Verb bench_track = {.options = &table, .call = call};

@@ -11,7 +11,6 @@
 #include "recon/fit/model_measure.h"
 #include "recon/tree_file.h"
 
-#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -20,20 +19,6 @@ enum { CLICK, FIVE, ARCH, NAMED, MODELS_MOST = NAMED + 8, PATH = 512 };
 enum { JUMPS, POINTS, TRUTH, NOISE, BLOBS, FIT, JUNCTIONS, FLOOD, SPREAD, STIFF, SPIRAL, PUSH, STEP, ROWS };
 
 static const char *const row_names[ROWS] = {"jumps", "points", "truth", "noise", "blobs", "fit", "junctions", "flood", "spread", "stiff", "spiral", "push", "step"};
-
-static const char help[] =
-    "Usage: seldinger bench wall [options] [TREE.h5|MODEL.h5 ...]\n\n"
-    "The wall of fitted trees in one table: value, what it must be, what is aimed at, met or missed. Trees are fitted by `seldinger fit` first, models are taken\n"
-    "as they are. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch, each skipped where it is not\n"
-    "here. Run it from the project's folder. Figures of the first table row by row; CPU times are the commands' own.\n\n"
-    "  --click F      stands for the one-click tree (a tree or a model), --five F for the five branches, --arch F for the arch\n"
-    "  --rows A,B,…   of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step; default: all\n"
-    "  --seeds N      fits of `spread`, 2 to 20; default 10\n"
-    "  --work DIR     where trees and models are put and kept; default: a folder that is removed afterwards\n"
-    "  --threads N    default 0: all cores; figures but times do not depend on it\n"
-    "  --quick        only what is given, no synthetic angiograms, stiff wires for 1 s\n"
-    "  --json F       all lines as JSON; - is standard output\n\n"
-    "Exit codes: 0 done; 1 a line missed what it must be; 2 wrong usage or bad input.\n";
 
 typedef struct WallLimits {
     double must, aim;        // NAN: none
@@ -63,7 +48,10 @@ typedef struct WallModel {
 
 typedef struct WallBench {
     BenchOptions common;
-    bool wanted[ROWS];
+    const char *tree[NAMED], *folder;    // of the command line
+    char **named;
+    int named_count;
+    bool any_given, wanted[ROWS];
     int seeds;
     char work[PATH];
     bool owns_work;
@@ -202,7 +190,7 @@ static bool make_tree(WallBench *bench, int which, Faults *faults)
     return true;
 }
 
-static bool open_models(WallBench *bench, bool any_given, Faults *faults)
+static bool open_models(WallBench *bench, Faults *faults)
 {
     static const char *const names[NAMED] = {"one click", "five branches", "arch"};
     static const double must[NAMED] = {0.022, 0.020, 0.05}, aim[NAMED] = {0.018, 0.015, 0.03};
@@ -213,7 +201,7 @@ static bool open_models(WallBench *bench, bool any_given, Faults *faults)
         m->wire_mm = k == ARCH ? 0.89 : 0.36;
         if (k < NAMED)
             snprintf(m->name, sizeof m->name, "%s", names[k]);
-        if (k < NAMED && !*m->tree && !*m->path && !any_given && !make_tree(bench, k, faults))
+        if (k < NAMED && !*m->tree && !*m->path && !bench->any_given && !make_tree(bench, k, faults))
             return false;
         if ((*m->tree || *m->path) && !open_model(bench, m, faults))
             return false;
@@ -578,7 +566,7 @@ static bool row_step(WallBench *bench, Faults *faults)
     return good;
 }
 
-static bool rows_of_shapes(WallBench *bench, bool any_given, Faults *faults)
+static bool rows_of_shapes(WallBench *bench, Faults *faults)
 {
     bool good = true;
     for (int row = 0; row < ROWS && good; row++) {
@@ -589,7 +577,7 @@ static bool rows_of_shapes(WallBench *bench, bool any_given, Faults *faults)
         switch (row) {
         case TRUTH: good = row_truth(bench, false, faults); break;
         case NOISE: good = row_truth(bench, true, faults); break;
-        case JUNCTIONS: good = (any_given && bench->common.quick) || row_synth_junctions(bench, faults); break;
+        case JUNCTIONS: good = (bench->any_given && bench->common.quick) || row_synth_junctions(bench, faults); break;
         case SPREAD:
             bench->table.on = "synth tree, 0.04 mm";
             good = row_spread(bench, NULL, faults);
@@ -610,8 +598,10 @@ static bool rows_of_shapes(WallBench *bench, bool any_given, Faults *faults)
 
 // --- The verb ---
 
-static bool take_rows(WallBench *bench, const char *list)
+static const char *take_rows(void *structure, const Option *option, const char *list)
 {
+    WallBench *bench = structure;
+    (void)option;
     memset(bench->wanted, 0, sizeof bench->wanted);
     for (const char *at = list; *at;) {
         size_t length = strcspn(at, ",");
@@ -619,62 +609,37 @@ static bool take_rows(WallBench *bench, const char *list)
         for (int row = 0; row < ROWS; row++)
             if (strlen(row_names[row]) == length && !strncmp(at, row_names[row], length))
                 bench->wanted[row] = known = true;
-        if (!known) {
-            fprintf(stderr, "seldinger bench wall: --rows: no row '%.*s'; valid: jumps points truth noise blobs fit junctions flood spread stiff spiral push step\n",
-                    (int)length, at);
-            return false;
-        }
+        if (!known)
+            return "valid, between commas: jumps points truth noise blobs fit junctions flood spread stiff spiral push step";
         at += length + (at[length] == ',');
     }
-    return true;
+    return NULL;
 }
 
-static int parse(int argc, char **argv, WallBench *bench, bool *any_given)
+static void set_defaults(void *structure)
 {
-    enum { FILE_CLICK = 256, FILE_FIVE, FILE_ARCH, THE_ROWS, SEEDS, WORK };
-    static const struct option list[] = {{"click", required_argument, NULL, FILE_CLICK}, {"five", required_argument, NULL, FILE_FIVE},
-                                         {"arch", required_argument, NULL, FILE_ARCH}, {"rows", required_argument, NULL, THE_ROWS},
-                                         {"seeds", required_argument, NULL, SEEDS}, {"work", required_argument, NULL, WORK},
-                                         {"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
-                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    double number;
-    int code;
+    WallBench *bench = structure;
     bench->seeds = 10;
-    bench->model_count = NAMED;
     memset(bench->wanted, true, sizeof bench->wanted);
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
-        switch (choice) {
-        case FILE_CLICK:
-        case FILE_FIVE:
-        case FILE_ARCH: snprintf(bench->model[choice - FILE_CLICK].tree, PATH, "%s", optarg); *any_given = true; break;
-        case THE_ROWS:
-            if (!take_rows(bench, optarg))
-                return EXIT_BAD_INPUT;
-            break;
-        case SEEDS:
-            if (!cli_whole_number("--seeds", optarg, 2, 20, &number))
-                return EXIT_BAD_INPUT;
-            bench->seeds = (int)number;
-            break;
-        case WORK: snprintf(bench->work, PATH, "%s", optarg); break;
-        default:
-            if ((code = bench_take(choice, "wall", help, &bench->common)) >= 0)
-                return code;
-        }
+}
+
+static const char *check(void *structure)
+{
+    WallBench *bench = structure;
+    if (bench->named_count > MODELS_MOST - NAMED)
+        return "at most 8 files";
+    bench->model_count = NAMED + bench->named_count;
+    for (int k = 0; k < bench->model_count; k++) {
+        const char *path = k < NAMED ? bench->tree[k] : bench->named[k - NAMED];
+        if (!path)
+            continue;
+        const char *slash = strrchr(path, '/');
+        snprintf(bench->model[k].tree, PATH, "%s", path);
+        if (k >= NAMED)
+            snprintf(bench->model[k].name, sizeof bench->model[k].name, "%.31s", slash ? slash + 1 : path);
+        bench->any_given = true;
     }
-    for (; optind < argc; optind++) {
-        if (bench->model_count == MODELS_MOST) {
-            fprintf(stderr, "seldinger bench wall: more than %d files\n", MODELS_MOST - NAMED);
-            return EXIT_BAD_INPUT;
-        }
-        WallModel *m = &bench->model[bench->model_count++];
-        const char *slash = strrchr(argv[optind], '/');
-        snprintf(m->tree, PATH, "%s", argv[optind]);
-        snprintf(m->name, sizeof m->name, "%.31s", slash ? slash + 1 : argv[optind]);
-        *any_given = true;
-    }
-    return -1;
+    return NULL;
 }
 
 static bool needs_models(const WallBench *bench)
@@ -688,7 +653,8 @@ static bool needs_models(const WallBench *bench)
 
 static bool make_work(WallBench *bench, Faults *faults)
 {
-    if (*bench->work) {
+    if (bench->folder) {
+        snprintf(bench->work, PATH, "%s", bench->folder);
         if (access(bench->work, W_OK) == 0)
             return true;
         faults_add(faults, bench->work, 0, 0, "is not a writable folder");
@@ -759,31 +725,53 @@ static bool plan_output(const WallBench *bench, Faults *faults)
     return faults->count == 0;
 }
 
-int bench_wall(int argc, char **argv)
+static int call(void *options, Faults *faults)
 {
-    static WallBench bench;
-    static Faults faults;
-    bool any_given = false;
-    int code = parse(argc, argv, &bench, &any_given), missed = 0;
-    if (code >= 0)
-        return code;
-    if (!plan_output(&bench, &faults) || !make_work(&bench, &faults))
-        return cli_bad_input(&faults);
-    bench.table.out = bench_text(&bench.common);
-    fprintf(bench.table.out, "%s, %s\n%-10s %-22s %-34s %10s %-7s %8s %8s\n", bench_processor(), simd_name[simd_level()], "row", "on", "what", "value", "", "must", "aim");
-    bool good = !needs_models(&bench) || open_models(&bench, any_given, &faults);
-    for (int k = 0; good && k < bench.model_count; k++)
-        if (bench.model[k].model)
-            good = rows_of_model(&bench, &bench.model[k], &faults);
-    good = good && rows_of_shapes(&bench, any_given, &faults) && write_json(&bench, &faults);
-    for (int k = 0; k < bench.table.count; k++)
-        missed += !strcmp(verdict(&bench.table.line[k]), "MISSED");
+    WallBench *bench = options;
+    int missed = 0;
+    if (!plan_output(bench, faults) || !make_work(bench, faults))
+        return EXIT_BAD_INPUT;
+    bench->table.out = bench_text(&bench->common);
+    fprintf(bench->table.out, "%s, %s\n%-10s %-22s %-34s %10s %-7s %8s %8s\n", bench_processor(), simd_name[simd_level()], "row", "on", "what", "value", "", "must", "aim");
+    bool good = !needs_models(bench) || open_models(bench, faults);
+    for (int k = 0; good && k < bench->model_count; k++)
+        if (bench->model[k].model)
+            good = rows_of_model(bench, &bench->model[k], faults);
+    good = good && rows_of_shapes(bench, faults) && write_json(bench, faults);
+    for (int k = 0; k < bench->table.count; k++)
+        missed += !strcmp(verdict(&bench->table.line[k]), "MISSED");
     if (good)
-        fprintf(bench.table.out, "%d lines, %d missed\n", bench.table.count, missed);
-    if (bench.owns_work)
-        remove_work(&bench);
-    for (int k = 0; k < bench.model_count; k++)
-        vessel_tree_free(bench.model[k].model);
-    free(bench.table.line);
-    return !good ? cli_bad_input(&faults) : missed > 0 ? EXIT_DIFFERENT : EXIT_DONE;
+        fprintf(bench->table.out, "%d lines, %d missed\n", bench->table.count, missed);
+    if (bench->owns_work)
+        remove_work(bench);
+    for (int k = 0; k < bench->model_count; k++)
+        vessel_tree_free(bench->model[k].model);
+    free(bench->table.line);
+    return !good ? EXIT_BAD_INPUT : missed > 0 ? EXIT_DIFFERENT : EXIT_DONE;
 }
+
+static const Option rows[] = {
+    {"click", "F", OPTION_FILE, OPTION_AT(WallBench, tree[CLICK]), "stands for the one-click tree (a tree or a model)"},
+    {"five", "F", OPTION_FILE, OPTION_AT(WallBench, tree[FIVE]), "for the five branches"},
+    {"arch", "F", OPTION_FILE, OPTION_AT(WallBench, tree[ARCH]), "for the arch"},
+    {"rows", "A,B", OPTION_TEXT, OPTION_AT(WallBench, wanted), "of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step", .take = take_rows,
+     .otherwise = "all"},
+    {"seeds", "N", OPTION_INT, OPTION_AT(WallBench, seeds), "fits of `spread`", .least = 2, .most = 20},
+    {"work", "DIR", OPTION_FOLDER, OPTION_AT(WallBench, folder), "where trees and models are put and kept", .otherwise = "a folder that is removed afterwards"},
+    BENCH_OPTIONS(WallBench, common, "only what is given, no synthetic angiograms, stiff wires for 1 s"),
+};
+
+static const OptionTable table = {
+    .program = "seldinger bench wall",
+    .does = "one table of what the wall of fitted trees is worth: agreement, accuracy, ostia, reach, tools in it",
+    .usage = "[options] [TREE.h5|MODEL.h5 ...]",
+    .intro = "The wall of fitted trees in one table: value, what it must be, what is aimed at, met or missed. Trees are fitted by `seldinger fit` first, models are taken as "
+             "they are. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch, each skipped where it is not here. "
+             "Run it from the project's folder. Figures of the first table row by row; CPU times are the commands' own.",
+    .exits = "0 done; 1 a line missed what it must be; 2 wrong usage or bad input",
+    CLI_OPTIONS(rows, WallBench),
+    .set_defaults = set_defaults, .check = check,
+    .takes_argument = true, .may_be_missing = true, .argument = offsetof(WallBench, named), .argument_count = offsetof(WallBench, named_count),
+};
+
+const Verb bench_wall = {.options = &table, .call = call};

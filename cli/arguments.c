@@ -1,30 +1,6 @@
 // Values of the command line that many verbs take.
 #include "cli/cli.h"
 
-bool cli_number(const char *option, const char *text, double least, double most, double *value)
-{
-    double number;
-    if (!option_number(text, &number) || number < least || number > most) {
-        fprintf(stderr, "%s: '%s' is not valid; a number from %g to %g\n", option, text, least, most);
-        return false;
-    }
-    *value = number;
-    return true;
-}
-
-bool cli_whole_number(const char *option, const char *text, double least, double most, double *value)
-{
-    double number;
-    if (!cli_number(option, text, least, most, &number))
-        return false;
-    if (floor(number) != number) {   // exact: whole numbers have no fraction
-        fprintf(stderr, "%s: '%s' is not valid; a whole number from %g to %g\n", option, text, least, most);
-        return false;
-    }
-    *value = number;
-    return true;
-}
-
 const char *const cli_view_name[] = {"fluoroscopy", "3d", "angioscopy", "all", NULL};
 
 const char *cli_take_size(void *structure, const Option *option, const char *text)

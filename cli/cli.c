@@ -41,6 +41,33 @@ int cli_call(const Verb *verb, int argc, char **argv)
     return code;
 }
 
+const char *cli_verb_name(const Verb *verb) { return strrchr(verb->options->program, ' ') + 1; }
+
+const Verb *cli_find_verb(const Verb *const *list, const char *name)
+{
+    while (*list && strcmp(name, cli_verb_name(*list)) != 0)
+        list++;
+    return *list;
+}
+
+void cli_list_verbs(FILE *out, const Verb *const *list, int usage_width)
+{
+    for (; *list; list++) {
+        const OptionTable *table = (*list)->options;
+        int form = usage_width > 0 ? (int)strcspn(table->usage, "\n") : 0;
+        fprintf(out, "  %-9s%-*.*s %s\n", cli_verb_name(*list), usage_width, form, table->usage, table->does);
+    }
+}
+
+int cli_refuse_verb(const char *program, const char *kind, const char *name, const Verb *const *list)
+{
+    fprintf(stderr, *name ? "%s: no %s '%s'; valid:" : "%s: the name of a %s is missing%s; valid:", program, kind, name);
+    for (; *list; list++)
+        fprintf(stderr, " %s", cli_verb_name(*list));
+    fprintf(stderr, "\n");
+    return EXIT_BAD_INPUT;
+}
+
 void cli_note(const char *path, const char *text) { cli_notes(stderr, path, text); }
 
 bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)

@@ -23,6 +23,13 @@ typedef struct Verb {
 extern const Verb run_verb, nav_verb, check_verb, segment_verb, import_verb, fit_verb, synth_verb, query_verb, export_verb, info_verb, replay_verb, report_verb,
     devices_verb, bench_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
+// A list of verbs ends with NULL; the name of each is the last word of its program.
+const char *cli_verb_name(const Verb *verb);
+const Verb *cli_find_verb(const Verb *const *list, const char *name);    // NULL: none is called so
+// One line a verb: its name, the first form of its usage in so many characters (0: without), what it does.
+void cli_list_verbs(FILE *out, const Verb *const *list, int usage_width);
+// Says which are valid instead of `name`. Returns EXIT_BAD_INPUT.
+int cli_refuse_verb(const char *program, const char *kind, const char *name, const Verb *const *list);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \
     {"threads", "N", OPTION_INT, OPTION_AT(structure, member), "threads; the result does not depend on them", .most = 256, .otherwise = "0: all cores"}
@@ -33,9 +40,6 @@ int cli_call(const Verb *verb, int argc, char **argv);
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
 int cli_bad_input(const Faults *faults);
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
-// Number options: the whole text must be a finite number within [least, most]; else a message that names the option and the range, and false.
-bool cli_number(const char *option, const char *text, double least, double most, double *value);
-bool cli_whole_number(const char *option, const char *text, double least, double most, double *value);
 // Views in the order of PanelView.
 extern const char *const cli_view_name[];
 #define CLI_VIEW(structure, member, text) \

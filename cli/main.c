@@ -12,58 +12,58 @@ static const Verb *const verbs[] = {
     &nav_verb,
 #endif
     &check_verb, &segment_verb, &import_verb, &fit_verb,     &synth_verb,   &query_verb,
-    &export_verb, &info_verb,   &replay_verb, &report_verb, &devices_verb, &bench_verb,
+    &export_verb, &info_verb,   &replay_verb, &report_verb, &devices_verb, &bench_verb, NULL,
 };
-enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
+enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] - 1 };
 
-static const char *name_of(const Verb *verb) { return strrchr(verb->options->program, ' ') + 1; }
+static const OptionTable program = {
+    .program = "seldinger",
+    .does = "catheter navigation simulator for training and research",
+    .usage = "VERB ARGUMENTS\nVERB --help\n--version",
+    .intro = "Simulates guide wires and catheters in blood vessels in real time, makes vessel models from angiograms or surfaces, and trains their navigation under "
+             "simulated fluoroscopy. Not a medical device.",
+    .notes = "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); run ends in order.",
+    .exits = "0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted",
+};
 
 static void print_help(FILE *out)
 {
     fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
             SELDINGER_VERSION);
-    for (int i = 0; i < VERB_COUNT; i++) {
-        const char *form = verbs[i]->options->usage;
-        fprintf(out, "  %-8s %-34.*s %s\n", name_of(verbs[i]), (int)strcspn(form, "\n"), form, verbs[i]->options->does);
-    }
+    cli_list_verbs(out, verbs, 34);
     fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
                  "`seldinger --completion` a script by which bash completes verbs and options.\n"
                  "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
                  "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
 }
 
-static int refuse_name(const char *name)
-{
-    fprintf(stderr, "seldinger: no verb '%s'; valid:", name);
-    for (int i = 0; i < VERB_COUNT; i++)
-        fprintf(stderr, " %s", name_of(verbs[i]));
-    fprintf(stderr, "\n");
-    return EXIT_BAD_INPUT;
-}
+static int refuse_name(const char *name) { return cli_refuse_verb("seldinger", "verb", name, verbs); }
 
-static const Verb *find_verb(const char *name)
+static const OptionTable *const *tables_of_verbs(const OptionTable *table[VERB_COUNT + 1])
 {
     for (int i = 0; i < VERB_COUNT; i++)
-        if (!strcmp(name, name_of(verbs[i])))
-            return verbs[i];
-    return NULL;
+        table[i] = verbs[i]->options;
+    return table;
 }
 
+// `name`: of a verb; NULL: the page of the program.
 static int print_manual(const char *name)
 {
-    const Verb *verb = find_verb(name);
-    if (!verb)
+    const OptionTable *table[VERB_COUNT + 1] = {0};
+    const Verb *verb = name ? cli_find_verb(verbs, name) : NULL;
+    if (name && !verb)
         return refuse_name(name);
-    options_manual(verb->options, SELDINGER_VERSION, stdout);
+    if (verb)
+        options_manual(verb->options, SELDINGER_VERSION, stdout);
+    else
+        options_overview(&program, tables_of_verbs(table), SELDINGER_VERSION, stdout);
     return EXIT_DONE;
 }
 
 static int print_completion(void)
 {
     const OptionTable *table[VERB_COUNT + 1] = {0};
-    for (int i = 0; i < VERB_COUNT; i++)
-        table[i] = verbs[i]->options;
-    options_completion("seldinger", table, stdout);
+    options_completion("seldinger", tables_of_verbs(table), stdout);
     return EXIT_DONE;
 }
 
@@ -83,10 +83,10 @@ static int call_verb(int argc, char **argv)
         return EXIT_DONE;
     }
     if (!strcmp(name, "--manual"))
-        return print_manual(argc > 2 ? argv[2] : "");
+        return print_manual(argc > 2 ? argv[2] : NULL);
     if (!strcmp(name, "--completion"))
         return print_completion();
-    const Verb *verb = find_verb(name);
+    const Verb *verb = cli_find_verb(verbs, name);
     return verb ? cli_call(verb, argc - 1, argv + 1) : refuse_name(name);
 }
 

@@ -28,7 +28,7 @@ static const Option options[] = {
     {"picture-at", "S", OPTION_NUMBER, OPTION_AT(RunOptions, headless.moment_s), "instead of the end, this moment; up to 6 of them stand side by side",
      .most = SCRIPT_LONGEST_S, .unit = "s", .count = offsetof(RunOptions, headless.moment_count), .times = MOMENTS_MOST},
     {"chart", "F.png", OPTION_FILE, OPTION_AT(RunOptions, files.chart),
-     "forces at the hand and the wall, run_contact, depth, CPU time, iterations and residual over time"},
+     "forces at the hand and the wall, contacts, depth, CPU time, iterations and residual over time"},
     {"contact", "KIND", OPTION_CHOICE, OPTION_AT(RunOptions, contact),
      "the surface that answers contact queries: lim, lim_blend, lim_switch, mesh, smooth_mesh, flat_mesh, grid or tube", .choices = run_contact,
      .otherwise = "the scene's"},

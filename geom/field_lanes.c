@@ -1,14 +1,14 @@
-// One kernel text, three compilations. See field_lanes.h for the layouts and why the bits agree, blobby.h for the equations.
+// One kernel text, compiled for each instruction set. See field_lanes.h for the layouts and why the bits agree, blobby.h for the equations.
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/field_lanes.h"
 
 #include "base/assert.h"
 
 #include "base/same_math.h"
-#include "base/simd.h"
+#include "base/simd_kernel.h"
 
 #include <stddef.h>
-#if defined(__x86_64__) && defined(__GNUC__)
+#if SIMD_HAS_AVX
 #include <immintrin.h>
 #endif
 
@@ -29,62 +29,57 @@ void field_directions(Vec3 *way, int count)
     }
 }
 
+static void add_clear_point(ClearPoints *points, Vec3 p)
+{
+    int at = points->count++;
+    points->x[at] = (float)p.x, points->y[at] = (float)p.y, points->z[at] = (float)p.z;
+    points->square[at] = (float)vec3_norm2(p);
+}
+
 void field_clear_points(ClearPoints *points)
 {
     static const int count[] = {CLEAR_ON_OUTER, CLEAR_ON_INNER};
     static const double sphere[] = {CLEAR_OUTER, CLEAR_INNER};
     Vec3 way[CLEAR_ON_OUTER];
-    for (int s = 0, at = 0; s < 2; s++) {
+    points->count = 0;
+    for (int s = 0; s < 2; s++) {
         field_directions(way, count[s]);
-        for (int k = 0; k < count[s]; k++, at++) {
-            points->x[at] = (float)(sphere[s] * way[k].x);
-            points->y[at] = (float)(sphere[s] * way[k].y);
-            points->z[at] = (float)(sphere[s] * way[k].z);
-        }
+        for (int k = 0; k < count[s]; k++)
+            add_clear_point(points, vec3_scale(way[k], sphere[s]));
     }
 }
 
-#define KERNEL_TABLE(isa) {load_##isa, sample_##isa, newton_##isa, finish_##isa, store_##isa, pick_##isa, bends_##isa, is_clear_##isa, look_##isa}
-
-#define WIDTH 2
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "geom/field_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-static const FieldKernels baseline = KERNEL_TABLE(baseline);
-
-#if defined(__x86_64__) && defined(__GNUC__)
-#define WIDTH 4
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "geom/field_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-static const FieldKernels avx2 = KERNEL_TABLE(avx2);
-
-#define WIDTH 8
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "geom/field_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-static const FieldKernels avx512 = KERNEL_TABLE(avx512);
-
-const FieldKernels *field_kernels(int isa)
+void field_clear_rings(ClearPoints *points)
 {
-    static const FieldKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
-    SEL_ASSERT(isa >= 0 && isa <= SIMD_COUNT, "instruction sets are 0 to 3");
-    int wanted = isa > 0 ? isa - 1 : (int)simd_level(), widest = (int)simd_widest();
-    return of[wanted < widest ? wanted : widest];
+    static const double from_axis[] = {0.38, 0.6, 0.82, 1.04};       // [rad]
+    static const int count[] = {18, 24, 26, 28};
+    points->count = 0;
+    for (int r = 0; r < 4; r++)
+        for (int k = 0; k < count[r]; k++) {
+            double angle = 2 * PI * (k + 0.5 * (r % 2)) / count[r], out = same_sin(from_axis[r]);
+            add_clear_point(points, vec3(out * same_cos(angle), out * same_sin(angle), same_cos(from_axis[r])));
+        }
+    SEL_ASSERT(points->count == CLEAR_ON_RINGS, "rings fill whole strips of lanes");
 }
-#else
-const FieldKernels *field_kernels(int isa)
+
+void field_turn_points(const ClearPoints *points, Vec3 axis, ClearPoints *turned)
 {
-    (void)isa;
-    return &baseline;
+    Vec3 across = vec3_normal_to(axis), along = vec3_cross(axis, across);
+    const float ax = (float)across.x, ay = (float)across.y, az = (float)across.z, bx = (float)along.x, by = (float)along.y, bz = (float)along.z;
+    const float cx = (float)axis.x, cy = (float)axis.y, cz = (float)axis.z;
+    turned->count = points->count;
+    for (int k = 0; k < points->count; k++) {
+        turned->x[k] = ax * points->x[k] + bx * points->y[k] + cx * points->z[k];
+        turned->y[k] = ay * points->x[k] + by * points->y[k] + cy * points->z[k];
+        turned->z[k] = az * points->x[k] + bz * points->y[k] + cz * points->z[k];
+        turned->square[k] = points->square[k];
+    }
 }
-#endif
+
+#define KERNEL_TABLE(set) {load_##set, sample_##set, newton_##set, finish_##set, store_##set, pick_##set, bends_##set, is_clear_##set, look_##set}
+
+#define KERNEL_TEXT "geom/field_kernel.inc"
+#include "base/each_simd.inc"
+static const FieldKernels kernel_table[SIMD_COUNT] = SIMD_EACH(KERNEL_TABLE);
+
+const FieldKernels *field_kernels(int isa) { return &kernel_table[simd_choose(isa)]; }

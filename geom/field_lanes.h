@@ -24,12 +24,13 @@ enum { MEMORY_FOOT = 0, MEMORY_PLACE = 3, MEMORY_NORMAL = 6, MEMORY_HESSIAN = 9,
        MEMORY_UP = 23, MEMORY_WRITTEN = 24, MEMORY_HELD_AT = 24, MEMORY_HELD_FOR2 = 27, MEMORY_BOUND_AT = 28, MEMORY_BOUND_FOR = 31, MEMORY_ROW = 32 };
 enum { HIT_ROW = 10 };               // gap, normal, Hessian
 
-// Points in the unit ball, on two spheres about its middle.
+// Points in the unit ball: on two spheres about its middle, and on rings of the ball itself about the z axis.
 #define CLEAR_OUTER 0.95
 #define CLEAR_INNER 0.8
-enum { CLEAR_ON_OUTER = 128, CLEAR_ON_INNER = 64, CLEAR_POINTS = CLEAR_ON_OUTER + CLEAR_ON_INNER };
+enum { CLEAR_ON_OUTER = 128, CLEAR_ON_INNER = 64, CLEAR_POINTS = CLEAR_ON_OUTER + CLEAR_ON_INNER, CLEAR_ON_RINGS = 96 };
 typedef struct ClearPoints {
-    float x[CLEAR_POINTS], y[CLEAR_POINTS], z[CLEAR_POINTS];
+    int count;                       // a multiple of 96
+    float x[CLEAR_POINTS], y[CLEAR_POINTS], z[CLEAR_POINTS], square[CLEAR_POINTS];     // square: of the distance from the middle
 } ClearPoints;
 
 typedef double FieldLane[FOOT_BLOCK];
@@ -74,6 +75,9 @@ typedef struct FieldKernels {
 // `count` directions all around: a spiral from pole to pole.
 void field_directions(Vec3 *way, int count);
 void field_clear_points(ClearPoints *points);
+void field_clear_rings(ClearPoints *points);
+// The same points turned so that the z axis becomes `axis` (unit).
+void field_turn_points(const ClearPoints *points, Vec3 axis, ClearPoints *turned);
 // isa as for lane_kernels.
 const FieldKernels *field_kernels(int isa);
 

@@ -46,7 +46,7 @@ typedef struct FieldVessel {
     PowerBlocks blocks;      // for points without a node
     bool inlet_open;         // the root is an end of the tree
     Vec3 way[WAYS];          // directions all around
-    ClearPoints clear_points;
+    ClearPoints clear_points, clear_rings;
 } FieldVessel;
 
 static const double SKIN = 0.2, SKIN_MOST = 0.3;    // of the radius, (1 + AHEAD) SKIN < BLOB_FLOOD_MARGIN; [mm]
@@ -410,19 +410,23 @@ static void look_around(const FieldVessel *field, Vec3 x, int node, double far, 
     }
 }
 
-static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle, double ball, double side)
+// Near the foot, which the ball touches, the spheres' points say nothing of a wall that leans by less than 50 degrees: there rings of the ball itself are
+// looked at.
+static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle, double ball, double side, Vec3 to_foot)
 {
     BlobList in;
+    ClearPoints rings;
     pick_list(field, list->blob, list->count, middle, ball, &in);
-    return field->kernels->is_clear(&field->clear_points, field->row, in.blob, in.count, middle, ball, side);
+    if (!field->kernels->is_clear(&field->clear_points, field->row, in.blob, in.count, middle, ball, side))
+        return false;
+    field_turn_points(&field->clear_rings, to_foot, &rings);
+    return field->kernels->is_clear(&rings, field->row, in.blob, in.count, middle, ball, side);
 }
 
 // [mm] A sharply bent wall has other feet close by: the foot is not trusted over more than this of travel.
 static double bend_radius(const Foot *foot)
 {
-    const Sym3 *h = &foot->hessian;
-    double bend2 = h->xx * h->xx + h->yy * h->yy + h->zz * h->zz + 2 * (h->xy * h->xy + h->xz * h->xz + h->yz * h->yz);
-    return 0.15 / fmax(sqrt(bend2), 1e-3);
+    return 0.15 / fmax(sqrt(sym3_norm2(&foot->hessian)), 1e-3);
 }
 
 // Does the wall at a foot bend no more than a round vessel's does? Only there do the few points of room_about tell of its surroundings. In the lumen h is
@@ -431,9 +435,7 @@ static bool bends_gently(const Foot *foot, double radius)
 {
     static const double HOLLOW = 1.3, BULGE = 0.3;       // of the inverse radius
     const Sym3 *h = &foot->hessian;
-    double half = 0.5 * (h->xx + h->yy + h->zz);
-    double norm2 = h->xx * h->xx + h->yy * h->yy + h->zz * h->zz + 2 * (h->xy * h->xy + h->xz * h->xz + h->yz * h->yz);
-    double apart = sqrt(fmax(0, 0.5 * norm2 - half * half)), most = half + apart, least = half - apart;
+    double half = 0.5 * sym3_trace(h), apart = sqrt(fmax(0, 0.5 * sym3_norm2(h) - half * half)), most = half + apart, least = half - apart;
     if (!(foot->gap * most < 1) || !(foot->gap * least < 1))
         return false;
     return least / (1 - foot->gap * least) > -HOLLOW / radius && most / (1 - foot->gap * most) < BULGE / radius;
@@ -455,7 +457,7 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
         if (is_at_inlet(field, node, middle, ball))
             continue;
-        if (room > 0.01 * node->radius && is_clear(field, list, middle, ball, side))
+        if (room > 0.01 * node->radius && is_clear(field, list, middle, ball, side, vec3_scale(foot->normal, -side)))
             return fmin(room, bend_radius(foot));
     }
     return 0;
@@ -509,7 +511,7 @@ static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double 
                 at[k] = HUGE_VAL;
     }
     Foot foot[FOOT_BLOCK];
-    int found = count > 0 ? settle(field, x, node, start, count, FEW_ROUNDS, foot) : 0;
+    int found = count > 0 ? settle(field, x, node, start, count, ROUNDS, foot) : 0;
     for (int i = 0; i < found; i++)
         if (foot[i].gap * side > -1e-9)
             add_sheet(sheets, &foot[i]);
@@ -1146,6 +1148,7 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     field->inlet_open = vessel_tree_root_is_open(tree);
     field_directions(field->way, WAYS);
     field_clear_points(&field->clear_points);
+    field_clear_rings(&field->clear_rings);
     fill_rows(field);
     fill_nodes(field);
     return &field->vessel;

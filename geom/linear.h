@@ -113,6 +113,12 @@ static inline void sym3_add_outer(Sym3 *s, double factor, Vec3 v)
 }
 static inline double sym3_trace(const Sym3 *s) { return s->xx + s->yy + s->zz; }
 
+// Sum of the squares of all nine entries.
+static inline double sym3_norm2(const Sym3 *s)
+{
+    return s->xx * s->xx + s->yy * s->yy + s->zz * s->zz + 2 * (s->xy * s->xy + s->xz * s->xz + s->yz * s->yz);
+}
+
 static inline Quat quat_identity(void) { return (Quat){1, 0, 0, 0}; }
 static inline bool quat_is_unit(Quat q) { return fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-9; }
 static inline Quat quat_conjugate(Quat q) { return (Quat){q.w, -q.x, -q.y, -q.z}; }

@@ -13,8 +13,6 @@
 
 #include <stdlib.h>
 
-const char *const reach_mode_name[REACH_MODES] = {"point", "tool", "tool aside"};
-
 enum { DIRECTIONS = 32, RING = 8, PLACES = 1 + 2 * RING, FINE = 10, COARSE = 4, STATIONS_MAX = 200 };
 static const double BETWEEN = 1.075;         // 1 / cos of the angle from the 32 directions to what lies farthest between them
 

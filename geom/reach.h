@@ -11,7 +11,6 @@
 #include "geom/vessel_tree.h"
 
 typedef enum { REACH_POINT, REACH_TOOL, REACH_ASIDE, REACH_MODES } ReachMode;
-extern const char *const reach_mode_name[REACH_MODES];   // "point", "tool", "tool aside"
 
 typedef struct ReachOptions {
     double tool_radius;      // [mm] > 0, default 0.18

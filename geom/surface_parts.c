@@ -7,8 +7,6 @@
 
 #include <stdlib.h>
 
-const char *const part_kind_name[PART_KINDS] = {"inlet", "bubble", "shut", "ghost"};
-
 enum { TRIES = 12, HELD = 1000 };
 
 static double cone_volume(const TriangleMesh *mesh, int t, Vec3 apex)

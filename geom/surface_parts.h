@@ -12,7 +12,6 @@ typedef enum {
     PART_GHOST,              // holds no node
     PART_KINDS
 } PartKind;
-extern const char *const part_kind_name[PART_KINDS];     // "inlet", "bubble", "shut", "ghost"
 
 typedef struct SurfacePart {
     PartKind kind;

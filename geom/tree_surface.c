@@ -33,6 +33,12 @@ static double cone_volume(const TriangleMesh *mesh, int t, Vec3 apex)
     return vec3_dot(a, vec3_cross(b, c)) / 6;
 }
 
+static double triangle_area(const TriangleMesh *mesh, int t)
+{
+    const int *c = mesh->triangle[t];
+    return 0.5 * vec3_norm(vec3_cross(vec3_sub(mesh->vertex[c[1]], mesh->vertex[c[0]]), vec3_sub(mesh->vertex[c[2]], mesh->vertex[c[0]])));
+}
+
 // --- Census ---
 
 typedef struct HalfEdge {
@@ -61,6 +67,32 @@ static void sort_half_edges(HalfEdge *edge, int count)
     }
 }
 
+// The half edges of each vertex v, at [first[v], first[v + 1]), sorted; to be freed with `first`. NULL where memory lacks.
+static HalfEdge *half_edges(const TriangleMesh *mesh, size_t **first)
+{
+    size_t vertices = (size_t)mesh->vertex_count, sides = 3 * (size_t)mesh->triangle_count, *at = calloc(vertices + 2, sizeof *at);
+    HalfEdge *edge = malloc((sides + 1) * sizeof *edge);
+    if (!at || !edge) {
+        free(at);
+        free(edge);
+        return NULL;
+    }
+    for (size_t i = 0; i < sides; i++) {
+        int a = mesh->triangle[i / 3][i % 3], b = mesh->triangle[i / 3][(i + 1) % 3];
+        at[(a < b ? a : b) + 2]++;
+    }
+    for (size_t v = 2; v < vertices + 2; v++)
+        at[v] += at[v - 1];
+    for (size_t i = 0; i < sides; i++) {
+        int a = mesh->triangle[i / 3][i % 3], b = mesh->triangle[i / 3][(i + 1) % 3], low = a < b ? a : b;
+        edge[at[low + 1]++] = (HalfEdge){a < b ? b : a, a < b};
+    }
+    for (size_t v = 0; v < vertices; v++)
+        sort_half_edges(edge + at[v], (int)(at[v + 1] - at[v]));
+    *first = at;
+    return edge;
+}
+
 static void count_edges(const HalfEdge *edge, int count, SurfaceCensus *census, int lower, const TriangleMesh *mesh, Vec3 *rim)
 {
     for (int i = 0, n; i < count; i += n) {
@@ -79,27 +111,13 @@ static void count_edges(const HalfEdge *edge, int count, SurfaceCensus *census, 
 bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census)
 {
     *census = (SurfaceCensus){.triangles = mesh->triangle_count};
-    size_t vertices = (size_t)mesh->vertex_count, sides = 3 * (size_t)mesh->triangle_count;
+    size_t vertices = (size_t)mesh->vertex_count, sides = 3 * (size_t)mesh->triangle_count, *first = NULL;
     int *part = find_parts(mesh);
-    size_t *first = calloc(vertices + 2, sizeof *first);
-    HalfEdge *edge = malloc((sides + 1) * sizeof *edge);
-    bool good = part && first && edge;
-    for (size_t i = 0; good && i < sides; i++) {
-        int a = mesh->triangle[i / 3][i % 3], b = mesh->triangle[i / 3][(i + 1) % 3];
-        first[(a < b ? a : b) + 2]++;
-    }
-    for (size_t v = 2; good && v < vertices + 2; v++)
-        first[v] += first[v - 1];
-    for (size_t i = 0; good && i < sides; i++) {
-        int a = mesh->triangle[i / 3][i % 3], b = mesh->triangle[i / 3][(i + 1) % 3], low = a < b ? a : b;
-        edge[first[low + 1]++] = (HalfEdge){a < b ? b : a, a < b};
-    }
+    HalfEdge *edge = half_edges(mesh, &first);
+    bool good = part && edge;
     Vec3 rim = {0, 0, 0};
-    for (size_t v = 0; good && v < vertices; v++) {
-        int count = (int)(first[v + 1] - first[v]);
-        sort_half_edges(edge + first[v], count);
-        count_edges(edge + first[v], count, census, (int)v, mesh, &rim);
-    }
+    for (size_t v = 0; good && v < vertices; v++)
+        count_edges(edge + first[v], (int)(first[v + 1] - first[v]), census, (int)v, mesh, &rim);
     if (good) {
         // used vertices: marked in `first`, whose work is done
         memset(first, 0, (vertices + 2) * sizeof *first);
@@ -112,9 +130,7 @@ bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census)
         census->euler = census->vertices - census->edges + census->triangles;
         Vec3 apex = census->open_edges > 0 ? vec3_scale(rim, 1 / (double)census->open_edges) : vertices > 0 ? mesh->vertex[0] : rim;
         for (int t = 0; t < mesh->triangle_count; t++) {
-            const int *c = mesh->triangle[t];
-            Vec3 a = mesh->vertex[c[0]];
-            census->area += 0.5 * vec3_norm(vec3_cross(vec3_sub(mesh->vertex[c[1]], a), vec3_sub(mesh->vertex[c[2]], a)));
+            census->area += triangle_area(mesh, t);
             census->volume += cone_volume(mesh, t, apex);
         }
     }
@@ -126,16 +142,33 @@ bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census)
 
 // --- Dropping ---
 
+// has_rim[p]: part p has an edge with one triangle. False where memory lacks.
+static bool find_rims(const TriangleMesh *mesh, const int *part, bool *has_rim)
+{
+    size_t *first = NULL;
+    HalfEdge *edge = half_edges(mesh, &first);
+    for (int v = 0; edge && v < mesh->vertex_count; v++)
+        for (size_t i = first[v]; i < first[v + 1]; i++)
+            has_rim[part[v]] |= (i == first[v] || edge[i - 1].to != edge[i].to) && (i + 1 == first[v + 1] || edge[i + 1].to != edge[i].to);
+    bool good = edge != NULL;
+    free(first);
+    free(edge);
+    return good;
+}
+
+// A part with a rim encloses nothing, and the cones over it add up to anything: its volume is that of the ball with its area.
 int surface_drop_specks(TriangleMesh *mesh, double least_volume)
 {
     int *part = find_parts(mesh), dropped = 0, largest = 0;
     double *volume = calloc((size_t)mesh->vertex_count + 1, sizeof *volume);
-    bool *keep = malloc((size_t)mesh->triangle_count + 1);
-    bool good = part && volume && keep;
+    bool *keep = malloc((size_t)mesh->triangle_count + 1), *has_rim = calloc((size_t)mesh->vertex_count + 1, sizeof *has_rim);
+    bool good = part && volume && keep && has_rim && find_rims(mesh, part, has_rim);
     for (int t = 0; good && t < mesh->triangle_count; t++) {
         int of = part[mesh->triangle[t][0]];
-        volume[of] += cone_volume(mesh, t, mesh->vertex[of]);
+        volume[of] += has_rim[of] ? triangle_area(mesh, t) : cone_volume(mesh, t, mesh->vertex[of]);
     }
+    for (int v = 0; good && v < mesh->vertex_count; v++)
+        volume[v] = has_rim[v] ? volume[v] * sqrt(volume[v] / PI) / 6 : volume[v];
     for (int v = 0; good && v < mesh->vertex_count; v++)
         largest = volume[v] > volume[largest] ? v : largest;
     for (int t = 0; good && t < mesh->triangle_count; t++) {
@@ -150,6 +183,7 @@ int surface_drop_specks(TriangleMesh *mesh, double least_volume)
     free(part);
     free(volume);
     free(keep);
+    free(has_rim);
     return good ? dropped : -1;
 }
 

@@ -20,7 +20,7 @@ typedef struct SurfaceCensus {
 bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census);
 
 // Removes connected parts with an enclosed volume of less than `least_volume` [mm3], bubbles inside the lumen (which face inwards) among them, and
-// vertices without a triangle. The largest part stays in any case. Returns the number of parts removed, -1 where memory lacks (the mesh is as it was).
+// vertices without a triangle. Of a part with a rim, which encloses nothing, the ball with its area counts. The largest part stays in any case. Returns the number of parts removed, -1 where memory lacks (the mesh is as it was).
 // Such specks are where neighbouring local models disagree at the border of their power cells.
 int surface_drop_specks(TriangleMesh *mesh, double least_volume);
 

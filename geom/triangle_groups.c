@@ -2,86 +2,14 @@
 // instruction set, with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
 #include "geom/triangle_groups.h"
 
-#include "base/simd.h"
+#include "base/simd_kernel.h"
 
-#define ALWAYS static inline __attribute__((always_inline))
+#define KERNEL_TEXT "geom/triangle_groups_kernel.inc"
+#include "base/each_simd.inc"
+#define KERNEL_TABLE(set) {#set, distances_##set, bounds_##set}
+static const GroupKernels kernel_table[SIMD_COUNT] = SIMD_EACH(KERNEL_TABLE);
 
-ALWAYS bool distances(const TriangleGroup *restrict g, Vec3 x, double bound, double *restrict distance2)
-{
-    long long any = 0;
-    for (int i = 0; i < GROUP_TRIANGLES; i++) {
-        double x0 = x.x - g->origin[0][i], x1 = x.y - g->origin[1][i], x2 = x.z - g->origin[2][i];
-        double u = g->along[0][i] * x0 + g->along[1][i] * x1 + g->along[2][i] * x2;
-        double v = g->across[0][i] * x0 + g->across[1][i] * x1 + g->across[2][i] * x2;
-        double height = g->normal[0][i] * x0 + g->normal[1][i] * x1 + g->normal[2][i] * x2;
-        double length = g->length[i], p = g->top[0][i], q = g->top[1][i];
-        double low = u < 0 ? u : 0, high = u - length, beside = high > 0 ? high : low;
-        double least = beside * beside + v * v;
-        double b = p - length, w = u - length, t = (w * b + v * q) * g->inverse[0][i];
-        t = t > 0 ? t : 0;
-        t = t < 1 ? t : 1;
-        double r = w - t * b, s = v - t * q, d2 = r * r + s * s;
-        least = d2 < least ? d2 : least;
-        double within = b * v - q * w;   // > 0 on the inner side of the side from (length, 0) …
-        t = (u * p + v * q) * g->inverse[1][i];
-        t = t > 0 ? t : 0;
-        t = t < 1 ? t : 1;
-        r = u - t * p, s = v - t * q, d2 = r * r + s * s;
-        least = d2 < least ? d2 : least;
-        double other = q * u - p * v;    // … and of that from (0, 0)
-        within = other < within ? other : within;
-        within = v < within ? v : within;
-        least = within >= 0 ? 0 : least;
-        least += height * height;
-        distance2[i] = least;
-        any |= least <= bound ? 1 : 0;
-    }
-    return any != 0;
-}
-
-ALWAYS void bounds(const GroupSurroundings *restrict s, Vec3 x, float *restrict distance2)
-{
-    Vec3 q = vec3_sub(x, s->origin);
-    float px = (float)vec3_dot(q, s->axis[0]), py = (float)vec3_dot(q, s->axis[1]), pz = (float)vec3_dot(q, s->axis[2]);
-    float rounding = 1e-6f * (fabsf(px) + fabsf(py) + fabsf(pz));
-    for (int i = 0; i < GROUP_NEAR; i++) {
-        float a = s->low[0][i] - px, b = px - s->high[0][i], dx = a > b ? a : b;
-        float c = s->low[1][i] - py, d = py - s->high[1][i], dy = c > d ? c : d;
-        float e = s->low[2][i] - pz, f = pz - s->high[2][i], dz = e > f ? e : f;
-        dx = dx > 0 ? dx : 0;
-        dy = dy > 0 ? dy : 0;
-        dz = dz > 0 ? dz : 0;
-        float height = s->facing[0][i] * px + s->facing[1][i] * py + s->facing[2][i] * pz, over = height - s->facing_high[i];
-        float under = s->facing_low[i] - height, slab = (over > under ? over : under) - rounding, box = (dx * dx + dy * dy + dz * dz) * (1 - 1e-6f);
-        slab = slab > 0 ? slab : 0;
-        slab *= slab;
-        distance2[i] = slab > box ? slab : box;
-    }
-}
-
-#define KERNELS(isa, ...) \
-    __VA_ARGS__ static bool distances_##isa(const TriangleGroup *g, Vec3 x, double least, double *distance2) { return distances(g, x, least, distance2); } \
-    __VA_ARGS__ static void bounds_##isa(const GroupSurroundings *s, Vec3 x, float *distance2) { bounds(s, x, distance2); } \
-    static const GroupKernels isa = {#isa, distances_##isa, bounds_##isa};
-
-KERNELS(baseline, )
-#if defined(__x86_64__) && defined(__GNUC__)
-KERNELS(avx2, __attribute__((target("avx2"))))
-KERNELS(avx512, __attribute__((target("avx512f,avx512dq,avx512vl"))))
-
-const GroupKernels *group_kernels(int isa)
-{
-    static const GroupKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
-    int wanted = isa > 0 ? isa - 1 : (int)simd_level(), widest = (int)simd_widest();
-    return of[wanted < widest ? wanted : widest];
-}
-#else
-const GroupKernels *group_kernels(int isa)
-{
-    (void)isa;
-    return &baseline;
-}
-#endif
+const GroupKernels *group_kernels(int isa) { return &kernel_table[simd_choose(isa)]; }
 
 // --- Order: halves by the longest side of the centroids' box, cut where whole groups end ---
 

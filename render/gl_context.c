@@ -7,6 +7,7 @@
 #include "render/message.h"
 #include "render/software_driver.h"
 
+#include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -18,6 +19,16 @@ struct GlContext {
     EGLContext previous_context;
     EGLSurface previous_draw, previous_read;
 };
+
+// epoxy opens these libraries at the first call and ends the process where one is missing.
+static bool has_libraries(char *message, size_t capacity)
+{
+    if (!dlopen("libEGL.so.1", RTLD_LAZY))
+        return message_fail(message, capacity, "EGL is missing (%s); install libegl1, libegl-mesa0 and libgl1-mesa-dri", dlerror());
+    if (!dlopen("libOpenGL.so.0", RTLD_LAZY) && !dlopen("libGL.so.1", RTLD_LAZY))
+        return message_fail(message, capacity, "OpenGL is missing (%s); install libopengl0 and libgl1-mesa-dri", dlerror());
+    return true;     // they stay open: epoxy uses them
+}
 
 static EGLDisplay open_display(char *message, size_t capacity)
 {
@@ -66,6 +77,10 @@ GlContext *gl_context_create(char *message, size_t capacity)
         return NULL;
     }
     software_driver_without_threads();
+    if (!has_libraries(message, capacity)) {
+        free(context);
+        return NULL;
+    }
     context->previous_display = eglGetCurrentDisplay();
     context->previous_context = eglGetCurrentContext();
     context->previous_draw = eglGetCurrentSurface(EGL_DRAW);

@@ -103,11 +103,6 @@ extern "C" void overlay_disc(Overlay *overlay, double x, double y, double radius
     overlay->list->AddCircleFilled(at(x, y), (float)radius, packed(color));
 }
 
-extern "C" void overlay_triangle(Overlay *overlay, double x0, double y0, double x1, double y1, double x2, double y2, Color color)
-{
-    overlay->list->AddTriangleFilled(at(x0, y0), at(x1, y1), at(x2, y2), packed(color));
-}
-
 extern "C" void overlay_text(Overlay *overlay, double x, double y, TextSize size, Color color, const char *text)
 {
     ImFont *font = overlay->font[size];

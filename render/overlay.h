@@ -26,7 +26,6 @@ void overlay_rectangle(Overlay *overlay, double x, double y, double width, doubl
 void overlay_fill(Overlay *overlay, double x, double y, double width, double height, Color color);
 void overlay_circle(Overlay *overlay, double x, double y, double radius, Color color, double thickness);
 void overlay_disc(Overlay *overlay, double x, double y, double radius, Color color);
-void overlay_triangle(Overlay *overlay, double x0, double y0, double x1, double y1, double x2, double y2, Color color);
 void overlay_text(Overlay *overlay, double x, double y, TextSize size, Color color, const char *text);   // x, y: upper left corner
 void overlay_text_size(Overlay *overlay, TextSize size, const char *text, double *width, double *height);
 // A GL texture; `is_bottom_up`: its first row is the lowest.

@@ -29,12 +29,6 @@ const char page_style[] =
     "@media print{:root{--paper:#fff;--ink:#000;--muted:#444;--rule:#bbb;--panel:#fff;--o1:#0b5fa5;--o2:#a8480a;--o3:#00725a;--o4:#8a2d73;--o5:#6b5a00;--o6:#4a4f57;"
     "--bad:#b3001b;--wide:#8a5a00;--sac:#7a2ba0}body{max-width:none;padding:0;font-size:11pt}figure,tr,svg{break-inside:avoid}h2{break-after:avoid}}\n";
 
-double page_tick_step(double range, int most)
-{
-    double step = pow(10, floor(log10(range / most)));
-    return range / step <= most ? step : range / (2 * step) <= most ? 2 * step : range / (5 * step) <= most ? 5 * step : 10 * step;
-}
-
 // The length of the UTF-8 character at s, 0 if there is none that HTML may hold.
 static int character_length(const unsigned char *s)
 {

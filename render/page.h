@@ -5,8 +5,6 @@
 #include <stdio.h>
 
 extern const char page_style[];                                // of every page: light, dark and paper
-// A round step (1, 2, 5 times a power of ten) so that at most `most` fit into `range`.
-double page_tick_step(double range, int most);
 // Text as HTML: markup escaped, bytes that are not UTF-8 and control characters replaced.
 void page_text(FILE *out, const char *text);
 

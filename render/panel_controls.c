@@ -10,7 +10,7 @@ static const float pulse_rate[] = {7.5f, 10, 15, 30};
 // Row by row; the X-ray and C-arm tabs put their sliders between (draw_tab).
 enum { TAB_TOOL, TAB_XRAY, TAB_C_ARM, TAB_VIEWS, TAB_SESSION };
 static const char *const tab_name[PANEL_TABS] = {"Tool", "X-ray", "C-arm", "Views", "Session"};
-const ButtonRow panel_button_row[] = {
+static const ButtonRow panel_button_row[] = {
     {TAB_TOOL, 1, {ACTION_PUSH}, false},
     {TAB_TOOL, 2, {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT}, false},
     {TAB_TOOL, 1, {ACTION_PULL}, false},
@@ -44,7 +44,7 @@ const ButtonRow panel_button_row[] = {
     {TAB_SESSION, 2, {ACTION_HELP, ACTION_BRIEFING}, false},
     {TAB_SESSION, 2, {ACTION_HINTS, ACTION_QUIT}, false},
 };
-const int panel_button_row_count = sizeof panel_button_row / sizeof panel_button_row[0];
+static const int panel_button_row_count = sizeof panel_button_row / sizeof panel_button_row[0];
 
 static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
 {

@@ -64,8 +64,6 @@ typedef struct ButtonRow {
     ActionId action[BUTTONS_IN_ROW];
     bool is_of_several;            // not shown with one tool
 } ButtonRow;
-extern const ButtonRow panel_button_row[];
-extern const int panel_button_row_count;
 
 // panel_text.c
 extern const char *const panel_sign[MARK_BAD + 1];         // a tick, a triangle or a cross, before a marked text

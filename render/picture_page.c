@@ -2,6 +2,7 @@
 
 #include "render/message.h"
 #include "render/png_file.h"
+#include "render/tick_step.h"
 
 #include <epoxy/gl.h>
 #include <stdarg.h>
@@ -158,9 +159,22 @@ void picture_page_label(PicturePage *page, double x, double y, double anchor, Te
     picture_page_text_anchored(page, x, y, anchor, size, color, text);
 }
 
+// The round number (1, 2 or 5 times a power of ten) at or below x; x itself where it is not a positive number.
+static double round_down(double x)
+{
+    if (!(x > 0) || !isfinite(x))
+        return x;
+    double power = pow(10, floor(log10(x)));
+    const double step[4] = {10, 5, 2, 1};
+    for (int i = 0; i < 3; i++)
+        if (x >= step[i] * power * (1 - 1e-9))
+            return step[i] * power;
+    return power;
+}
+
 void picture_page_scale_bar(PicturePage *page, double x, double y, double longest, double mm_per_pixel, Color color)
 {
-    double length = picture_page_round_down(longest * mm_per_pixel);
+    double length = round_down(longest * mm_per_pixel);
     double pixels = length / mm_per_pixel, s = page->scale;
     overlay_fill(page->overlay, x, y - 4 * s, pixels, 4 * s, color);
     char text[64];
@@ -180,7 +194,7 @@ void picture_page_color_bar(PicturePage *page, double x, double y, double width,
     int parts = (int)width;
     for (int i = 0; i < parts; i++)
         overlay_fill(page->overlay, x + width * i / parts, top, width / parts, height, map(map_low + (1 - map_low) * (i + 0.5) / parts));
-    double step = picture_page_tick_step(low, high, 5);
+    double step = tick_step(high - low, 5);
     for (double first = ceil(low / step - 1e-9), k = first; k * step <= high * (1 + 1e-9) + 1e-12; k++) {
         char text[32];
         picture_page_format_tick(text, sizeof text, k * step, step);
@@ -193,18 +207,6 @@ void picture_page_color_bar(PicturePage *page, double x, double y, double width,
     }
 }
 
-double picture_page_round_up(double x)
-{
-    if (!(x > 0) || !isfinite(x))
-        return x;
-    double power = pow(10, floor(log10(x)));
-    const double step[4] = {1, 2, 5, 10};
-    for (int i = 0; i < 4; i++)
-        if (x <= step[i] * power * (1 + 1e-9))
-            return step[i] * power;
-    return 10 * power;
-}
-
 double picture_page_scale_end(double x)
 {
     if (!(x > 0) || !isfinite(x))
@@ -215,24 +217,6 @@ double picture_page_scale_end(double x)
         if (x <= step[i] * power * (1 + 1e-9))
             return step[i] * power;
     return 10 * power;
-}
-
-double picture_page_round_down(double x)
-{
-    if (!(x > 0) || !isfinite(x))
-        return x;
-    double power = pow(10, floor(log10(x)));
-    const double step[4] = {10, 5, 2, 1};
-    for (int i = 0; i < 3; i++)
-        if (x >= step[i] * power * (1 - 1e-9))
-            return step[i] * power;
-    return power;
-}
-
-double picture_page_tick_step(double low, double high, int most)
-{
-    double span = high - low;
-    return span > 0 && isfinite(span) ? picture_page_round_up(span / most) : 1;
 }
 
 void picture_page_format_tick(char *text, size_t capacity, double value, double step)

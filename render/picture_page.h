@@ -62,13 +62,8 @@ bool picture_page_error_surface(PicturePage *page, const PictureOptions *options
 // The paper's Table 4 as a histogram: `count` values `error` [mm] in voxels, classes C1 to C4 with their borders and shares; ticks below the box.
 void picture_page_class_chart(PicturePage *page, double x, double y, double width, double height, int count, const double *error, double voxel);
 
-// The round number (1, 2 or 5 times a power of ten) at or above x, at or below x; x itself where it is not a positive number.
-double picture_page_round_up(double x);
-double picture_page_round_down(double x);
-// A finer one at or above x for the end of a scale: 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8.
+// A round number at or above x for the end of a scale: 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8.
 double picture_page_scale_end(double x);
-// Where ticks go: a step so that at most `most` fall into [low, high].
-double picture_page_tick_step(double low, double high, int most);
 void picture_page_format_tick(char *text, size_t capacity, double value, double step);
 
 #endif

@@ -2,6 +2,7 @@
 // that no spike is lost.
 #include "render/message.h"
 #include "render/picture_page.h"
+#include "render/tick_step.h"
 
 #include <stdlib.h>
 
@@ -115,7 +116,7 @@ static void draw_grid(PicturePage *page, const Chart *chart, bool is_last)
     double s = page->scale;
     overlay_fill(page->overlay, chart->x, chart->y, chart->width, chart->height, SHEET_PANEL);
     char text[48];
-    double step = picture_page_tick_step(chart->low, chart->high, chart->height > 150 * s ? 6 : 4);
+    double step = tick_step(chart->high - chart->low, chart->height > 150 * s ? 6 : 4);
     if (chart->logarithmic) {
         // whole decades, and 2 and 5 between them where there is room
         static const double part[3] = {1, 2, 5};
@@ -133,7 +134,7 @@ static void draw_grid(PicturePage *page, const Chart *chart, bool is_last)
         picture_page_format_tick(text, sizeof text, k * step, step);
         draw_level(page, chart, k * step, text, k == 0);
     }
-    step = picture_page_tick_step(chart->t0, chart->t1, 10);
+    step = tick_step(chart->t1 - chart->t0, 10);
     for (double k = ceil(chart->t0 / step - 1e-9); k * step <= chart->t1 + 1e-9 * step; k++) {
         double x = chart->x + chart->width * (k * step - chart->t0) / (chart->t1 - chart->t0);
         overlay_line(page->overlay, x, chart->y, x, chart->y + chart->height, SHEET_FAINT, s);

@@ -4,6 +4,7 @@
 // not. The images are darker than the lines drawn over them.
 #include "render/message.h"
 #include "render/picture_page.h"
+#include "render/tick_step.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -116,7 +117,7 @@ static void draw_axes(PicturePage *page, const Panel *panel)
         Vec3 step = way ? p->up : p->across;
         int pixels = way ? p->height : p->width;
         double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size,
-               tick = picture_page_tick_step(low, high, 6);
+               tick = tick_step(high - low, 6);
         for (double k = ceil(low / tick); k * tick <= high; k++) {
             char text[32];
             picture_page_format_tick(text, sizeof text, k * tick, tick);

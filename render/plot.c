@@ -1,5 +1,7 @@
 #include "render/plot.h"
 
+#include "render/tick_step.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -38,17 +40,6 @@ bool plot_range(const RunningPlot *plot, double *least, double *most)
         is_found = true;
     }
     return is_found;
-}
-
-double plot_tick_step(double span, int most_ticks)
-{
-    double power = pow(10, floor(log10(span / most_ticks)));
-    for (int i = 0; i < 3; i++) {
-        double step = power * (double[]){1, 2, 5}[i];
-        if (span / step <= most_ticks * (1 + 1e-9))
-            return step;
-    }
-    return 10 * power;
 }
 
 static void draw_ticks(Gui *gui, GuiRect at, double low, double high, double step, float label_right)
@@ -120,7 +111,7 @@ void plot_draw(const RunningPlot *plot, Gui *gui, const char *title, const char 
     low -= low < 0 ? margin : 0;
     high += high > 0 ? margin : 0;
     GuiRect at = {all.x, all.y + line + gap, all.width, all.height - line - gap};
-    double step = plot_tick_step(high - low, at.height > 4.5f * line ? 4 : 3);
+    double step = tick_step(high - low, at.height > 4.5f * line ? 4 : 3);
     // room for the numbers: the widest of the two ends
     float label = 0;
     for (int i = 0; i < 2; i++) {

@@ -21,8 +21,6 @@ void plot_clear(RunningPlot *plot);
 void plot_add(RunningPlot *plot, double time_s, double value);
 // Minimum and maximum shown; false without a sample.
 bool plot_range(const RunningPlot *plot, double *least, double *most);
-// A round number of ticks: the step (1, 2 or 5 times a power of ten) that puts at most `most_ticks` steps into `span` > 0.
-double plot_tick_step(double span, int most_ticks);
 // Title and newest value with unit above, ticks with numbers at the left, a line every 5 s. `least_span`: the axis shows at least 0 to this, so that
 // noise is not magnified. `height` of all.
 void plot_draw(const RunningPlot *plot, Gui *gui, const char *title, const char *unit, int decimals, double least_span, float height);

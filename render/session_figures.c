@@ -5,6 +5,7 @@
 #include "render/c_arm.h"
 #include "render/camera.h"
 #include "render/page.h"
+#include "render/tick_step.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +56,7 @@ static void draw_strip(FILE *out, const RecordedRun *run, const Strip *strip, in
         most = fmax(most, high[c]);
         columns = c + 1;
     }
-    double range = fmax(most - least, 1e-6), tick = page_tick_step(range, 4), floor_at = tick * floor(least / tick), scale;
+    double range = fmax(most - least, 1e-6), tick = tick_step(range, 4), floor_at = tick * floor(least / tick), scale;
     range = fmax(tick * ceil(most / tick) - floor_at, tick);
     scale = STRIP / range;
     fprintf(out, "<text x=\"%d\" y=\"%d\">%s</text>\n", STRIP_LEFT, top - 6, strip->name);
@@ -128,7 +129,7 @@ void session_time_figure(const SessionPage *page)
         draw_bars(out, run, &axis, "contrast", contrast_of, 1, bottom + 6 + BARS + 8);
     }
     draw_errors(page, &axis, foot + 4);
-    double tick = page_tick_step(axis.end_s, 10);
+    double tick = tick_step(axis.end_s, 10);
     for (int k = 0; k * tick <= axis.end_s * (1 + 1e-9); k++)
         fprintf(out, "<path class=\"axis\" d=\"M%.1f %d v4\"/><text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%d\">%g</text>\n",
                 at_time(&axis, k * tick), foot + 4, at_time(&axis, k * tick), foot + 19, k * tick);
@@ -352,7 +353,7 @@ void session_path_figure(const SessionPage *page)
     if (!run || run->frame_count < 1)
         return;
     RoadMap map = frame_path(page);
-    double bar = page_tick_step(VIEW_WIDTH / map.mm, 5), foot = map.height + 44, end_s = run->time_s[run->step_count - 1];
+    double bar = tick_step(VIEW_WIDTH / map.mm, 5), foot = map.height + 44, end_s = run->time_s[run->step_count - 1];
     fprintf(out,
             "<figure id=\"figure-path\"><svg role=\"img\" aria-labelledby=\"path-t path-d\" viewBox=\"0 0 %d %.0f\" width=\"%d\" height=\"%.0f\">\n"
             "<title id=\"path-t\">Path of the tip over the vessel</title><desc id=\"path-d\">The path of the tool's tip in %.1f s, seen in %s, over the "

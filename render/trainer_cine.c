@@ -69,7 +69,7 @@ bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *tol
     return true;
 }
 
-void trainer_cine_contrast(const TrainerCine *cine, const float *concentration, ViewsFrame *frame)
+static void trainer_cine_contrast(const TrainerCine *cine, const float *concentration, ViewsFrame *frame)
 {
     frame->contrast = cine->tree_nodes > 0 ? concentration : NULL;
     frame->filling = concentration ? concentration + cine->tree_nodes : NULL;

@@ -18,8 +18,6 @@ bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *pa
 void trainer_cine_close(TrainerCine *cine);
 // Record and replay as pressed; true if the picture jumps, so that the held one must be forgotten. `told` receives a message, "" if none.
 bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *told, size_t capacity);
-// Sets the frame's contrast from `concentration`, at the vessel's nodes, then at the tools' (sim/contrast_injection.h); NULL: none.
-void trainer_cine_contrast(const TrainerCine *cine, const float *concentration, ViewsFrame *frame);
 // During replay, replaces `frame`'s pose, controls, contrast and pulse by those of the loop's image; otherwise adds `frame` to the loop with this
 // concentration.
 void trainer_cine_frame(TrainerCine *cine, double passed_s, const float *concentration, ViewsFrame *frame);

@@ -3,6 +3,7 @@
 
 #include "base/heap.h"
 #include "render/page.h"
+#include "render/tick_step.h"
 
 #include <stdlib.h>
 
@@ -70,7 +71,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     FILE *out = report->out;
     const VesselTree *tree = report->tree;
     double width = p->scale * (p->high[p->across] - p->low[p->across]), height = p->scale * (p->high[p->up] - p->low[p->up]);
-    double bar = page_tick_step(width / p->scale, 4);
+    double bar = tick_step(width / p->scale, 4);
     double(*side)[2] = HEAP_ZEROED(2 * (size_t)tree->node_count, sizeof *side);
     fprintf(out,
             "<svg class=\"tree\" role=\"img\" aria-labelledby=\"tree%d-t tree%d-d\" viewBox=\"-12 -24 %.1f %.1f\" width=\"%.0f\" height=\"%.0f\">\n"
@@ -136,11 +137,11 @@ static double chart_y(const Chart *c, double y) { return c->top + c->height * (1
 
 static void draw_axes(FILE *out, const Chart *c, int ticks_x, int ticks_y, const char *x_name)
 {
-    double step = page_tick_step(c->x_high, ticks_x);
+    double step = tick_step(c->x_high, ticks_x);
     fprintf(out, "<path class=\"axis\" d=\"M%.1f %.1f v%.1f h%.1f\"/>\n", c->left, c->top, c->height, c->width);
     for (int k = 0; k * step <= c->x_high * (1 + 1e-9); k++)
         fprintf(out, "<text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%.1f\">%g</text>\n", chart_x(c, k * step), c->top + c->height + 14, k * step);
-    step = page_tick_step(c->y_high, ticks_y);
+    step = tick_step(c->y_high, ticks_y);
     for (int k = 0; k * step <= c->y_high * (1 + 1e-9); k++)
         fprintf(out, "<path class=\"grid\" d=\"M%.1f %.1f h%.1f\"/><text class=\"tick\" text-anchor=\"end\" x=\"%.1f\" y=\"%.1f\">%g</text>\n", c->left,
                 chart_y(c, k * step), c->width, c->left - 4, chart_y(c, k * step) + 4, k * step);

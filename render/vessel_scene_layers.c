@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const float vessel_scene_background[3] = {0.075f, 0.088f, 0.112f};
+static const float vessel_scene_background[3] = {0.075f, 0.088f, 0.112f};
 
 typedef struct WallBuffers {
     unsigned array, vertices, indices;

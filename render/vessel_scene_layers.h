@@ -34,6 +34,4 @@ void vessel_layers_show(const VesselLayers *layers, ViewPort port);
 // Binds front colour, front depth, back colour and back depth to texture units 0 to 3. Colours are premultiplied.
 void vessel_layers_bind(const VesselLayers *layers);
 
-extern const float vessel_scene_background[3];
-
 #endif

@@ -174,7 +174,7 @@ static void look_for_joysticks(Window *w)
     }
 }
 
-const WindowInput *window_poll(Window *w)
+static const WindowInput *window_poll(Window *w)
 {
     WindowInput *input = &w->input;
     input->event_count = input->events_lost = 0;
@@ -315,8 +315,6 @@ void window_set_full_screen(Window *w, bool is_full)
     glfwGetWindowSize(w->window, &w->width, &w->height);
     glfwSetWindowMonitor(w->window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
-
-void window_set_title(Window *w, const char *title) { glfwSetWindowTitle(w->window, title); }
 
 const char *window_renderer(const Window *w)
 {

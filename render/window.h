@@ -72,10 +72,8 @@ typedef struct Window Window;
 Window *window_create(const char *title, int width, int height, double hz, char *message, size_t capacity);
 void window_destroy(Window *window);   // signals and what was current are put back
 
-// Polls events and says what came. Valid until the next call.
-const WindowInput *window_poll(Window *window);
 // Sleeps until the next frame's deadline (absolute: a late frame does not shift later ones; whole periods are skipped if needed), then polls. False
-// if nothing should be drawn: iconified or of zero size.
+// if nothing should be drawn: iconified or of zero size. *input is valid until the next call.
 bool window_next_frame(Window *window, const WindowInput **input);
 void window_swap(Window *window);   // the first time it also shows the window, which is hidden until then
 int64_t window_frames_skipped(const Window *window);   // periods left out because a frame took longer
@@ -86,7 +84,6 @@ const char *window_gamepad_name(const Window *window, int index);   // also of o
 
 void window_set_full_screen(Window *window, bool is_full);
 bool window_is_full_screen(const Window *window);
-void window_set_title(Window *window, const char *title);
 const char *window_renderer(const Window *window);     // OpenGL's name of what draws
 
 #endif

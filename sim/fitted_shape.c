@@ -41,41 +41,24 @@ static bool cache_folder(char folder[CACHE_PATH])
     return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
 }
 
-// The key holds all that the fit depends on: the shape with its options, the fit's options, and the program or library itself, so that a
-// newer one never takes an older one's fit.
-static void cache_key(const Scene *scene, const LimFitOptions *options, char hex[65])
+// The key holds all that fit_shape() sees: the shape with its options, the kind of contact, and the program or library itself, whose defaults are the fit's options.
+// False where the program cannot be read.
+static bool cache_key(const Scene *scene, char hex[65])
 {
     bool local = contact_is_local(scene->contact);
     Sha256 sha;
-    char program[65] = SELDINGER_VERSION, path[CACHE_PATH];
-    if (process_code_file(path, sizeof path))
-        sha256_of_file(path, program);
-    double figures[] = {options->alpha,
-                        options->beta,
-                        options->s,
-                        options->iso_level,
-                        options->max_blobs,
-                        options->target_mm,
-                        options->topological_distance,
-                        options->max_loops,
-                        options->line_searches,
-                        options->voxel_mm,
-                        options->weigh_distance,
-                        options->project_points,
-                        options->sweep_all_blobs,
-                        options->give_up_splits,
-                        options->extend_inlet,
-                        options->guard_shape,
-                        options->max_points};
+    char program[65], path[CACHE_PATH];
+    if (!process_code_file(path, sizeof path) || !sha256_of_file(path, program))
+        return false;
     sha256_begin(&sha);
     sha256_add(&sha, program, strlen(program));
-    sha256_add(&sha, figures, sizeof figures);
     sha256_add(&sha, &local, sizeof local);
     sha256_add(&sha, scene->shape_name, strlen(scene->shape_name) + 1);
     for (int i = 0; i < scene->shape_option_count; i++)
         for (int j = 0; j < 2; j++)
             sha256_add(&sha, scene->shape_option[i][j], strlen(scene->shape_option[i][j]) + 1);
     sha256_end(&sha, hex);
+    return true;
 }
 
 VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const LimFitOptions *options, const Progress *progress, Faults *faults)
@@ -88,26 +71,25 @@ VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const Li
     return field_fit(sampled, &shared, progress, faults);
 }
 
-static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, const Progress *progress, Faults *faults)
+static VesselTree *fit_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults)
 {
+    LimFitOptions options = lim_fit_default_options();
+    // exact samples allow a tighter fit than an angiogram's
+    options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
+    options.threads = threads;
     VesselTree *sampled =
         shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
-    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, options, progress, faults) : NULL;
+    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &options, progress, faults) : NULL;
     vessel_tree_free(sampled);
     return model;
 }
 
 VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults)
 {
-    LimFitOptions options = lim_fit_default_options();
-    // exact samples allow a tighter fit than an angiogram's
-    options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
-    options.threads = threads;
     char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
     Faults *ignored = calloc(1, sizeof *ignored);
     VesselTree *model = NULL;
-    if (ignored && cache_folder(folder)) {
-        cache_key(scene, &options, hex);
+    if (ignored && cache_folder(folder) && cache_key(scene, hex)) {
         snprintf(path, sizeof path, "%.4000s/fit-%.32s.h5", folder, hex);
         if (access(path, R_OK) == 0)
             model = tree_file_load(path, NULL, ignored);
@@ -117,7 +99,7 @@ VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progre
         }
     }
     if (!model) {
-        model = fit_shape(scene, &options, progress, faults);
+        model = fit_shape(scene, threads, progress, faults);
         char source[sizeof scene->shape_name];
         strcpy(source, scene->shape_name);
         char created_by[] = "seldinger " SELDINGER_VERSION, parameters[] = "";

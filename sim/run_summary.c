@@ -51,13 +51,13 @@ static void add_times(cJSON *summary, const StepProfile *profile)
     }
 }
 
-static const char *const energy_name[] = {"hand", "load", "elastic", "kinetic", "friction", "damping", "numerical", "wall", "gained", "gained_most_in_a_step",
+static const char *const energy_name[] = {"hand", "load", "elastic", "kinetic", "friction", "damping", "numerical", "wall", "work", "gained", "gained_most_in_a_step",
                                           "gained_most_at_s"};
 
 static void add_energy(cJSON *summary, const EnergyBalance *e)
 {
     cJSON *energy = cJSON_AddObjectToObject(summary, "energy_mj");
-    double value[] = {e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->gained, e->gained_most, e->gained_at_s};
+    double value[] = {e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->work, e->gained, e->gained_most, e->gained_at_s};
     add_numbers(energy, (int)(sizeof value / sizeof *value), energy_name, value);
 }
 

@@ -146,7 +146,8 @@ static void balance_energy(Simulator *simulator)
     SEL_ASSERT(isfinite(e.elastic) && isfinite(e.kinetic), "a state has an energy");
     double elastic = e.elastic - simulator->before.elastic, kinetic = e.kinetic - simulator->before.kinetic;
     double numerical = e.hand + e.load - e.friction - e.damping - elastic - kinetic, contact = e.wall - e.friction;
-    double by_end = -numerical - e.wall, by_mean = by_end + 0.5 * (e.hand + contact - e.hand_start - e.contact_start), gained = fmin(by_end, by_mean);
+    double by_end = -numerical - e.wall, by_start = by_end + e.hand + contact - e.hand_start - e.contact_start, by_mean = 0.5 * (by_end + by_start);
+    double gained = fmin(by_end + fmin(0, e.wall), by_start);
     simulator->before = e;
     sum->hand += e.hand;
     sum->load += e.load;

@@ -52,13 +52,14 @@ typedef struct EnergyBalance {
     double numerical;                // the remainder: dissipated by implicit Euler, less what …
     double wall;                     // … the wall's pressure gave to points outside
     double work;                     // done by hand and loads, without sign
-    double gained;                   // sum of the unexplained gains of single steps, by the smaller of both counts below
+    // Sum of the gains of single steps that no force explains: more than hands, walls, friction and valves gave both by their forces at the step's end and by
+    // those at its start. In between a force's work lies between the two; a rigid wall gives where it pushes out and takes nothing.
+    double gained;
     double gained_most;              // in one step …
     double gained_at_s;              // … which ended then
-    // The same sum, with the work of hands, walls, friction and valves by the forces of each step's end alone, as implicit Euler has it, and by the
-    // mean of those at its start and end. The first counts a gain of -dF u / 2 when a force F falls in a step that moves by u. The second is then
-    // accurate to third order, but off by as much, either way, when the force jumps: a reversed hand, a tool that begins to touch. A force that is
-    // not the slope of the energy shows in both. In a step they differ by at most half of |dF| |u|.
+    // The same sum by the forces at each step's end alone, as implicit Euler has it, and by the mean of those at its start and end. The first counts a gain of
+    // -dF u / 2 when a force F falls in a step that moves by u. The second is then accurate to third order, but off by as much, either way, when the force
+    // jumps: a reversed hand, a tool that begins to touch.
     double gained_end, gained_mean;
 } EnergyBalance;
 // A gain of more than this share of the work needs an explanation.

@@ -1,15 +1,14 @@
 // A chain of beam elements into the blocks of its linear system, LANES elements at a time: lanes compute element by element what
 // beam_equations.h says, then the tile is transposed into blocks. Compiled once per instruction set (beam_chain.inc).
-#include "base/simd.h"
+#include "base/assert.h"
+#include "base/simd_kernel.h"
 #include "solver/beam_equations.h"
 
 #include <string.h>
 
 #if defined(__GNUC__) && !defined(__clang__)
-#define VECTOR_LOOP _Pragma("GCC ivdep")
 #define UNROLL_ROWS _Pragma("GCC unroll 9")
 #else
-#define VECTOR_LOOP
 #define UNROLL_ROWS
 #endif
 
@@ -207,19 +206,22 @@ INLINE void leave_to_next(Tile *t, int lanes)
 }
 
 #define KERNEL_TEXT "solver/beam_chain.inc"
-#include "solver/each_isa.inc"
+#include "base/each_simd.inc"
 
-static void (*const assemble_on[SIMD_COUNT])(const BeamChain *, int, int, double, double, BlockChain *, double *) = ON(assemble);
+static void (*const assemble_on[SIMD_COUNT])(const BeamChain *, int, int, double, double, BlockChain *, double *) = SIMD_FORMS(assemble);
 
 void beam_chain_assemble(const BeamChain *beam, int first, int last, double scale, double rate, BlockChain *chain, double *b)
 {
+    SEL_ASSERT(first >= 0 && first <= last && last < chain->count && chain->size == 6, "elements are between nodes of the chain, of six unknowns each");
+    SEL_ASSERT(scale > 0 && rate >= 0, "stiffness and inertia count");
     assemble_on[simd_level()](beam, first, last, scale, rate, chain, b);
 }
 
-static void (*const damping_on[SIMD_COUNT])(const BeamChain *, const BeamPose *, int, double, double (*)[LANES]) = ON(damping);
+static void (*const damping_on[SIMD_COUNT])(const BeamChain *, const BeamPose *, int, double, double (*)[LANES]) = SIMD_FORMS(damping);
 
 void beam_chain_damp(const BeamChain *beam, const BeamPose *start, int first, int last, double rate, double *b)
 {
+    SEL_ASSERT(first >= 0 && first <= last && rate >= 0, "damping takes energy from some elements of the chain");
     _Alignas(64) double force[9][LANES];
     memset(b + 6 * (size_t)first, 0, 6 * (size_t)(last + 1 - first) * sizeof *b);
     for (int base = first; base < last; base += LANES) {

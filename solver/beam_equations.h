@@ -27,13 +27,12 @@
 #ifndef SELDINGER_SOLVER_BEAM_EQUATIONS_H
 #define SELDINGER_SOLVER_BEAM_EQUATIONS_H
 
+#include "base/simd_kernel.h"
 #include "solver/beam.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
-#define INLINE static inline __attribute__((always_inline))
 #define UNROLL _Pragma("GCC unroll 3")
 #else
-#define INLINE static inline
 #define UNROLL
 #endif
 

@@ -27,6 +27,8 @@
 // Left out: angle with length (torques), borders' second order, negative parts. Axial and torsion likewise: (dlen - dl - T df)^2, f = integral of dS / EA.
 #include "solver/coaxial.h"
 
+#include "base/assert.h"
+
 #include "base/same_math.h"
 #include "solver/beam_equations.h"
 
@@ -152,6 +154,7 @@ static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
 
 CoaxialSprings coaxial_springs(const CoaxialSpan *span)
 {
+    SEL_ASSERT(!span->has_tip, "the tool goes through the whole element");
     CoaxialRest rest;
     rest.strained_length[0] = fmax(span->s2 - span->s1, LENGTH_MIN);
     strain(span, 0, &rest);
@@ -335,6 +338,7 @@ static void bend_with_carrier(CoaxialRest *rest, int k)
 
 void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
 {
+    SEL_ASSERT(count > 0 && count <= COAXIAL_TOOLS_MAX && !span[0].has_tip, "an element has tools, the first of which carries it from end to end");
     memset(rest, 0, offsetof(CoaxialRest, piece));
     rest->count = count;
     rest->length = fmax(span[0].s2 - span[0].s1, LENGTH_MIN);
@@ -456,6 +460,8 @@ static double energy_slope(const Bent *b, const CoaxialSlope *s)
 
 void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
 {
+    SEL_ASSERT(in->count > 0 && in->count <= COAXIAL_TOOLS_MAX, "an element has tools");
+    SEL_ASSERT(quat_is_unit(in->q1) && quat_is_unit(in->q2), "frames are unit quaternions");
     CoaxialRest *rest = &out->rest;
     int count = in->count;
     bool tips = has_tips(in);
@@ -780,6 +786,7 @@ static void settle_columns(const CoaxialInput *in, CoaxialTangent *tangent)
 
 void coaxial_tangent(const CoaxialInput *in, const CoaxialOutput *out, double scale, CoaxialTangent *tangent)
 {
+    SEL_ASSERT(scale > 0 && out->rest.count == in->count, "the element was computed, and its stiffness counts");
     const CoaxialRest *rest = &out->rest;
     int count = in->count;
     Work w;

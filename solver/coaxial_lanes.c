@@ -2,14 +2,13 @@
 //   F11 = F22 = 1 / (3 B) + 1 / S,  F12 = -1 / (6 B) + 1 / S,  their slopes with l_k:  b_k / (B^2 l_k) (1/3 or -1/6) - kappa G A_k / S^2
 #include "solver/coaxial_lanes.h"
 
-#include "base/simd.h"
+#include "base/assert.h"
+#include "base/simd_kernel.h"
 #include "solver/beam_equations.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
-#define VECTOR_LOOP _Pragma("GCC ivdep")
 #define UNROLL_ALL _Pragma("GCC unroll 12")
 #else
-#define VECTOR_LOOP
 #define UNROLL_ALL
 #endif
 
@@ -161,11 +160,12 @@ INLINE void find_lane(CoaxialTile *t, int l, const int count, double scale)
 }
 
 #define KERNEL_TEXT "solver/coaxial_lanes.inc"
-#include "solver/each_isa.inc"
+#include "base/each_simd.inc"
 
 void coaxial_tile_find(CoaxialTile *tile, double scale)
 {
-    static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {ON(find_1), ON(find_2), ON(find_3), ON(find_4)};
+    SEL_ASSERT(tile->lanes > 0 && tile->lanes <= LANES && tile->count > 0 && tile->count <= COAXIAL_TOOLS_MAX, "a tile holds elements of some tools");
+    static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {SIMD_FORMS(find_1), SIMD_FORMS(find_2), SIMD_FORMS(find_3), SIMD_FORMS(find_4)};
     // lanes without an element compute the first one's
     for (int l = tile->lanes; l < LANES; l++)
         for (double(*row)[LANES] = tile->x1; row < tile->k11; row++)
@@ -183,6 +183,8 @@ static const CoaxialSection *only_section(const CoaxialTool *tool, double from, 
 
 bool coaxial_tile_take(CoaxialTile *tile, const CoaxialInput *in)
 {
+    SEL_ASSERT(tile->lanes < LANES, "the tile has a lane for another element");
+    SEL_ASSERT(in->count > 0 && in->count <= COAXIAL_TOOLS_MAX && (tile->lanes == 0 || in->count == tile->count), "elements of a tile have as many tools");
     const CoaxialSection *section[COAXIAL_TOOLS_MAX];
     for (int k = 0; k < in->count; k++) {
         const CoaxialSpan *p = &in->span[k];

@@ -124,7 +124,6 @@ void contact_add_curvature(const ContactSet *set, BlockChain *chain, double *b)
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
         SEL_REQUIRE(p->node >= 0 && p->node < chain->count, "a contact is at a node of the chain");
-        SEL_ASSERT(p->xi >= 0 && p->xi < 1, "a contact lies at its node or before the next");
         SEL_ASSERT(p->friction >= 0 && p->roll >= 0, "friction and roll are no less than 0");
         double force = vec3_dot(p->force, p->normal);
         if (!(force > 0))

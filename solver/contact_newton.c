@@ -68,6 +68,7 @@ static void choose_active(const ContactSolver *s, bool *active)
     int i = 0;
     while (i < count) {
         int at = wall[i];
+        SEL_ASSERT(at >= 0 && at < s->banded && !s->row[at].far && !s->row[at].slide, "walls are listed without pairs and slides");
         const ContactRow *c = &s->row[at];
         double v = normal_violation(c, s->motion[at]);
         if (s->law[at].state != OPEN || !(v < 0)) {
@@ -217,6 +218,7 @@ static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double 
 // The matrix += J^T C J with J = (w I, R) for each node, R = -[arm]x.
 static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 {
+    SEL_ASSERT(c->node >= 0 && c->node + c->nodes <= s->matrix.count, "a contact is at nodes of the matrix");
     Vec3 r[2];
     const double *w = c->weight;
     const int n = c->stride;
@@ -235,6 +237,7 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 // P (n + mu p) n^T is P n n^T, and the elimination, which does not look for pivots, finds large positive ones.
 static void straighten(const ContactRow *c, ContactLaw *law, int e, ContactSolver *s)
 {
+    SEL_ASSERT(!c->far && !c->slide && e < c->nodes, "rows of contacts with the wall are straightened, not those of pairs or slides");
     const int n = c->stride;
     double *v = law->lean[e], w = c->weight[e];
     law->leans[e] = c->mask[e] == 63 && !(w < 0.05);
@@ -278,6 +281,7 @@ static void solve_straightened(const ContactSolver *s, const BlockFactor *factor
 // The blocks of a contact's rows as the chain has them.
 static void restore(ContactSolver *s, const BlockChain *chain, const ContactRow *c)
 {
+    SEL_ASSERT(c->node >= 0 && c->node + c->nodes <= chain->count, "a contact is at nodes of the chain");
     const size_t block = (size_t)(c->stride * c->stride), bytes = block * sizeof(double), last = (size_t)(c->node + c->nodes - 1);
     for (size_t i = (size_t)c->node; i <= last; i++)
         memcpy(s->matrix.diag + block * i, chain->diag + block * i, bytes);
@@ -386,6 +390,7 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
 // Part t of it. False where the result is not finite.
 static bool take_step(ContactSolver *s, int unknowns, int count, double t, double *u)
 {
+    SEL_ASSERT(t > 0 && t <= 1, "some part of the step is taken");
     double sum = 0;
     for (int k = 0; k < unknowns; k++) {
         u[k] += t * s->delta[k];
@@ -439,6 +444,7 @@ void contact_cut(ContactSolver *s, int count, ContactReport *report)
 
 bool contact_newton_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
 {
+    SEL_ASSERT(change != s->rhs && u != s->delta, "what the solve overwrites is not what it was given");
     int unknowns = chain->size * chain->count;
     memcpy(s->rhs, change, (size_t)unknowns * sizeof *s->rhs);
     bool finite = newton_step(s, chain, count, true, false) && take_step(s, unknowns, count, 1, u);
@@ -449,6 +455,8 @@ bool contact_newton_again(ContactSolver *s, const BlockChain *chain, const doubl
 ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                              const ContactOptions *options, double *u)
 {
+    SEL_ASSERT(chain->count <= s->node_count && chain->size == s->matrix.size, "the solver was made for such a chain");
+    SEL_ASSERT(b != s->rhs && u != s->best_u, "what the solve overwrites is not what it was given");
     ContactReport report = {0};
     s->matrix.count = chain->count;
     int unknowns = chain->size * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;

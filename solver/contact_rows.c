@@ -6,6 +6,7 @@ static Sym3 block_at(const double *d, int n) { return (Sym3){d[0], d[n], d[2 * n
 // The stiffness that a contact sees: its node's own, or of two nodes and their turns in series, each with its share.
 static void own_stiffness(const BlockChain *chain, ContactRow *c)
 {
+    SEL_ASSERT(c->node >= 0 && c->node + c->nodes <= chain->count, "a contact is at nodes of the chain");
     double kn = 0, kt = 0, yields = 0, give_n = 0, give_t = 0;
     Vec3 n = c->normal;
     for (int e = 0; e < c->nodes; e++) {
@@ -29,6 +30,8 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
 // The mean over the directions in which it can move, as along a wall.
 static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
 {
+    SEL_ASSERT(c->node >= 0 && c->node < chain->count && c->slide + 1 < chain->size, "a slide has two unknowns of a node of the chain");
+    SEL_ASSERT(give > 0, "a slide gives before it slips");
     const size_t n = (size_t)chain->size, at = (size_t)c->slide;
     const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
     c->mask[0] = (contact_is_free(chain, c->node, c->slide) ? 1u : 0) | (c->radius > 0 && contact_is_free(chain, c->node, c->slide + 1) ? 2u : 0);
@@ -75,6 +78,8 @@ static void insert(ContactRow *row, int k, const ContactRow *c)
 
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slides_apart, ContactRow *row, ContactRow *far)
 {
+    SEL_ASSERT(set->count >= 0 && set->slide_count >= 0 && set->pair_count >= 0, "a set holds contacts, slides and pairs, or none");
+    SEL_REQUIRE(set->pair_count == 0 || far, "there is room for the second ends of pairs");
     const Vec3 none = {0, 0, 0};
     int count = set->count, behind = set->count + set->pair_count;
     for (int i = 0; i < set->count; i++) {

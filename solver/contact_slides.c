@@ -27,6 +27,7 @@ static Vec3 force_at(const ContactRow *c, Vec3 d) { return contact_project(c, ve
 // C about motion e.
 static Mat3 resistance(const ContactRow *c, Vec3 e)
 {
+    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a slide that bears has a bound, and gives before it slips");
     Vec3 t = vec3_add_scaled(c->held, -c->spring, e), f0 = contact_project(c, c->force);
     double size = vec3_norm(t);
     if (size <= c->bound)
@@ -38,6 +39,7 @@ static Mat3 resistance(const ContactRow *c, Vec3 e)
 
 static double *slide_block(const BlockChain *chain, const ContactRow *c)
 {
+    SEL_ASSERT(c->slide >= 6 && c->slide + 1 < chain->size, "a slide's unknowns stand behind the first six");
     const size_t n = (size_t)chain->size;
     return chain->diag + n * n * (size_t)c->node + (n + 1) * (size_t)c->slide;
 }
@@ -56,6 +58,7 @@ static void keep_own(ContactSolver *s, const BlockChain *chain, int from, int to
 // The laws about each slide's motion: into the chain's diagonal, and their forces on what does not move into the right-hand side.
 static void write_laws(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to)
 {
+    SEL_ASSERT(b != s->side, "the right-hand side without slides is kept: each round begins with it");
     const int n = chain->size;
     memcpy(s->side, b, (size_t)(chain->count * n) * sizeof *b);
     for (int i = from; i < to; i++) {
@@ -105,10 +108,13 @@ static bool comes_before(const ContactRow *a, const ContactRow *b)
 // The walls' contacts and the pairs [0, to), those that wait behind the others, both in the order of the chain; they were so up to `before`. Returns how many do not wait.
 static int put_in_order(ContactSolver *s, int before, int to)
 {
+    SEL_ASSERT(before >= 0 && before <= to, "rows that were in order stand before the others");
     ContactRow *row = s->row;
     int a = 0, b = before, count = 0, waiting = 0;
-    for (int i = 0; i < to; i++)
+    for (int i = 0; i < to; i++) {
         s->spare[i] = b == to || (a < before && comes_before(&row[a], &row[b])) ? row[a++] : row[b++];
+        SEL_ASSERT(i == 0 || !comes_before(&s->spare[i], &s->spare[i - 1]), "both parts were in the order of the chain");
+    }
     for (int i = 0; i < to; i++)
         count += !s->spare[i].waits;
     s->wall_count = s->banded = 0;
@@ -209,6 +215,7 @@ static void add_missing(ContactSolver *s, const BlockChain *chain, int from, int
 // Forces of an iterate and slides' motion, aside, or back again.
 static void keep_forces(ContactSolver *s, int walls, int from, int to, bool back)
 {
+    SEL_ASSERT(walls <= from && from <= to, "slides stand behind the contacts with walls");
     for (int i = 0; i < to; i = i + 1 == walls ? from : i + 1) {
         *(back ? &s->row[i].force : &s->best[i]) = back ? s->best[i] : s->row[i].force;
         if (i >= from)
@@ -242,6 +249,7 @@ static Errors refine(ContactSolver *s, const BlockChain *chain, int walls, int f
 
 ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
 {
+    SEL_ASSERT(from >= 0 && from < to, "there are slides, behind the contacts with walls");
     ContactReport report = {0};
     keep_own(s, chain, from, to, false);
     ContactOptions round = *options;

@@ -10,10 +10,12 @@ static const double FULL_SHARE = 1.25;
 bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
                             ContactReport *report)
 {
+    SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs stand behind all other rows");
     bool *keep = block_condenser_keep(s->condenser);
     int kept = 0;
     for (int i = 0; i < count; i++)
         for (int e = 0; e < s->row[i].nodes; e++) {
+            SEL_ASSERT(s->row[i].chain_node + e < chain->count, "a contact is at nodes of the chain");
             bool *flag = &keep[s->row[i].chain_node + e];
             kept += !*flag;
             *flag = true;
@@ -31,8 +33,10 @@ bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *
     const BlockChain *small = block_condense(s->condenser, chain, b);
     if (!small || !(s->is_positive || block_chain_factor(small, s->factor)))
         return false;
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
+        SEL_ASSERT(s->row[i].nodes == 1 || s->row[i].node + 1 == block_condenser_place(s->condenser, s->row[i].chain_node + 1), "neighbours are neighbours in the condensed chain too");
+    }
     for (int i = s->banded; i < count; i++)
         s->row[i].far->node = block_condenser_place(s->condenser, s->row[i].far->chain_node);
     // an iteration costs what is left of the chain: up to twice as many are in the same bound
@@ -64,6 +68,7 @@ bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, i
 
 bool contact_walls_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
 {
+    SEL_ASSERT(change != s->best_u && u != s->best_u, "the kept iterate is not in use between solves");
     double *more = s->best_u;    // not in use between solves
     if (!s->small && count > 0)
         return false;

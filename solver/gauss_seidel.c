@@ -35,6 +35,7 @@ struct PointwiseWork {
 
 PointwiseWork *pointwise_work_create(int node_count, int size, int capacity)
 {
+    SEL_ASSERT(node_count > 0 && block_size_is_known(size) && capacity >= 0, "there is a chain of a size that the solver knows");
     PointwiseWork *w = calloc(1, sizeof *w);
     if (!w)
         return NULL;
@@ -72,6 +73,7 @@ void pointwise_work_destroy(PointwiseWork *w)
 // inverse = d^-1 of a symmetric positive definite block; false where it is not.
 static bool invert(int n, const double *d, double *inverse)
 {
+    SEL_ASSERT(n <= BLOCK_LARGEST, "a block fits the arrays on the stack");
     double l[BLOCK_LARGEST][BLOCK_LARGEST], y[BLOCK_LARGEST][BLOCK_LARGEST];
     for (int j = 0; j < n; j++)
         for (int i = j; i < n; i++) {
@@ -102,6 +104,7 @@ static bool invert(int n, const double *d, double *inverse)
 // y += s a x, or y += s a^T x
 static void add_product(int n, const double *a, double s, const double *x, double *y)
 {
+    SEL_ASSERT(n >= 2 && n % 2 == 0, "a block has an even number of columns: they are added in pairs");
     for (int i = 0; i < n; i++) {
         const double *r = a + n * i;
         double sum = r[0] * x[0] + r[1] * x[1];
@@ -121,6 +124,7 @@ static void add_product_transposed(int n, const double *a, double s, const doubl
 // Eliminations from both ends: E, F, S and D^-1.
 static bool prepare(PointwiseWork *w, const BlockChain *a)
 {
+    SEL_ASSERT(a->count > 0 && a->size == w->size, "the work space was made for blocks of this size");
     const int m = a->count, n = w->size, block = n * n;
     const size_t bytes = (size_t)block * sizeof(double);
     double d[BLOCK_LARGEST * BLOCK_LARGEST], inverse[BLOCK_LARGEST * BLOCK_LARGEST];
@@ -167,6 +171,7 @@ static bool prepare(PointwiseWork *w, const BlockChain *a)
 // Motion of a contact's nodes (2 n, the second half unused at a node) under loads g on them.
 static void respond(const PointwiseWork *w, const ContactRow *c, const double *g, double *v)
 {
+    SEL_ASSERT(!c->far, "a pair of the tool with itself is not between neighbours, and is solved apart");
     const int n = w->size;
     const size_t i = (size_t)c->node, block = (size_t)(n * n), bytes = (size_t)n * sizeof *v;
     memset(v, 0, 2 * bytes);
@@ -184,6 +189,7 @@ static void respond(const PointwiseWork *w, const ContactRow *c, const double *g
 
 static void prepare_local(const PointwiseWork *w, const ContactRow *c, Local *l)
 {
+    SEL_ASSERT(fabs(vec3_norm2(c->normal) - 1) < 1e-6, "a contact's normal is a unit vector");
     l->g = 0;
     l->axis[0] = c->normal;
     l->axis[1] = c->slide ? vec3(1, 0, 0) : vec3_normal_to(c->normal);
@@ -214,6 +220,7 @@ static double slide_excess(const double *f, double mu) { return sqrt(f[1] * f[1]
 // Signorini and Coulomb of one contact: d + w f, d[0] with the gap.
 static void solve_local(const Mat3 *w, const double *d, double mu, double *start, double *f)
 {
+    SEL_ASSERT(w->m[0][0] > 0, "a contact that is not inert yields along its normal");
     f[0] = f[1] = f[2] = 0;
     if (d[0] >= 0)
         return;
@@ -279,6 +286,7 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
 // What a slide gives is a spring in series.
 static void solve_slide(const ContactRow *c, const Mat3 *own, const double *motion, double *f)
 {
+    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a slide that bears has a bound, and gives before it slips");
     const double bound = c->bound, soft = 1 / c->spring;
     const double d[3] = {0, motion[1] - soft * c->held.x, motion[2] - soft * c->held.y};
     Mat3 spring = *own, *w = &spring;
@@ -323,6 +331,7 @@ static void place_motion(const PointwiseWork *w, const ContactRow *first, double
 // The contacts [from, to) at one place, in turn; their nodes' motion is found once and kept up to date.
 static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reverse)
 {
+    SEL_ASSERT(from >= 0 && from < to, "a place has at least one contact");
     double v[2 * BLOCK_LARGEST];
     place_motion(w, &row[from], v);
     for (int n = 0; n < to - from; n++) {

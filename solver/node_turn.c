@@ -2,16 +2,7 @@
 #include "solver/node_turn.h"
 
 #include "base/assert.h"
-
-#include "base/simd.h"
-
-#if defined(__GNUC__) && !defined(__clang__)
-#define INLINE static inline __attribute__((always_inline))
-#define VECTOR_LOOP _Pragma("GCC ivdep")
-#else
-#define INLINE static inline
-#define VECTOR_LOOP
-#endif
+#include "base/simd_kernel.h"
 
 INLINE Quat turned(double rx, double ry, double rz, Quat q)
 {
@@ -31,22 +22,9 @@ INLINE Quat turned(double rx, double ry, double rz, Quat q)
     return (Quat){p.w * scale, p.x * scale, p.y * scale, p.z * scale};
 }
 
-#define KERNEL(name, target)                                                                                                                         \
-    target static void name(int count, const double *rx, const double *ry, const double *rz, Quat *q)                                                \
-    {                                                                                                                                                \
-        VECTOR_LOOP                                                                                                                                  \
-        for (int i = 0; i < count; i++)                                                                                                              \
-            q[i] = turned(rx[i], ry[i], rz[i], q[i]);                                                                                                \
-    }
-
-KERNEL(turn_sse2, )
-#if defined(__GNUC__) && defined(__x86_64__)
-KERNEL(turn_avx2, __attribute__((target("avx2"))))
-KERNEL(turn_avx512, __attribute__((target("avx512f,avx512dq,avx512vl"))))
-static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, const double *, Quat *) = {turn_sse2, turn_avx2, turn_avx512};
-#else
-static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, const double *, Quat *) = {turn_sse2, turn_sse2, turn_sse2};
-#endif
+#define KERNEL_TEXT "solver/node_turn_kernel.inc"
+#include "base/each_simd.inc"
+static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, const double *, Quat *) = SIMD_FORMS(turn);
 
 void node_turn(int count, const double *rx, const double *ry, const double *rz, Quat *q)
 {

@@ -255,6 +255,7 @@ static void build_tree(SelfContact *c)
         c->sphere[k] = (Sphere){middle, sqrt(far) + more};
     }
     for (; count > 0; count = (count + 1) / 2) {
+        SEL_REQUIRE(c->levels < LEVELS, "each level of the tree has half as many spheres");
         int below = c->levels > 0 ? c->start[c->levels - 1] : 0;
         for (int k = 0; k < count && c->levels > 0; k++)
             c->sphere[at + k] = 2 * k + 1 < c->size[c->levels - 1] ? around(c->sphere[below + 2 * k], c->sphere[below + 2 * k + 1]) : c->sphere[below + 2 * k];
@@ -293,6 +294,7 @@ static void nearest_on_chords(Vec3 p, Vec3 d, Vec3 q, Vec3 e, double xi[2])
 
 static SlotPlace place_on(const SelfContact *c, int e, double xi)
 {
+    SEL_ASSERT(e >= c->first && e < c->count, "the element is one of those outside the sheath");
     Slot slot = slot_shifted(&(Slot){.element = e}, c->length[e], xi);
     return slot_place(&slot, c->length[e], c->x[e], c->t[e], c->x[e + 1], c->t[e + 1]);
 }
@@ -307,6 +309,7 @@ static const Vec3 *lay_pieces(const Stepper *s, int e)
     Vec3 *point = c->point + point_at(s, e);
     int pieces = pieces_of(s, e);
     if (!c->laid[e]) {
+        SEL_REQUIRE(point_at(s, e) + pieces <= s->point_capacity, "there is room for the ends of all pieces");
         c->laid[e] = true;
         point[0] = c->x[e];
         for (int k = 1; k < pieces; k++)
@@ -319,6 +322,7 @@ static const Vec3 *lay_pieces(const Stepper *s, int e)
 // The nearest points of two pieces of cubics, from those of their chords: shares of the elements.
 static void nearest_on_pieces(const Stepper *s, const int e[2], const int piece[2], double xi[2], SlotPlace place[2])
 {
+    SEL_ASSERT(piece[0] >= 0 && piece[0] < pieces_of(s, e[0]) && piece[1] >= 0 && piece[1] < pieces_of(s, e[1]), "elements have these pieces");
     const SelfContact *c = s->self;
     const Vec3 *p = lay_pieces(s, e[0]) + piece[0], *q = lay_pieces(s, e[1]) + piece[1];
     nearest_on_chords(p[0], vec3_sub(p[1], p[0]), q[0], vec3_sub(q[1], q[0]), xi);
@@ -371,6 +375,7 @@ static ContactEnd end_of(const Stepper *s, int e, const SlotPlace *p)
 // [mm] between the surfaces, and all about the pair.
 static double measure_pair(const Stepper *s, const int element[2], const int piece[2], Near *n)
 {
+    SEL_ASSERT(element[0] + 1 < element[1], "neighbours along the tool are no pair: bending keeps them apart");
     const SelfContact *c = s->self;
     SlotPlace place[2];
     nearest_on_pieces(s, element, piece, n->xi, place);
@@ -415,12 +420,14 @@ static void look_at_pieces(Stepper *s, const int element[2], const int piece[2])
     }
     if (is_known(c, &n, &slot))
         return;
+    SEL_REQUIRE(c->near_count < NEAR_MAX, "a pair that finds no room is known");
     c->near[c->near_count++] = n;
     c->table[slot] = c->near_count;
 }
 
 static void look_at_elements(Stepper *s, int i, int j)
 {
+    SEL_ASSERT(i >= s->self->first && i < j && j < s->self->count, "two elements outside the sheath, in the order of the chain");
     SelfContact *c = s->self;
     double radii = c->radius[i] + c->radius[j];
     if (c->turned[j + 1] - c->turned[i] <= SAFE_TURN || c->along[j] - c->along[i + 1] < ARC * radii)
@@ -447,6 +454,7 @@ static void look_at_elements(Stepper *s, int i, int j)
 
 static void elements_of(const SelfContact *c, int level, int k, int *from, int *to)
 {
+    SEL_ASSERT(level >= 0 && level < c->levels && k >= 0 && k < c->size[level], "the sphere is one of the tree's");
     *from = c->first + ((LEAF * k) << level);
     *to = c->first + ((LEAF * (k + 1)) << level);
     if (*to > c->count)
@@ -545,6 +553,7 @@ static void hand_on_forces(SelfContact *c)
 
 static double friction_of(const Stepper *s, int e)
 {
+    SEL_ASSERT(e >= 0 && e + 1 < s->state.node_count, "the element is one of the chain's");
     bool distal = s->tool_count > 1 && s->carrier[e] != s->carrier[e + 1];
     double friction = s->wire.friction[distal ? e + 1 : e];
     return friction >= 0 ? friction : s->wall_friction;
@@ -681,6 +690,7 @@ void self_contact_keep_forces(Stepper *s)
     if (!c)
         return;
     c->kept_count = 0;
+    SEL_ASSERT(s->set.pair_count <= PAIRS_MAX, "there is room to keep the forces of all pairs");
     for (int k = 0; k < s->set.pair_count; k++) {
         const Near *n = &c->near[c->near_of[k]];
         if (vec3_norm2(s->set.pair[k].force) > 0)
@@ -743,6 +753,7 @@ void self_contact_restore(Stepper *s, const void *from)
         return;
     Saved saved;
     memcpy(&saved, from, sizeof saved);
+    SEL_REQUIRE(saved.kept_count >= 0 && saved.kept_count <= PAIRS_MAX, "a checkpoint keeps no more pairs than there is room for");
     c->clearance = saved.clearance;
     c->fastest = saved.fastest;
     c->kept_count = saved.kept_count;
@@ -753,6 +764,7 @@ int self_contact_numbers(const Stepper *s) { return s->self ? 5 * s->self->kept_
 
 double self_contact_number(const Stepper *s, int k)
 {
+    SEL_ASSERT(k >= 0 && k < self_contact_numbers(s), "a number of a pair that is kept");
     const Kept *kept = &s->self->kept[k / 5];
     const double number[5] = {kept->feature[0], kept->feature[1], kept->force.x, kept->force.y, kept->force.z};
     return number[k % 5];

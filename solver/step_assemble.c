@@ -47,6 +47,7 @@ static void add_vec(double *at, Vec3 v)
 // The elements between free nodes, their inertia and gravity.
 static void free_nodes(Stepper *s, double scale, double inertia)
 {
+    SEL_ASSERT(s->first_free >= 0 && s->first_free < s->state.node_count, "some node is outside the sheath");
     int first = s->first_free, count = s->state.node_count;
     size_t from = row_of(s, first), to = row_of(s, count);
     load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
@@ -65,6 +66,7 @@ static void free_nodes(Stepper *s, double scale, double inertia)
 // Axial and torsional chain behind the mouth; lateral rows are unit rows.
 static void sheath_nodes(Stepper *s, double scale, double inertia)
 {
+    SEL_ASSERT(s->chain.size == 6, "nodes of a single tool have six unknowns");
     const Wire *w = &s->wire;
     const double *done = s->linearised;
     for (int i = 0; i < s->first_free; i++) {
@@ -94,6 +96,7 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
 // Between the last held node and the first free one. Clamped at the mouth it turns little in a step: its damping is that of the displacement.
 static void mouth_element(Stepper *s, double scale)
 {
+    SEL_ASSERT(s->first_free > 0 && s->first_free < s->state.node_count, "an element goes through the mouth");
     int i = s->first_free - 1;
     double ahead = s->mouth_ahead - s->linearised[row_of(s, i)], column[12];
     SheathElement *e = &s->mouth_element;
@@ -140,6 +143,7 @@ Vec3 stepper_tip_curvature(const Stepper *s)
 
 bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time, Vec3 *force, Vec3 *moment)
 {
+    SEL_ASSERT(place->weight >= 0 && place->weight <= 1 && (end == 0 || end == 1), "a load is shared by two nodes");
     const WireLoad *load = &place->load;
     double weight = end ? place->weight : 1 - place->weight, part = weight * (load->ramp > time ? time / load->ramp : 1);
     if (weight == 0)
@@ -195,14 +199,17 @@ static void clear_held(Stepper *s)
 // Where the whole tool is held, what is past the mouth of its tip is not straightened: a constant force over this step's way.
 static void tip_at_mouth(Stepper *s)
 {
+    SEL_ASSERT(s->first_free > 1, "the whole tool is in the sheath, and it has an element");
     int last = s->first_free - 1;
     double before = vec3_dot(vec3_sub(s->start_position[last], s->mouth), s->axis[0]), after = before + s->mouth_ahead, way = after - before;
     double share = fabs(way) > 1e-9 ? (fmax(after, 0) - fmax(before, 0)) / way : before > 1e-6;
     s->b[row_of(s, last)] += share * stepper_tip_straightening(s);
 }
 
-void stepper_assemble(Stepper *s)
+void step_assemble(Stepper *s)
 {
+    SEL_ASSERT(s->dt > 0, "a step takes time");
+    SEL_ASSERT(s->first_free >= 0 && s->first_free <= s->chain.count, "the sheath holds nodes of the chain");
     double h = s->dt, scale = 1 + s->damping_stiffness / h, inertia = 1 / (h * h) + s->damping_mass / h;
     if (s->tool_count > 1) {
         tools_assemble(s, scale, inertia);

@@ -63,6 +63,12 @@ static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
         }
         tool[count++] = k;
     }
+    // tools that come out of the tip at node c and end before node c + 1 bend there with the one that goes on
+    for (int k = s->carrier[c] + 1; k < first; k++)
+        if (is_inside(s, c, k)) {
+            span[count] = (CoaxialSpan){.tool = &s->tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k), .has_tip = true};
+            tool[count++] = k;
+        }
     return count;
 }
 
@@ -82,20 +88,18 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
         total = vec3_add(total, rest[i]);
         bending += own[i];
     }
-    Vec3 curvature = vec3_scale(total, 1 / bending), sum = vec3(0, 0, 0);
-    double tension = 0;
+    Vec3 curvature = vec3_scale(total, 1 / bending);
     s->bent[c] = vec3_norm(curvature);
-    for (int k = 0; k < inner; k++) {
-        s->inner_moment[c * inner + k] = vec3(0, 0, 0);
-        s->inner_tension[c * inner + k] = 0;
-    }
-    for (int i = in->count - 1; i >= 0; i--) {
-        sum = vec3_add(sum, vec3_sub(vec3_scale(curvature, own[i]), rest[i]));
-        tension += out->tension[i];
-        for (int k = tool[i]; k > (i > 0 ? tool[i - 1] : 0) && k > 0; k--) {      // a tool that is not there has those inside it
-            s->inner_moment[c * inner + k - 1] = sum;
-            s->inner_tension[c * inner + k - 1] = tension;
-        }
+    for (int k = 1; k <= inner; k++) {
+        Vec3 *moment = &s->inner_moment[c * inner + k - 1];
+        double *tension = &s->inner_tension[c * inner + k - 1];
+        *moment = vec3(0, 0, 0);
+        *tension = 0;
+        for (int i = 0; i < in->count; i++)
+            if (tool[i] >= k) {
+                *moment = vec3_add(*moment, vec3_sub(vec3_scale(curvature, own[i]), rest[i]));
+                *tension += out->tension[i];
+            }
     }
 }
 
@@ -762,6 +766,15 @@ ToolNode tools_further(const Stepper *s, int c, double d)
     double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;      // input_at()
     node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(remainder(-turned, 2 * PI), 0, 0))));
     return node;
+}
+
+double tools_strained_length(const Stepper *s, int c)
+{
+    if (c + 1 < s->first_free)
+        return stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c);
+    CoaxialOutput out;
+    going_on(s, c, &out);
+    return tools_span_length(s, c) + out.tension[0] / out.rest.axial[0];
 }
 
 // --- all of it ---

@@ -17,8 +17,9 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (5 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 8 * (size_t)s->state.inner_count + 2) * m,
-                        sizeof *s->scratch);
+    size_t per_node = 6 * (size_t)s->chain.size + 9 + 8 * (size_t)s->state.inner_count;
+    size_t total = (BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + per_node * m;
+    s->scratch = calloc(total, sizeof *s->scratch);
     if (!s->scratch)
         return false;
     double *at = s->scratch;
@@ -48,6 +49,7 @@ static bool allocate_scratch(Stepper *s)
     s->inner_tension = take(&at, inner);
     s->middle = take(&at, m);
     s->bent = take(&at, m);
+    SEL_REQUIRE(at <= s->scratch + total, "the arrays of a step fit the memory that they share");
     return true;
 }
 
@@ -121,6 +123,7 @@ static bool allocate(Stepper *s)
     s->state.slide_velocity = s->state.angle + inner;
     s->state.slide_spin = s->state.slide_velocity + inner;
     s->state.slide_force = s->state.slide_spin + inner;
+    SEL_REQUIRE(s->state.slide_force + inner <= s->memory + s->memory_count, "the arrays of the state fit the memory that they share");
     s->linger = s->room + points;
     s->lack = s->linger + points;
     s->touch_next = s->lack + points;
@@ -140,6 +143,7 @@ static const double IMPERFECTION = 1e-12;    // [rad]
 
 static void make_imperfect(const Wire *wire, BeamRest *rest)
 {
+    SEL_ASSERT(wire->element_count > 0, "a wire has an element");
     int tip = wire->element_count - 1;
     if (rest->curvature[tip] > 0)
         return;
@@ -172,6 +176,7 @@ static bool place_rig(Stepper *s, const WireOptions *o)
         int node = 0;
         while (node + 2 < s->wire.node_count && s->wire.s[node + 1] <= o->load[i].s)
             node++;
+        SEL_ASSERT(node + 1 < s->wire.node_count, "a load lies on an element");
         double weight = fmin(1, fmax(0, (o->load[i].s - s->wire.s[node]) / s->wire.length[node]));
         if (weight < 1e-9)
             weight = 0;
@@ -279,6 +284,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     s->is_slender = o.follows_touch && stepper_is_slender(s);
     place_wire(s, &o.wire);
     s->first_free = stepper_count_held(s, 0);
+    SEL_ASSERT(s->first_free >= 0 && s->first_free <= s->state.node_count, "the sheath holds nodes of the chain");
     return s;
 }
 

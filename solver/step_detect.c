@@ -312,7 +312,7 @@ static void ask(Stepper *s, int point, int *count)
 static double unlike(const Sym3 *a, const Sym3 *b)
 {
     Sym3 d = {a->xx - b->xx, a->xy - b->xy, a->xz - b->xz, a->yy - b->yy, a->yz - b->yz, a->zz - b->zz};
-    return sqrt(d.xx * d.xx + d.yy * d.yy + d.zz * d.zz + 2 * (d.xy * d.xy + d.xz * d.xz + d.yz * d.yz));
+    return sqrt(sym3_norm2(&d));
 }
 
 // [mm] of travel that a slope and a bend take to use up what there is, at most GUARD_MAX.

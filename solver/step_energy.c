@@ -58,7 +58,7 @@ static Vec3 done_in_space(const Stepper *s, int node, int from)
     return node < s->first_free ? vec3_scale(s->axis[0], u[0]) : vec3(u[0], u[1], u[2]);
 }
 
-static double of_loads(const Stepper *s)
+double stepper_load_work(const Stepper *s)
 {
     double work = 0;
     for (int i = 0; i < s->state.node_count; i++)
@@ -91,7 +91,7 @@ StepEnergy stepper_energy(Stepper *s)
     if (s->has_failed)
         return e;
     e.hand = hands_work(s);
-    e.load = of_loads(s);
+    e.load = stepper_load_work(s);
     e.damping = of_mass_damping(s) + stepper_stiffness_damping(s);
     stepper_wall_work(s, &e.wall, &e.friction);
     e.friction += hands_valve_work(s);

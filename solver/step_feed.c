@@ -20,6 +20,7 @@ static Quat on_line(const Stepper *s, Quat q)
 // soft, the piece would spring.
 void stepper_hold(Stepper *s, int node)
 {
+    SEL_ASSERT(s->has_sheath && node >= 0 && node < s->state.node_count, "the sheath holds a node of the chain");
     WireState *w = &s->state;
     double along = stepper_sheath_coordinate(s, node);
     w->position[node] = vec3_add_scaled(s->mouth, along, s->axis[0]);
@@ -28,6 +29,7 @@ void stepper_hold(Stepper *s, int node)
 
 static Vec3 mouth_curvature(const Stepper *s, int node)
 {
+    SEL_ASSERT(node > 0 && node + 1 < s->state.node_count, "a node that is let go has an element on either side, or is the tip");
     const WireState *w = &s->state;
     const BeamRest *r = &s->beam.rest;
     SheathElement e;
@@ -114,9 +116,9 @@ void stepper_begin(Stepper *s)
     memcpy(s->start_angle, s->state.angle, inner);
     memset(s->linearised, 0, row_of(s, s->state.node_count) * sizeof *s->linearised);
     memset(s->seen, 0, row_of(s, s->state.node_count) * sizeof *s->seen);
-    s->is_iterate = s->overshoots = s->blocked = false;
-    s->hand_tries = s->looks = 0;
-    s->energy_before = -1;
+    s->is_iterate = s->overshoots = s->makes_energy = s->progress.is_blocked = false;
+    s->progress.hand_tries = s->progress.looks = 0;
+    s->knows_energy = false;
     s->mouth_ahead = s->command.advance;
     s->slides = stepper_slides(s);
     if (s->tool_count > 1)
@@ -131,8 +133,7 @@ static void feed(Stepper *s, unsigned released)
     s->wall_force_sum = s->report.wall_force_sum;
     s->report = (StepReport){0};
     s->has_failed = s->was_held = s->knows_motion = false;
-    s->linearisations = 0;
-    s->is_held_back = false;
+    s->progress = (StepProgress){0};
     if (!s->has_sheath)
         command = (StepCommand){0};
     double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
@@ -149,6 +150,7 @@ static void feed(Stepper *s, unsigned released)
     if (s->tool_count > 1)
         tools_feed(s);
     int held = stepper_count_held(s, command.advance);
+    SEL_ASSERT(held >= 0 && held <= s->state.node_count, "the sheath holds nodes of the chain");
     for (int i = s->first_free; i < held; i++) {
         stepper_hold(s, i);
         stepper_forget(s, i);

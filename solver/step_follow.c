@@ -10,6 +10,7 @@ static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displac
 // Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; halves at most, and
 // how often linear walls are moved before.
 static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
+static const double ENERGY_LEAST = 1e-9;         // [mJ] rounding
 enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
 static const double JAMMED = 0.002;              // share of its length by which a tool is squeezed that has a reason to be stuck
 static const double LOST = 0.1;                  // residual of a contact solve that says nothing
@@ -130,7 +131,7 @@ static void move(Stepper *s, double part)
 static double energy_bound(const Stepper *s)
 {
     const Wire *w = &s->wire;
-    double work = 0, bound = s->energy_before;
+    double work = 0, bound = s->elastic_before + stepper_kinetic_energy(s);
     for (int i = s->first_free; i < w->node_count; i++)
         work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[row_of(s, i)], s->u[row_of(s, i) + 1], s->u[row_of(s, i) + 2])));
     for (int k = 0; k < s->set.count; k++)
@@ -172,6 +173,29 @@ static double largest_part(const Stepper *s)
     return fmin(part, part_until(s->linearised[k], s->u[k], fabs(s->command.advance) + MOUTH_TRAVEL * s->wire.length[i]));
 }
 
+static double elastic_at_start(Stepper *s)
+{
+    if (!s->knows_energy) {           // of x_n, or of an iterate beside it
+        s->elastic_before = stepper_elastic_energy(s);
+        s->knows_energy = true;
+    }
+    return s->elastic_before;
+}
+
+double stepper_energy_made(Stepper *s)
+{
+    double before = elastic_at_start(s);
+    copy_iterate(s, false);
+    move(s, 1);
+    hands_report(s);
+    double grown = stepper_elastic_energy(s) - before, hand = hands_work(s), load = stepper_load_work(s), wall, friction;
+    stepper_wall_work(s, &wall, &friction);
+    friction += hands_valve_work(s);
+    copy_iterate(s, true);
+    double given = hand + load - friction + fmax(0, wall);     // a rigid wall takes nothing
+    return (grown - given) / (fabs(grown) + fabs(hand) + fabs(load) + fabs(friction) + ENERGY_LEAST);
+}
+
 // The share of the solution that was followed. A quiet step goes all the way, and so does a wire without walls but for TURN_MAX. Else only as far as
 // no node is driven through the wall and the wire is not left with energy that nobody gave it. Where the wall is not where its linear form has it,
 // the form is first moved there and the contacts solved again (a second-order correction); then by halves, from places that are good.
@@ -179,12 +203,12 @@ double stepper_follow(Stepper *s, bool halfway)
 {
     double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
     bool is_trusted = !s->was_held && s->report.residual < LOST;
-    if ((!s->vessel && !self_contact_is_near(s)) || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted)) {
+    bool is_quiet = s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted;
+    if ((!s->vessel && !self_contact_is_near(s)) || (is_quiet && !s->makes_energy)) {
         move(s, part);
         return part;
     }
-    if (s->energy_before < 0)         // of x_n, or of an iterate beside it
-        s->energy_before = stepper_elastic_energy(s) + stepper_kinetic_energy(s);
+    elastic_at_start(s);
     double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
     copy_iterate(s, false);
     double most = fmax(DEPTH_MAX, s->depth);
@@ -195,8 +219,7 @@ double stepper_follow(Stepper *s, bool halfway)
             most = fmax(most, DEPTH_LAST);
         }
         move(s, part);
-        double depth = fmax(stepper_depth(s), self_contact_depth(s, false));
-        bool contained = depth <= most;
+        bool contained = is_quiet || fmax(stepper_depth(s), self_contact_depth(s, false)) <= most;
         if (contained && stepper_elastic_energy(s) <= bound)
             return part;
         bool meets = !contained && k < MEETINGS_MAX && !stepper_is_spent(s) && stepper_meet_walls(s, part) + self_contact_meet(s, part) > 0;

@@ -65,6 +65,16 @@ typedef struct Inside {      // what lies inside at a node in the sheath
 
 typedef struct SelfContact SelfContact;
 
+// How far a step has come (step_judge.c).
+typedef struct StepProgress {
+    int linearisations;      // that have been judged
+    // of this one
+    int looks;               // for walls that the solution goes beyond
+    int hand_tries;          // since the last look, of what hands and mouth do
+    bool is_held_back;       // the sheath has taken a node back
+    bool is_blocked;         // no part of the way to the solution could be followed
+} StepProgress;
+
 struct Stepper {
     // given once
     Wire wire;
@@ -158,19 +168,16 @@ struct Stepper {
     double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
     double turn;             // [rad] largest of the solution against the iterate
     bool overshoots;         // the solution goes through the wall, or may
+    bool makes_energy;       // the solution, though it turns little
     unsigned tips_changed;   // bit k: the node at the tip around tool k has come or gone since the step was fed
-    bool blocked;            // no part of it could be followed
-    double energy_before;    // [mJ] at x_n, elastic and kinetic; < 0: not asked for yet
+    bool knows_energy;       // it has been asked for …
+    double elastic_before;   // [mJ] … at x_n
     double depth;            // [mm] outside the wall at the iterate
     bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
     double wall_force_max, wall_force_sum;   // [N] of the step before
     bool has_failed;
     bool was_held;           // some solve of the step was held to its iterate
-    // how far the step has come (step_judge)
-    int linearisations;      // that have been judged
-    int looks;               // of this one, for walls that the solution goes beyond
-    int hand_tries;          // since the last look, of what hands and mouth do
-    bool is_held_back;       // in this linearisation the sheath has taken a node back
+    StepProgress progress;
     bool is_iterate;         // linearised about something else than x_n
 };
 
@@ -189,7 +196,7 @@ static inline bool stepper_presses(const Stepper *s, int point)
     return f.x != 0 || f.y != 0 || f.z != 0;
 }
 
-// [rad] Nothing is seen to gain energy among contacts where an element turns by less.
+// [rad] Among contacts an element that turns by less is linearised again only where that makes energy.
 static const double NEWTON_MOTION_IN_CONTACT = 0.04;
 // The step begins at the state's pose.
 void stepper_begin(Stepper *s);
@@ -203,6 +210,9 @@ void stepper_hold(Stepper *s, int node);
 double stepper_squeeze(const Stepper *s, const Vec3 *position);
 bool stepper_is_spent(const Stepper *s);         // so many contact iterations that the step looks no further
 double stepper_largest_turn(const Stepper *s);   // [rad] of an element's chord or a node against the iterate; not about the axis
+// By how much the tool's elastic energy would grow more than hands, walls and weight give, were the solution followed to its end: as a share of all that is given
+// and taken. The system is linear, the energy is not.
+double stepper_energy_made(Stepper *s);
 // Moves the iterate towards the solution, half of it at most where `halfway`; returns the share that was followed.
 double stepper_follow(Stepper *s, bool halfway);
 void stepper_detect(Stepper *s);
@@ -224,7 +234,6 @@ void stepper_use_clearance(Stepper *s);
 void stepper_forget(Stepper *s, int node);
 // Adds the slots' forces to the nodes between which they are.
 void stepper_share_forces(const Stepper *s, NodeReport *node);
-void stepper_assemble(Stepper *s);
 // By how much the tool slides along itself in this step, as far as can be foreseen.
 double stepper_slides(const Stepper *s);
 bool stepper_is_slender(const Stepper *s);
@@ -258,6 +267,8 @@ BeamInput stepper_beam(const Stepper *s, int i);
 void stepper_prescribe(Stepper *s, int node, int dof, double value);
 // What a load puts on its node (end 0) or the one after it (1) at this time, in space; false: nothing.
 bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time, Vec3 *force, Vec3 *moment);
+// [mJ] of weight and a rig's loads in this step.
+double stepper_load_work(const Stepper *s);
 // [mJ] that stiffness damping took from the motion of this step …
 double stepper_stiffness_damping(Stepper *s);
 // … and what the wall's pressure gave and its friction took.

@@ -15,6 +15,8 @@
 
 // A chord turned by 0.02 rad stretches by 2e-4 in a linear step, which a free wire would keep as energy: another linearisation costs it 30 us.
 static const double NEWTON_MOTION = 0.005, NEWTON_MOTION_AT_MOUTH = 0.002;      // [rad]
+static const double QUIET_MOTION = 1e-3;         // [rad] less makes no energy
+static const double ENERGY_MADE = 3e-3;          // share of what is given and taken in a step
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice as many of them as otherwise.
 static const double OVERSHOOT = 0.015, SELF_OVERSHOOT = 0.005;
@@ -79,22 +81,22 @@ static bool goes_back(const Stepper *s)
 // What the hand and the mouth do follows from the solution.
 static unsigned judge_hand(Stepper *s)
 {
-    if (s->hand_tries >= HAND_TRIES || !(misjudges_border(s) || hands_misjudge(s)))
+    if (s->progress.hand_tries >= HAND_TRIES || !(misjudges_border(s) || hands_misjudge(s)))
         return 0;
-    s->hand_tries++;
+    s->progress.hand_tries++;
     return STEP_NEEDS_SYSTEM | STEP_NEEDS_CONTACT;
 }
 
 // A wire that springs goes further than anybody looked: look that far, and solve again.
 static unsigned judge_reach(Stepper *s)
 {
-    if (s->looks >= LOOKS_MAX || s->has_failed || stepper_is_spent(s))
+    if (s->progress.looks >= LOOKS_MAX || s->has_failed || stepper_is_spent(s))
         return 0;
     bool escapes = stepper_escapes(s), misses = self_contact_misses(s);
     if (!misses && !escapes)
         return 0;
-    s->looks++;
-    s->hand_tries = 0;
+    s->progress.looks++;
+    s->progress.hand_tries = 0;
     s->knows_motion = escapes;
     return (escapes ? STEP_NEEDS_WALLS : 0) | STEP_NEEDS_CONTACT;
 }
@@ -103,7 +105,7 @@ static unsigned judge_reach(Stepper *s)
 // the step's start on.
 static unsigned judge_mouth(Stepper *s)
 {
-    if (s->tool_count > 1 && !s->is_held_back && (tools_leave_back(s) || tools_come_out(s))) {
+    if (s->tool_count > 1 && !s->progress.is_held_back && (tools_leave_back(s) || tools_come_out(s))) {
         stepper_begin(s);
         return STEP_NEEDS_ALL;
     }
@@ -119,35 +121,39 @@ static unsigned judge_mouth(Stepper *s)
     stepper_hold(s, node);
     stepper_forget(s, node);
     s->first_free++;
-    s->is_held_back = true;
+    s->progress.is_held_back = true;
     stepper_begin(s);
     return STEP_NEEDS_ALL;
 }
 
+// Does the solution give the tool energy that nobody pays for? Among contacts a small turn may, where the tool is stiff or its elements are short.
+static bool makes_energy(Stepper *s) { return s->has_sheath && s->load_count == 0 && s->turn > QUIET_MOTION && stepper_energy_made(s) > ENERGY_MADE; }
+
 // Newton's method: the solution is the next place to linearise about, where it turns or goes further than a linear step may.
 static unsigned judge_motion(Stepper *s)
 {
-    if (s->linearisations > 0) {
-        s->report.newton = s->linearisations;
+    if (s->progress.linearisations > 0) {
+        s->report.newton = s->progress.linearisations;
         s->overshoots = true;
     }
-    int next = ++s->linearisations;
+    int next = ++s->progress.linearisations;
     if (next >= 2 * s->newton_max || s->has_failed || stepper_is_spent(s))
         return 0;
-    bool touches = s->report.active > 0;
+    bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && goes_back(s);     // before another iterate is kept
     bool turns = s->turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
+    s->makes_energy = !turns && makes_energy(s);
     s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
-    if (!(turns && next < s->newton_max) && !s->overshoots)
+    if (!((turns || s->makes_energy) && next < s->newton_max) && !s->overshoots)
         return 0;
-    if (stepper_follow(s, next > 1 && s->vessel && goes_back(s)) == 0) {
-        s->blocked = true;
+    if (stepper_follow(s, is_back) == 0) {
+        s->progress.is_blocked = true;
         stepper_doubt(s);
         return 0;
     }
     stepper_use_clearance(s);
     s->is_iterate = true;
-    s->is_held_back = false;
-    s->hand_tries = s->looks = 0;
+    s->progress.is_held_back = false;
+    s->progress.hand_tries = s->progress.looks = 0;
     return STEP_NEEDS_ALL;
 }
 
@@ -258,7 +264,7 @@ void step_correct(Stepper *s)
         report_forces(s);
         if (s->was_held)
             s->report.flags |= STEP_NOT_CONVERGED;
-        double part = s->blocked ? 0 : stepper_follow(s, false);
+        double part = s->progress.is_blocked ? 0 : stepper_follow(s, false);
         if (part < 1)
             report_cut_forces(s, part);
         set_velocities(s);

@@ -7,6 +7,7 @@
 
 double stepper_sheath_coordinate(const Stepper *s, int node)
 {
+    SEL_ASSERT(node >= 0 && node < s->state.node_count, "the node is one of the chain's");
     return vec3_dot(vec3_sub(s->state.position[node], s->mouth), s->axis[0]);
 }
 
@@ -21,6 +22,7 @@ void stepper_go_back(Stepper *s)
 
 BeamInput stepper_beam(const Stepper *s, int i)
 {
+    SEL_ASSERT(i >= 0 && i + 1 < s->state.node_count, "the element is one of the chain's");
     const BeamRest *r = &s->beam.rest;
     const WireState *w = &s->state;
     return (BeamInput){.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1], .length = r->length[i],
@@ -30,12 +32,14 @@ BeamInput stepper_beam(const Stepper *s, int i)
 
 double tools_span_length(const Stepper *s, int c)
 {
+    SEL_ASSERT(c >= 0 && c + 1 < s->state.node_count, "the element is one of the chain's");
     int k = s->carrier[c + 1];
     return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
 }
 
 double tools_twist(const Stepper *s, int c)
 {
+    SEL_ASSERT(c >= 0 && c + 1 < s->state.node_count, "the element is one of the chain's");
     // whole turns of the tool that goes on at a tip count
     double turned = is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;
     Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));

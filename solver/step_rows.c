@@ -3,6 +3,8 @@
 
 void stepper_prescribe(Stepper *s, int node, int dof, double value)
 {
+    SEL_ASSERT(node >= 0 && node < s->chain.count && dof >= 0 && dof < s->chain.size, "an unknown is one of the chain's");
+    SEL_ASSERT(isfinite(value), "an unknown is given a number");
     int n = s->chain.size;
     double *d = s->chain.diag + block_of(s, node), *b = s->b + row_of(s, node);
     for (int r = 0; r < n; r++) {
@@ -29,6 +31,7 @@ void stepper_prescribe(Stepper *s, int node, int dof, double value)
 
 double stepper_reaction(const Stepper *s, int dof)
 {
+    SEL_ASSERT(dof >= 0 && dof < s->chain.size, "an unknown of the first node holds it");
     int n = s->chain.size;
     double sum = -s->grip_b[dof];
     for (int c = 0; c < n; c++) {

@@ -16,11 +16,10 @@ void step_detect(Stepper *s)
     s->knows_motion = false;
 }
 
-void step_assemble(Stepper *s) { stepper_assemble(s); }
-
 // The iterate in the unknowns that are solved for: hands at node 0, slips elsewhere.
 static double solved_for(const Stepper *s, int c, int unknown)
 {
+    SEL_ASSERT(unknown >= 0 && unknown < s->chain.size, "an unknown is one of its node's");
     int k = unknown < 6 ? 0 : 1 + (unknown - 6) / 2;
     if (k == 0 || !is_inside(s, c, k))
         return s->linearised[row_of(s, c) + (size_t)unknown];
@@ -38,6 +37,7 @@ static bool is_unit_row(const double *row, int n, int unknown)
 // Holds the solution to the iterate by a share of each unknown's own stiffness.
 static void hold_to_iterate(Stepper *s, double share)
 {
+    SEL_ASSERT(share > 0, "what holds is stiff");
     int n = s->chain.size;
     for (int c = 0; c < s->chain.count; c++)
         for (int i = 0; i < n; i++) {
@@ -70,6 +70,7 @@ void step_factor(Stepper *s)
 
 void step_contact(Stepper *s)
 {
+    SEL_ASSERT(s->set.count <= s->set.capacity, "detection found no more contacts than there is room for");
     if (s->has_failed)
         return;
     ContactReport report = {.converged = true};

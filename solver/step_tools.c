@@ -536,11 +536,11 @@ static void pass_nodes(Stepper *s, int k, double ahead)
     if (tools_carries(t) || pass_nodes_back(s, k, ahead))
         return;
     for (int last = t->inside - 1; last >= 0 && t->inside < w->node_count && s->carrier[t->inside] <= k; last++) {
-        double next = *slide_of(s, last, k) + tools_span_length(s, last);
+        double next = *slide_of(s, last, k) + tools_strained_length(s, last);
         if (next - ahead >= t->wire.total_length + pass_early(s, last, ahead))
             return;
         *slide_of(s, t->inside, k) = next;
-        // untwisted: turned against the node by what the carrier is twisted
+        // unstretched and untwisted: turned against the node by what the carrier is twisted
         *angle_of(s, t->inside, k) = *angle_of(s, last, k) - tools_twist(s, last);
         w->slide_velocity[t->inside * w->inner_count + k - 1] = w->slide_velocity[last * w->inner_count + k - 1];
         w->slide_spin[t->inside * w->inner_count + k - 1] = w->slide_spin[last * w->inner_count + k - 1];

@@ -41,8 +41,9 @@ static inline bool tools_carries(const Tool *t)
 // The tool that is next around tool k at node c and is an unknown there too; 0: none.
 int tools_around(const Stepper *s, int c, int k);
 
-// [mm] rest length of the chain's element c; [rad] its twist.
+// [mm] rest length of the chain's element c, and as long as it is stretched; [rad] its twist.
 double tools_span_length(const Stepper *s, int c);
+double tools_strained_length(const Stepper *s, int c);
 double tools_twist(const Stepper *s, int c);
 // Where the line is d [mm] from node c, or from the mouth where that is the last node in the sheath, as its element is bent, slanted by shear, stretched and
 // twisted there: position, and the node's frame carried along.

@@ -112,18 +112,6 @@ bool field_model_list(FieldModel *model)
     return true;
 }
 
-void field_model_keep(FieldModel *model, const bool *keep)
-{
-    int kept = 0;
-    for (int b = 0; b < model->count; b++) {
-        if (keep[b])
-            model->blob[kept++] = model->blob[b];
-        else
-            free(model->blob[b].node);
-    }
-    model->count = kept;
-}
-
 LaneBlob field_lane_blob(const VesselTree *tree, int node, const FieldBlob *blob)
 {
     Vec3 c = vec3_sub(blob->center, tree->center[node]);

@@ -40,8 +40,6 @@ void field_model_free(FieldModel *model);
 bool field_model_add(FieldModel *model, int owner, Vec3 center, double reach, double amplitude);
 // Updates which node sees which blob, for new or moved blobs.
 bool field_model_list(FieldModel *model);
-// Drops the blobs whose `keep` is false.
-void field_model_keep(FieldModel *model, const bool *keep);
 // A blob as a tile's rows see it, and whether any of them is within `share` of its reach.
 LaneBlob field_lane_blob(const VesselTree *tree, int node, const FieldBlob *blob);
 bool field_tile_meets(const RowTile *tile, const LaneBlob *blob, float share);

@@ -1,6 +1,6 @@
 #include "recon/fit/fit_lanes.h"
 
-#include "base/simd.h"
+#include "base/simd_kernel.h"
 
 #include <string.h>
 
@@ -12,11 +12,11 @@ typedef struct FitKernels {
     void (*mean)(const float *, const float *, const float *, const float *, const float *, int, const LaneBlob *, float (*)[FIELD_LANES]);
 } FitKernels;
 
-#define KERNEL_TABLE(isa) {sum_##isa, columns_##isa, gram_##isa, mean_##isa}
+#define KERNEL_TABLE(set) {sum_##set, columns_##set, gram_##set, mean_##set}
 
 #define KERNEL_TEXT "recon/fit/fit_kernel.inc"
-#include "recon/fit/each_isa.inc"
-static const FitKernels kernel_table[SIMD_COUNT] = EACH_ISA;
+#include "base/each_simd.inc"
+static const FitKernels kernel_table[SIMD_COUNT] = SIMD_EACH(KERNEL_TABLE);
 
 static const FitKernels *kernels(void) { return &kernel_table[simd_level()]; }
 

@@ -9,7 +9,7 @@
 //   dkappa = dN / (2|g|^3) - 3 kappa g.dg / |g|^2
 #include "recon/fit/lim_energy.h"
 
-#include "base/simd.h"
+#include "base/simd_kernel.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -33,13 +33,13 @@ typedef struct LimKernels {
     void (*dot_lanes)(const float *, const float *, int, float *);
     bool (*solve)(double *, int, int, double *);
 } LimKernels;
-#define KERNEL_TABLE(isa) \
-    {add_##isa, sum_##isa, taubin_##isa, approach_##isa, feet_##isa, moving_energy_##isa, total_energy_##isa, residuals_##isa, columns_##isa, gram_##isa, \
-     dot_lanes_##isa, solve_##isa}
+#define KERNEL_TABLE(set) \
+    {add_##set, sum_##set, taubin_##set, approach_##set, feet_##set, moving_energy_##set, total_energy_##set, residuals_##set, columns_##set, gram_##set, \
+     dot_lanes_##set, solve_##set}
 
 #define KERNEL_TEXT "recon/fit/lim_energy_kernel.inc"
-#include "recon/fit/each_isa.inc"
-static const LimKernels kernel_table[SIMD_COUNT] = EACH_ISA;
+#include "base/each_simd.inc"
+static const LimKernels kernel_table[SIMD_COUNT] = SIMD_EACH(KERNEL_TABLE);
 
 static const LimKernels *kernels(void) { return &kernel_table[simd_level()]; }
 

@@ -21,7 +21,7 @@ static void print_stop(FILE *out, const VesselTree *tree, const Reach *reach, co
             percent(reach, stop->lost));
 }
 
-void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
+static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
 {
     double tool = reach->options.tool_radius;
     fprintf(out, "from the inlet a point gets to %.1f %% of %.0f mm of centreline, a tool of %.2f mm radius on the line to %.1f %%, up to %.2g r aside to %.1f %%\n",
@@ -109,7 +109,7 @@ static void add_branches(cJSON *object, const VesselTree *tree, const Reach *rea
     vessel_branches_free(branches);
 }
 
-void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach)
+static void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach)
 {
     cJSON *at = cJSON_AddObjectToObject(object, "reach");
     cJSON_AddNumberToObject(at, "tool_radius_mm", reach->options.tool_radius);

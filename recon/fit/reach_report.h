@@ -11,8 +11,4 @@
 // `out` too. `tool_radius` [mm].
 bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults);
 
-void reach_print(FILE *out, const VesselTree *tree, const Reach *reach);
-// Adds an object "reach".
-void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach);
-
 #endif

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-const char *const fit_preset_name[] = {"default", "local", "paper", NULL};
+static const char *const fit_preset_name[] = {"default", "local", "paper", NULL};
 
 TreeFitOptions tree_fit_default_options(void) { return (TreeFitOptions){.local = lim_fit_default_options(), .edge_blur = -1}; }
 

@@ -11,7 +11,6 @@ typedef enum {
     FIT_LOCAL,               // a local model for each node
     FIT_PAPER                // the same with the published values and method
 } FitPreset;
-extern const char *const fit_preset_name[];      // ends with NULL
 
 typedef struct TreeFitOptions {
     FitPreset preset;

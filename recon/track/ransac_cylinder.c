@@ -5,15 +5,12 @@
 // PRAXIS, keeps no state between calls.
 #include "recon/track/ransac_cylinder.h"
 
-#include <math.h>
-#include <nlopt.h>
-#include <string.h>
+#include "base/simd_kernel.h"
 
-// Kernels compiled for several instruction sets; the sanitizers cannot start them.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define ISA_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define ISA_CLONES
+#include <math.h>
+#include <string.h>
+#ifdef SELDINGER_NLOPT
+#include <nlopt.h>
 #endif
 
 // --- random numbers ---
@@ -26,17 +23,6 @@ Random random_from_seed(uint64_t seed, uint64_t stream)
 }
 
 // --- circles ---
-
-// How many points have a squared distance from (cu, cv) within [low, high].
-ISA_CLONES static int count_ring(const float *u, const float *v, int count, float cu, float cv, float low, float high)
-{
-    int inside = 0;
-    for (int i = 0; i < count; i++) {
-        float du = u[i] - cu, dv = v[i] - cv, d2 = du * du + dv * dv;
-        inside += (d2 >= low) & (d2 <= high);
-    }
-    return inside;
-}
 
 // Trials are drawn and computed in batches; surplus draws of the last batch are discarded.
 enum { BATCH = 16 };
@@ -61,18 +47,10 @@ static void draw_triples(Circles *c, const float *u, const float *v, int count, 
     }
 }
 
-ISA_CLONES static void circles_of_three(Circles *c, double least2, double most2, double offset2)
-{
-    for (int k = 0; k < BATCH; k++) {
-        double ax = c->ax[k], ay = c->ay[k], bx = c->bx[k], by = c->by[k];
-        double det = 2 * (ax * by - ay * bx), a2 = ax * ax + ay * ay, b2 = bx * bx + by * by;
-        double x = (by * a2 - ay * b2) / det, y = (ax * b2 - bx * a2) / det, r2 = x * x + y * y, cu = c->u0[k] + x, cv = c->v0[k] + y;
-        c->cu[k] = cu;
-        c->cv[k] = cv;
-        c->r2[k] = r2;
-        c->fits[k] &= (det * det > 1e-12 * a2 * b2) & (r2 >= least2) & (r2 <= most2) & (cu * cu + cv * cv <= offset2);
-    }
-}
+#define KERNEL_TEXT "recon/track/ransac_kernel.inc"
+#include "base/each_simd.inc"
+static int (*const count_ring_on[SIMD_COUNT])(const float *, const float *, int, float, float, float, float) = SIMD_FORMS(count_ring);
+static void (*const circles_of_three_on[SIMD_COUNT])(Circles *, double, double, double) = SIMD_FORMS(circles_of_three);
 
 double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const RansacOptions *options, Random *random, Cylinder *out)
 {
@@ -88,11 +66,12 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
     int best = 0, trial = 0;
     const double rounding = 1e-9;   // the exact test follows
     double least2 = options->radius_min * options->radius_min * (1 - rounding), most2 = options->radius_max * options->radius_max * (1 + rounding);
+    const SimdLevel level = simd_level();
     for (bool more = true; more;) {
         Circles c;
         Random drawn = *random;
         draw_triples(&c, u, v, count, &drawn);
-        circles_of_three(&c, least2, most2, options->offset_max * options->offset_max);
+        circles_of_three_on[level](&c, least2, most2, options->offset_max * options->offset_max);
         int k = 0;
         for (; k < BATCH; k++, trial++) {
             more = trial < options->trials_max && (trial < options->trials_min || best <= options->inlier_rate * count);
@@ -104,7 +83,7 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
             if (!(r >= options->radius_min && r <= options->radius_max))
                 continue;
             double low = fmax(r - options->threshold, 0), high = r + options->threshold;
-            int inside = count_ring(u, v, count, (float)c.cu[k], (float)c.cv[k], (float)(low * low), (float)(high * high));
+            int inside = count_ring_on[level](u, v, count, (float)c.cu[k], (float)c.cv[k], (float)(low * low), (float)(high * high));
             if (inside > best) {
                 best = inside;
                 *out = (Cylinder){vec3_add_scaled(vec3_add_scaled(origin, c.cu[k], e1), c.cv[k], e2), r, axis, 0};
@@ -217,6 +196,9 @@ static Cylinder refine_gauss_newton(const Cylinder *start, const Vec3 *point, co
     return best;
 }
 
+#ifdef SELDINGER_NLOPT
+bool cylinder_refine_has_powell(void) { return true; }
+
 typedef struct PowellProblem {
     const Cylinder *start;
     Vec3 e1, e2;
@@ -252,6 +234,14 @@ static Cylinder refine_powell(const Cylinder *start, const Vec3 *point, const in
     nlopt_destroy(powell);
     return moved(start, e1, problem.e2, x);
 }
+#else
+bool cylinder_refine_has_powell(void) { return false; }
+
+static Cylinder refine_powell(const Cylinder *start, const Vec3 *point, const int *inlier, int count)
+{
+    return refine_gauss_newton(start, point, inlier, count);
+}
+#endif
 
 double cylinder_refine(Cylinder *cylinder, const Vec3 *point, const int *inlier, int count, bool by_powell, bool *good)
 {

@@ -33,7 +33,9 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
 int cylinder_inliers(const Cylinder *cylinder, const Vec3 *point, int count, double threshold, int *inlier);
 // Least squares of the distance over centre, axis and radius, for the listed points: by Gauss-Newton, or by Powell's method as in the paper. The
 // centre stays where it is along the axis. Returns the root mean square [mm]; *good is false if it diverged (the cylinder is then unchanged).
+// Without NLopt in the build both are Gauss-Newton: callers ask cylinder_refine_has_powell() first.
 double cylinder_refine(Cylinder *cylinder, const Vec3 *point, const int *inlier, int inlier_count, bool by_powell, bool *good);
+bool cylinder_refine_has_powell(void);
 // The sphere of least squares through points; false if they do not define one.
 bool sphere_fit(const Vec3 *point, int count, Vec3 *center, double *radius);
 

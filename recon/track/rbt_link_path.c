@@ -28,7 +28,7 @@ LinkLight rbt_link_light(const Track *tree, const Tracker *t, int node)
     return (LinkLight){inside[n / 2], inside[n / 2] - c};
 }
 
-double rbt_link_lit(const LinkLight *light, double value)
+static double rbt_link_lit(const LinkLight *light, double value)
 {
     double range = light->inside - light->outside;
     return range > 0 ? fmax(0, fmin(1, (value - light->outside) / range)) : value >= light->inside;

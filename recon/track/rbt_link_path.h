@@ -11,8 +11,6 @@ typedef struct LinkLight {   // of the child: 0 is the background beside it, 1 i
 
 // Medians over the first nodes of the vessel that begins at `node`.
 LinkLight rbt_link_light(const Track *tree, const Tracker *t, int node);
-// Brightness as a share of the child's contrast, 0 … 1.
-double rbt_link_lit(const LinkLight *light, double value);
 // From the parent's axis to the child's first node, within `beside` [mm] of the straight line. False: out of memory.
 bool rbt_link_path(const Tracker *t, Vec3 from, Vec3 to, double beside, const LinkLight *light, LinkPath *out);
 // The cheapest path through the image from the child `node` to any vessel or aneurysm outside its subtree, within `reach` [mm], with a brightness of

@@ -30,7 +30,7 @@ typedef struct RbtParameters {
     double height_share;     // of the inliers that the height encompasses
     double back_step;        // a centre closer to the former centreline than this many radii is a step back
     double relaxed;          // where no direction is valid, the best one is, above relaxed * p_inl
-    double powell;           // 1: refine by Powell's method (NLopt's PRAXIS), 0: by Gauss-Newton (same minimum)
+    double powell;           // 1: refine by Powell's method (NLopt's PRAXIS; refused without NLopt), 0: by Gauss-Newton (same minimum)
     // our extensions
     double r_t_voxels;       // inlier threshold is at least this many voxels
     double r_t_second;       // threshold (share of the radius) of the second try; 0: none

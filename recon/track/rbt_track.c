@@ -3,6 +3,7 @@
 
 #include "base/heap.h"
 #include "recon/track/cast_rays.h"
+#include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_aneurysm.h"
 #include "recon/track/rbt_branch.h"
 #include "recon/track/rbt_branches.h"
@@ -577,6 +578,9 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         good = (center[i] = malloc((size_t)aneurysm[i].center_count * sizeof **center)) != NULL;
     if (!good)
         faults_add(faults, path, 0, 0, "out of memory");
+    if (good && parameters->powell > 0 && !cylinder_refine_has_powell())
+        faults_add(faults, path, 0, 0, "powell: 1 (as with `parameters: paper`) needs NLopt, and this program was built without it; install libnlopt-dev and build again, or "
+                                       "set powell: 0, which reaches the same minimum");
     if (good && seed_count < 1)
         faults_add(faults, path, 0, 0, "there is no branch to track; expected `branches` with at least one start");
     if (good) {

@@ -6,11 +6,10 @@
 // Lines are sampled in blocks: places and cells of a block at once, then sample by sample with the cell's taps in registers, which the next sample
 // mostly shares (a ray takes ten samples a voxel). Lanes of samples would have to gather each of their 64 taps.
 #include "recon/volume/bspline.h"
-#include "base/simd.h"
+#include "base/simd_kernel.h"
 
 #include <string.h>
 
-#define INLINE static inline __attribute__((always_inline))
 typedef float Row __attribute__((vector_size(16)));
 
 // Of the taps at -1, 0, 1, 2 from the cell of which t is the part.
@@ -119,39 +118,11 @@ INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start,
     }
 }
 
-#define ROWS 1
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "recon/volume/bspline_kernel.inc"
-#undef ROWS
-#undef TARGET
-#undef KERNEL
-
-#if defined(__x86_64__) && defined(__GNUC__)
-#define ROWS 2
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "recon/volume/bspline_kernel.inc"
-#undef ROWS
-#undef TARGET
-#undef KERNEL
-
-#define ROWS 4
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "recon/volume/bspline_kernel.inc"
-#undef ROWS
-#undef TARGET
-#undef KERNEL
-#endif
+#define KERNEL_TEXT "recon/volume/bspline_kernel.inc"
+#include "base/each_simd.inc"
+static void (*const sample_line_on[SIMD_COUNT])(const Volume *, Vec3, Vec3, int, float *) = SIMD_FORMS(sample_line);
 
 void bspline_sample_line(const Volume *volume, Vec3 start, Vec3 step, int count, float *out)
 {
-    switch (simd_level()) {
-#if defined(__x86_64__) && defined(__GNUC__)
-    case SIMD_AVX512: sample_line_avx512(volume, start, step, count, out); return;
-    case SIMD_AVX2: sample_line_avx2(volume, start, step, count, out); return;
-#endif
-    default: sample_line_baseline(volume, start, step, count, out); return;
-    }
+    sample_line_on[simd_level()](volume, start, step, count, out);
 }

@@ -65,6 +65,8 @@ static void curved_tools_leave_the_mouth(void **state)
 {
     (void)state;
     cJSON_Delete(holds((HardCase){"pigtail", 8.2448 * 1.001, 0.005, 0, 0, true}));
+    if (!WHOLE_RUN)
+        return;
     cJSON_Delete(holds((HardCase){"simmons", 60.470 * 1.001, 0.1, 0, 0, true}));
     cJSON_Delete(holds((HardCase){"phantom-pigtail", 67, 1, 1, 0, true}));
 }
@@ -122,6 +124,7 @@ static void an_inner_hand_pushes_a_stiff_bend_out(void **state)
 static void a_curved_tip_is_drawn_into_the_sheath(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON_Delete(holds((HardCase){"withdrawn", 0.767 * 1.002, 0.002, 0, 0, true}));
 }
 
@@ -151,6 +154,24 @@ static void a_curl_is_drawn_into_the_sheath(void **state)
     cJSON_Delete(s);
 }
 
+// Single steps gained 2.1e-2, 8.1e-2 and 3.9e3 of the work before.
+static void quick_steps_gain_no_energy(void **state)
+{
+    (void)state;
+    NEED_WHOLE_RUNS();
+    const struct {
+        const char *name;
+        double share;        // of the work of hands and loads that all steps together may gain
+    } scene[] = {{"stiff-wire-turned", 1e-3}, {"wire-in-soft-guide", 5e-3}, {"tips-nearly-flush", 5e-3}};
+    for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+        cJSON *s = run(scene[i].name);
+        double gained = number(s, "energy_mj", "gained"), work = number(s, "energy_mj", "work");
+        print_message("%-20s gained %.2g of %.3g mJ\n", scene[i].name, gained, work);
+        assert_true(work > 1 && gained < scene[i].share * work);
+        cJSON_Delete(s);
+    }
+}
+
 // A tip that the wall holds keeps its node, and one that comes out far in a step gets it for that step: without a node it went 2.3 mm through the wall.
 static void an_inner_tip_stays_within_the_wall(void **state)
 {
@@ -171,6 +192,7 @@ int main(void)
         cmocka_unit_test(twist_passes_a_clearance_of_5_um), cmocka_unit_test(a_curved_tip_is_drawn_into_the_sheath),
         cmocka_unit_test(a_hand_that_slips_makes_no_energy), cmocka_unit_test(a_guide_is_drawn_back_over_a_turned_wire),
         cmocka_unit_test(a_curl_is_drawn_into_the_sheath), cmocka_unit_test(an_inner_tip_stays_within_the_wall),
+        cmocka_unit_test(quick_steps_gain_no_energy),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

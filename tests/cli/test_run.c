@@ -358,6 +358,7 @@ static void help_names_every_option(void **state)
         assert_non_null(strstr(output, ".SH EXIT STATUS"));
         assert_non_null(strstr(output, "\\fB\\-\\-quiet\\fR"));
     }
+    assert_int_equal(run("--manual"), 0);
     assert_int_equal(run("--manual banana"), 2);
     assert_int_equal(run("--completion | bash -n"), 0);
 }

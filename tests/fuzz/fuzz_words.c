@@ -1,5 +1,5 @@
 // Words of the command line and of devices: each line of the input as each of them. What is taken is within its range.
-// Covers: base/option_table.c cli/arguments.c input/gamepad.c
+// Covers: base/option_table.c cli/arguments.c base/options.c input/gamepad.c
 #include "cli/cli.h"
 #include "input/gamepad.h"
 #include "input/hid_report.h"
@@ -10,15 +10,22 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
+static const Option number_row = {"x", "X", OPTION_NUMBER, .help = "", .least = 0, .most = 1e6},
+                    whole_row = {"n", "N", OPTION_WHOLE, .help = "", .least = -256, .most = 256};
+static const OptionTable numbers[2] = {{.program = "x", .usage = "", .option = &number_row, .option_count = 1, .size = sizeof(double)},
+                                       {.program = "n", .usage = "", .option = &whole_row, .option_count = 1, .size = sizeof(double)}};
+
 static void try_word(const char *word)
 {
     double number = -1, point[3];
     int size[2] = {0}, vendor, product;
     const Option option = {.name = "size"};
     char name[32];
-    if (cli_number("--x", word, 0, 1e6, &number) && !(number >= 0 && number <= 1e6))
+    char *argv[] = {"", "--x", (char *)word, NULL};
+    if (options_parse(&numbers[0], 3, argv, &number) < 0 && !(number >= 0 && number <= 1e6))
         abort();
-    if (cli_whole_number("--n", word, -256, 256, &number) && (!(number >= -256 && number <= 256) || (double)(int)number != number))
+    argv[1] = "--n";
+    if (options_parse(&numbers[1], 3, argv, &number) < 0 && (!(number >= -256 && number <= 256) || (double)(int)number != number))
         abort();
     if (option_point(word, point) && !(vec3_is_finite(vec3(point[0], point[1], point[2])) && fabs(point[0]) <= 1e9))
         abort();

@@ -768,6 +768,107 @@ static void contradiction_is_told(void **state)
     vessel_tree_free(t);
 }
 
+// --- walls full of hollows ---
+
+enum { HOLLOWS = 14, WALL_POINTS = 3000 };
+
+// A ball of a vessel with hollows and humps wherever chance has it.
+static VesselTree *hollow_ball(uint64_t *seed)
+{
+    VesselTree *t = vessel_tree_create_shared(1, 0, HOLLOWS);
+    t->center[0] = t->blob_center[0] = vec3(0, 0, 0);
+    t->radius[0] = 1.8;
+    t->direction[0] = vec3(-1, 0, 0);
+    t->parent[0] = -1;
+    t->blob_width[0] = 3.6;
+    t->blob_amplitude[0] = 1 / (0.75 * 0.75 * 0.75);
+    for (int k = 1; k < HOLLOWS; k++) {
+        Vec3 d = random_unit_vector(seed);
+        d.x = -fabs(d.x);
+        t->blob_center[k] = vec3_scale(d, random_in(seed, 1.4, 2.6));
+        t->blob_width[k] = random_in(seed, 0.8, 1.6);
+        t->blob_amplitude[k] = random_in(seed, 0, 1) < 0.3 ? -random_in(seed, 0.3, 0.9) : random_in(seed, 0.3, 0.9);
+    }
+    t->blob_offset[1] = HOLLOWS;
+    assert_true(vessel_tree_link(t));
+    return t;
+}
+
+// Points of the wall on rays from the middle, where the inlet does not bend it.
+static void find_wall(const VesselTree *t, uint64_t *seed, Vec3 *wall)
+{
+    Blobby blobs = blobby_of(t, 0);
+    for (int k = 0; k < WALL_POINTS;) {
+        Vec3 d = random_unit_vector(seed);
+        double far = 0.3;
+        while (blobby_field(&blobs, vec3_scale(d, far)) > 0)
+            far += 0.05;
+        double near = far - 0.05;
+        for (int i = 0; i < 40; i++) {
+            double middle = 0.5 * (near + far);
+            if (blobby_field(&blobs, vec3_scale(d, middle)) > 0)
+                near = middle;
+            else
+                far = middle;
+        }
+        wall[k] = vec3_scale(d, far);
+        k += wall[k].x < -0.5 * t->radius[0];
+    }
+}
+
+static Vec3 nearest_of(const Vec3 *wall, Vec3 x)
+{
+    int best = 0;
+    for (int k = 1; k < WALL_POINTS; k++)
+        best = vec3_norm2(vec3_sub(wall[k], x)) < vec3_norm2(vec3_sub(wall[best], x)) ? k : best;
+    return wall[best];
+}
+
+// The gap is the way to the nearest point of the wall: no point of the wall is nearer than that. A ball is led along a wall in whose hollows it has two
+// feet, by the wall's points, not by what is answered; a foot that is followed must give way to the other one.
+static void no_wall_is_nearer(void **state)
+{
+    (void)state;
+    static Vec3 wall[WALL_POINTS];
+    int asked = 0, off = 0, far_off = 0;
+    double worst = 0;
+    // of seeds 100 to 159 those where answers were most off before the rings were looked at: by up to 0.126 mm
+    static const uint64_t from[] = {109, 110, 111, 151};
+    for (size_t n = 0; n < sizeof from / sizeof from[0]; n++) {
+        uint64_t seed = from[n];
+        VesselTree *t = hollow_ball(&seed);
+        Vessel *v = make(t, 0);
+        find_wall(t, &seed, wall);
+        for (int walk = 0; walk < 6; walk++) {
+            VesselMemory memory = {.node = 0};
+            Vec3 x = vec3(-0.6, 0, 0), d = random_unit_vector(&seed);
+            double radius = random_in(&seed, 0.5, 0.9), stride = random_in(&seed, 0.02, 0.06);
+            for (int step = 0; step < 250; step++) {
+                d = vec3_unit(vec3_add_scaled(d, 0.3, random_unit_vector(&seed)));
+                d.x = x.x > -0.5 ? -fabs(d.x) : d.x;
+                x = vec3_add_scaled(x, stride, d);
+                Vec3 in = vec3_sub(x, nearest_of(wall, x));
+                double gap = vec3_norm(in);
+                if (gap < radius)
+                    x = vec3_add_scaled(x, radius / gap - 1, in);
+                VesselHit hit;
+                vessel_query(v, 1, &x, 5, &memory, &hit);
+                if (hit.flags)
+                    continue;
+                double more = hit.gap - vec3_distance(x, nearest_of(wall, x));
+                asked++;
+                off += more > 0.02;
+                far_off += more > 0.05;
+                worst = fmax(worst, more);
+            }
+        }
+        v->destroy(v);
+        vessel_tree_free(t);
+    }
+    print_message("%d answers among hollows: %d say more than 0.02 mm more than there is, %d more than 0.05, %.3f mm at most\n", asked, off, far_off, worst);
+    assert_true(asked > 4000 && far_off == 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -776,7 +877,7 @@ int main(void)
         cmocka_unit_test(no_jump_between_cells), cmocka_unit_test(kissing_vessels_keep_apart), cmocka_unit_test(inlet_is_open),
         cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(nowhere_is_survived), cmocka_unit_test(far_is_far),
         cmocka_unit_test(copies_repeat_and_heap_rests), cmocka_unit_test(crowded_places), cmocka_unit_test(rough_walls_are_met), cmocka_unit_test(contradiction_is_told),
-        cmocka_unit_test(cleft_behind_the_wall),
+        cmocka_unit_test(cleft_behind_the_wall), cmocka_unit_test(no_wall_is_nearer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

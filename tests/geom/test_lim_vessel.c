@@ -518,6 +518,37 @@ static void another_wall_comes_closer(void **state)
     vessel_tree_free(t);
 }
 
+// The clearance that one query leaves holds about its own place: a flat lumen is 2.38 mm from its middle to either wall, asked there and then beside a wall.
+static void clearance_holds_about_its_place(void **state)
+{
+    (void)state;
+    enum { SIDE = 25 };
+    VesselTree *t = vessel_tree_create(1, 0, SIDE * SIDE);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        t->blob_center[i] = vec3(0.5 * (i % SIDE - SIDE / 2), 0.5 * (i / SIDE - SIDE / 2), 2);
+        t->blob_width[i] = blob_row_width(SIDE, 0.5, 1);
+    }
+    t->blob_offset[1] = SIDE * SIDE;
+    t->center[0] = vec3(0, 0, 2);
+    t->radius[0] = 1;
+    t->direction[0] = vec3(1, 0, 0);
+    t->parent[0] = -1;
+    vessel_tree_link(t);
+    Blobby m = blobby_of(t, 0);
+    Vessel *v = lim_vessel_create(t);
+    VesselMemory memory = {.node = 0};
+    const Vec3 middle = {2, 0, 2}, low = {0.25, 0, 0};
+    VesselHit hit;
+    vessel_query(v, 1, &middle, 10, &memory, &hit);
+    assert_true(hit.flags == 0 && hit.gap > 2.3 && memory.clearance > 1);
+    double away = blobby_project(&m, low, vec3(0.25, 0, -0.5)).distance;
+    assert_true(away > 0.3 && away < 0.5);
+    vessel_query(v, 1, &low, 0.2, &memory, &hit);
+    assert_true(hit.gap > 0 && hit.gap < away + 1e-3);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
 // A vessel whose blobs grow along it: from its axis the field falls fastest towards the thin end, and a foot there once put points to sleep beside the
 // near wall. However a point comes to where it is, what is called far is far.
 static void far_is_far_in_a_taper(void **state)
@@ -775,7 +806,7 @@ int main(void)
         cmocka_unit_test(lanes_against_twin), cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(kernels_follow_the_level), cmocka_unit_test(one_blob_is_a_sphere),
         cmocka_unit_test(gaps_against_slow_projection), cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(back_from_outside),
         cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
-        cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer),
+        cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer), cmocka_unit_test(clearance_holds_about_its_place),
         cmocka_unit_test(far_is_far_in_a_taper), cmocka_unit_test(nearest_through_boxes), cmocka_unit_test(planes_against_walk),
         cmocka_unit_test(near_the_axis), cmocka_unit_test(on_the_axis), cmocka_unit_test(cost),
     };

@@ -95,6 +95,29 @@ static void specks_are_dropped(void **state)
     release(&m);
 }
 
+// The wall of a straight tube ends in a flare, whose cones over the other end take away more than those of the wall add.
+static void an_open_tube_is_no_speck(void **state)
+{
+    (void)state;
+    enum { BALLS = 80 };
+    Faults faults = {0};
+    TubePiece line = {40, 0, 0, 0};
+    Vessel *tube = tube_vessel_create(&(TubeOptions){.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 1, .piece_count = 1, .piece = &line}, "test", &faults);
+    Vec3 center[BALLS];
+    double reach[BALLS];
+    assert_non_null(tube);
+    for (int i = 0; i < BALLS; i++)
+        center[i] = vec3(40.0 * i / (BALLS - 1), 0, 0), reach[i] = 2.2;
+    TriangleMesh *m = isosurface_of_vessel(tube, BALLS, center, reach, NULL, 0.25);
+    assert_non_null(m);
+    int triangles = m->triangle_count;
+    assert_int_equal(surface_drop_specks(m, 4 * PI / 3), 0);
+    assert_int_equal(m->triangle_count, triangles);
+    assert_int_equal(surface_drop_specks(m, 1e6), 0);    // the largest stays
+    triangle_mesh_free(m);
+    tube->destroy(tube);
+}
+
 enum { NODES = 30, OVERLAP = 3, BLOBS = 10 };
 static const double STEP = 0.6;
 
@@ -269,7 +292,7 @@ static void vertices_know_their_data(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(edges_are_counted),  cmocka_unit_test(specks_are_dropped),       cmocka_unit_test(the_inlet_opens),
+        cmocka_unit_test(edges_are_counted),  cmocka_unit_test(specks_are_dropped), cmocka_unit_test(an_open_tube_is_no_speck), cmocka_unit_test(the_inlet_opens),
         cmocka_unit_test(what_is_not_an_inlet_stays_closed), cmocka_unit_test(vertices_know_their_data),
     };
     return cmocka_run_group_tests_name("tree_surface", tests, NULL, NULL);

@@ -16,6 +16,8 @@
 
 #include <seldinger/seldinger.h>
 
+#include "tests/short_run.h"
+
 static char folder[] = "/tmp/seldinger-library-XXXXXX";
 #include "tests/folder.h"
 
@@ -91,6 +93,12 @@ static void wrong_arguments_are_refused(void **state)
     expect_fault("sel_scene_open: context, path or scene is NULL");
     assert_int_equal(sel_scene_open(context, phantom, &unset, &none), SEL_ERROR_ARGUMENT);
     expect_fault("sel_open_defaults()");
+    double point[3] = {0}, gap = 0;
+    assert_int_equal(sel_scene_query(NULL, scene, 1, point, &gap, NULL), SEL_ERROR_ARGUMENT);
+    assert_int_equal(sel_scene_query(context, NULL, 1, point, &gap, NULL), SEL_ERROR_ARGUMENT);
+    assert_int_equal(sel_scene_query(context, scene, -1, point, &gap, NULL), SEL_ERROR_ARGUMENT);
+    assert_int_equal(sel_scene_query(context, scene, 1, NULL, &gap, NULL), SEL_ERROR_ARGUMENT);
+    assert_int_equal(sel_scene_query(context, scene, 1, point, NULL, NULL), SEL_ERROR_ARGUMENT);
     assert_int_equal(sel_simulator_create(context, NULL, NULL, &simulator), SEL_ERROR_ARGUMENT);
     assert_int_equal(sel_simulator_step(NULL, NULL), SEL_ERROR_ARGUMENT);
     assert_int_equal(sel_simulator_report(NULL, &report, sizeof report), SEL_ERROR_ARGUMENT);
@@ -207,7 +215,7 @@ static void the_host_keeps_its_settings(void **state)
 static void two_simulators_in_turn_are_two_alone(void **state)
 {
     (void)state;
-    enum { STEPS = 400 };
+    enum { STEPS = WHOLE_OR_SHORT(400, 100) };
     SelOpenOptions slow = sel_open_defaults();
     SelScene *other = NULL;
     slow.script = SOURCE_DIR "/scenes/phantom/slow.csv";
@@ -225,6 +233,8 @@ static void two_simulators_in_turn_are_two_alone(void **state)
     sel_simulator_destroy(b);
 }
 
+enum { SHARED_STEPS = WHOLE_OR_SHORT(300, 100) };
+
 static void *run_alone(void *hash)
 {
     SelContext *own = NULL;
@@ -232,7 +242,7 @@ static void *run_alone(void *hash)
     SelHand hand;
     bool is_good = sel_context_create(NULL, &own) == SEL_OK && sel_simulator_create(own, scene, NULL, &simulator) == SEL_OK;
     sel_context_destroy(own);        // the simulator keeps it
-    for (int i = 0; is_good && i < 300; i++)
+    for (int i = 0; is_good && i < SHARED_STEPS; i++)
         is_good = sel_simulator_script_hand(simulator, &hand) == SEL_OK && sel_simulator_step(simulator, &hand) == SEL_OK;
     *(uint64_t *)hash = is_good ? sel_simulator_hash(simulator) : 0;
     sel_simulator_destroy(simulator);
@@ -248,7 +258,7 @@ static void threads_share_a_scene(void **state)
         assert_int_equal(pthread_create(&thread[i], NULL, run_alone, &hash[i]), 0);
     for (int i = 0; i < 2; i++)
         pthread_join(thread[i], NULL);
-    uint64_t alone = hash_after(scene, 300);
+    uint64_t alone = hash_after(scene, SHARED_STEPS);
     assert_true(hash[0] == alone && hash[1] == alone);
 }
 
@@ -303,7 +313,7 @@ static void the_host_may_speak_german(void **state)
     setlocale(LC_NUMERIC, "C");
     unsetenv("LOCPATH");
     good(status);
-    assert_true(hash_after(same, 1200) == hash_after(scene, 1200));
+    assert_true(hash_after(same, WHOLE_OR_SHORT(1200, 100)) == hash_after(scene, WHOLE_OR_SHORT(1200, 100)));
     assert_non_null(strstr(sel_scene_text(built), "push_mm_s\": 17.300000000000001"));
     sel_scene_destroy(same);
     sel_scene_destroy(built);
@@ -313,7 +323,7 @@ static void the_host_may_speak_german(void **state)
 static void a_scene_in_code_is_that_of_the_file(void **state)
 {
     (void)state;
-    enum { STEPS = 500 };
+    enum { STEPS = WHOLE_OR_SHORT(500, 100) };
     SelSimulator *by_file = new_simulator(scene);
     SelHand hand = {.tool = {{.push_mm_s = 17.3}}};
     for (int i = 0; i < STEPS; i++)

@@ -48,7 +48,7 @@ static void exact_samples_give_the_wall(void **state)
         double tube, bifurcation, sac, worst;
     } of[] = {{"arc", 0.002, 0, 0, 0}, {"y", 0.002, 0.003, 0, 0}, {"bifurcation", 0.002, 0.003, 0, 0}, {"kissing", 0.002, 0, 0, 0}, {"twig", 0.001, 0.003, 0, 0}, {"helix", 0.002, 0, 0, 0},
               {"phantom", 0.003, 0.006, 0.007, 0.040}};
-    for (size_t i = 0; i < sizeof of / sizeof of[0] - (is_slow ? 3 : 0); i++) {
+    for (size_t i = 0; i < sizeof of / sizeof of[0] - (is_slow ? 5 : 0); i++) {
         Shape *shape = make(of[i].name, 0, NULL);
         VesselTree *model = shared_fit(shape, 0.05, 0);
         ModelMeasure m = measure(of[i].name, model, shape);

@@ -11,13 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/short_run.h"
 #include "tube_volume.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-enum { SEEDS = 1 };
-#else
-enum { SEEDS = 4 };
-#endif
+enum { SEEDS = WHOLE_OR_SHORT(4, 1), VARIANTS = WHOLE_OR_SHORT(2, 1) };
 
 static Faults faults;
 
@@ -69,7 +66,7 @@ static Volume *trunk_with_branches(int variant, uint64_t seed)
 static void the_tree_ends_at_until(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 2; variant++)
+    for (int variant = 0; variant < VARIANTS; variant++)
         for (uint64_t seed = 1; seed <= SEEDS; seed++) {
             Volume *v = trunk_with_branches(variant, seed);
             RbtParameters p = automatic();
@@ -118,7 +115,7 @@ static Volume *artery_and_vein(int variant, uint64_t seed)
 static void what_is_not_wanted_is_left_out(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 2; variant++)
+    for (int variant = 0; variant < VARIANTS; variant++)
         for (uint64_t seed = 1; seed <= SEEDS; seed++) {
             Volume *v = artery_and_vein(variant, seed);
             RbtParameters p = automatic();
@@ -151,7 +148,7 @@ static void what_is_not_wanted_is_left_out(void **state)
 static void one_lumen_is_divided_where_it_is_narrow(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 2; variant++) {
+    for (int variant = 0; variant < VARIANTS; variant++) {
         Volume *v = dark_volume(100, 100, 145, 0.2);
         for (int i = 0; i <= 600; i++) {
             double z = -2 + i * 0.05, d = (z - 17) / 1.2;
@@ -205,7 +202,7 @@ static void unfit_limits_are_refused(void **state)
 static void a_ring_is_a_loop(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 2; variant++)
+    for (int variant = 0; variant < VARIANTS; variant++)
         for (uint64_t seed = 1; seed <= SEEDS; seed++) {
             Volume *v = dark_volume(100, 100, 145, 0.2);
             tube(v, variant, vec3(10, 10, -2), vec3(10, 10, 6), 1);

@@ -166,6 +166,7 @@ static void straight_cylinder(void **state)
         for (int seed = 1; seed <= WHOLE_OR_SHORT(3, 1); seed++) {
             RbtParameters parameters = cases[k].paper ? rbt_paper_parameters() : rbt_default_parameters();
             parameters.seed = seed;
+            parameters.powell *= cylinder_refine_has_powell();
             develop(&p, &disc, 0, cases[k].noise, (uint64_t)seed);
             Vec3 start = vec3_add_scaled(a, 2 + 2.5 * r, axis);
             VesselTree *tree = track(&p, &parameters, vec3_add(start, vec3(0.2 * r, 0, 0)), vec3_add_scaled(start, 1, axis), 1.1 * r, NULL);

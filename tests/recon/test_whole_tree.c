@@ -11,15 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/short_run.h"
 #include "tube_volume.h"
 
 static Faults faults;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-static const bool is_slow = true;    // one case of a kind: the figures are the release build's business
-#else
-static const bool is_slow = false;
-#endif
 
 // A trunk with four branches, one of which forks.
 static const Vec3 tip[6] = {{10, 10, 27.5}, {18, 10, 9}, {3, 10, 15}, {10, 17.5, 18}, {17, 4, 20}, {14, 2, 27}};
@@ -79,7 +74,7 @@ static void every_branch_from_one_start(void **state)
 {
     (void)state;
     Volume *v = small_tree(0.05);
-    for (int number = 1; number <= 3; number++) {
+    for (int number = 1; number <= WHOLE_OR_SHORT(3, 1); number++) {
         RbtParameters p = automatic();
         RbtReport report = {0};
         RbtSeed seed = trunk();
@@ -108,7 +103,7 @@ static void every_branch_from_one_start(void **state)
 static void kissing_vessel_is_refused(void **state)
 {
     (void)state;
-    for (int k = 0; k < 6; k++) {
+    for (int k = 0; k < 6; k += WHOLE_OR_SHORT(1, 3)) {
         double gap = 0.1 * (1 << k % 3), slope = k < 3 ? 0.5 : 1.5;
         Volume *v = dark_volume(100, 70, 130, 0.2);
         double x = 7 + 1.0 + gap + 0.8;
@@ -140,7 +135,7 @@ static void dense_and_near_neighbours_are_refused(void **state)
         char option[3][2][64];
     } shapes[] = {{"bone", 5, {{"seed", "5"}, {"radius_mm", "1"}, {"points", "8"}}}, {"bone", 7, {{"seed", "7"}, {"radius_mm", "1"}, {"points", "8"}}},
                   {"kissing", 13, {{"gap_mm", "0.4"}, {"radius_mm", "0.6"}, {"crossing_deg", "90"}}}};
-    for (size_t k = is_slow ? 1 : 0; k < sizeof shapes / sizeof shapes[0]; k++) {
+    for (size_t k = WHOLE_OR_SHORT(0, 1); k < sizeof shapes / sizeof shapes[0]; k++) {
         VolumeOptions options = volume_default_options();
         options.seed = shapes[k].seed;   // as `synth` has it: of the places and of the noise
         Shape *shape = shape_create(shapes[k].name, 3, shapes[k].option, "test", &faults);
@@ -175,7 +170,7 @@ static void a_sac_is_found(void **state)
     add_ball(v, sac, 3.6, 1);
     add_noise(v, 0.05);
     RbtSeed seed = {.start = {7, 7, 2}, .toward = {7, 7, 4}, .has_toward = true, .radius = 1};
-    for (int wanted = 0; wanted <= 1; wanted++) {
+    for (int wanted = WHOLE_OR_SHORT(0, 1); wanted <= 1; wanted++) {
         RbtParameters p = automatic();
         RbtReport report = {0};
         p.find_aneurysms = wanted;
@@ -251,7 +246,7 @@ static void a_click_anywhere(void **state)
     VesselTree *truth = shape_sample(shape, &faults);
     Volume *v = shape_volume(shape, 0.25, 0.2, 0.05, 3, &faults);
     assert_true(truth && v);
-    for (int k = 0; k < (is_slow ? 1 : 3); k++) {
+    for (int k = 0; k < WHOLE_OR_SHORT(3, 1); k++) {
         int node = truth->node_count * (2 * k + 1) / 8;
         Vec3 off = vec3_normal_to(truth->direction[node]);
         RbtSeed seed = {.start = vec3_add_scaled(truth->center[node], (k % 2 ? 0.5 : -0.5) * truth->radius[node], off), .line = 1, .column = 1};

@@ -6,6 +6,7 @@
 #include "render/panel_internal.h"
 #include "render/panel_tray.h"
 #include "render/png_file.h"
+#include "render/tick_step.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -220,7 +221,7 @@ static void ticks_are_round(void **unused)
     (void)unused;
     for (double span = 1e-6; span < 1e6; span *= 1.07)
         for (int ticks = 2; ticks <= 6; ticks++) {
-            double step = plot_tick_step(span, ticks), mantissa = step / pow(10, floor(log10(step) + 1e-9));
+            double step = tick_step(span, ticks), mantissa = step / pow(10, floor(log10(step) + 1e-9));
             assert_true(fabs(mantissa - 1) < 1e-9 || fabs(mantissa - 2) < 1e-9 || fabs(mantissa - 5) < 1e-9);
             assert_true(span / step <= ticks * (1 + 1e-9) && span / step * 2.5 > ticks * (1 - 1e-9));
         }

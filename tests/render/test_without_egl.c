@@ -1,4 +1,4 @@
-// Where EGL finds no driver (the environment set in CMakeLists.txt hides it) every picture reports it and the program continues.
+// Where EGL finds no driver, or there is no EGL at all (the environment set in CMakeLists.txt hides them), every picture reports it and the program continues.
 #include "render/picture.h"
 
 #include <setjmp.h>
