@@ -52,7 +52,8 @@ typedef struct FieldVessel {
 static const double SKIN = 0.2, SKIN_MOST = 0.3;    // of the radius, (1 + AHEAD) SKIN < BLOB_FLOOD_MARGIN; [mm]
 static const double AHEAD = 0.45;            // of the skin
 static const double BOUND = 0.1, BOUND_MOST = 0.15;  // what bounds are wider than the gap: of the radius; [mm]
-static const double TRUST = 0.05;            // of the radius: rivals that are this much farther are kept an eye on
+static const double TRUST = 0.05;            // of the radius: a foot is followed over this much of travel, beside one rival; with more rivals over less, at least …
+static const double TRUST_LEAST = 0.01;      // … this
 static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] what Newton may leave of the gap: of a foot that is followed, of one from scratch
 // Feet on two nodes' walls that are closer together than this [mm] are the same.
 static const double AGREE = 1e-3;
@@ -326,6 +327,7 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
 {
     SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "starts fit into a block");
     static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
+    static const double LONGEST = 0.25;              // of the start's distance: longer steps leave a near ridge for a farther wall
     FieldBlock b;
     NearLists lists;
     FootBatch *f = &b.foot;
@@ -339,7 +341,7 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
         set_lane(field, &b, i, node, field->node[node].carried);
         f->xx[i] = x.x, f->xy[i] = x.y, f->xz[i] = x.z;
         f->at.x[i] = from->x, f->at.y[i] = from->y, f->at.z[i] = from->z;
-        f->longest[i] = 0.5 * f->radius[i];
+        f->longest[i] = fmin(0.5 * f->radius[i], fmax(0.05 * f->radius[i], LONGEST * vec3_distance(x, *from)));
         f->allowed[i] = REST_FRESH;
         f->state[i] = FOOT_PENDING;
         if (i < count)
@@ -396,18 +398,15 @@ static double field_here(const FieldVessel *field, int node, Vec3 x)
     return f[0];
 }
 
-// f at `far` from x in all directions.
-static void look_around(const FieldVessel *field, Vec3 x, int node, double far, double *f)
+// f at eight places; `list`: the node's blobs that reach there.
+static void look(const FieldVessel *field, int node, const BlobList *list, const Vec3 *place, double *f)
 {
-    const FieldNode *n = &field->node[node];
-    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
-        FieldLane at_x, at_y, at_z;
-        for (int i = 0; i < FOOT_BLOCK; i++) {
-            Vec3 q = asked_at(field, n, vec3_add_scaled(x, far, field->way[k + i]));
-            at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
-        }
-        field->kernels->look(field->row, n->seen, n->seen_count, at_x, at_y, at_z, f + k);
+    FieldLane at_x, at_y, at_z;
+    for (int i = 0; i < FOOT_BLOCK; i++) {
+        Vec3 q = asked_at(field, &field->node[node], place[i]);
+        at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
     }
+    field->kernels->look(field->row, list->blob, list->count, at_x, at_y, at_z, f);
 }
 
 // Near the foot, which the ball touches, the spheres' points say nothing of a wall that leans by less than 50 degrees: there rings of the ball itself are
@@ -463,82 +462,122 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
     return 0;
 }
 
-// What is found of a point's feet on the wall of a node.
+// What is found of a point's feet.
+enum { SHEETS = 3 };
 typedef struct Sheets {
-    bool found, has_rival;
-    Foot foot, rival;        // the closest, and the next one
+    int count;
+    Foot foot[SHEETS];       // the closest first
 } Sheets;
 
 static void add_sheet(Sheets *s, const Foot *foot)
 {
     SEL_ASSERT(isfinite(foot->gap), "a foot that was found has a distance");
     static const double SAME = 1e-4;         // [mm]
-    if (!s->found || fabs(foot->gap) < fabs(s->foot.gap)) {
-        if (s->found && vec3_distance(foot->at, s->foot.at) > SAME) {
-            s->rival = s->foot;
-            s->has_rival = true;
-        }
-        s->foot = *foot;
-        s->found = true;
-    } else if (vec3_distance(foot->at, s->foot.at) > SAME && (!s->has_rival || fabs(foot->gap) < fabs(s->rival.gap))) {
-        s->rival = *foot;
-        s->has_rival = true;
+    int at = 0;
+    for (int i = 0; i < s->count; i++) {
+        if (vec3_distance(foot->at, s->foot[i].at) <= SAME)
+            return;
+        at += fabs(s->foot[i].gap) <= fabs(foot->gap);
     }
+    if (at == SHEETS)
+        return;
+    s->count = s->count < SHEETS ? s->count + 1 : SHEETS;
+    memmove(s->foot + at + 1, s->foot + at, (size_t)(s->count - 1 - at) * sizeof *s->foot);
+    s->foot[at] = *foot;
 }
 
-// Feet from where directions cross the wall between two distances, the nearest crossings first and none beside one that is taken. `side`: 1 where x is
-// inside, -1 outside. False where none crosses.
-static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double side, const double *near_f, const double *far_f, double near, double far,
-                             Sheets *sheets)
+// Is the foot on the vessel's wall? Far from its cell a node does not see all lumen, and its field ends where there is no wall.
+static bool is_known_there(const FieldVessel *field, const Foot *foot)
+{
+    Vec3 q = asked_at(field, &field->node[foot->node], foot->at);
+    int cell = cell_of(field, q, foot->node);
+    return cell == foot->node || sees_all(field, q, foot->node) || walls_apart(field, foot->node, cell, q) <= AGREE;
+}
+
+// Where the wall may be in each direction from a point.
+typedef struct Looks {
+    double at[WAYS];         // [mm] from the point: where a direction crosses the wall, or is nearest to it
+    double order[WAYS];      // [mm] how far the wall may be; +HUGE_VAL: none
+    double before[WAYS];     // f at the last distance
+    double far;              // [mm] that distance
+} Looks;
+
+static void start_looks(Looks *looks, double here)
+{
+    looks->far = 0;
+    for (int k = 0; k < WAYS; k++)
+        looks->before[k] = here, looks->order[k] = looks->at[k] = HUGE_VAL;
+}
+
+// Looks in all directions at a distance. Where the wall is crossed since the last one, it is there; where f is below LOW far slope, a ridge or septum may lie
+// between two directions. slope: |grad f| at a wall; 0: only crossings.
+static void look_farther(const FieldVessel *field, Vec3 x, int node, const BlobList *list, double side, double far, double slope, Looks *looks)
+{
+    static const double LOW = 0.3;           // more than half the angle between directions
+    double f[WAYS], near = looks->far;
+    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
+        Vec3 to[FOOT_BLOCK];
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            to[i] = vec3_add_scaled(x, far, field->way[k + i]);
+        look(field, node, list, to, f + k);
+    }
+    for (int k = 0; k < WAYS; k++) {
+        double h = side * f[k], before = side * looks->before[k], at = far, order = HUGE_VAL;
+        if (h <= 0 && before > 0)
+            order = at = near + (far - near) * before / (before - h);
+        else if (h > 0 && h < LOW * far * slope)
+            order = far + h / slope;
+        if (order < looks->order[k])
+            looks->order[k] = order, looks->at[k] = at;
+        looks->before[k] = f[k];
+    }
+    looks->far = far;
+}
+
+// Feet from what was looked at, the nearest starts first and none beside one that is taken.
+static void settle_looks(const FieldVessel *field, Vec3 x, int node, double side, Looks *looks, Sheets *sheets)
 {
     static const double ASIDE = 0.9;         // cosine
     Vec3 start[FOOT_BLOCK];
-    double at[WAYS];
+    Foot foot[FOOT_BLOCK];
     int count = 0;
-    for (int k = 0; k < WAYS; k++)
-        at[k] = side * far_f[k] > 0 || !(side * near_f[k] > 0) ? HUGE_VAL : near + (far - near) * near_f[k] / (near_f[k] - far_f[k]);
     while (count < FOOT_BLOCK) {
         int best = 0;
         for (int k = 1; k < WAYS; k++)
-            best = at[k] < at[best] ? k : best;
-        if (at[best] == HUGE_VAL)
+            best = looks->order[k] < looks->order[best] ? k : best;
+        if (looks->order[best] == HUGE_VAL)
             break;
-        start[count] = vec3_add_scaled(x, at[best], field->way[best]);
-        SEL_ASSERT(at[best] >= near && at[best] <= far, "a crossing lies between the two looks");
-        count++;
+        Vec3 way = field->way[best];
+        start[count++] = vec3_add_scaled(x, looks->at[best], way);
         for (int k = 0; k < WAYS; k++)
-            if (vec3_dot(field->way[k], field->way[best]) > ASIDE)
-                at[k] = HUGE_VAL;
+            if (vec3_dot(field->way[k], way) > ASIDE)
+                looks->order[k] = HUGE_VAL;
     }
-    Foot foot[FOOT_BLOCK];
     int found = count > 0 ? settle(field, x, node, start, count, ROUNDS, foot) : 0;
     for (int i = 0; i < found; i++)
-        if (foot[i].gap * side > -1e-9)
+        if (foot[i].gap * side > -1e-9 && is_known_there(field, &foot[i]))
             add_sheet(sheets, &foot[i]);
-    return count > 0;
 }
 
-// Looks on one node's wall for feet nearer than `gap`, or hardly farther. At the gap itself too: a thin septum may be crossed before the last distance.
+// Looks on one node's wall for feet nearer than `gap`, or hardly farther.
 static void look_on_node(const FieldVessel *field, Vec3 x, int node, double side, double gap, Sheets *sheets)
 {
-    const double all[] = {0.7 * gap, gap, gap + 2 * TRUST * field->node[node].radius};
-    double near_f[WAYS], far_f[WAYS], near = 0;
-    for (int k = 0; k < WAYS; k++)
-        near_f[k] = side;
-    for (size_t p = 0; p < sizeof all / sizeof all[0]; p++) {
-        double far = all[p];
-        look_around(field, x, node, far, far_f);
-        settle_crossings(field, x, node, side, near_f, far_f, near, far, sheets);
-        memcpy(near_f, far_f, sizeof near_f);
-        near = far;
-    }
+    const double all[] = {0.5 * gap, gap, gap + 2 * TRUST * field->node[node].radius};
+    enum { DISTANCES = sizeof all / sizeof all[0] };
+    BlobList list;
+    Looks looks;
+    list_blobs(field, node, x, all[DISTANCES - 1], &list);
+    start_looks(&looks, side);
+    for (int p = 0; p < DISTANCES; p++)
+        look_farther(field, x, node, &list, side, all[p], sheets->foot[0].slope, &looks);
+    settle_looks(field, x, node, side, &looks, sheets);
 }
 
 // Looks for walls nearer than the foot, or hardly farther: those that the foot's node sees, and those that the node of x sees.
 static void look_for_rivals(const FieldVessel *field, Vec3 x, double side, Sheets *sheets)
 {
-    int node = sheets->foot.node, own = walk(field, x, node, 4);
-    double gap = fabs(sheets->foot.gap);
+    int node = sheets->foot[0].node, own = walk(field, x, node, 4);
+    double gap = fabs(sheets->foot[0].gap);
     look_on_node(field, x, node, side, gap, sheets);
     if (own != node)
         look_on_node(field, x, own, side, gap, sheets);
@@ -547,17 +586,18 @@ static void look_for_rivals(const FieldVessel *field, Vec3 x, double side, Sheet
 // Feet of x on the wall of one node, from scratch.
 static Sheets find_sheets(const FieldVessel *field, Vec3 x, int node)
 {
+    const FieldNode *n = &field->node[node];
+    const BlobList list = {.blob = n->seen, .count = n->seen_count};
     Sheets sheets = {0};
-    double here = field_here(field, node, x), side = here > 0 ? 1 : -1, near_f[WAYS], far_f[WAYS], near = 0, radius = field->node[node].radius;
+    Looks looks;
     Foot foot;
-    for (int k = 0; k < WAYS; k++)
-        near_f[k] = here;
-    for (double far = 0.3 * radius; far < 60 * radius && !sheets.found; near = far, far *= far < radius ? 1.7 : 1.4) {
-        look_around(field, x, node, far, far_f);
-        settle_crossings(field, x, node, side, near_f, far_f, near, far, &sheets);
-        memcpy(near_f, far_f, sizeof near_f);
+    double here = field_here(field, node, x), side = here > 0 ? 1 : -1;
+    start_looks(&looks, here);
+    for (double far = 0.3 * n->radius; far < 60 * n->radius && sheets.count == 0; far *= far < n->radius ? 1.7 : 1.4) {
+        look_farther(field, x, node, &list, side, far, 0, &looks);
+        settle_looks(field, x, node, side, &looks, &sheets);
     }
-    if (!sheets.found) {
+    if (sheets.count == 0) {
         Blobby blobs = blobby_of(field->tree, node);
         SurfacePoint s = blobby_project(&blobs, x, x);
         if (s.converged && settle(field, x, node, &s.foot, 1, ROUNDS, &foot) > 0)
@@ -604,10 +644,12 @@ static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
             if (foot[i].gap * side > 0)
                 add_sheet(&sheets, &foot[i]);
     }
-    if (!sheets.found)
+    if (sheets.count == 0)
         sheets = find_sheets(field, x, node);
-    if (sheets.found)
-        move_to_cell(field, x, &sheets.foot);
+    if (sheets.count > 0) {
+        sheets.count = 1;
+        move_to_cell(field, x, &sheets.foot[0]);
+    }
     return sheets;
 }
 
@@ -717,26 +759,29 @@ static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
 // Makes sure that a foot is the closest, or finds that which is, and answers; `list`: of the foot's list_about, used up.
 static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets sheets, BlobList *list, VesselMemory *m, VesselHit *hit)
 {
-    double radius = field->node[sheets.foot.node].radius;
-    answer(field, x, &sheets.foot, list, m, hit);
+    double radius = field->node[sheets.foot[0].node].radius;
+    answer(field, x, &sheets.foot[0], list, m, hit);
     m->has_rival = false;
     m->trust = 0;
-    if (is_closest(field, x, &sheets.foot, m)) {
-        set_clearance(m, x, sheets.foot.gap);
+    if (is_closest(field, x, &sheets.foot[0], m)) {
+        set_clearance(m, x, sheets.foot[0].gap);
     } else {
-        set_clearance(m, x, clear_ball(field, &field->node[sheets.foot.node], x, sheets.foot.gap, list));
-        m->trust = room_about(field, side, &sheets.foot, list);
+        set_clearance(m, x, clear_ball(field, &field->node[sheets.foot[0].node], x, sheets.foot[0].gap, list));
+        m->trust = room_about(field, side, &sheets.foot[0], list);
         if (m->trust == 0) {
-            Foot before = sheets.foot;
+            Vec3 before = sheets.foot[0].at;
             look_for_rivals(field, x, side, &sheets);
-            if (vec3_distance(sheets.foot.at, before.at) > 1e-4) {
-                move_to_cell(field, x, &sheets.foot);
-                list_about(field, x, &sheets.foot, list);
-                answer(field, x, &sheets.foot, list, m, hit);
+            if (vec3_distance(sheets.foot[0].at, before) > 1e-4) {
+                move_to_cell(field, x, &sheets.foot[0]);
+                list_about(field, x, &sheets.foot[0], list);
+                answer(field, x, &sheets.foot[0], list, m, hit);
             }
-            m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(sheets.foot.gap) + 2 * TRUST * radius;
-            m->rival = sheets.rival.at;
-            m->trust = fmin(TRUST * radius, bend_radius(&sheets.foot));
+            double size = fabs(sheets.foot[0].gap), trust = TRUST * radius;
+            if (sheets.count == SHEETS)
+                trust = fmax(TRUST_LEAST * radius, fmin(trust, 0.5 * (fabs(sheets.foot[SHEETS - 1].gap) - size)));
+            m->has_rival = sheets.count > 1 && fabs(sheets.foot[1].gap) < size + 2 * trust;
+            m->rival = sheets.foot[1].at;
+            m->trust = fmin(trust, bend_radius(&sheets.foot[0]));
         }
     }
     set_flags(field, x, m->node, hit);
@@ -751,14 +796,14 @@ static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Vesse
         // a foot follows its wall where the cell of X is another's: the remembered node's wall may be the closer one
         double other_side = field_here(field, m->node, x) > 0 ? 1 : -1;
         Sheets other = project(field, x, m->node, other_side);
-        if (other.found && (!sheets.found || fabs(other.foot.gap) < fabs(sheets.foot.gap))) {
+        if (other.count > 0 && (sheets.count == 0 || fabs(other.foot[0].gap) < fabs(sheets.foot[0].gap))) {
             sheets = other;
             side = other_side;
         }
     }
-    if (sheets.found) {
+    if (sheets.count > 0) {
         BlobList list;
-        list_about(field, x, &sheets.foot, &list);
+        list_about(field, x, &sheets.foot[0], &list);
         answer_surely(field, x, side, sheets, &list, m, hit);
         return;
     }
@@ -794,7 +839,7 @@ static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, Ve
         answer_afresh(field, x, m, hit);
         return;
     }
-    answer_surely(field, x, side, (Sheets){.found = true, .foot = *foot}, &list, m, hit);
+    answer_surely(field, x, side, (Sheets){.count = 1, .foot = {*foot}}, &list, m, hit);
     if (m->contradicted)
         compare_gaps(m, 0, travel, hit);
 }
