@@ -131,10 +131,12 @@ static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *r
     return first;
 }
 
-// One tool's compliance: of S1 to S2, and of what is behind S1 where `spread` is longer. What is past its tip is strained as its last section.
+// One tool's compliance: of S1 to S2, and of what is behind S1 where `spread` is longer; at a mouth of `spread`, even where node 1 is past it: what lies between
+// the two is in the element behind too. What is past its tip is strained as its last section.
 static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
 {
-    double length = rest->strained_length[k], end = span->s1 + length, start = end - fmax(span->spread, length), axial = 0, torsion = 0;
+    double length = rest->strained_length[k], end = span->s1 + length, spread = span->spreads_twist ? span->spread : fmax(span->spread, length);
+    double start = end - spread, axial = 0, torsion = 0;
     const CoaxialSection *last = span->tool->section + span->tool->count - 1, *back = coaxial_section_at(span->tool, start), *first = coaxial_section_at(span->tool, span->s1);
     const CoaxialSection *section = back;
     for (double at = start;; section++) {
@@ -145,7 +147,7 @@ static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
         if (section == last || section->end >= end)
             break;
     }
-    bool is_spread = start < span->s1, spreads_twist = is_spread && span->spreads_twist;
+    bool spreads_twist = span->spreads_twist, is_spread = spreads_twist || start < span->s1;
     rest->axial[k] = 1 / axial;
     rest->torsion[k] = 1 / torsion;
     rest->axial_end[k][0] = is_spread ? 0 : 1 / first->axial, rest->axial_end[k][1] = 1 / section->axial - (is_spread ? 1 / back->axial : 0);

@@ -49,7 +49,7 @@ typedef struct CoaxialSpan { // one tool in one element
     double phi1, phi2;       // [rad], of any size; where has_tip, coaxial_element() takes for phi2 what leaves the tool without torque
     double spread;           // [mm] strain is that of at least this length, what is behind S1 counted in; default 0. For an element that begins at a
                              // mouth or a tip and may be short: the full element's length
-    bool spreads_twist;      // the twist too: at a mouth, where the tools' angles at node 1 are those of a node behind it
+    bool spreads_twist;      // the twist too, and `spread` is exact: at a mouth, where the tools' angles at node 1 are those of the last node in the sheath
     double soft[2];          // [mm] default 0: over so much to either side of node 1, of node 2, a section's border of this tool goes from this element to the one
                              // there; its tip does not. Where the carrier's section changes or ends the energy would have a kink, and a step a force that depends on the side.
                              // 0 for the carrier

@@ -743,7 +743,7 @@ static Vec3 stiffness_at(const CoaxialInput *in, double d, Quat q, double *bendi
     return sum;
 }
 
-ToolNode tools_further(const Stepper *s, int c, double d)
+ToolNode tools_further(const Stepper *s, int c, double d, bool strains)
 {
     enum { PARTS = 8 };
     CoaxialOutput out;
@@ -752,7 +752,8 @@ ToolNode tools_further(const Stepper *s, int c, double d)
     if (in.count == 0)
         return node;
     const CoaxialSection *first = coaxial_section_at(in.span[0].tool, in.span[0].s1);
-    double length = fmax(out.rest.length, d), ds = d / PARTS, stretch = out.tension[0] / first->axial, twist = ds * out.torque[0] / first->torsion;
+    double length = fmax(out.rest.length, d), ds = d / PARTS, strain = strains ? 1 : 0;
+    double stretch = strain * out.tension[0] / first->axial, twist = strain * ds * out.torque[0] / first->torsion;
     for (int i = 0; i < PARTS; i++) {
         double at = (i + 0.5) * ds, x = at / length, bending, shear;
         Vec3 moment = vec3_add_scaled(stiffness_at(&in, at, node.orientation, &bending, &shear), x - 1, out.end_moment[0]);
@@ -764,7 +765,7 @@ ToolNode tools_further(const Stepper *s, int c, double d)
         node.orientation = quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0)));
     }
     double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;      // input_at()
-    node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(remainder(-turned, 2 * PI), 0, 0))));
+    node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(-turned, 0, 0))));
     return node;
 }
 

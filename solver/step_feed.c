@@ -46,7 +46,7 @@ static void let_go(Stepper *s, int node)
     if (s->tool_count > 1 && !is_tip) {
         if (along > SPRUNG * s->wire.length[node - 1])
             return;
-        ToolNode further = tools_further(s, node, along);
+        ToolNode further = tools_further(s, node, along, false);
         w->position[node] = further.position;
         w->orientation[node] = further.orientation;
         return;

@@ -402,10 +402,11 @@ static void join(Stepper *s, int k, double d)
     int before = c - 1;
     double phi = *angle_of(s, before, k);
     Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0));
-    ToolNode further = tools_further(s, before, d);
+    ToolNode further = tools_further(s, before, d, true);
     shift(s, c, slots_of(t, j - 1), true);
     w->position[c] = further.position;
-    w->orientation[c] = quat_unit(quat_mul(further.orientation, quat_from_rotation_vector(vec3(remainder(phi, 2 * PI), 0, 0))));
+    // whole turns too: they are the quaternion's sign, and elements see p and -p as two
+    w->orientation[c] = quat_unit(quat_mul(further.orientation, quat_from_rotation_vector(vec3(phi, 0, 0))));
     // its material moves as it did inside
     int i = before * w->inner_count + k - 1;
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);

@@ -46,8 +46,8 @@ double tools_span_length(const Stepper *s, int c);
 double tools_strained_length(const Stepper *s, int c);
 double tools_twist(const Stepper *s, int c);
 // Where the line is d [mm] from node c, or from the mouth where that is the last node in the sheath, as its element is bent, slanted by shear, stretched and
-// twisted there: position, and the node's frame carried along.
-ToolNode tools_further(const Stepper *s, int c, double d);
+// twisted there: position, and the node's frame carried along. Without `strains` it is only bent and slanted: a node of the sheath has its strain already.
+ToolNode tools_further(const Stepper *s, int c, double d, bool strains);
 
 // [mm] radial, the least there is; at least a thousandth of the inner tool's diameter.
 double tools_clearance(const Tool *around, const Tool *inner);
