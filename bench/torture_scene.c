@@ -154,7 +154,7 @@ static void write_script(Draws *draws, int tools, double seconds)
 {
     static const char *const name[4] = {"a", "b", "c", "d"};
     fprintf(draws->out, "script:\n");
-    for (double t = 0; t < seconds; t += draw(draws, 0.05, 0.5)) {
+    for (double t = 0; t < seconds - 1e-3; t += draw(draws, 0.05, 0.5)) {    // times differ as they are written, too
         fprintf(draws->out, "  - {t_s: %.4f", t);
         for (int k = 0; k < tools; k++) {
             double push = draw_speed(draws, 100), twist = draw_speed(draws, 1000);

@@ -141,7 +141,7 @@ static unsigned judge_motion(Stepper *s)
         return 0;
     bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && goes_back(s);     // before another iterate is kept
     bool turns = s->turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
-    s->makes_energy = !turns && makes_energy(s);
+    s->makes_energy = makes_energy(s);
     s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
     if (!((turns || s->makes_energy) && next < s->newton_max) && !s->overshoots)
         return 0;
