@@ -8,6 +8,7 @@
 
 #include <cstdio>
 #include <sstream>
+#include <sys/resource.h>
 
 int main()
 {
@@ -16,6 +17,9 @@ int main()
         reader.SetFileName("/dev/stdin");
         if (!reader.Read())
             return 1;
+        // no more files: GDCM's last resort (PVRG) leaves temporary ones behind
+        const rlimit files = {3, 3};
+        setrlimit(RLIMIT_NOFILE, &files);
         gdcm::ImageChangeTransferSyntax change;
         change.SetTransferSyntax(gdcm::TransferSyntax::ExplicitVRLittleEndian);
         change.SetInput(reader.GetImage());

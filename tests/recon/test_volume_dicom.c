@@ -5,6 +5,7 @@
 #include "tests/recon/dicom_file.h"
 #include "tests/short_run.h"
 
+#include <glob.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -484,6 +485,8 @@ static void what_is_damaged_is_refused(void **state)
         skip();
     static uint8_t byte[1 << 16];
     int read = 0, refused = 0;
+    glob_t left;
+    setenv("TMPDIR", folder, 1);
     for (int i = 0; i < 4; i++) {
         empty_folder();
         write_slice("plain", &plain, 0);
@@ -506,7 +509,10 @@ static void what_is_damaged_is_refused(void **state)
             read += volume != NULL, refused += !volume;
             volume_free(volume);
         }
+        assert_int_equal(glob(in_folder("gdcm*"), 0, NULL, &left), GLOB_NOMATCH);       // GDCM's own temporary files
+        globfree(&left);
     }
+    unsetenv("TMPDIR");
     print_message("%d read, %d refused\n", read, refused);
     assert_true(refused > 0);
 }
