@@ -50,7 +50,8 @@ void *options_defaults(const OptionTable *table)
     return structure;
 }
 
-void option_default(const Option *option, const void *defaults, char *text, size_t capacity)
+// The default in words: as the table gives it, or as it stands in `defaults`. "" where none is to be shown.
+static void option_default(const Option *option, const void *defaults, char *text, size_t capacity)
 {
     const char *place = (const char *)defaults + option->at;
     *text = 0;

@@ -68,8 +68,6 @@ typedef struct OptionTable {
     const char *too_many;    // message before one too many; ends with a blank where that shall follow
 } OptionTable;
 
-// The default in words: as the table gives it, or as it stands in `defaults`. "" where none is to be shown.
-void option_default(const Option *option, const void *defaults, char *text, size_t capacity);
 // The table's structure with its defaults, to be freed.
 void *options_defaults(const OptionTable *table);
 // The option's help with its unit and default.

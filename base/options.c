@@ -17,7 +17,8 @@ typedef struct Parse {
     char **argv;
 } Parse;
 
-int options_refuse(const OptionTable *table, const char *format, ...)
+// One line on standard error, "PROGRAM: MESSAGE; see `PROGRAM --help`". Returns EXIT_BAD_INPUT.
+static int __attribute__((format(printf, 2, 3))) options_refuse(const OptionTable *table, const char *format, ...)
 {
     va_list arguments;
     fprintf(stderr, "%s: ", table->program);

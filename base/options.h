@@ -8,7 +8,5 @@
 // Fills `structure` (table->size bytes) from argv[1] on; the order of argv changes. -1: done; otherwise the exit code: after --help, or after a message on
 // standard error.
 int options_parse(const OptionTable *table, int argc, char **argv, void *structure);
-// One line on standard error, "PROGRAM: MESSAGE; see `PROGRAM --help`". Returns EXIT_BAD_INPUT.
-int options_refuse(const OptionTable *table, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 #endif

@@ -43,7 +43,8 @@ static void *work(void *argument)
     return NULL;
 }
 
-int parallel_thread_count(int threads)
+// For 0: one for each processor.
+static int parallel_thread_count(int threads)
 {
     if (threads <= 0)
         threads = (int)sysconf(_SC_NPROCESSORS_ONLN);

@@ -11,6 +11,5 @@ typedef struct Progress {
 } Progress;
 
 void parallel_for(int threads, long count, void (*job)(void *context, long index), void *context, const Progress *progress);
-int parallel_thread_count(int threads);   // the number of threads for 0
 
 #endif

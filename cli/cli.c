@@ -16,7 +16,8 @@ void cli_notes(FILE *out, const char *path, const char *text)
     }
 }
 
-int cli_bad_input(const Faults *faults)
+// Prints all faults to standard error; returns EXIT_BAD_INPUT.
+static int cli_bad_input(const Faults *faults)
 {
     static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];
     faults_print(faults, text, sizeof text);
@@ -41,7 +42,8 @@ int cli_call(const Verb *verb, int argc, char **argv)
     return code;
 }
 
-const char *cli_verb_name(const Verb *verb) { return strrchr(verb->options->program, ' ') + 1; }
+// The last word of its program.
+static const char *cli_verb_name(const Verb *verb) { return strrchr(verb->options->program, ' ') + 1; }
 
 const Verb *cli_find_verb(const Verb *const *list, const char *name)
 {

@@ -23,8 +23,6 @@ typedef struct Verb {
 extern const Verb run_verb, nav_verb, check_verb, segment_verb, import_verb, fit_verb, synth_verb, query_verb, export_verb, info_verb, replay_verb, report_verb,
     devices_verb, bench_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
-// A list of verbs ends with NULL; the name of each is the last word of its program.
-const char *cli_verb_name(const Verb *verb);
 const Verb *cli_find_verb(const Verb *const *list, const char *name);    // NULL: none is called so
 // One line a verb: its name, the first form of its usage in so many characters (0: without), what it does.
 void cli_list_verbs(FILE *out, const Verb *const *list, int usage_width);
@@ -37,8 +35,6 @@ int cli_refuse_verb(const char *program, const char *kind, const char *name, con
 #define CLI_OPTIONS(rows, structure) .option = rows, .option_count = sizeof rows / sizeof *rows, .size = sizeof(structure)
 #define CLI_BAD_INPUT_EXITS "0 done; 2 wrong usage or bad input"
 
-// Prints all faults to standard error; returns EXIT_BAD_INPUT.
-int cli_bad_input(const Faults *faults);
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
 // Views in the order of PanelView.
 extern const char *const cli_view_name[];

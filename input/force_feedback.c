@@ -282,7 +282,8 @@ bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg,
     return true;
 }
 
-double pid_axis_sign(const PidLayout *layout, double direction_deg)
+// Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.
+static double pid_axis_sign(const PidLayout *layout, double direction_deg)
 {
     return !layout->direction.is_there && (direction_deg < 45 || direction_deg > 225) ? -1 : 1;
 }

@@ -63,8 +63,6 @@ bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length
 // `direction_deg`: where the force comes from, clockwise from north (away from the user). Half a second or what is nearest to it, largest
 // gain, no trigger button.
 bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out);
-// Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.
-double pid_axis_sign(const PidLayout *layout, double direction_deg);
 // magnitude -1 to 1 of the device's largest, zero where it is not finite; `value`: what was written.
 bool pid_encode_force(const PidLayout *layout, int block, double magnitude, PidMessage *out, int64_t *value);
 bool pid_encode_start(const PidLayout *layout, int block, PidMessage *out);

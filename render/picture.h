@@ -87,10 +87,6 @@ typedef struct PictureMark {
     const char *label;         // NULL: none
 } PictureMark;
 
-// `low`, `high`: values drawn black and white; equal (0, 0): from the images' percentiles.
-bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
-                            float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
-                            size_t capacity);
 // The same from a voxel grid (layout of recon's Volume: value (size[2], size[1], size[0]), voxel (i,j,k) at origin + i axis[0] + …) and a tree:
 // three maximum-intensity projections, branches coloured by their order (vessel_branches.h). `tree` may be NULL. Without marks the tree's root is marked.
 bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value,

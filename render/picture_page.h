@@ -59,8 +59,6 @@ void picture_page_color_bar(PicturePage *page, double x, double y, double width,
 // A panel of the surface, each vertex in the colour of its `error` (mesh->vertex_count) [mm], +-scale at the ends, NaN grey: discs that overlap, opaque.
 bool picture_page_error_surface(PicturePage *page, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
                          int width, int height);
-// The paper's Table 4 as a histogram: `count` values `error` [mm] in voxels, classes C1 to C4 with their borders and shares; ticks below the box.
-void picture_page_class_chart(PicturePage *page, double x, double y, double width, double height, int count, const double *error, double voxel);
 
 // A round number at or above x for the end of a scale: 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8.
 double picture_page_scale_end(double x);

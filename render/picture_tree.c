@@ -239,7 +239,8 @@ static double lay_out(const PictureOptions *page, int count, const PictureProjec
     return y;
 }
 
-bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
+// `low`, `high`: values drawn black and white; equal (0, 0): from the images' percentiles.
+static bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
                             float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
                             size_t capacity)
 {

@@ -93,7 +93,8 @@ void free_camera_reset(FreeCamera *camera)
     camera->height_mm = camera->home_height_mm;
 }
 
-void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
+// Looks along any direction from the eye into the scene, with `up` (made perpendicular to it) upwards: for scenes whose frame is not the patient's.
+static void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
 {
     Camera axes = {0};
     camera_orient(&axes, view, up, 0, NULL);

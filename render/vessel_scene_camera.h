@@ -38,8 +38,6 @@ void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int he
 void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int width, int height);
 void free_camera_reset(FreeCamera *camera);
 void free_camera_look_from(FreeCamera *camera, LookFrom from);   // at all there is to see
-// The same along any direction from the eye into the scene, with `up` (made perpendicular to it) upwards: for scenes whose frame is not the patient's.
-void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up);
 // The projection for a view of width x height; depths that are drawn reach `depth` mm before and behind the focus.
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth);
 

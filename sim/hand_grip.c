@@ -2,7 +2,8 @@
 
 #include "input/hand_port.h"
 
-int hand_grip_partner(const HandGrip *grip, int tool_count)
+// The partner: the next tool inside the chosen one; for the innermost tool the next around it; for a single tool itself. Both together are the pair.
+static int hand_grip_partner(const HandGrip *grip, int tool_count)
 {
     return grip->chosen + 1 < tool_count ? grip->chosen + 1 : grip->chosen > 0 ? grip->chosen - 1 : 0;
 }

@@ -15,8 +15,6 @@ typedef struct HandGrip {
     int fitted[TOOLS_MOST];  // which of its devices each tool should be (input/input.h); a tool not at its hub stays as it is, see hand_grip_fit()
 } HandGrip;
 
-// The partner: the next tool inside the chosen one; for the innermost tool the next around it; for a single tool itself. Both together are the pair.
-int hand_grip_partner(const HandGrip *grip, int tool_count);
 // The tool that a hand moves which drives this (HandDrives of input/hand_port.h).
 int hand_grip_tool(const HandGrip *grip, int tool_count, int drives);
 void hand_grip_choose(HandGrip *grip, int tool_count, int tool);       // no effect if there is no such tool

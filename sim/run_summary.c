@@ -11,7 +11,8 @@
 // A tool deeper in the wall than this has left the vessel. (Leaving through an open end is reported but is not a failure.)
 static const double lost_mm = 1;
 
-double run_final_penetration_mm(const NodeReport *node, int node_count)
+// How far the last state's deepest node is outside the wall [mm], from a node report.
+static double run_final_penetration_mm(const NodeReport *node, int node_count)
 {
     double deepest = 0;
     for (int i = 0; i < node_count; i++)
@@ -115,7 +116,8 @@ static void add_flags(cJSON *summary, const Simulator *simulator, const DriveRep
         cJSON_AddItemToArray(list, cJSON_CreateString("stopped"));
 }
 
-char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node)
+// Text of the summary (docs/scene-format.md, "Output files"); the caller frees it. NULL if out of memory.
+static char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node)
 {
     const RunTotals *totals = simulator_totals(simulator);
     const StepReport *last = simulator_last(simulator);
@@ -201,7 +203,8 @@ static bool write_tools(FILE *stream, Simulator *simulator, const NodeReport *no
     return true;
 }
 
-char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length)
+// Text of the final state, one row per node.
+static char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length)
 {
     const WireState *state = simulator_state(simulator);
     char *text = NULL;

@@ -338,7 +338,8 @@ static void bend_with_carrier(CoaxialRest *rest, int k)
     slope_add(&rest->slope[COAXIAL_S2], 1, slope);
 }
 
-void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
+// The tools of an element, carrier first, 1 <= count <= COAXIAL_TOOLS_MAX.
+static void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
 {
     SEL_ASSERT(count > 0 && count <= COAXIAL_TOOLS_MAX && !span[0].has_tip, "an element has tools, the first of which carries it from end to end");
     memset(rest, 0, offsetof(CoaxialRest, piece));

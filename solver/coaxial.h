@@ -112,9 +112,6 @@ typedef struct CoaxialRest {       // layer 1: what the tools are together
     CoaxialPiece piece[COAXIAL_BORDERS_MAX + 1];
 } CoaxialRest;
 
-// The tools of an element, carrier first, 1 <= count <= COAXIAL_TOOLS_MAX.
-void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest);
-
 // One tool alone, straight, without its tip: as `strained_length`, `axial` and `torsion` of the element.
 typedef struct CoaxialSprings {
     double length, axial, torsion;

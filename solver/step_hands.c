@@ -164,7 +164,8 @@ void hands_constrain(Stepper *s)
         }
 }
 
-double hand_force(const Stepper *s, int k, int about)
+// [N] or [N mm] that tool k's hand, or the valve that holds it, pushes along or turns about the line with.
+static double hand_force(const Stepper *s, int k, int about)
 {
     int n = s->chain.size, at = row_of_hand(k, about);
     double force = 0;

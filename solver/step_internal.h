@@ -290,8 +290,6 @@ void hands_solved(Stepper *s);
 // Does a hand hold what it cannot, or slip where it could hold? Then it does otherwise from now on.
 bool hands_misjudge(Stepper *s);
 void hands_report(Stepper *s);
-// [N] or [N mm] that tool k's hand, or the valve that holds it, pushes along or turns about the line with.
-double hand_force(const Stepper *s, int tool, int about);
 void hands_count(Stepper *s);
 double hand_moved(const Stepper *s, int tool, int about);     // … in this step, to the iterate
 // [mJ] that they may do in the step: their forces are those of before, since a solution that is not to be trusted says anything.

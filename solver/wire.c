@@ -96,7 +96,8 @@ static bool check_rig(const WireOptions *o, double total, char *why, int capacit
     return true;
 }
 
-bool wire_check(const WireOptions *o, char *why, int capacity)
+// Every option in range? Else false with a message in `why` (capacity >= 256).
+static bool wire_check(const WireOptions *o, char *why, int capacity)
 {
     if (o->elements < 1 || o->elements > ELEMENTS_MAX)
         return complain(why, capacity, "elements of the wire", -1, o->elements, "1 to 10000");

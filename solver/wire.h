@@ -92,8 +92,6 @@ typedef struct Wire {
 } Wire;
 
 WireOptions wire_default_options(void);          // 200 elements, Rayleigh damping 1e-4 per ms and 0.2 ms, no section, along +x from the origin
-// Every option in range? Else false with a message in `why` (capacity >= 256).
-bool wire_check(const WireOptions *options, char *why, int capacity);
 double wire_length(const WireOptions *options);   // [mm] of all sections
 bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity);
 bool wire_reserve(Wire *wire, int nodes);      // room for so many nodes; what it holds is lost

@@ -67,7 +67,8 @@ Station part_at(const Part *part, double t)
 
 // --- Parts ---
 
-bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
+// Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False if out of memory.
+static bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
                        const double (*end_slope)[4])
 {
     *part = (Part){.knot_count = count, .open_start = open_start, .open_end = open_end, .parent = parent, .kind = kind};

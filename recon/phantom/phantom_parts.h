@@ -68,9 +68,6 @@ typedef struct Station {     // of a part at parameter t
 } Station;
 
 Station part_at(const Part *part, double t);
-// Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False if out of memory.
-bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
-                const double (*end_slope)[4]);
 void part_free(Part *part);
 // The same part made larger or smaller about the origin.
 bool part_scale(Part *part, double scale);

@@ -53,7 +53,7 @@ static void add_line(void *context, const int *node, int count)
     fprintf(lines->offsets, "%" PRId64 "\n", lines->points);
 }
 
-bool centreline_print_vtp(FILE *out, const VesselTree *tree)
+static bool centreline_print_vtp(FILE *out, const VesselTree *tree)
 {
     OutputText connectivity, offsets;
     bool first = output_text_open(&connectivity), second = output_text_open(&offsets), good = first && second;
@@ -90,7 +90,7 @@ bool centreline_print_vtp(FILE *out, const VesselTree *tree)
     return good;
 }
 
-bool centreline_print_swc(FILE *out, const VesselTree *tree)
+static bool centreline_print_swc(FILE *out, const VesselTree *tree)
 {
     fprintf(out, "# seldinger " SELDINGER_VERSION ", mm: id type x y z radius parent; type 0: vessel, 5: aneurysm\n");
     for (int i = 0; i < tree->node_count; i++)
@@ -143,7 +143,8 @@ static void add_curve(void *context, const int *node, int count)
     cJSON_AddItemToArray(curves->list, curve);
 }
 
-bool centreline_print_markups(FILE *out, const VesselTree *tree, const char *frame)
+// Markups of 3D Slicer, a curve a branch; `frame`: "RAS" or "LPS".
+static bool centreline_print_markups(FILE *out, const VesselTree *tree, const char *frame)
 {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "@schema",

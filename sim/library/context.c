@@ -148,7 +148,8 @@ SelStatus context_call(SelContext *context, Work work, void *what, SelStatus oth
     return !is_whole ? SEL_ERROR_MEMORY : call.is_good && context->faults.count == 0 ? SEL_OK : otherwise;
 }
 
-bool context_begin(SelContext *context)
+// For a call that does no work of its own: its faults are none. False where the context is NULL.
+static bool context_begin(SelContext *context)
 {
     if (context)
         faults_clear(&context->faults);

@@ -41,8 +41,6 @@ typedef bool (*Work)(SelContext *context, void *what);
 SelStatus context_call(SelContext *context, Work work, void *what, SelStatus otherwise);
 // Adds `FUNCTION: words` and returns `status`. The context may be NULL.
 SelStatus context_refuse(SelContext *context, SelStatus status, const char *function, const char *words);
-// For a call that does no work of its own: its faults are none. False where the context is NULL.
-bool context_begin(SelContext *context);
 
 // Progress of a call to the host; `call` NULL where nobody asks.
 Progress context_progress(SelContext *context);
