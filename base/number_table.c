@@ -108,8 +108,7 @@ static bool read_header(Cursor *cursor, int *column_count)
     }
     int count = split_fields(line, end, got, NUMBER_TABLE_COLUMNS);
     for (int i = 0; i < *column_count || i < count; i++) {
-        if (i < *column_count && i < count && i < NUMBER_TABLE_COLUMNS && got[i].length == want[i].length &&
-            !memcmp(got[i].name, want[i].name, want[i].length))
+        if (i < *column_count && i < count && i < NUMBER_TABLE_COLUMNS && got[i].length == want[i].length && !memcmp(got[i].name, want[i].name, want[i].length))
             continue;
         int column = i < count && i < NUMBER_TABLE_COLUMNS ? got[i].column : (int)(end - line) + 1;
         int shown = i < count && i < NUMBER_TABLE_COLUMNS ? (int)(got[i].length < 40 ? got[i].length : 40) : 0;

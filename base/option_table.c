@@ -72,5 +72,8 @@ void option_sentence(const Option *option, const void *defaults, char *text, siz
     char value[200];
     option_default(option, defaults, value, sizeof value);
     snprintf(text, capacity, "%s%s%s%s%s%s", option->help, option->unit ? " [" : "", option->unit ? option->unit : "", option->unit ? "]" : "",
-             !*value ? "" : isalpha((unsigned char)*value) && option->otherwise ? "; default: " : "; default ", value);
+             !*value                                               ? ""
+             : isalpha((unsigned char)*value) && option->otherwise ? "; default: "
+                                                                   : "; default ",
+             value);
 }

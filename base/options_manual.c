@@ -187,7 +187,8 @@ void options_completion(const char *program, const OptionTable *const *table, FI
 {
     fprintf(out, "# bash completion of %s, made by `%s --completion`\n_%s()\n{\n", program, program, program);
     fputs("    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} verb=${COMP_WORDS[1]} names=\n    COMPREPLY=()\n"
-          "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n        COMPREPLY=($(compgen -W '", out);
+          "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n        COMPREPLY=($(compgen -W '",
+          out);
     for (int i = 0; table[i]; i++)
         fprintf(out, "%s ", verb_of(table[i]));
     fputs("--help --version' -- \"$word\"))\n        return\n    fi\n    case \"$verb $before\" in\n", out);
@@ -198,6 +199,7 @@ void options_completion(const char *program, const OptionTable *const *table, FI
     for (int i = 0; table[i]; i++)
         print_names(out, table[i]);
     fputs("    esac\n    if [[ $word == -* ]]; then\n        COMPREPLY=($(compgen -W \"$names\" -- \"$word\"))\n    else\n"
-          "        COMPREPLY=($(compgen -f -- \"$word\"))\n    fi\n}\n", out);
+          "        COMPREPLY=($(compgen -f -- \"$word\"))\n    fi\n}\n",
+          out);
     fprintf(out, "complete -o filenames -F _%s %s\n", program, program);
 }

@@ -130,7 +130,6 @@ bool part_file_begin(PartFile *part, const char *path)
     return true;
 }
 
-
 bool part_file_write(PartFile *part, const void *bytes, size_t length)
 {
     for (const char *at = bytes; length > 0;) {

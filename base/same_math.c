@@ -83,11 +83,11 @@ static double nearest(double x)
 
 static const Pair half_pi = {0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54}, pi = {0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53};
 // The first 1280 bits of 2 / pi behind 64 zeros.
-static const uint32_t two_over_pi[42] = {
-    0, 0, 0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041, 0xfe5163ab, 0xdebbc561, 0xb7246e3a,
-    0x424dd2e0, 0x06492eea, 0x09d1921c, 0xfe1deb1c, 0xb129a73e, 0xe88235f5, 0x2ebb4484, 0xe99c7026, 0xb45f7e41, 0x3991d639, 0x835339f4,
-    0x9c845f8b, 0xbdf9283b, 0x1ff897ff, 0xde05980f, 0xef2f118b, 0x5a0a6d1f, 0x6d367ecf, 0x27cb09b7, 0x4f463f66, 0x9e5fea2d, 0x7527bac7,
-    0xebe5f17b, 0x3d0739f7, 0x8a5292ea, 0x6bfb5fb1, 0x1f8d5d08, 0x56033046, 0xfc7b6bab, 0xf0cfbc20, 0x9af4361d};
+static const uint32_t two_over_pi[42] = {0,          0,          0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041, 0xfe5163ab,
+                                         0xdebbc561, 0xb7246e3a, 0x424dd2e0, 0x06492eea, 0x09d1921c, 0xfe1deb1c, 0xb129a73e, 0xe88235f5, 0x2ebb4484,
+                                         0xe99c7026, 0xb45f7e41, 0x3991d639, 0x835339f4, 0x9c845f8b, 0xbdf9283b, 0x1ff897ff, 0xde05980f, 0xef2f118b,
+                                         0x5a0a6d1f, 0x6d367ecf, 0x27cb09b7, 0x4f463f66, 0x9e5fea2d, 0x7527bac7, 0xebe5f17b, 0x3d0739f7, 0x8a5292ea,
+                                         0x6bfb5fb1, 0x1f8d5d08, 0x56033046, 0xfc7b6bab, 0xf0cfbc20, 0x9af4361d};
 
 // x = m 2^e, m whole. Of m 2^e 2 / pi modulo 4 only 192 bits of 2 / pi matter, those that weigh 2^(1 - e) and less (Payne and Hanek, Radian reduction for
 // trigonometric functions, SIGNUM Newsletter 18, 1983).
@@ -166,13 +166,23 @@ double same_cos(double x) { return sine_from(x, 1); }
 // --- arcs ---
 
 // atan(i / 16)
-static const Pair arc[17] = {
-    {0, 0}, {0x1.ff55bb72cfdeap-5, -0x1.c934d86d23f1dp-60}, {0x1.fd5ba9aac2f6ep-4, -0x1.cd37686760c17p-59},
-    {0x1.7b97b4bce5b02p-3, 0x1.347b0b4f881cap-58}, {0x1.f5b75f92c80ddp-3, 0x1.8ab6e3cf7afbdp-57}, {0x1.362773707ebccp-2, -0x1.963a544b672d8p-57},
-    {0x1.6f61941e4def1p-2, -0x1.c63aae6f6e918p-56}, {0x1.a64eec3cc23fdp-2, -0x1.24dec1b50b7ffp-56}, {0x1.dac670561bb4fp-2, 0x1.a2b7f222f65e2p-56},
-    {0x1.0657e94db30d0p-1, -0x1.d5b495f6349e6p-56}, {0x1.1e00babdefeb4p-1, -0x1.928df287a668fp-58}, {0x1.345f01cce37bbp-1, 0x1.1021137c71102p-55},
-    {0x1.4978fa3269ee1p-1, 0x1.2419a87f2a458p-56}, {0x1.5d58987169b18p-1, 0x1.0028e4bc5e7cap-57}, {0x1.700a7c5784634p-1, -0x1.8c34d25aadef6p-56},
-    {0x1.819d0b7158a4dp-1, -0x1.bf76229d3b917p-56}, {0x1.921fb54442d18p-1, 0x1.1a62633145c07p-55}};
+static const Pair arc[17] = {{0, 0},
+                             {0x1.ff55bb72cfdeap-5, -0x1.c934d86d23f1dp-60},
+                             {0x1.fd5ba9aac2f6ep-4, -0x1.cd37686760c17p-59},
+                             {0x1.7b97b4bce5b02p-3, 0x1.347b0b4f881cap-58},
+                             {0x1.f5b75f92c80ddp-3, 0x1.8ab6e3cf7afbdp-57},
+                             {0x1.362773707ebccp-2, -0x1.963a544b672d8p-57},
+                             {0x1.6f61941e4def1p-2, -0x1.c63aae6f6e918p-56},
+                             {0x1.a64eec3cc23fdp-2, -0x1.24dec1b50b7ffp-56},
+                             {0x1.dac670561bb4fp-2, 0x1.a2b7f222f65e2p-56},
+                             {0x1.0657e94db30d0p-1, -0x1.d5b495f6349e6p-56},
+                             {0x1.1e00babdefeb4p-1, -0x1.928df287a668fp-58},
+                             {0x1.345f01cce37bbp-1, 0x1.1021137c71102p-55},
+                             {0x1.4978fa3269ee1p-1, 0x1.2419a87f2a458p-56},
+                             {0x1.5d58987169b18p-1, 0x1.0028e4bc5e7cap-57},
+                             {0x1.700a7c5784634p-1, -0x1.8c34d25aadef6p-56},
+                             {0x1.819d0b7158a4dp-1, -0x1.bf76229d3b917p-56},
+                             {0x1.921fb54442d18p-1, 0x1.1a62633145c07p-55}};
 
 // z - atan z, |z| below 1 / 31.
 static double beyond_arc(double z)

@@ -23,10 +23,9 @@ struct YamlReader {
 
 // --- suggestions for names ---
 
-static const char *const units[] = {"mm",    "cm",     "m",       "um",    "in",    "s",     "ms",     "us",    "min",    "gpa",    "mpa",
-                                    "kpa",   "pa",     "n_mm2",   "g_cm3", "kg_m3", "g_mm3", "n",      "mn",    "n_mm",   "n_m",    "deg",
-                                    "rad",   "1_mm",   "1_m",     "1_cm",  "1_s",   "1_ms",  "m_s2",   "mm_s2", "mm_ms2", "cm_s2",  "mm_s", "cm_s", "m_s",
-                                    "deg_s", "rad_s",  "hz",      "psi",   "percent", NULL};
+static const char *const units[] = {"mm",    "cm",    "m",      "um",    "in",   "s",    "ms",  "us",    "min",   "gpa",  "mpa", "kpa",     "pa",  "n_mm2",
+                                    "g_cm3", "kg_m3", "g_mm3",  "n",     "mn",   "n_mm", "n_m", "deg",   "rad",   "1_mm", "1_m", "1_cm",    "1_s", "1_ms",
+                                    "m_s2",  "mm_s2", "mm_ms2", "cm_s2", "mm_s", "cm_s", "m_s", "deg_s", "rad_s", "hz",   "psi", "percent", NULL};
 
 static bool same_letters(const char *a, const char *b)
 {
@@ -203,15 +202,9 @@ void yaml_reader_close(YamlReader *reader)
     free(reader);
 }
 
-static yaml_node_t *node_of(YamlValue value)
-{
-    return value.node > 0 ? yaml_document_get_node(&value.reader->document, value.node) : NULL;
-}
+static yaml_node_t *node_of(YamlValue value) { return value.node > 0 ? yaml_document_get_node(&value.reader->document, value.node) : NULL; }
 
-YamlValue yaml_root(YamlReader *reader)
-{
-    return (YamlValue){.reader = reader, .node = 1, .name = "scene"};
-}
+YamlValue yaml_root(YamlReader *reader) { return (YamlValue){.reader = reader, .node = 1, .name = "scene"}; }
 
 void yaml_place(YamlValue value, int *line, int *column)
 {
@@ -391,8 +384,7 @@ static bool scalar_number(YamlValue value, const char *valid, double *number)
     if (node->type != YAML_SCALAR_NODE)
         yaml_fault(value, "'%s' is a %s; expected %s", value.name, node->type == YAML_SEQUENCE_NODE ? "list" : "map", valid);
     else
-        yaml_fault(value, "'%s' is '%.40s', not a number; expected %s (the unit is part of the key)", value.name, (const char *)node->data.scalar.value,
-                   valid);
+        yaml_fault(value, "'%s' is '%.40s', not a number; expected %s (the unit is part of the key)", value.name, (const char *)node->data.scalar.value, valid);
     return false;
 }
 

@@ -24,12 +24,31 @@ enum { LARGE = 100000, TIMES_FASTER = 8 };   // required speed of detection in t
 static const double FLAT = 1.2;              // … and within this ratio whatever the size of the tree
 
 static const CollisionCase cases[CASES] = {
-    {.name = "capsule", .scene = "scenes/peer/capsule-a-100.yaml", .convolution_capsule = true, .mesh_count = 1, .triangles = {12000}, .pointwise_steps = 300,
-     .paper_name = "Capsule", .paper_mesh = {{4.89, 51}}, .paper_lim = {0.0232, 50}},
-    {.name = "spiral", .scene = "scenes/collision/spiral.yaml", .mesh_count = 3, .triangles = {2740, 11300, 45000}, .pointwise_steps = 300,
-     .paper_name = "Spiral", .paper_mesh = {{1.09, 79}, {1.84, 80}, {5.58, 80}}, .paper_lim = {0.0219, 80}},
-    {.name = "phantom", .scene = "scenes/collision/phantom.yaml", .mesh_count = 1, .triangles = {SCENE_TRIANGLES}, .pointwise_steps = POINTWISE_STEPS,
-     .paper_name = "Vascular Model (another vessel)", .paper_mesh = {{16.23, 80}}, .paper_lim = {0.133, 82}},
+    {.name = "capsule",
+     .scene = "scenes/peer/capsule-a-100.yaml",
+     .convolution_capsule = true,
+     .mesh_count = 1,
+     .triangles = {12000},
+     .pointwise_steps = 300,
+     .paper_name = "Capsule",
+     .paper_mesh = {{4.89, 51}},
+     .paper_lim = {0.0232, 50}},
+    {.name = "spiral",
+     .scene = "scenes/collision/spiral.yaml",
+     .mesh_count = 3,
+     .triangles = {2740, 11300, 45000},
+     .pointwise_steps = 300,
+     .paper_name = "Spiral",
+     .paper_mesh = {{1.09, 79}, {1.84, 80}, {5.58, 80}},
+     .paper_lim = {0.0219, 80}},
+    {.name = "phantom",
+     .scene = "scenes/collision/phantom.yaml",
+     .mesh_count = 1,
+     .triangles = {SCENE_TRIANGLES},
+     .pointwise_steps = POINTWISE_STEPS,
+     .paper_name = "Vascular Model (another vessel)",
+     .paper_mesh = {{16.23, 80}},
+     .paper_lim = {0.133, 82}},
     {.name = "aneurism", .scene = "scenes/collision/aneurism.yaml", .mesh_count = 1, .triangles = {SCENE_TRIANGLES}},
     {.name = "peer a", .scene = "scenes/peer/capsule-a-100.yaml", .mesh_count = 1, .triangles = {12000}},
     {.name = "peer b", .scene = "scenes/peer/tube-b-100.yaml", .mesh_count = 1, .triangles = {44640}, .pointwise_steps = POINTWISE_STEPS},
@@ -41,11 +60,12 @@ static const struct {
               {"peer c", "scenes/peer/tube-c-centreline.csv", "scenes/peer/prepare brings it"}};
 static const char legend[] =
     "exact: the true wall, where it can be asked; lim: one field of shared blobs; lim fine: the same fitted ten times closer; lim-blend: local models,\n"
-    "neighbours blended; lim-switch: the paper's, a point's own model alone; mesh full, warm, cached: a wall of planes, searched by Embree from nothing, within the last distance, and only where what is\n"
+    "neighbours blended; lim-switch: the paper's, a point's own model alone; mesh full, warm, cached: a wall of planes, searched by Embree from nothing, "
+    "within the last distance, and only where what is\n"
     "remembered of each triangle's surroundings does not do; mesh curved: its planes with the bend of the wall as Hessian; mesh smooth: interpolated\n"
     "normals; grid: a sampled distance, trilinear, with the mesh's edge as its cell\n";
 static const char *const in_quick[] = {"capsule", "spiral"}, *const clamped[] = {"capsule", "spiral", "phantom", "peer b"},
-                  *const clamped_quick[] = {"capsule"};
+                         *const clamped_quick[] = {"capsule"};
 static const int caps[CAPS] = {50, 100, 200, 1000};
 static const char *const form_name[FORMS] = {"block", "pointwise"};
 
@@ -127,10 +147,7 @@ typedef struct Run {         // of one surface
     int64_t reference_steps;
 } Run;
 
-static bool is_mesh_search(const char *name) 
-{
-    return !strcmp(name, "mesh full") || !strcmp(name, "mesh warm") || !strcmp(name, "mesh cached");
-}
+static bool is_mesh_search(const char *name) { return !strcmp(name, "mesh full") || !strcmp(name, "mesh warm") || !strcmp(name, "mesh cached"); }
 
 // The fastest search represents the mesh in closed loop: all give the same answers.
 static bool is_fastest_search(const CollisionBench *bench, const Run *run, const Row *row)
@@ -171,8 +188,7 @@ static bool no_memory(const char *name, Faults *faults)
 }
 
 // A shape's own distance is too slow for simulation: its cost is measured in a few steps, and its error is zero.
-static bool replay(const CollisionSurface *s, const CollisionWall *wall, const CollisionMotion *motion, int repeats, CollisionReplay *out,
-                   Faults *faults)
+static bool replay(const CollisionSurface *s, const CollisionWall *wall, const CollisionMotion *motion, int repeats, CollisionReplay *out, Faults *faults)
 {
     enum { STEPS = 100 };
     bool is_slow = s->shape && wall->vessel == s->truth;
@@ -197,8 +213,13 @@ static bool measure_walls(CollisionBench *bench, Run *run, const Progress *progr
         if (!row)
             return false;
         const CollisionWall *wall = &walls->wall[i];
-        *row = (Row){.of = s->of, .wall = *wall, .primitives = wall->vessel->primitives, .bytes = (double)wall->vessel->bytes,
-                     .bytes_per_mm = (double)wall->vessel->bytes / s->length_mm, .truth_is_model = s->truth_is_model, .reference = walls->wall[0].name};
+        *row = (Row){.of = s->of,
+                     .wall = *wall,
+                     .primitives = wall->vessel->primitives,
+                     .bytes = (double)wall->vessel->bytes,
+                     .bytes_per_mm = (double)wall->vessel->bytes / s->length_mm,
+                     .truth_is_model = s->truth_is_model,
+                     .reference = walls->wall[0].name};
     }
     if (!collision_loop(s->scene, walls->wall[0].vessel, s->truth, s->truth_gap, &record, &bench->row[run->first_row].loop, faults))
         return false;
@@ -278,8 +299,12 @@ static bool find_equal_error(CollisionBench *bench, const Run *run, Faults *faul
     const Row *lim = row_of(bench, s->of, "lim", -1), *mesh = row_of(bench, s->of, "mesh warm", s->of->mesh_count - 1);
     if (!lim || !mesh || s->truth_is_model || !(lim->motion.gap_um.rms > 0) || !(mesh->motion.gap_um.rms > 0))
         return true;
-    EqualError trial = {.surface = s->of->name, .lim_um = lim->motion.gap_um.rms, .lim_us = lim->motion.us_per_80_points, .triangles = mesh->wall.triangles,
-                        .mesh_um = mesh->motion.gap_um.rms, .warm_us = mesh->motion.us_per_80_points};
+    EqualError trial = {.surface = s->of->name,
+                        .lim_um = lim->motion.gap_um.rms,
+                        .lim_us = lim->motion.us_per_80_points,
+                        .triangles = mesh->wall.triangles,
+                        .mesh_um = mesh->motion.gap_um.rms,
+                        .warm_us = mesh->motion.us_per_80_points};
     const Row *cached = row_of(bench, s->of, "mesh cached", s->of->mesh_count - 1);
     trial.cached_us = cached ? cached->motion.us_per_80_points : NAN;
     EqualError best = trial;
@@ -315,8 +340,11 @@ static bool run_clamps(CollisionBench *bench, const Run *run, Faults *faults)
                 if (!clamp)
                     return false;
                 *clamp = (Clamp){.surface = s->of->name, .wall = list[w]->name, .form = form, .cap = caps[c]};
-                LoopOptions options = {.most_steps = form == 0 ? CLAMP_STEPS : bench->common.quick ? QUICK_POINTWISE_STEPS : s->of->pointwise_steps,
-                                       .stop_at_failure = true, .contact = s->scene->contact_options};
+                LoopOptions options = {.most_steps = form == 0             ? CLAMP_STEPS
+                                                     : bench->common.quick ? QUICK_POINTWISE_STEPS
+                                                                           : s->of->pointwise_steps,
+                                       .stop_at_failure = true,
+                                       .contact = s->scene->contact_options};
                 options.most_steps = options.most_steps < run->most_steps ? options.most_steps : run->most_steps;
                 options.contact.form = form ? CONTACT_POINTWISE : CONTACT_BLOCK;
                 options.contact.max_iterations = caps[c];
@@ -358,8 +386,8 @@ static void print_motion(FILE *out, const CollisionBench *bench, int first)
         text_of_seconds(row->wall.surface_s, made);
         text_of_seconds(row->wall.build_s, built);
         fprintf(out, "    %-20s %10lld %8.2f %8.1f    %10s  %10s  %10.2f     %10.2f    %10.3f %10.2f       %8.3f %8.2f %6lld\n", name,
-                (long long)row->primitives, row->bytes / 1e6, row->bytes_per_mm / 1e3, made, built, m->us_per_step, m->us_per_80_points,
-                m->gap_um.rms, m->gap_um.max, m->normal_deg.rms, m->normal_deg.max, (long long)m->lost);
+                (long long)row->primitives, row->bytes / 1e6, row->bytes_per_mm / 1e3, made, built, m->us_per_step, m->us_per_80_points, m->gap_um.rms,
+                m->gap_um.max, m->normal_deg.rms, m->normal_deg.max, (long long)m->lost);
     }
 }
 
@@ -377,8 +405,7 @@ static void print_loops(FILE *out, const CollisionBench *bench, int first)
         if (row->has_loop)
             fprintf(out, "    %-20s %6.1f %8.1f  %7.1f (%7.1f)         %3.0f (%3.0f)         %3.0f (%3.0f)  %10.0f     %10lld    %10.1f  %s%s\n", name,
                     l->detect_us, l->contact_us, l->step_us.median, l->step_us.p99, l->candidates, l->candidates_max, l->contacts, l->contacts_max,
-                    l->iterations, (long long)l->not_converged, l->penetration_um,
-                    l->survived ? "survived" : "FAILED: ", l->why);
+                    l->iterations, (long long)l->not_converged, l->penetration_um, l->survived ? "survived" : "FAILED: ", l->why);
     }
     fprintf(out, "  the same, mu = 0       push [N]  artificial [N]    (%%)   jitter rms     p99   work lost [N]  as a mu   deepest [um]; push against %s\n",
             bench->row[first].reference);
@@ -393,8 +420,7 @@ static void print_loops(FILE *out, const CollisionBench *bench, int first)
             snprintf(artificial, sizeof artificial, "%10s %6s", "-", "-");
         if (row->has_loop)
             fprintf(out, "    %-20s %9.4f      %s     %8.4f %7.4f      %10.5f %8.5f     %10.1f  %s%s\n", name, row->push.mean_n, artificial,
-                    row->push.jitter_rms, row->push.jitter_p99, l->work_n, l->work_mu, l->penetration_um,
-                    l->survived ? "survived" : "FAILED: ", l->why);
+                    row->push.jitter_rms, row->push.jitter_p99, l->work_n, l->work_mu, l->penetration_um, l->survived ? "survived" : "FAILED: ", l->why);
     }
 }
 
@@ -416,9 +442,11 @@ static void print_clamps(FILE *out, const CollisionBench *bench)
 {
     if (bench->clamp_count == 0)
         return;
-    fprintf(out, "\nclamped contact iterations (paper, section 6.5): survived, or the step at which it failed: how (um outside); deepest [um]; steps not "
-                 "converged\n"
-                 "  surface                  form       wall          %27d %27d %27d %27d\n", caps[0], caps[1], caps[2], caps[3]);
+    fprintf(out,
+            "\nclamped contact iterations (paper, section 6.5): survived, or the step at which it failed: how (um outside); deepest [um]; steps not "
+            "converged\n"
+            "  surface                  form       wall          %27d %27d %27d %27d\n",
+            caps[0], caps[1], caps[2], caps[3]);
     for (int i = 0; i < bench->clamp_count; i++) {
         const Clamp *c = &bench->clamp[i];
         char text[128] = "survived";
@@ -506,7 +534,8 @@ static bool judge_growth(CollisionBench *bench, const cJSON *sizes, Faults *faul
     for (size_t k = 0; k < 2; k++) {
         double least = HUGE_VAL, most = 0, nodes = 0;
         const cJSON *at;
-        cJSON_ArrayForEach(at, sizes) {
+        cJSON_ArrayForEach(at, sizes)
+        {
             const cJSON *field = cJSON_GetObjectItem(at, "field"), *time = cJSON_GetObjectItem(at, times[k]), *size = cJSON_GetObjectItem(at, "nodes");
             if (!cJSON_IsString(field) || strcmp(field->valuestring, "blend") != 0 || !cJSON_IsNumber(time) || !cJSON_IsNumber(size))
                 continue;
@@ -534,8 +563,9 @@ static void print_verdicts(FILE *out, const CollisionBench *bench)
 {
     for (int i = 0; i < bench->equal_count; i++) {
         const EqualError *e = &bench->equal[i];
-        fprintf(out, "\nequal error, %s: the model is wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um).\n  80 near points: lim %.2f us, "
-                     "Embree in each step %.2f us (%.1f times), cached triangles %.2f us (%.1f times)\n",
+        fprintf(out,
+                "\nequal error, %s: the model is wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um).\n  80 near points: lim %.2f us, "
+                "Embree in each step %.2f us (%.1f times), cached triangles %.2f us (%.1f times)\n",
                 e->surface, e->lim_um, e->triangles, e->mesh_um, e->lim_us, e->warm_us, e->warm_us / e->lim_us, e->cached_us, e->cached_us / e->lim_us);
     }
     if (bench->verdict_count > 0)
@@ -772,8 +802,8 @@ static const char *check(void *structure)
     if (bench->scene_count > SCENES_MOST)
         return "at most 16 scenes";
     for (int i = 0; i < bench->scene_count; i++)
-        bench->list[bench->case_count++] = (CollisionCase){.name = bench->scene[i], .scene = bench->scene[i], .mesh_count = 1, .triangles = {SCENE_TRIANGLES},
-                                                             .pointwise_steps = POINTWISE_STEPS};
+        bench->list[bench->case_count++] = (CollisionCase){
+            .name = bench->scene[i], .scene = bench->scene[i], .mesh_count = 1, .triangles = {SCENE_TRIANGLES}, .pointwise_steps = POINTWISE_STEPS};
     bench->given = bench->case_count > 0;
     for (int i = 0; !bench->given && i < CASES; i++)
         if (!bench->common.quick || is_listed(cases[i].name, in_quick, sizeof in_quick / sizeof in_quick[0]))
@@ -797,14 +827,19 @@ static const OptionTable table = {
     .program = "seldinger bench collision",
     .does = "local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, spurious friction",
     .usage = "[SCENE...] [options]",
-    .intro = "Implicit models (LIM: one field of blobs, and local models) against triangle meshes searched by Embree, the exact wall and a sampled distance, in one run: the "
-             "surfaces of Kerrien 2017, Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop, artificial "
-             "friction, clamped contact iterations, growth. Run it from the project's folder. Times are CPU times.\n"
-             "SCENE, instead of those: its vessel (tube, shape or model) as about 100,000 triangles, with its own tool and script.",
+    .intro =
+        "Implicit models (LIM: one field of blobs, and local models) against triangle meshes searched by Embree, the exact wall and a sampled distance, in one "
+        "run: the "
+        "surfaces of Kerrien 2017, Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop, artificial "
+        "friction, clamped contact iterations, growth. Run it from the project's folder. Times are CPU times.\n"
+        "SCENE, instead of those: its vessel (tube, shape or model) as about 100,000 triangles, with its own tool and script.",
     .exits = "0 done; 1 the model missed a verdict; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, CollisionBench),
     .check = check,
-    .takes_argument = true, .may_be_missing = true, .argument = offsetof(CollisionBench, scene), .argument_count = offsetof(CollisionBench, scene_count),
+    .takes_argument = true,
+    .may_be_missing = true,
+    .argument = offsetof(CollisionBench, scene),
+    .argument_count = offsetof(CollisionBench, scene_count),
 };
 
 const Verb bench_collision = {.options = &table, .call = call};

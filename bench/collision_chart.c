@@ -30,8 +30,12 @@ typedef struct Chart {
 
 static const char *const colour[] = {"#0072b2", "#d55e00", "#009e73", "#a6548a", "#8a6d00", "#3a95cf", "#000000", "#b3001b"};
 // about 11 pixels wide, around 0,0
-static const char *const shape[] = {"M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z", "M-4.5-4.5h9v9h-9z", "M0-6L5.5 4.5h-11z", "M0-6.2L6.2 0L0 6.2L-6.2 0z",
-                                    "M0 6L5.5-4.5h-11z",                     "M-1.8-5.5h3.6v3.7h3.7v3.6h-3.7v3.7h-3.6v-3.7h-3.7v-3.6h3.7z",
+static const char *const shape[] = {"M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
+                                    "M-4.5-4.5h9v9h-9z",
+                                    "M0-6L5.5 4.5h-11z",
+                                    "M0-6.2L6.2 0L0 6.2L-6.2 0z",
+                                    "M0 6L5.5-4.5h-11z",
+                                    "M-1.8-5.5h3.6v3.7h3.7v3.6h-3.7v3.7h-3.6v-3.7h-3.7v-3.6h3.7z",
                                     "M-6-2.5h12v5h-12z"};
 enum { COLOURS = sizeof colour / sizeof colour[0], SHAPES = sizeof shape / sizeof shape[0] };
 
@@ -90,10 +94,7 @@ static bool axis_close(Axis *axis, double from, double to)
     return true;
 }
 
-static double place(const Axis *axis, double value)
-{
-    return axis->from + (axis->to - axis->from) * log(value / axis->low) / log(axis->high / axis->low);
-}
+static double place(const Axis *axis, double value) { return axis->from + (axis->to - axis->from) * log(value / axis->low) / log(axis->high / axis->low); }
 
 static void print_number(FILE *out, double value)
 {
@@ -177,8 +178,9 @@ static double draw_legend(const Chart *chart, double top)
     fprintf(out, "<g id=\"legend\">\n");
     for (int k = 0; k < chart->representations.count + 2; k++) {
         bool known = k < chart->representations.count;
-        const char *name = known ? chart->representations.name[k] : k == chart->representations.count ? "hollow: the paper's Table 6 (its machine, 2017)"
-                                                                                                       : "crossed: the run did not survive";
+        const char *name = known                               ? chart->representations.name[k]
+                           : k == chart->representations.count ? "hollow: the paper's Table 6 (its machine, 2017)"
+                                                               : "crossed: the run did not survive";
         double wide = 42 + 7.4 * (double)strlen(name);
         if (x + wide > WIDTH - MARGIN) {
             x = MARGIN + 8;
@@ -209,7 +211,8 @@ static bool paper_us(const Chart *chart, const cJSON *row, double *us)
     *us = 1000 * number_at(row, "paper.ms");
     if (!(*us > 0))
         return false;
-    cJSON_ArrayForEach(before, chart->rows) {
+    cJSON_ArrayForEach(before, chart->rows)
+    {
         if (before == row)
             break;
         if (1000 * number_at(before, "paper.ms") == *us && !strcmp(text_at(before, "surface"), text_at(row, "surface")))
@@ -232,7 +235,8 @@ static double draw_detection(const Chart *chart, double top)
     Axis x = {0};
     double us, band = LANE * chart->representations.count + 10, begin = top + HEAD, end = begin + band * chart->surfaces.count;
     open_panel(chart, "detect", MARGIN, top, "Detection: CPU time of 80 points on the same recorded motion");
-    cJSON_ArrayForEach(row, chart->rows) {
+    cJSON_ArrayForEach(row, chart->rows)
+    {
         axis_hold(&x, number_at(row, "motion.us_per_80_points"));
         axis_hold(&x, paper_us(chart, row, &us) ? us : NAN);
     }
@@ -246,7 +250,8 @@ static double draw_detection(const Chart *chart, double top)
             fprintf(out, "</text>\n");
         }
         draw_axis(out, &x, false, begin, end, "microseconds for 80 points");
-        cJSON_ArrayForEach(row, chart->rows) {
+        cJSON_ArrayForEach(row, chart->rows)
+        {
             int surface = name_index(&chart->surfaces, text_at(row, "surface")), kind = name_index(&chart->representations, text_at(row, "representation"));
             double y = begin + surface * band + 5 + LANE * (kind + 0.5), own = number_at(row, "motion.us_per_80_points");
             if (surface < 0 || kind < 0)
@@ -272,7 +277,8 @@ static void draw_error(const Chart *chart, double left, double top, double width
     Axis x = {0}, y = {0};
     double begin = top + HEAD, end = top + HALF_HEIGHT - FOOT;
     open_panel(chart, "error", left, top, "Error of the gap against the price");
-    cJSON_ArrayForEach(row, chart->rows) {
+    cJSON_ArrayForEach(row, chart->rows)
+    {
         if (number_at(row, time) > 0 && number_at(row, error) > 0) {
             axis_hold(&x, number_at(row, time));
             axis_hold(&y, number_at(row, error));
@@ -282,7 +288,8 @@ static void draw_error(const Chart *chart, double left, double top, double width
     if (filled) {
         draw_axis(chart->out, &x, false, begin, end, "microseconds for 80 points");
         draw_axis(chart->out, &y, true, x.from, x.to, "micrometres, rms");
-        cJSON_ArrayForEach(row, chart->rows) {
+        cJSON_ArrayForEach(row, chart->rows)
+        {
             if (number_at(row, time) > 0 && number_at(row, error) > 0)
                 draw_mark(chart, "mark", row, place(&x, number_at(row, time)), place(&y, number_at(row, error)), number_at(row, error), "um");
         }
@@ -324,12 +331,14 @@ static void draw_curve(FILE *out, const Curve *curve, const Axis *x, const Axis 
     const cJSON *item;
     double across, up;
     fprintf(out, "<polyline class=\"curve%s\" style=\"color:%s\" points=\"", curve->dashed ? " dashed" : "", colour[curve->kind % COLOURS]);
-    cJSON_ArrayForEach(item, curve->list) {
+    cJSON_ArrayForEach(item, curve->list)
+    {
         if (is_on_curve(curve, item, &across, &up))
             fprintf(out, "%.2f,%.2f ", place(x, across), place(y, up));
     }
     fprintf(out, "\"><title>%s</title></polyline>\n", curve->name);
-    cJSON_ArrayForEach(item, curve->list) {
+    cJSON_ArrayForEach(item, curve->list)
+    {
         if (is_on_curve(curve, item, &across, &up)) {
             draw_shape(out, "dot", curve->kind, place(x, across), place(y, up));
             fprintf(out, "><title>%s, %.0f: %.4g ns</title></path>\n", curve->name, across, up);
@@ -350,22 +359,22 @@ static void draw_growth(const Chart *chart, double left, double top, double widt
     const char *surface = text_at(cJSON_GetArrayItem(chart->growth, 0), "surface");
     const cJSON *g = chart->growth, *s = chart->sizes, *item;
     int lim = kind_of(chart, "lim", 0), full = kind_of(chart, "mesh full", 1), warm = kind_of(chart, "mesh warm", 2), cached = kind_of(chart, "mesh cached", 3);
-    const Curve curve[CURVES] = {
-        {g, "surface", surface, "search", "full", "triangles", "ns_per_query.spread", "mesh, full, all over", full, true},
-        {g, "surface", surface, "search", "full", "triangles", "ns_per_query.wire", "mesh, full, wire", full, false},
-        {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.spread", "mesh, warm, all over", warm, true},
-        {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.wire", "mesh, warm, wire", warm, false},
-        {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.spread", "mesh, cached, all over", cached, true},
-        {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.wire", "mesh, cached, wire", cached, false},
-        {s, "field", "blend", NULL, NULL, "nodes", "ns_cold", "LIM, far apart", lim, true},
-        {s, "field", "blend", NULL, NULL, "nodes", "ns_warm", "LIM, wire", lim, false}};
+    const Curve curve[CURVES] = {{g, "surface", surface, "search", "full", "triangles", "ns_per_query.spread", "mesh, full, all over", full, true},
+                                 {g, "surface", surface, "search", "full", "triangles", "ns_per_query.wire", "mesh, full, wire", full, false},
+                                 {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.spread", "mesh, warm, all over", warm, true},
+                                 {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.wire", "mesh, warm, wire", warm, false},
+                                 {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.spread", "mesh, cached, all over", cached, true},
+                                 {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.wire", "mesh, cached, wire", cached, false},
+                                 {s, "field", "blend", NULL, NULL, "nodes", "ns_cold", "LIM, far apart", lim, true},
+                                 {s, "field", "blend", NULL, NULL, "nodes", "ns_warm", "LIM, wire", lim, false}};
     Axis x = {0}, y = {0};
     Tail tail[CURVES];
     int tails = 0;
     double begin = top + HEAD, end = top + HALF_HEIGHT - FOOT, across, up, labels = 166;
     open_panel(chart, "growth", left, top, "Growth of the model: time of one query");
     for (int k = 0; k < CURVES; k++)
-        cJSON_ArrayForEach(item, curve[k].list) {
+        cJSON_ArrayForEach(item, curve[k].list)
+        {
             if (is_on_curve(&curve[k], item, &across, &up)) {
                 axis_hold(&x, across);
                 axis_hold(&y, up);
@@ -377,7 +386,8 @@ static void draw_growth(const Chart *chart, double left, double top, double widt
         draw_axis(chart->out, &y, true, x.from, x.to, "nanoseconds a query");
         for (int k = 0; k < CURVES; k++) {
             double last = NAN;
-            cJSON_ArrayForEach(item, curve[k].list) {
+            cJSON_ArrayForEach(item, curve[k].list)
+            {
                 if (is_on_curve(&curve[k], item, &across, &up))
                     last = place(&y, up);
             }
@@ -411,8 +421,7 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
     Axis x = {0};
     double begin = top + HEAD, end = top + list_height(chart) - FOOT;
     open_panel(chart, id, left, top, title);
-    cJSON_ArrayForEach(row, chart->rows)
-        axis_hold(&x, fabs(number_at(row, keys)));
+    cJSON_ArrayForEach(row, chart->rows) axis_hold(&x, fabs(number_at(row, keys)));
     x.low = fmax(x.low, 1e-9 * x.high);   // smaller values are not drawn
     bool filled = axis_close(&x, left + 150, left + width - 10);
     if (filled) {
@@ -425,7 +434,8 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
             fprintf(chart->out, "</text>\n");
         }
         draw_axis(chart->out, &x, false, begin, end, name);
-        cJSON_ArrayForEach(row, chart->rows) {
+        cJSON_ArrayForEach(row, chart->rows)
+        {
             double value = number_at(row, keys);
             int kind = name_index(&chart->representations, text_at(row, "representation"));
             if (kind < 0 || !(fabs(value) >= x.low))
@@ -460,8 +470,8 @@ static bool draw(const Chart *chart)
     draw_error(&panels, MARGIN, top, half);
     draw_growth(&panels, right, top, half);
     top += HALF_HEIGHT + 12;
-    draw_list(&panels, "friction", "Artificial friction with mu = 0", "frictionless.artificial_mu",
-              "equivalent coefficient of friction", "", MARGIN, top, half);
+    draw_list(&panels, "friction", "Artificial friction with mu = 0", "frictionless.artificial_mu", "equivalent coefficient of friction", "", MARGIN, top,
+              half);
     draw_list(&panels, "work", "Work lost along the wall with mu = 0", "frictionless.work_lost_n", "mJ a millimetre of slide (N)", "N", right, top, half);
     top += list_height(chart) + 8;
     if (fclose(panels.out) != 0 || !body) {
@@ -485,13 +495,16 @@ bool collision_chart(const cJSON *root, const char *path, Faults *faults)
     char *text = NULL;
     size_t length = 0;
     const cJSON *row;
-    Chart chart = {.out = open_memstream(&text, &length), .rows = cJSON_GetObjectItemCaseSensitive(root, "rows"),
-                   .growth = cJSON_GetObjectItemCaseSensitive(root, "growth"), .sizes = cJSON_GetObjectItemCaseSensitive(root, "sizes")};
+    Chart chart = {.out = open_memstream(&text, &length),
+                   .rows = cJSON_GetObjectItemCaseSensitive(root, "rows"),
+                   .growth = cJSON_GetObjectItemCaseSensitive(root, "growth"),
+                   .sizes = cJSON_GetObjectItemCaseSensitive(root, "sizes")};
     if (!chart.out) {
         faults_add(faults, path, 0, 0, "not enough memory for the chart");
         return false;
     }
-    cJSON_ArrayForEach(row, chart.rows) {
+    cJSON_ArrayForEach(row, chart.rows)
+    {
         add_name(&chart.surfaces, cJSON_GetObjectItemCaseSensitive(row, "surface"));
         add_name(&chart.representations, cJSON_GetObjectItemCaseSensitive(row, "representation"));
     }

@@ -102,8 +102,7 @@ static bool measure(Growth *g, const Wall *wall, const Vessel *vessel, Figures *
 {
     figures->wire_ns = course_ns(vessel, 1, &wall->wire, 2 * g->runs);
     figures->spread_ns = course_ns(vessel, 1, &wall->spread, g->runs);
-    return (course_error(vessel, &wall->spread, &figures->error) && figures->wire_ns > 0 && figures->spread_ns > 0) ||
-           fault(g, "a wall that gives no answers");
+    return (course_error(vessel, &wall->spread, &figures->error) && figures->wire_ns > 0 && figures->spread_ns > 0) || fault(g, "a wall that gives no answers");
 }
 
 static void add_pair(cJSON *row, const char *key, const char *first, double a, const char *second, double b)
@@ -299,8 +298,8 @@ static bool grow_phantom(Growth *g, const Phantom *p)
 static bool grow_tube(Growth *g)
 {
     static const char name[] = "exact tube";
-    static const TubePiece piece[] = {{.length = 10}, {.arc_radius = 6, .angle = 2 * PI / 3}, {.arc_radius = 8, .angle = 5 * PI / 6, .plane = PI / 2},
-                                      {.length = 10}};
+    static const TubePiece piece[] = {
+        {.length = 10}, {.arc_radius = 6, .angle = 2 * PI / 3}, {.arc_radius = 8, .angle = 5 * PI / 6, .plane = PI / 2}, {.length = 10}};
     const TubeOptions options = {.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 1.5, .piece_count = 4, .piece = piece, .closed_ends = true};
     Vessel *tube = tube_vessel_create(&options, name, g->faults);
     VesselTree *samples = tube ? tube_tree(tube, &options, name, g->faults) : NULL;
@@ -463,8 +462,7 @@ static bool open_size(Growth *g, const VesselTree *helix, int nodes, Size *s)
     const Vessel *blend = s->vessel[LIM_BLEND];
     int strand = nodes < STRAND ? nodes : STRAND;
     return (s->tool && s->close && s->vessel[LIM_SWITCH] && blend && place_wire(blend, s->tree, &s->wire) &&
-            place_tools(blend, s->tree, 0, nodes, s->tools, s->tool) &&
-            place_tools(blend, s->tree, nodes / STRAND / 2 * STRAND, strand, s->tools, s->close)) ||
+            place_tools(blend, s->tree, 0, nodes, s->tools, s->tool) && place_tools(blend, s->tree, nodes / STRAND / 2 * STRAND, strand, s->tools, s->close)) ||
            fault(g, "not enough memory for a large tree");
 }
 
@@ -526,8 +524,10 @@ static void add_size(Growth *g, const char *field, const VesselTree *tree, const
 static void print_sizes(Growth *g, int count, const Size *size)
 {
     static const char *const field_name[FIELDS] = {[LIM_SWITCH] = "switch", [LIM_BLEND] = "blend"};
-    fprintf(g->out, "\nLocal models of a helix that winds on, 1000 nodes a strand: nanoseconds a query, for one wire of %d points, for %d wires all over the "
-            "tree in turn\n(far apart: what they touch outgrows the caches), and for as many in one strand\n", WIRE_POINTS, size[0].tools);
+    fprintf(g->out,
+            "\nLocal models of a helix that winds on, 1000 nodes a strand: nanoseconds a query, for one wire of %d points, for %d wires all over the "
+            "tree in turn\n(far apart: what they touch outgrows the caches), and for as many in one strand\n",
+            WIRE_POINTS, size[0].tools);
     fputs("  field    nodes    blobs |   wire far apart   one strand | us: first location, next from there | MB, s to build\n", g->out);
     for (int field = 0; field < FIELDS; field++) {
         double least = HUGE_VAL, most = 0;

@@ -15,7 +15,8 @@
 #include <string.h>
 #include <time.h>
 
-static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 0.401485;  // [mm]; the width gives the radius half way (docs/references.md, "Blobs")
+static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25,
+                    CAPSULE_WIDTH = 0.401485;               // [mm]; the width gives the radius half way (docs/references.md, "Blobs")
 enum { FINE = 10 };                          // by how much the fine fit is closer
 enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
@@ -332,7 +333,9 @@ static bool add_mesh(const CollisionSurface *s, CollisionWalls *walls, const Tri
         const char *name;
         MeshNormals normals;
         MeshSearch search;
-    } kinds[] = {{"mesh full", MESH_FACES, MESH_SEARCH_FULL}, {"mesh warm", MESH_FACES, MESH_SEARCH_WARM}, {"mesh cached", MESH_FACES, MESH_SEARCH_CACHED},
+    } kinds[] = {{"mesh full", MESH_FACES, MESH_SEARCH_FULL},
+                 {"mesh warm", MESH_FACES, MESH_SEARCH_WARM},
+                 {"mesh cached", MESH_FACES, MESH_SEARCH_CACHED},
                  {"mesh curved", MESH_CURVED, MESH_SEARCH_CACHED},
                  {"mesh smooth", MESH_SMOOTH, MESH_SEARCH_CACHED}};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {

@@ -101,8 +101,11 @@ static void draw(Studio *studio, const Case *what, int frame)
     if (what->camera_turns)
         free_camera_orbit(&studio->controls.look.camera, 3, 0);
     PanelLayout layout = panel_layout(what->width, what->height, 1, what->view, true);
-    ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL,
-                        .filling = what->flows ? lesson->concentration + lesson->node_count : NULL, .pulse = ++studio->pulse,
+    ViewsFrame views = {.pose = pose,
+                        .xray = &xray,
+                        .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL,
+                        .filling = what->flows ? lesson->concentration + lesson->node_count : NULL,
+                        .pulse = ++studio->pulse,
                         .look = &studio->controls.look};
     WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
     for (int i = 0; what->only && i < VIEW_COUNT; i++)
@@ -275,7 +278,12 @@ static int call(void *options, Faults *faults)
         cJSON_AddStringToObject(root, "scene", path);
         cJSON_AddStringToObject(root, "renderer", gl_context_renderer(studio.context));
         good = measure_pictures(&studio, text, root, faults) &&
-               measure_disturbance(&studio, bench->seconds > 0 ? bench->seconds : bench->common.quick ? 3 : 10, text, root, faults) && bench_write_json(&bench->common, root, faults);
+               measure_disturbance(&studio,
+                                   bench->seconds > 0    ? bench->seconds
+                                   : bench->common.quick ? 3
+                                                         : 10,
+                                   text, root, faults) &&
+               bench_write_json(&bench->common, root, faults);
     }
     cJSON_Delete(root);
     for (int i = 0; i < MOMENTS; i++)
@@ -300,12 +308,17 @@ static const OptionTable table = {
     .program = "seldinger bench drawing",
     .does = "the trainer's pictures: CPU time, and the 1 kHz thread with and without them",
     .usage = "[SCENE] [options]",
-    .intro = "Draws the trainer off screen (EGL), views and panels together, from moments of the scene's script: CPU time of all drawing threads for a picture, with C-arm "
-             "and camera still and turning. Then the 1 kHz thread beside 30 pictures a second and beside none, in turns: how late it wakes, what a step costs.\n"
-             "SCENE: default scenes/phantom/scene.yaml.",
+    .intro =
+        "Draws the trainer off screen (EGL), views and panels together, from moments of the scene's script: CPU time of all drawing threads for a picture, "
+        "with C-arm "
+        "and camera still and turning. Then the 1 kHz thread beside 30 pictures a second and beside none, in turns: how late it wakes, what a step costs.\n"
+        "SCENE: default scenes/phantom/scene.yaml.",
     .exits = "0 done; 2 wrong usage, bad input, or no EGL",
     CLI_OPTIONS(rows, DrawingBench),
-    .takes_argument = true, .may_be_missing = true, .argument = offsetof(DrawingBench, scene), .too_many = "one scene at a time, not also ",
+    .takes_argument = true,
+    .may_be_missing = true,
+    .argument = offsetof(DrawingBench, scene),
+    .too_many = "one scene at a time, not also ",
 };
 
 const Verb bench_drawing = {.options = &table, .call = call};

@@ -116,8 +116,7 @@ static bool report_shape(const Table3 *table, int s, FILE *text, cJSON *rows)
     bool few = blobs.median <= paper[s].limit, enough = share >= 0.85, close = worst_ratio < 1, aim = d.median <= paper[s].d[1];
     fprintf(text, "\n%-13s t_g met in %.1f %%, bias %+.4f mm, %.2f ms a model\n", "", 100 * share, bias, 1000 * cpu);
     fprintf(text, "%-13s N_b <= %.0f: %s; t_g met in 85 %%: %s; d < sigma: %s; aim d <= %.3f: %s\n", "", paper[s].limit, few ? "yes" : "NO",
-            enough ? "yes" : "NO",
-            close ? "yes" : "NO", paper[s].d[1], aim ? "yes" : "no");
+            enough ? "yes" : "NO", close ? "yes" : "NO", paper[s].d[1], aim ? "yes" : "no");
     cJSON_AddStringToObject(row, "shape", lim_trial_name[s]);
     json_range(row, "d_mm", d);
     json_range(row, "d_a_mm", approximate);
@@ -227,11 +226,11 @@ static bool report_tree(const FitBench *bench, const VesselTree *tree, const cha
                 faults_add(faults, "bench fit", 0, 0, "not enough memory");
                 return false;
             }
-            fprintf(text, "  %3.1f v  %3d | %6.2f %6.2f %6.2f %6.2f | %5.2f | %6.1f %6.1f | %.2f\n", target[t].voxels, limit[l], share[0], share[1],
-                    share[2], share[3], blobs, on_grid, equal, ms);
+            fprintf(text, "  %3.1f v  %3d | %6.2f %6.2f %6.2f %6.2f | %5.2f | %6.1f %6.1f | %.2f\n", target[t].voxels, limit[l], share[0], share[1], share[2],
+                    share[3], blobs, on_grid, equal, ms);
             if (l == LIMITS - 1) {
-                fprintf(text, "  paper   100 | %6.2f %6.2f %6.2f %6.2f | %5.2f | %6.0f        |\n", target[t].paper[0], target[t].paper[1],
-                        target[t].paper[2], target[t].paper[3], target[t].blobs, target[t].triangles);
+                fprintf(text, "  paper   100 | %6.2f %6.2f %6.2f %6.2f | %5.2f | %6.0f        |\n", target[t].paper[0], target[t].paper[1], target[t].paper[2],
+                        target[t].paper[3], target[t].blobs, target[t].triangles);
                 if (t == 1)
                     *kept = *kept && share[0] + share[1] >= 99 && share[0] >= 97 && blobs <= 6.4;
             }
@@ -276,7 +275,10 @@ static bool time_model(const FitBench *bench, FILE *text, cJSON *root, Faults *f
     if (!tree)
         return false;
     int64_t first = tree->point_offset[MIDDLE - 2], count = tree->point_offset[MIDDLE + 3] - first;
-    LimFitTask task = {.point_count = (int)count, .point = tree->point + first, .center = tree->center[MIDDLE], .direction = tree->direction[MIDDLE],
+    LimFitTask task = {.point_count = (int)count,
+                       .point = tree->point + first,
+                       .center = tree->center[MIDDLE],
+                       .direction = tree->direction[MIDDLE],
                        .radius = tree->radius[MIDDLE]};
     LimFitOptions options = bench->options;
     options.target_mm = 1e-4;   // out of reach
@@ -360,10 +362,12 @@ static int call(void *options, Faults *faults)
 static const char *const presets[] = {"default", "paper", NULL};
 static const Option options[] = {
     {"table3", NULL, OPTION_FLAG, OPTION_AT(FitBench, table3),
-     "one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with what least squares could reach; exit code 1 where a "
+     "one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with what least squares could reach; exit code 1 "
+     "where a "
      "median of blobs, the share that meets t_g or d against the noise misses its limit"},
     {"tables45", NULL, OPTION_FLAG, OPTION_AT(FitBench, tables45),
-     "whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs a node, triangles a blob, time; the angiogram of scenes/aneurism, "
+     "whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs a node, triangles a blob, time; the angiogram of "
+     "scenes/aneurism, "
      "segmented first (where ../shared/data has it), a random tree and the phantom; and what one local model of 540 points and 10 blobs takes"},
     {"tree", "F.h5", OPTION_FILE, OPTION_AT(FitBench, tree), "for --tables45, instead: a tree of points (`segment`, `synth`); may be given several times",
      .count = offsetof(FitBench, tree_count), .times = MOST_TREES},

@@ -52,7 +52,10 @@ static int build(int which, const double *size, Vec3 *center, double *width)
     return count;
 }
 
-static Blobby truth_of(const LimTrialShape *shape) { return (Blobby){.count = shape->blob_count, .center = shape->center, .width = shape->width, .iso_level = ISO_LEVEL}; }
+static Blobby truth_of(const LimTrialShape *shape)
+{
+    return (Blobby){.count = shape->blob_count, .center = shape->center, .width = shape->width, .iso_level = ISO_LEVEL};
+}
 
 static void sizes_of(int which, double *size)
 {
@@ -265,8 +268,14 @@ bool lim_trial_run(const LimTrialShape *shape, double sigma, uint64_t seed, cons
         noisy[i] = vec3_add_scaled(exact[i], -noise[i], vec3_unit(g));
     }
     if (good) {
-        LimFitTask task = {.point_count = N, .point = noisy, .center = shape->middle, .direction = shape->direction, .radius = 1,
-                           .start_count = shape->start_count, .start = shape->start, .start_radius = shape->start_radius};
+        LimFitTask task = {.point_count = N,
+                           .point = noisy,
+                           .center = shape->middle,
+                           .direction = shape->direction,
+                           .radius = 1,
+                           .start_count = shape->start_count,
+                           .start = shape->start,
+                           .start_radius = shape->start_radius};
         double begin = cpu_s();
         out->blobs = lim_fit_model(&task, &options, center, width);
         out->cpu_s = cpu_s() - begin;

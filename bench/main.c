@@ -5,7 +5,13 @@
 
 #include <string.h>
 
-static const Verb *const tables[] = {&bench_collision, &bench_step, &bench_fit, &bench_track, &bench_wall, &bench_torture, &bench_peer,
+static const Verb *const tables[] = {&bench_collision,
+                                     &bench_step,
+                                     &bench_fit,
+                                     &bench_track,
+                                     &bench_wall,
+                                     &bench_torture,
+                                     &bench_peer,
 #ifdef SELDINGER_RENDER
                                      &bench_drawing,
 #endif

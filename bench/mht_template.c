@@ -127,9 +127,12 @@ static Frame frame_of(const MhtWindow *window, const MhtTemplate *t)
 {
     Vec3 e1 = vec3_normal_to(t->axis), e2 = vec3_cross(t->axis, e1), c = vec3_scale(vec3_sub(t->center, window->middle), 1 / t->radius);
     double s = 1 / t->radius;
-    return (Frame){{(float)(s * e1.x), (float)(s * e1.y), (float)(s * e1.z)}, {(float)(s * e2.x), (float)(s * e2.y), (float)(s * e2.z)},
-                   {(float)(s * t->axis.x), (float)(s * t->axis.y), (float)(s * t->axis.z)}, (float)vec3_dot(c, e1), (float)vec3_dot(c, e2),
-                       (float)vec3_dot(c, t->axis)};
+    return (Frame){{(float)(s * e1.x), (float)(s * e1.y), (float)(s * e1.z)},
+                   {(float)(s * e2.x), (float)(s * e2.y), (float)(s * e2.z)},
+                   {(float)(s * t->axis.x), (float)(s * t->axis.y), (float)(s * t->axis.z)},
+                   (float)vec3_dot(c, e1),
+                   (float)vec3_dot(c, e2),
+                   (float)vec3_dot(c, t->axis)};
 }
 
 static inline Lanes load(const float *from)

@@ -15,9 +15,21 @@ enum { CIRCLE = 16, CONTRAST_MEMORY = 8, MAX_LEAVES = 24, MAX_ANGLES = 10, MAX_D
 
 MhtParameters mht_paper_parameters(void)
 {
-    return (MhtParameters){.step = 0.1, .window = 5, .radius_min = 0.25, .radius_max = 1.25, .radius_change = 0.1, .max_angle_deg = 85, .search_angles = 0,
+    return (MhtParameters){.step = 0.1,
+                           .window = 5,
+                           .radius_min = 0.25,
+                           .radius_max = 1.25,
+                           .radius_change = 0.1,
+                           .max_angle_deg = 85,
+                           .search_angles = 0,
                            .search_depth = 1,
-                           .pruning = 1, .termination = 3, .max_steps = 2000, .max_length_mm = 1000, .contrast = 0, .overlap = 0.5, .own_overlap = 0};
+                           .pruning = 1,
+                           .termination = 3,
+                           .max_steps = 2000,
+                           .max_length_mm = 1000,
+                           .contrast = 0,
+                           .overlap = 0.5,
+                           .own_overlap = 0};
 }
 
 MhtParameters mht_default_parameters(void)
@@ -171,8 +183,8 @@ static int predict(Tracker *t, const MhtTemplate *from, MhtTemplate *out, int ca
             if (angle > widest * (1 + 1e-9))
                 continue;
             if (angle > 0)
-                guess->axis = vec3_unit(vec3_add_scaled(vec3_scale(from->axis, same_cos(angle)), same_sin(angle) / angle, vec3_add(vec3_scale(e1, a), vec3_scale(e2,
-                                                                                                                                                       b))));
+                guess->axis = vec3_unit(
+                    vec3_add_scaled(vec3_scale(from->axis, same_cos(angle)), same_sin(angle) / angle, vec3_add(vec3_scale(e1, a), vec3_scale(e2, b))));
             guess->center = vec3_add_scaled(from->center, p->step * from->radius, guess->axis);
             if (n > 0 && mht_window_open(t->window, t->volume, guess, p->window) > 0)
                 mht_template_score(t->window, guess);
@@ -496,8 +508,8 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
         extent = fmax(extent, vec3_norm(t->volume->axis[i]) * size[i]);
     if (!inside_volume(t->volume, seed->start))
         faults_add(faults, path, seed->line, seed->column,
-                   "the start of branch %d (%g, %g, %g) mm lies outside the volume; expected voxel (0, 0, 0) to (%d, %d, %d)", number + 1,
-                   seed->start.x, seed->start.y, seed->start.z, size[0] - 1, size[1] - 1, size[2] - 1);
+                   "the start of branch %d (%g, %g, %g) mm lies outside the volume; expected voxel (0, 0, 0) to (%d, %d, %d)", number + 1, seed->start.x,
+                   seed->start.y, seed->start.z, size[0] - 1, size[1] - 1, size[2] - 1);
     if (number == 0 && !seed->has_toward)
         faults_add(faults, path, seed->line, seed->column, "the first branch has no direction; expected a point further down the vessel");
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
@@ -579,7 +591,8 @@ static bool track_all(Tracker *t, const RbtSeed *seed, int seed_count, const Pro
         if (!found) {
             faults_add(faults, path, seed[i].line, seed[i].column,
                        "nothing could be tracked from the start of branch %d (%s); expected a point well inside the vessel, about its "
-                       "true radius and direction", i + 1, t->why);
+                       "true radius and direction",
+                       i + 1, t->why);
             return false;
         }
         report_branch(t, i, &seed[i], &report->branch[i]);
@@ -590,8 +603,7 @@ static bool track_all(Tracker *t, const RbtSeed *seed, int seed_count, const Pro
 }
 
 VesselTree *mht_track(const Volume *volume, const MhtParameters *parameters, const RbtSeed *given, int seed_count, int threads, const Progress *progress,
-                      RbtReport *report,
-                      const char *path, Faults *faults)
+                      RbtReport *report, const char *path, Faults *faults)
 {
     (void)threads;
     int before = faults->count;

@@ -46,7 +46,7 @@ MhtParameters mht_paper_parameters(void);
 // both ways; where the return path misses its parent it is joined where it came nearest, and its rest is a limb there. Nodes carry 16 points on the
 // template's circle and are as high as a step is long. `threads` is not used: a branch is one chain of steps. In the report the inlier rates and
 // counts of retries are 0. NULL with faults if a seed is unsuitable or its first template does not score.
-VesselTree *mht_track(const Volume *volume, const MhtParameters *parameters, const RbtSeed *seed, int seed_count, int threads,
-                      const Progress *progress, RbtReport *report, const char *path, Faults *faults);
+VesselTree *mht_track(const Volume *volume, const MhtParameters *parameters, const RbtSeed *seed, int seed_count, int threads, const Progress *progress,
+                      RbtReport *report, const char *path, Faults *faults);
 
 #endif

@@ -24,12 +24,19 @@ typedef struct Tube {
 } Tube;
 
 static const Tube tubes[TUBES] = {
-    {"c, gentle bends", {"scenes/peer/tube-c-100.yaml", "scenes/peer/tube-c-20.yaml"}, "scenes/peer/tube-c-centreline.csv",
-     "contained at tuned settings", {{"all steps", 2000, 0, 0, {"7.8 (18), 10", "8.2 (14), 10"}}}},
-    {"b, S-bends", {"scenes/peer/tube-b-100.yaml", "scenes/peer/tube-b-20.yaml"}, "scenes/peer/tube-b-centreline.csv",
+    {"c, gentle bends",
+     {"scenes/peer/tube-c-100.yaml", "scenes/peer/tube-c-20.yaml"},
+     "scenes/peer/tube-c-centreline.csv",
+     "contained at tuned settings",
+     {{"all steps", 2000, 0, 0, {"7.8 (18), 10", "8.2 (14), 10"}}}},
+    {"b, S-bends",
+     {"scenes/peer/tube-b-100.yaml", "scenes/peer/tube-b-20.yaml"},
+     "scenes/peer/tube-b-centreline.csv",
      "contained at tuned settings; else out of the vessel at steps 739 to 979",
      {{"all steps", 2000, 0, 0, {"22.2 (72), 21", "15.8 (43), 21"}}, {"30-50 contacts", 2000, 30, 50, {"44.9 (74), 39", "26.4 (47), 39"}}}},
-    {"a, capsule", {"scenes/peer/capsule-a-100.yaml", "scenes/peer/capsule-a-20.yaml"}, NULL,
+    {"a, capsule",
+     {"scenes/peer/capsule-a-100.yaml", "scenes/peer/capsule-a-20.yaml"},
+     NULL,
      "contained to 88-91 mm, then out of time; else out of the vessel by step 239 to 599",
      {{"first 1000 steps", 1000, 0, 0, {"59 (113), 34", "58 (111), 34"}}, {"70-90 contacts", 2000, 70, 90, {"101 (132), 75", "97 (128), 75"}}}}};
 static const ContactKind surfaces[SURFACES] = {CONTACT_TUBE, CONTACT_LIM, CONTACT_MESH};
@@ -89,10 +96,7 @@ static bool run_row(Row *row, int64_t most_steps, int threads, Faults *faults)
     return good;
 }
 
-static bool is_contained(const Row *row)
-{
-    return !(row->run.flags & (STEP_DIVERGED | STEP_OUT_OF_VESSEL)) && row->run.penetration_um.max <= contained_um;
-}
+static bool is_contained(const Row *row) { return !(row->run.flags & (STEP_DIVERGED | STEP_OUT_OF_VESSEL)) && row->run.penetration_um.max <= contained_um; }
 
 // All steps, and all that the hand fed is in.
 static bool is_whole(const Row *row) { return row->run.steps == row->wanted_steps && fabs(row->run.stalled_mm) <= stalled_mm; }
@@ -100,7 +104,8 @@ static bool is_whole(const Row *row) { return row->run.steps == row->wanted_step
 static void print_row(FILE *out, const Row *row)
 {
     const StepFigures *run = &row->run;
-    fprintf(out, "  %3d GPa, %-4s  %5.3f (%6.3f)   %3d, %3.0f at most  %6.1f  %s%s, %lld of %lld steps, %.1f mm in; not converged %lld, linearised again %lld, "
+    fprintf(out,
+            "  %3d GPa, %-4s  %5.3f (%6.3f)   %3d, %3.0f at most  %6.1f  %s%s, %lld of %lld steps, %.1f mm in; not converged %lld, linearised again %lld, "
             "limited %lld\n",
             stiffness_gpa[row->stiffness], contact_name[surfaces[row->surface]], run->step_us.median / 1000, run->step_us.p99 / 1000, run->last.active,
             run->contacts.max, run->penetration_um.max, is_contained(row) ? "contained" : "NOT CONTAINED", is_whole(row) ? "" : ", NOT WHOLE",
@@ -207,7 +212,8 @@ static const OptionTable table = {
     .program = "seldinger bench peer",
     .does = "the scenes on which SOFA with BeamAdapter was measured, beside its figures",
     .usage = "[options]",
-    .intro = "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube, on local models "
+    .intro = "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube, on "
+             "local models "
              "fitted to it and on a mesh of it, beside the peer's figures. Run it from the project's folder, after scenes/peer/prepare. CPU times.",
     .exits = "0 done; 1 a run on tube or models ended early, stalled, or had a node more than 0.05 mm outside the wall; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, PeerBench),

@@ -151,8 +151,13 @@ Vessel *shape_vessel_create(const Shape *shape)
     if (!v)
         return NULL;
     v->shape = shape;
-    v->vessel = (Vessel){.kind = "shape", .query = shape_query, .locate = shape_locate, .inlet = shape_inlet, .destroy = shape_destroy,
-                         .primitives = shape->part_count, .bytes = sizeof *v};
+    v->vessel = (Vessel){.kind = "shape",
+                         .query = shape_query,
+                         .locate = shape_locate,
+                         .inlet = shape_inlet,
+                         .destroy = shape_destroy,
+                         .primitives = shape->part_count,
+                         .bytes = sizeof *v};
     for (int p = 0; p < shape->part_count; p++) {
         const Part *part = &shape->part[p];
         v->vessel.bytes += sizeof *part + (size_t)part->sample_count * (sizeof(Vec3) + 2 * sizeof(double)) +

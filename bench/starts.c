@@ -279,7 +279,8 @@ static void json_row(cJSON *list, const Kind *kind, const Row *r)
 static void print_verdict(FILE *out, const char *what, double found, double limit, bool at_least, bool *kept)
 {
     bool reached = at_least ? found >= limit : found <= limit;
-    fprintf(out, "%-4s %-4s one click, noisy volumes: %s: %.3g, %s %g\n", kept ? "must" : "aim", reached ? "yes" : "NO", what, found, at_least ? "at least" : "at most", limit);
+    fprintf(out, "%-4s %-4s one click, noisy volumes: %s: %.3g, %s %g\n", kept ? "must" : "aim", reached ? "yes" : "NO", what, found,
+            at_least ? "at least" : "at most", limit);
     if (kept)
         *kept = *kept && reached;
 }
@@ -296,7 +297,8 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
         good = !session.trial[i].failed;
     if (good)
         fprintf(out,
-                "\none click in volumes of whole grey values, as VascuSynth's: random trees of 13 branches, 1 mm voxels, trunk of 4 voxels' radius (thin: 2.5, hidden 3 and\n1.2), a band of 8 of its radii across it (narrow: 3)\n"
+                "\none click in volumes of whole grey values, as VascuSynth's: random trees of 13 branches, 1 mm voxels, trunk of 4 voxels' radius (thin: 2.5, "
+                "hidden 3 and\n1.2), a band of 8 of its radii across it (narrow: 3)\n"
                 "  %-46s %4s %5s %5s %5s %5s %5s  %11s %7s %8s %5s  %5s %5s %5s %5s %6s\n",
                 "", "n", "right", "ref.", "warn", "wrong", "smth", "drift   max", "radius", "trunk", "turn.", "ST %", "PS %", "WT %", "leaks", "CPU s");
     for (int k = 0; good && k < KINDS; k++) {
@@ -312,11 +314,12 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
     }
     bool *judged = seeds >= ENOUGH ? kept : NULL;   // one or two seeds cannot estimate a rate
     if (good) {
-        fprintf(out,
-                "right: the start within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused; warn: tracked, with a\n"
-                "warning (other than that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: from the click to the axis found [true\n"
-                "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted).\n"
-                "In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
+        fprintf(out, "right: the start within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused; warn: "
+                     "tracked, with a\n"
+                     "warning (other than that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: from the click to the "
+                     "axis found [true\n"
+                     "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted).\n"
+                     "In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
         print_verdict(out, "right of those that can be seen [%]", percent(right, seen), 80, true, judged);
         print_verdict(out, "refused of those that can be seen [%]", percent(false_refusals, seen), 10, false, judged);
         print_verdict(out, "not refused of the hidden [%]", percent(missing, hidden), 5, false, judged);

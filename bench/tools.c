@@ -63,8 +63,8 @@ static ToolCommands commands_at(int tools, double t_s, double feed_s, double spe
     ToolCommands c = {0};
     // push and twist of each hand, in shares of the speed and of 90 degrees a second: half a second each
     static const double play[6][4][2] = {{{0, 0}, {-0.5, 0.5}, {0.5, 1}, {-0.5, 1}}, {{0.2, 0}, {0.5, 0.5}, {-0.5, 0}, {0.5, 0}},
-                                         {{0, 0.3}, {0, 0}, {0.5, -1}, {0.5, -1}},    {{-0.2, 0}, {0, -0.5}, {-0.5, 0}, {-0.5, 0}},
-                                         {{0, -0.3}, {0, 0}, {0, 0}, {0, 0}},         {{0, 0}, {0, -0.5}, {0, 0}, {0, 0}}};
+                                         {{0, 0.3}, {0, 0}, {0.5, -1}, {0.5, -1}},   {{-0.2, 0}, {0, -0.5}, {-0.5, 0}, {-0.5, 0}},
+                                         {{0, -0.3}, {0, 0}, {0, 0}, {0, 0}},        {{0, 0}, {0, -0.5}, {0, 0}, {0, 0}}};
     int part = (int)floor((t_s - feed_s) / 0.5 + 1e-9);
     for (int k = 0; k < tools; k++) {
         if (t_s < feed_s)
@@ -125,18 +125,24 @@ void bench_tools_print(FILE *out, const ToolsBench *bench)
             fprintf(out, "\n%s: skipped, %s is not here\n", vessel_name[v], stack[v].needs);
             continue;
         }
-        fprintf(out, "\n%s, coaxial tools: %g mm at %g mm/s, then against each other\n"
-                     "    tools nodes  CPU [us] median     p99   p99.9     max  assemble contact  iterations, p99.9  deepest [um]  push [N]  not converged, limited\n",
-                vessel_name[v], stack[v].depth_mm, stack[v].speed_mm_s);
+        fprintf(
+            out,
+            "\n%s, coaxial tools: %g mm at %g mm/s, then against each other\n"
+            "    tools nodes  CPU [us] median     p99   p99.9     max  assemble contact  iterations, p99.9  deepest [um]  push [N]  not converged, limited\n",
+            vessel_name[v], stack[v].depth_mm, stack[v].speed_mm_s);
         for (int k = 0; k < TOOLS_MOST; k++)
             for (int n = 0; n < TOOLS_NODES; n++) {
                 const ToolsRow *r = &bench->row[v][n][k];
                 const StepFigures *f = &r->run;
-                bool has_must = r->tools == MUST_TOOLS && tools_bench_nodes[n] == MUST_NODES, holds = f->step_us.median <= must_us[0] && f->step_us.p999 <= must_us[1];
-                fprintf(out, "    %5d %5d %16.0f %7.0f %7.0f %7.0f %9.0f %7.0f %10.0f %7.0f %13.1f %9.3f %8" PRId64 " %5" PRId64 "%s%s\n", r->tools, r->chain_nodes,
-                        f->step_us.median, f->step_us.p99, f->step_us.p999, f->step_us.max, f->stage_us[STAGE_ASSEMBLE].median, f->stage_us[STAGE_CONTACT].median,
-                        f->iterations.median, f->iterations.p999, f->penetration_um.max, r->push_most, f->not_converged, f->limited,
-                        f->flags & STEP_DIVERGED ? "  DIVERGED" : "", !has_must ? "" : holds ? "  must" : "  MISSED");
+                bool has_must = r->tools == MUST_TOOLS && tools_bench_nodes[n] == MUST_NODES,
+                     holds = f->step_us.median <= must_us[0] && f->step_us.p999 <= must_us[1];
+                fprintf(out, "    %5d %5d %16.0f %7.0f %7.0f %7.0f %9.0f %7.0f %10.0f %7.0f %13.1f %9.3f %8" PRId64 " %5" PRId64 "%s%s\n", r->tools,
+                        r->chain_nodes, f->step_us.median, f->step_us.p99, f->step_us.p999, f->step_us.max, f->stage_us[STAGE_ASSEMBLE].median,
+                        f->stage_us[STAGE_CONTACT].median, f->iterations.median, f->iterations.p999, f->penetration_um.max, r->push_most, f->not_converged,
+                        f->limited, f->flags & STEP_DIVERGED ? "  DIVERGED" : "",
+                        !has_must ? ""
+                        : holds   ? "  must"
+                                  : "  MISSED");
             }
     }
 }

@@ -158,7 +158,8 @@ static void drive(const Scene *scene, const Vessel *contact, const Vessel *truth
         for (int k = 0; k < tools; k++)
             outcome->not_taken = fmax(outcome->not_taken, fabs(inserted[k] + witness.fed[k] - stepper_tool_inserted(witness.stepper, k)));
         outcome->failed |= (report.end == DRIVE_DIVERGED ? FAILED_NUMBER : 0) | (outcome->deepest > outside_mm ? FAILED_DEEP : 0) |
-                           (outcome->unreported > unreported_mm ? FAILED_UNREPORTED : 0) | (simulator_gains_energy(simulator) && !outcome->kinks ? FAILED_ENERGY : 0);
+                           (outcome->unreported > unreported_mm ? FAILED_UNREPORTED : 0) |
+                           (simulator_gains_energy(simulator) && !outcome->kinks ? FAILED_ENERGY : 0);
     }
     free(witness.node);
     simulator_destroy(simulator);
@@ -266,9 +267,10 @@ static void add_run(Row *row, const Outcome *o)
 
 static void print_row(FILE *out, const char *vessel, const char *tool, const Row *row)
 {
-    fprintf(out, "%-7s %-18s %6lld %10lld %9.3f %9.3f %9.1e %8lld %8lld %6lld |%5lld %5lld %5lld %5lld (%lld, %lld) %5lld/%-4lld %5lld\n", vessel, tool, (long long)row->runs, (long long)row->steps,
-            row->deepest, row->unreported, row->gained_share, (long long)row->cut, (long long)row->not_converged, (long long)row->kinked, (long long)row->failed[0], (long long)row->failed[1],
-            (long long)row->failed[2], (long long)row->failed[3], (long long)row->by_end, (long long)row->by_mean, (long long)row->failed[4], (long long)row->compared, (long long)row->failed[5]);
+    fprintf(out, "%-7s %-18s %6lld %10lld %9.3f %9.3f %9.1e %8lld %8lld %6lld |%5lld %5lld %5lld %5lld (%lld, %lld) %5lld/%-4lld %5lld\n", vessel, tool,
+            (long long)row->runs, (long long)row->steps, row->deepest, row->unreported, row->gained_share, (long long)row->cut, (long long)row->not_converged,
+            (long long)row->kinked, (long long)row->failed[0], (long long)row->failed[1], (long long)row->failed[2], (long long)row->failed[3],
+            (long long)row->by_end, (long long)row->by_mean, (long long)row->failed[4], (long long)row->compared, (long long)row->failed[5]);
 }
 
 static cJSON *row_json(const char *vessel, const char *tool, const Row *row)
@@ -277,9 +279,17 @@ static cJSON *row_json(const char *vessel, const char *tool, const Row *row)
     const struct {
         const char *name;
         double value;
-    } figure[] = {{"runs", (double)row->runs}, {"steps", (double)row->steps}, {"deepest_mm", row->deepest}, {"unreported_mm", row->unreported}, {"gained_share", row->gained_share},
-                  {"cut_steps", (double)row->cut}, {"not_converged_steps", (double)row->not_converged}, {"compared", (double)row->compared}, {"kinked", (double)row->kinked},
-                  {"gained_by_end", (double)row->by_end}, {"gained_by_mean", (double)row->by_mean}};
+    } figure[] = {{"runs", (double)row->runs},
+                  {"steps", (double)row->steps},
+                  {"deepest_mm", row->deepest},
+                  {"unreported_mm", row->unreported},
+                  {"gained_share", row->gained_share},
+                  {"cut_steps", (double)row->cut},
+                  {"not_converged_steps", (double)row->not_converged},
+                  {"compared", (double)row->compared},
+                  {"kinked", (double)row->kinked},
+                  {"gained_by_end", (double)row->by_end},
+                  {"gained_by_mean", (double)row->by_mean}};
     cJSON_AddStringToObject(at, "vessel", vessel);
     cJSON_AddStringToObject(at, "tool", tool);
     for (size_t i = 0; i < sizeof figure / sizeof figure[0]; i++)
@@ -299,7 +309,8 @@ static bool print_table(const Torture *torture, cJSON *list)
         add_run(&row[torture->outcome[i].vessel][torture->outcome[i].tool], &torture->outcome[i]);
         add_run(&all, &torture->outcome[i]);
     }
-    fprintf(out, "vessel  tool                 runs      steps   deepest    unrep.    gained     cut    not conv. kinked | deep unrep.  NaN energy (by end, by mean) stuck/of  refused\n"
+    fprintf(out, "vessel  tool                 runs      steps   deepest    unrep.    gained     cut    not conv. kinked | deep unrep.  NaN energy (by end, by "
+                 "mean) stuck/of  refused\n"
                  "                                                  [mm]      [mm]   of work   [steps]  [steps]   runs | runs that failed\n");
     for (int v = 0; v < TORTURE_VESSELS; v++)
         for (int t = 0; t < TORTURE_TOOLS; t++)
@@ -364,8 +375,8 @@ static const Option rows[] = {
     {"first", "N", NUMBER(first, 0, 1e15, "the first seed")},
     {"steps", "N", NUMBER(steps, 10, 1e7, "of each run")},
     {"finer", "N", NUMBER(finer, 0, 1e9, "every N-th run again with half the step and half the elements' length; 0: never")},
-    {"model", "F", OPTION_FILE, OPTION_AT(Torture, model), "a model file as one of the vessels, up to 8", .count = offsetof(Torture, model_count), .times = MODELS_MOST,
-     .otherwise = "scenes/aneurism/aneurism.h5 and scenes/arch/arch.h5 where they are here"},
+    {"model", "F", OPTION_FILE, OPTION_AT(Torture, model), "a model file as one of the vessels, up to 8", .count = offsetof(Torture, model_count),
+     .times = MODELS_MOST, .otherwise = "scenes/aneurism/aneurism.h5 and scenes/arch/arch.h5 where they are here"},
     {"keep", "FOLDER", OPTION_FOLDER, OPTION_AT(Torture, keep), "for the scenes of runs that fail: torture-SEED.yaml", .otherwise = "the working folder"},
     BENCH_OPTIONS(Torture, common, "40 runs"),
 };
@@ -397,14 +408,19 @@ static const OptionTable table = {
     .program = "seldinger bench torture",
     .does = "random hands, tools and vessels, judged by the true wall",
     .usage = "[options]",
-    .intro = "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four in each other), "
-             "vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is judged by the true wall, not by what "
-             "the contact saw: a node more than 0.2 mm outside, or outside without being reported; a number that is none; single steps that gain more than 1e-3 of the "
-             "work (where no element is bent by more than a radian: a kink); a tool that is stuck where a finer run is not. The scene of each run that fails is kept and "
+    .intro = "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four "
+             "in each other), "
+             "vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is judged by the true wall, "
+             "not by what "
+             "the contact saw: a node more than 0.2 mm outside, or outside without being reported; a number that is none; single steps that gain more than "
+             "1e-3 of the "
+             "work (where no element is bent by more than a radian: a kink); a tool that is stuck where a finer run is not. The scene of each run that fails "
+             "is kept and "
              "can be replayed.",
     .exits = "0 done; 1 a run failed; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, Torture),
-    .set_defaults = set_defaults, .check = check,
+    .set_defaults = set_defaults,
+    .check = check,
     .too_many = "unexpected argument ",
 };
 

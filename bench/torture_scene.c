@@ -28,10 +28,7 @@ typedef struct Draws {
     double finer;            // 1, or 2: twice the elements, half the step
 } Draws;
 
-static double draw(Draws *draws, double low, double high)
-{
-    return low + (high - low) * random_unit(&draws->random);
-}
+static double draw(Draws *draws, double low, double high) { return low + (high - low) * random_unit(&draws->random); }
 
 static double draw_log(Draws *draws, double low, double high) { return exp(draw(draws, log(low), log(high))); }
 static int draw_whole(Draws *draws, int count) { return (int)fmin(count - 1, floor(draw(draws, 0, count))); }
@@ -87,7 +84,8 @@ static void write_tool(Draws *draws, TortureTool tip, double diameter, double in
     switch (tip) {
     case TORTURE_J:
         rest = radius * draw(draws, 0.3, 3);
-        snprintf(curve, sizeof curve, "{arc: {radius_mm: %.4f, angle_deg: %.3f, plane_deg: %.2f}}", radius, rest / radius * 180 / 3.141592653589793, draw(draws, -180, 180));
+        snprintf(curve, sizeof curve, "{arc: {radius_mm: %.4f, angle_deg: %.3f, plane_deg: %.2f}}", radius, rest / radius * 180 / 3.141592653589793,
+                 draw(draws, -180, 180));
         break;
     case TORTURE_PIGTAIL:
         rest = radius * 4.7;
@@ -96,7 +94,8 @@ static void write_tool(Draws *draws, TortureTool tip, double diameter, double in
     case TORTURE_SIMMONS: {
         double arm = draw(draws, 5, 25);
         rest = 3 * radius + arm + 0.8 * radius;
-        snprintf(curve, sizeof curve, "{arc: {radius_mm: %.4f, angle_deg: 171.887, plane_deg: %.2f}}, {line_mm: %.3f}, {arc: {radius_mm: %.4f, angle_deg: 45.837, plane_deg: 180}}",
+        snprintf(curve, sizeof curve,
+                 "{arc: {radius_mm: %.4f, angle_deg: 171.887, plane_deg: %.2f}}, {line_mm: %.3f}, {arc: {radius_mm: %.4f, angle_deg: 45.837, plane_deg: 180}}",
                  radius, draw(draws, -180, 180), arm, radius);
         break;
     }
@@ -104,10 +103,10 @@ static void write_tool(Draws *draws, TortureTool tip, double diameter, double in
     }
     soft += rest;
     fprintf(draws->out, "%selements: %.0f\n%ssections:\n", indent, elements * draws->finer, indent);
-    fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n", indent,
-            fmax(length - soft, 20), diameter, inner, modulus);       // a wide stiff tool has a wide curve
-    fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n", indent, soft,
-            diameter, inner, tip_modulus);
+    fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n",
+            indent, fmax(length - soft, 20), diameter, inner, modulus); // a wide stiff tool has a wide curve
+    fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n",
+            indent, soft, diameter, inner, tip_modulus);
     if (*curve)
         fprintf(draws->out, "%srest: [%s]\n", indent, curve);
     fprintf(draws->out, "%shand_limit_n: 20\n", indent);
@@ -183,7 +182,8 @@ static TortureScene make(uint64_t seed, int64_t steps, int model_count, const ch
     scene.vessel = (TortureVessel)draw_whole(&draws, model_count > 0 ? TORTURE_VESSELS : TORTURE_MODEL);
     scene.tool = (TortureTool)draw_whole(&draws, TORTURE_TOOLS);
     scene.step_ms = step_ms[draw_whole(&draws, 5)];
-    fprintf(draws.out, "# bench torture, seed %llu: %s in a %s\nseldinger: 1\n", (unsigned long long)seed, torture_tool_name[scene.tool], torture_vessel_name[scene.vessel]);
+    fprintf(draws.out, "# bench torture, seed %llu: %s in a %s\nseldinger: 1\n", (unsigned long long)seed, torture_tool_name[scene.tool],
+            torture_vessel_name[scene.vessel]);
     write_vessel(&draws, scene.vessel, model_count, model, lumen_mm);
     int tools = write_tools(&draws, scene.tool);
     const char *points = draw(&draws, 0, 1) < 0.25 ? ", contact_points: follow" : "";

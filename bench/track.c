@@ -244,8 +244,7 @@ static void tally_score(Figures *figures, const Trial *trial, int only, double v
     const TrackScore *score = &trial->score;
     for (int b = 0; b < score->branch_count; b++)
         if (only < 0 || b == only)
-            tally_branch(score->branch[b].radius >= 2 * voxel ? &figures->wide : &figures->narrow, &score->branch[b],
-                         only < 0 ? 0 : score->branch[b].skip);
+            tally_branch(score->branch[b].radius >= 2 * voxel ? &figures->wide : &figures->narrow, &score->branch[b], only < 0 ? 0 : score->branch[b].skip);
     for (int i = 0; i < score->sample_count; i++) {
         const TrackSample *s = &score->sample[i];
         if (only >= 0 && s->branch != only)
@@ -367,8 +366,8 @@ static void print_tally(FILE *out, const char *name, const Tally *t, const Figur
 static void print_groups(FILE *out, const Group *groups, int count)
 {
     static const double paper[2][TRACK_LABELS] = {{82.55, 12.89, 4.16, 0.40, 0, 0, 0, 0}, {59.87, 0.27, 9.66, 13.02, 2.55, 0.27, 8.86, 5.50}};
-    fprintf(out, "%-28s %5s %6s %6s %6s %6s %6s %6s %6s %6s %8s %12s %21s %4s %6s %4s %5s %7s %5s\n", "% of branches", "n", "ST", "PS", "WT",
-            "KV", "KB", "KA", "LB", "BT", "length", "centre p95", "radius  exact   |.|", "inv.", "mm", "att.", "bg %", "s/tree", "ms/n");
+    fprintf(out, "%-28s %5s %6s %6s %6s %6s %6s %6s %6s %6s %8s %12s %21s %4s %6s %4s %5s %7s %5s\n", "% of branches", "n", "ST", "PS", "WT", "KV", "KB", "KA",
+            "LB", "BT", "length", "centre p95", "radius  exact   |.|", "inv.", "mm", "att.", "bg %", "s/tree", "ms/n");
     fprintf(out, "the paper's Table 2, six patients\n");
     for (int m = 0; m < 2; m++) {
         fprintf(out, "  %-26s %5d", m ? "MHT" : "RBT", 745);
@@ -514,8 +513,8 @@ static int call(void *structure, Faults *faults)
         for (int g = 0; g < group_count; g++) {
             Verdict list[8];
             for (int k = 0, n = verdicts(&groups[g], list); k < n; k++) {
-                fprintf(out, "%-4s %-4s %s, %s: %.4g, %s %g\n", list[k].must ? "must" : "aim", reached(&list[k]) ? "yes" : "NO", groups[g].name,
-                        list[k].what, list[k].found, list[k].at_least ? "at least" : "at most", list[k].limit);
+                fprintf(out, "%-4s %-4s %s, %s: %.4g, %s %g\n", list[k].must ? "must" : "aim", reached(&list[k]) ? "yes" : "NO", groups[g].name, list[k].what,
+                        list[k].found, list[k].at_least ? "at least" : "at most", list[k].limit);
                 kept = kept && (reached(&list[k]) || !list[k].must);
             }
         }
@@ -531,7 +530,8 @@ static int call(void *structure, Faults *faults)
 }
 
 static const Option options[] = {
-    {"trees", "N", OPTION_INT, OPTION_AT(TrackBench, trees), "random trees (51 branches each) at a level of noise", .least = 1, .most = MOST_TREES, .otherwise = "5"},
+    {"trees", "N", OPTION_INT, OPTION_AT(TrackBench, trees), "random trees (51 branches each) at a level of noise", .least = 1, .most = MOST_TREES,
+     .otherwise = "5"},
     {"click", NULL, OPTION_FLAG, OPTION_AT(TrackBench, click_only), "whole trees from one click alone, without the other trackers"},
     {"starts", "N", OPTION_INT, OPTION_AT(TrackBench, starts), "clicks in noisy volumes of each kind", .least = 1, .most = 100, .otherwise = "8"},
     {"only-starts", NULL, OPTION_FLAG, OPTION_AT(TrackBench, only_starts), "these alone"},
@@ -552,9 +552,12 @@ static const OptionTable table = {
     .program = "seldinger bench track",
     .does = "trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times",
     .usage = "[options]",
-    .intro = "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least 200 branches of "
-             "two voxels' radius or more at each of 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms; anisotropic, fading, "
-             "clipped volumes. Then what a millimetre of vessel costs in trees of two sizes, and clicks in volumes as noisy as VascuSynth's (contrast 12 to 15 of 255, "
+    .intro = "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least "
+             "200 branches of "
+             "two voxels' radius or more at each of 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms; anisotropic, "
+             "fading, "
+             "clipped volumes. Then what a millimetre of vessel costs in trees of two sizes, and clicks in volumes as noisy as VascuSynth's (contrast 12 to 15 "
+             "of 255, "
              "noise 11 to 21, a bright band), refusals and warnings counted.",
     .exits = "0 done; 1 a figure that must be reached is not; 2 wrong usage or bad input",
     CLI_OPTIONS(options, TrackBench),

@@ -62,8 +62,12 @@ static void map_free(Map *map)
 static bool map_make(const VesselTree *tree, Map *map)
 {
     size_t n = (size_t)tree->node_count;
-    *map = (Map){.tree = tree, .arc = calloc(n, sizeof(double)), .branch = calloc(n, sizeof(int)), .depth = calloc(n, sizeof(int)),
-                 .vessel_children = calloc(n, sizeof(int)), .ball = calloc(n / GROUP + 1, sizeof(Ball))};
+    *map = (Map){.tree = tree,
+                 .arc = calloc(n, sizeof(double)),
+                 .branch = calloc(n, sizeof(int)),
+                 .depth = calloc(n, sizeof(int)),
+                 .vessel_children = calloc(n, sizeof(int)),
+                 .ball = calloc(n / GROUP + 1, sizeof(Ball))};
     if (!map->arc || !map->branch || !map->depth || !map->vessel_children || !map->ball)
         return false;
     for (int i = 1; i < tree->node_count; i++) {
@@ -200,8 +204,8 @@ static void begin_run(Judge *j, Step *step, const Step *before, bool is_back)
 
 static void extend_run(Run *run, Zone zone, double length)
 {
-    static const TrackLabel kind[] = {[IN_VESSEL] = TRACK_KV,    [PAST_END] = TRACK_LB, [IN_SAC] = TRACK_KA, [IN_NEIGHBOUR] = TRACK_KV,
-                                      [IN_BONE] = TRACK_KB, [IN_BACKGROUND] = TRACK_LB};
+    static const TrackLabel kind[] = {
+        [IN_VESSEL] = TRACK_KV, [PAST_END] = TRACK_LB, [IN_SAC] = TRACK_KA, [IN_NEIGHBOUR] = TRACK_KV, [IN_BONE] = TRACK_KB, [IN_BACKGROUND] = TRACK_LB};
     run->length += length;
     run->kind_mm[kind[zone]] += length;
 }
@@ -330,11 +334,7 @@ static void label_branches(Judge *j, const TrackLabel *lost, const bool *hung)
         double share = all > 0 ? seen / all : 0;
         branch->skip = skip;
         branch->hangs_wrong = hung[b];
-        branch->label = hung[b]                    ? TRACK_WT
-                        : reached && share >= 0.8  ? TRACK_ST
-                        : lost[b] != TRACK_ST      ? lost[b]
-                        : share < 0.1              ? TRACK_WT
-                                                   : TRACK_PS;
+        branch->label = hung[b] ? TRACK_WT : reached && share >= 0.8 ? TRACK_ST : lost[b] != TRACK_ST ? lost[b] : share < 0.1 ? TRACK_WT : TRACK_PS;
         score->true_mm += branch->length;
         score->covered_mm += branch->covered;
     }

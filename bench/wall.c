@@ -18,7 +18,8 @@
 enum { CLICK, FIVE, ARCH, NAMED, MODELS_MOST = NAMED + 8, PATH = 512 };
 enum { JUMPS, POINTS, TRUTH, NOISE, BLOBS, FIT, JUNCTIONS, FLOOD, SPREAD, STIFF, SPIRAL, PUSH, STEP, ROWS };
 
-static const char *const row_names[ROWS] = {"jumps", "points", "truth", "noise", "blobs", "fit", "junctions", "flood", "spread", "stiff", "spiral", "push", "step"};
+static const char *const row_names[ROWS] = {"jumps", "points", "truth", "noise",  "blobs", "fit", "junctions",
+                                            "flood", "spread", "stiff", "spiral", "push",  "step"};
 
 typedef struct WallLimits {
     double must, aim;        // NAN: none
@@ -71,7 +72,9 @@ static const char *verdict(const WallLine *line)
         return "";
     if (isnan(line->value))
         return "MISSED";
-    return (l->at_least ? line->value >= l->aim : line->value <= l->aim) ? "aim" : (l->at_least ? line->value >= l->must : line->value <= l->must) ? "must" : "MISSED";
+    return (l->at_least ? line->value >= l->aim : line->value <= l->aim)     ? "aim"
+           : (l->at_least ? line->value >= l->must : line->value <= l->must) ? "must"
+                                                                             : "MISSED";
 }
 
 static void format_limit(char text[16], double value)
@@ -100,7 +103,8 @@ static void wall_add(WallTable *table, const char *what, double value, const cha
     char must[16], aim[16];
     format_limit(must, limits.must);
     format_limit(aim, limits.aim);
-    fprintf(table->out, "%-10s %-22s %-34s %10.4g %-7s %8s %8s  %-6s %s\n", line->row, line->on, line->what, value, line->unit, must, aim, verdict(line), line->note);
+    fprintf(table->out, "%-10s %-22s %-34s %10.4g %-7s %8s %8s  %-6s %s\n", line->row, line->on, line->what, value, line->unit, must, aim, verdict(line),
+            line->note);
     fflush(table->out);
 }
 
@@ -513,7 +517,8 @@ static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
     bench->table.on = spiral ? "spiral" : "phantom";
     snprintf(note, sizeof note, "without friction; %.3g %% on the exact wall%s", 100 * felt.exact_rms, felt.survived ? "" : "; the run failed before its end");
     if (spiral)
-        wall_add(&bench->table, felt.over_exact < 0 ? "push below exact" : "push over exact", 100 * fabs(felt.over_exact), "%", (WallLimits){3, 0.5, false}, note);
+        wall_add(&bench->table, felt.over_exact < 0 ? "push below exact" : "push over exact", 100 * fabs(felt.over_exact), "%", (WallLimits){3, 0.5, false},
+                 note);
     else
         wall_add(&bench->table, "change of push a step over mean", 100 * felt.change_rms, "%", (WallLimits){1, 0.3, false}, note);
     return true;
@@ -536,7 +541,8 @@ static bool time_scene(WallBench *bench, const char *scene_path, const VesselTre
             bench_detection(scene, open.vessel, run.crowded_step, &detection, &points, faults);
             snprintf(what, sizeof what, "80 points near the wall, %s", simd_name[level]);
             snprintf(note, sizeof note, "%.2f us for %d points", detection, points);
-            wall_add(&bench->table, what, detection * 80 / fmax(1, points), "us", level == SIMD_AVX512 ? (WallLimits){5.5, 4, false} : (WallLimits){7, 5, false}, note);
+            wall_add(&bench->table, what, detection * 80 / fmax(1, points), "us",
+                     level == SIMD_AVX512 ? (WallLimits){5.5, 4, false} : (WallLimits){7, 5, false}, note);
         }
         if (good && level == (int)widest && !strcmp(bench->table.on, "five branches")) {
             snprintf(note, sizeof note, "p99 %.0f, max %.0f us; deepest %.0f um", run.step_us.p99, run.step_us.max, run.penetration_um.max);
@@ -732,7 +738,8 @@ static int call(void *options, Faults *faults)
     if (!plan_output(bench, faults) || !make_work(bench, faults))
         return EXIT_BAD_INPUT;
     bench->table.out = bench_text(&bench->common);
-    fprintf(bench->table.out, "%s, %s\n%-10s %-22s %-34s %10s %-7s %8s %8s\n", bench_processor(), simd_name[simd_level()], "row", "on", "what", "value", "", "must", "aim");
+    fprintf(bench->table.out, "%s, %s\n%-10s %-22s %-34s %10s %-7s %8s %8s\n", bench_processor(), simd_name[simd_level()], "row", "on", "what", "value", "",
+            "must", "aim");
     bool good = !needs_models(bench) || open_models(bench, faults);
     for (int k = 0; good && k < bench->model_count; k++)
         if (bench->model[k].model)
@@ -754,8 +761,8 @@ static const Option rows[] = {
     {"click", "F", OPTION_FILE, OPTION_AT(WallBench, tree[CLICK]), "stands for the one-click tree (a tree or a model)"},
     {"five", "F", OPTION_FILE, OPTION_AT(WallBench, tree[FIVE]), "for the five branches"},
     {"arch", "F", OPTION_FILE, OPTION_AT(WallBench, tree[ARCH]), "for the arch"},
-    {"rows", "A,B", OPTION_TEXT, OPTION_AT(WallBench, wanted), "of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step", .take = take_rows,
-     .otherwise = "all"},
+    {"rows", "A,B", OPTION_TEXT, OPTION_AT(WallBench, wanted), "of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step",
+     .take = take_rows, .otherwise = "all"},
     {"seeds", "N", OPTION_INT, OPTION_AT(WallBench, seeds), "fits of `spread`", .least = 2, .most = 20},
     {"work", "DIR", OPTION_FOLDER, OPTION_AT(WallBench, folder), "where trees and models are put and kept", .otherwise = "a folder that is removed afterwards"},
     BENCH_OPTIONS(WallBench, common, "only what is given, no synthetic angiograms, stiff wires for 1 s"),
@@ -765,13 +772,19 @@ static const OptionTable table = {
     .program = "seldinger bench wall",
     .does = "one table of what the wall of fitted trees is worth: agreement, accuracy, ostia, reach, tools in it",
     .usage = "[options] [TREE.h5|MODEL.h5 ...]",
-    .intro = "The wall of fitted trees in one table: value, what it must be, what is aimed at, met or missed. Trees are fitted by `seldinger fit` first, models are taken as "
-             "they are. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch, each skipped where it is not here. "
+    .intro = "The wall of fitted trees in one table: value, what it must be, what is aimed at, met or missed. Trees are fitted by `seldinger fit` first, "
+             "models are taken as "
+             "they are. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch, each skipped where it is "
+             "not here. "
              "Run it from the project's folder. Figures of the first table row by row; CPU times are the commands' own.",
     .exits = "0 done; 1 a line missed what it must be; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, WallBench),
-    .set_defaults = set_defaults, .check = check,
-    .takes_argument = true, .may_be_missing = true, .argument = offsetof(WallBench, named), .argument_count = offsetof(WallBench, named_count),
+    .set_defaults = set_defaults,
+    .check = check,
+    .takes_argument = true,
+    .may_be_missing = true,
+    .argument = offsetof(WallBench, named),
+    .argument_count = offsetof(WallBench, named_count),
 };
 
 const Verb bench_wall = {.options = &table, .call = call};

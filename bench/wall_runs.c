@@ -58,7 +58,8 @@ bool wall_push_felt(const char *scene_path, const char *model_path, PushFelt *ou
     Scene *scene = scene_load(scene_path, faults);
     VesselTree *model = scene ? tree_file_load(model_path, NULL, faults) : NULL;
     OpenVessel open = {.vessel = model ? model_vessel_create(model) : NULL};
-    Shape *shape = open.vessel ? shape_create(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene_path, faults) : NULL;
+    Shape *shape =
+        open.vessel ? shape_create(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene_path, faults) : NULL;
     Vessel *exact = shape ? shape_vessel_create(shape) : NULL;
     bool good = exact && open_vessel_inlet(scene, &open, faults);
     int64_t steps = good ? bench_steps(scene, INT64_MAX) : 0;

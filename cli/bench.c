@@ -10,7 +10,8 @@ static const OptionTable table = {
     .program = "seldinger bench",
     .does = "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs",
     .usage = "TABLE [options]",
-    .intro = "Timing tables and campaigns, by the program seldinger-bench beside this one. `seldinger bench --help` names them, `seldinger bench TABLE --help` explains "
+    .intro = "Timing tables and campaigns, by the program seldinger-bench beside this one. `seldinger bench --help` names them, `seldinger bench TABLE --help` "
+             "explains "
              "their options.",
     .exits = "0 done; 1 a comparison failed; 2 wrong usage or bad input",
 };

@@ -31,15 +31,19 @@ static const OptionTable table = {
     .program = "seldinger check",
     .does = "runs every scene that has a golden tool path and compares",
     .usage = "PATH... [options]",
-    .intro = "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares point by point over time. The table names each scene, its "
+    .intro = "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares point by point over time. The table names each "
+             "scene, its "
              "worst distance, and the first time, node and distance beyond the tolerance.\n"
-             "Then every scene below PATH with the key `verify:` is measured against exact solutions, at several numbers of elements: case, reference, result, error, "
+             "Then every scene below PATH with the key `verify:` is measured against exact solutions, at several numbers of elements: case, reference, result, "
+             "error, "
              "tolerance, and the order in which the error falls. The key is described in scenes/verify/README.md.",
     .notes = "Scenes whose vessel file is not there are skipped by name.",
     .exits = "0 all pass; 1 a path differs or a tolerance is missed; 2 wrong usage or a scene or golden that cannot be read; 3 a run diverged",
     CLI_OPTIONS(rows, CheckOptions),
     .set_defaults = set_defaults,
-    .takes_argument = true, .argument = offsetof(CheckOptions, path), .argument_count = offsetof(CheckOptions, path_count),
+    .takes_argument = true,
+    .argument = offsetof(CheckOptions, path),
+    .argument_count = offsetof(CheckOptions, path_count),
     .missing = "missing the scenes or folders to check",
 };
 

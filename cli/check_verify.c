@@ -13,10 +13,7 @@
 
 // --- the table ---
 
-static void print_heading(void)
-{
-    printf("%-40s %5s %16s %16s %9s %9s %6s\n", "case", "N", "reference", "result", "error", "tolerance", "order");
-}
+static void print_heading(void) { printf("%-40s %5s %16s %16s %9s %9s %6s\n", "case", "N", "reference", "result", "error", "tolerance", "order"); }
 
 // What is wrong with a row, "" for nothing; `order_text` is how the error fell from the row above.
 static const char *judge(const VerifyCase *c, double error, double tolerance, double ratio, double error_before, char order_text[16])

@@ -29,20 +29,30 @@ void cli_list_verbs(FILE *out, const Verb *const *list, int usage_width);
 // Says which are valid instead of `name`. Returns EXIT_BAD_INPUT.
 int cli_refuse_verb(const char *program, const char *kind, const char *name, const Verb *const *list);
 // Rows of the table that many verbs have.
-#define CLI_THREADS(structure, member) \
-    {"threads", "N", OPTION_INT, OPTION_AT(structure, member), "threads; the result does not depend on them", .most = 256, .otherwise = "0: all cores"}
-#define CLI_QUIET(structure, member, text) {"quiet", NULL, OPTION_FLAG, OPTION_AT(structure, member), text}
+#define CLI_THREADS(structure, member)                                                                                                                         \
+    {                                                                                                                                                          \
+        "threads", "N", OPTION_INT, OPTION_AT(structure, member), "threads; the result does not depend on them", .most = 256, .otherwise = "0: all cores"      \
+    }
+#define CLI_QUIET(structure, member, text)                                                                                                                     \
+    {                                                                                                                                                          \
+        "quiet", NULL, OPTION_FLAG, OPTION_AT(structure, member), text                                                                                         \
+    }
 #define CLI_OPTIONS(rows, structure) .option = rows, .option_count = sizeof rows / sizeof *rows, .size = sizeof(structure)
 #define CLI_BAD_INPUT_EXITS "0 done; 2 wrong usage or bad input"
 
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
 // Views in the order of PanelView.
 extern const char *const cli_view_name[];
-#define CLI_VIEW(structure, member, text) \
-    {"view", "V", OPTION_CHOICE, OPTION_AT(structure, member), text ": fluoroscopy, 3d, angioscopy or all", .choices = cli_view_name}
+#define CLI_VIEW(structure, member, text)                                                                                                                      \
+    {                                                                                                                                                          \
+        "view", "V", OPTION_CHOICE, OPTION_AT(structure, member), text ": fluoroscopy, 3d, angioscopy or all", .choices = cli_view_name                        \
+    }
 // WIDTHxHEIGHT, 320x240 to 8192x8192, into two int that follow each other.
 OptionTaker cli_take_size;
-#define CLI_SIZE(structure, width, text) {"size", "WxH", OPTION_TEXT, OPTION_AT(structure, width), text " [pixel]", .take = cli_take_size, .otherwise = "1280x720"}
+#define CLI_SIZE(structure, width, text)                                                                                                                       \
+    {                                                                                                                                                          \
+        "size", "WxH", OPTION_TEXT, OPTION_AT(structure, width), text " [pixel]", .take = cli_take_size, .otherwise = "1280x720"                               \
+    }
 
 bool cli_write_json(const char *path, const cJSON *root, Faults *faults);
 bool cli_is_standard_output(const char *path);   // "-"; NULL is not

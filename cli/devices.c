@@ -18,12 +18,15 @@ typedef struct DevicesCommand {
 #define AT(member) OPTION_AT(DevicesCommand, member)
 static const Option options[] = {
     {"map", "F.yaml", OPTION_FILE, AT(map),
-     "a device map of yours (input/device_map.h explains; examples in scenes/devices); may be given several times; the first that fits a device is taken, then the "
-     "built-in ones for joysticks, gamepads and multi-axis controllers", .count = offsetof(DevicesCommand, map_count), .times = LIST_MAPS},
+     "a device map of yours (input/device_map.h explains; examples in scenes/devices); may be given several times; the first that fits a device is taken, then "
+     "the "
+     "built-in ones for joysticks, gamepads and multi-axis controllers",
+     .count = offsetof(DevicesCommand, map_count), .times = LIST_MAPS},
     {"json", "F.json", OPTION_FILE, AT(json), "the list as JSON; - is standard output"},
     CLI_QUIET(DevicesCommand, quiet, "no list"),
     {"watch", NULL, OPTION_FLAG, AT(watch),
-     "then prints each control's raw value, its least and most so far, and what the tool would be asked; Ctrl-C ends. For calibrating: let go for the centre, move "
+     "then prints each control's raw value, its least and most so far, and what the tool would be asked; Ctrl-C ends. For calibrating: let go for the centre, "
+     "move "
      "each axis to its ends"},
     {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "ends --watch by itself after S seconds", .least = 0.01, .most = 86400, .otherwise = ""},
 };

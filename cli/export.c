@@ -58,9 +58,12 @@ static const OptionTable table = {
              "                         tools all nodes of each, with what carries them: a column of the .csv, numbers (0 outermost) in a .vtp",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(rows, ExportOptions),
-    .set_defaults = set_defaults, .check = check,
-    .takes_argument = true, .argument = offsetof(ExportOptions, in),
-    .missing = "one file and `-o OUT` are needed", .too_many = "one file and `-o OUT` are needed, not also ",
+    .set_defaults = set_defaults,
+    .check = check,
+    .takes_argument = true,
+    .argument = offsetof(ExportOptions, in),
+    .missing = "one file and `-o OUT` are needed",
+    .too_many = "one file and `-o OUT` are needed, not also ",
 };
 
 static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
@@ -104,7 +107,8 @@ static bool export_tree(const ExportOptions *options, const char *extension, Fau
     else if (surface && !model)
         faults_add(faults, options->in, 0, 0, "is a tree without a model, so it has no surface; `seldinger fit` makes one, or export the centreline");
     else
-        good = surface ? export_surface(options, extension, tree, faults) : centreline_write_file(options->out, extension, tree, frames[options->frame], faults);
+        good =
+            surface ? export_surface(options, extension, tree, faults) : centreline_write_file(options->out, extension, tree, frames[options->frame], faults);
     vessel_tree_free(tree);
     return good;
 }

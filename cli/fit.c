@@ -33,8 +33,8 @@ static VesselTree *load_tree(const FitCommand *command, TreeFileInfo *info, Faul
 
 static bool save(const FitCommand *command, const VesselTree *model, const TreeFileInfo *from, Faults *faults)
 {
-    TreeFileInfo info = {.source = from->source, .parameters = tree_fit_parameters(&command->fit, from),
-                         .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " fit"};
+    TreeFileInfo info = {
+        .source = from->source, .parameters = tree_fit_parameters(&command->fit, from), .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " fit"};
     bool good = tree_file_save(model, &info, command->output, faults);
     free(info.parameters);
     return good;

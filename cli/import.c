@@ -88,8 +88,9 @@ static bool import(const ImportCommand *command, const SurfaceMesh *mesh, Import
     VesselTree *tree = set ? import_surface(mesh, set, &command->options, &found->report, command->surface, faults) : NULL;
     double unseen = 100.0 * (double)found->report.left_points / (double)(found->report.sampled_points + 1);
     if (tree && found->computed && unseen > UNSEEN_MAX_PERCENT)
-        faults_add(faults, command->surface, 0, 0, "the computed centrelines leave %.0f %% of the surface out, more than %d %%: no tree is written; give --centerline F",
-                   unseen, UNSEEN_MAX_PERCENT);
+        faults_add(faults, command->surface, 0, 0,
+                   "the computed centrelines leave %.0f %% of the surface out, more than %d %%: no tree is written; give --centerline F", unseen,
+                   UNSEEN_MAX_PERCENT);
     bool good = tree && faults->count == 0 && save(command, tree, faults) && (!command->centreline_out || write_curves(command, set, faults));
     if (good) {
         found->curve_count = set->curve_count;

@@ -33,7 +33,8 @@ const OptionTable import_options = {
     .program = "seldinger import",
     .does = "the same tree from a surface, with centrelines or alone",
     .usage = "--surface F -o TREE.h5 [options]",
-    .intro = "A vessel's surface and its centrelines become the tree that `seldinger fit` takes. Without centrelines they are computed; a result that leaves out more "
+    .intro = "A vessel's surface and its centrelines become the tree that `seldinger fit` takes. Without centrelines they are computed; a result that leaves "
+             "out more "
              "than 10 % of the surface is refused. Narrow branches that no centreline runs into are left out.\n"
              "Surface: STL, PLY, OBJ or VTK PolyData (.vtp), open or closed; flat lids over the ends of a closed one are taken off.\n"
              "Centrelines: VTK PolyData (.vtp), 3D Slicer Markups (.mrk.json), SWC; several files and overlapping curves make one tree.\n"
@@ -41,6 +42,7 @@ const OptionTable import_options = {
              "A branch whose link to its parent has no path inside the surface hangs on another vessel in plain sight, or is left out; the summary names it.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, ImportCommand),
-    .set_defaults = set_defaults, .check = check,
+    .set_defaults = set_defaults,
+    .check = check,
     .too_many = "what is this argument for: ",
 };

@@ -26,13 +26,16 @@ typedef struct InfoCommand {
 #define AT(member) OPTION_AT(InfoCommand, member)
 static const Option options[] = {
     {"json", NULL, OPTION_FLAG, AT(json), "as JSON on standard output"},
-    {"report", "F.html", OPTION_FILE, AT(report), "of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, "
+    {"report", "F.html", OPTION_FILE, AT(report),
+     "of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, "
      "aneurysms), branches, radius along each, quality of the fit; for training and research, not a medical device"},
     {"picture", "F.png", OPTION_FILE, AT(picture), "of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram"},
-    {"junctions", "F.png", OPTION_FILE, AT(junctions.picture), "of a model: a section through each junction, the narrowest first; further pages are F-2.png and so on"},
+    {"junctions", "F.png", OPTION_FILE, AT(junctions.picture),
+     "of a model: a section through each junction, the narrowest first; further pages are F-2.png and so on"},
     {"volume", "V", OPTION_FILE, AT(junctions.volume), "the angiogram behind these"},
     {"before", "M.h5", OPTION_FILE, AT(junctions.before), "another model of the same vessels: the ten narrowest junctions in that, beside what they are now"},
-    {"tool-radius-mm", "X", OPTION_NUMBER, AT(junctions.tool_radius), "of the tool that is led from a model's inlet through the tree", .least = 0.01, .most = 100},
+    {"tool-radius-mm", "X", OPTION_NUMBER, AT(junctions.tool_radius), "of the tool that is led from a model's inlet through the tree", .least = 0.01,
+     .most = 100},
     CLI_QUIET(InfoCommand, quiet, "no figures as text: the report or picture alone"),
 };
 
@@ -47,8 +50,10 @@ static const OptionTable table = {
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, InfoCommand),
     .set_defaults = set_defaults,
-    .takes_argument = true, .argument = offsetof(InfoCommand, file),
-    .missing = "one file is needed", .too_many = "one file is needed, not also ",
+    .takes_argument = true,
+    .argument = offsetof(InfoCommand, file),
+    .missing = "one file is needed",
+    .too_many = "one file is needed, not also ",
 };
 
 static bool add_reach(cJSON *object, const VesselTree *tree, InfoCommand *command, Faults *faults)
@@ -104,8 +109,9 @@ static bool describe(cJSON *object, FileKind kind, InfoCommand *command, Faults 
     case FILE_UNKNOWN: break;
     }
     if (kind == FILE_UNKNOWN)
-        faults_add(faults, path, 0, 0, "is of no kind that `info` can describe; it reads volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), "
-                                       "trees, models, recordings, scenes and scripts");
+        faults_add(faults, path, 0, 0,
+                   "is of no kind that `info` can describe; it reads volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), "
+                   "trees, models, recordings, scenes and scripts");
     return false;
 }
 
@@ -114,7 +120,9 @@ static void plan_files(const InfoCommand *command, FileKind kind, Faults *faults
     const JunctionSheets *junctions = &command->junctions;
     if ((command->report || command->picture || junctions->picture) && kind != FILE_TREE && kind != FILE_MISSING)
         faults_add(faults, command->file, 0, 0, "is no tree or model; %s is made of those",
-                   command->report ? "--report" : command->picture ? "--picture" : "--junctions");
+                   command->report    ? "--report"
+                   : command->picture ? "--picture"
+                                      : "--junctions");
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--report", command->report);
     output_plan_write_file(&plan, "--picture", command->picture);

@@ -57,7 +57,8 @@ static bool draw(const JunctionSheets *sheets, const char *title, const VesselTr
     options.title = title;
     options.width = 1920, options.height = 1360;
     if (reach) {
-        PictureJunctions what = {.tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = sheets->tool_radius, .before = before};
+        PictureJunctions what = {
+            .tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = sheets->tool_radius, .before = before};
         if (before) {
             int count = choose_compared(model, reach, before, sheets->tool_radius, chosen);
             what.junction_count = count > 0 ? count : 0;

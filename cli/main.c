@@ -11,8 +11,8 @@ static const Verb *const verbs[] = {
 #ifdef SELDINGER_RENDER
     &nav_verb,
 #endif
-    &check_verb, &segment_verb, &import_verb, &fit_verb,     &synth_verb,   &query_verb,
-    &export_verb, &info_verb,   &replay_verb, &report_verb, &devices_verb, &bench_verb, NULL,
+    &check_verb, &segment_verb, &import_verb, &fit_verb,     &synth_verb, &query_verb, &export_verb,
+    &info_verb,  &replay_verb,  &report_verb, &devices_verb, &bench_verb, NULL,
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] - 1 };
 
@@ -20,8 +20,9 @@ static const OptionTable program = {
     .program = "seldinger",
     .does = "catheter navigation simulator for training and research",
     .usage = "VERB ARGUMENTS\nVERB --help\n--version",
-    .intro = "Simulates guide wires and catheters in blood vessels in real time, makes vessel models from angiograms or surfaces, and trains their navigation under "
-             "simulated fluoroscopy. Not a medical device.",
+    .intro =
+        "Simulates guide wires and catheters in blood vessels in real time, makes vessel models from angiograms or surfaces, and trains their navigation under "
+        "simulated fluoroscopy. Not a medical device.",
     .notes = "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); run ends in order.",
     .exits = "0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted",
 };
@@ -31,10 +32,11 @@ static void print_help(FILE *out)
     fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
             SELDINGER_VERSION);
     cli_list_verbs(out, verbs, 34);
-    fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
-                 "`seldinger --completion` a script by which bash completes verbs and options.\n"
-                 "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
-                 "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
+    fprintf(out,
+            "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
+            "`seldinger --completion` a script by which bash completes verbs and options.\n"
+            "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
+            "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
 }
 
 static int refuse_name(const char *name) { return cli_refuse_verb("seldinger", "verb", name, verbs); }

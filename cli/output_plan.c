@@ -84,8 +84,7 @@ void output_plan_read_folder(OutputPlan *plan, const char *what, const char *fol
     for (struct dirent *entry; directory && (entry = readdir(directory));) {
         char path[PATH_MAX];
         size_t length = strlen(entry->d_name), end = strlen(ending);
-        if (length >= end && !strcmp(entry->d_name + length - end, ending) &&
-            snprintf(path, sizeof path, "%s/%s", folder, entry->d_name) < (int)sizeof path)
+        if (length >= end && !strcmp(entry->d_name + length - end, ending) && snprintf(path, sizeof path, "%s/%s", folder, entry->d_name) < (int)sizeof path)
             output_plan_read(plan, what, path);
     }
     if (directory)

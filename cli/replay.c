@@ -72,8 +72,13 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
 static int show(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
 #ifdef SELDINGER_RENDER
-    ReplayWindowOptions window = {.name = options->recording, .width = options->width, .height = options->height, .view = (PanelView)options->view,
-                                  .at_s = isfinite(options->at_s) ? options->at_s : 0, .duration_s = options->duration_s, .lao_deg = options->lao_deg,
+    ReplayWindowOptions window = {.name = options->recording,
+                                  .width = options->width,
+                                  .height = options->height,
+                                  .view = (PanelView)options->view,
+                                  .at_s = isfinite(options->at_s) ? options->at_s : 0,
+                                  .duration_s = options->duration_s,
+                                  .lao_deg = options->lao_deg,
                                   .cra_deg = options->cra_deg};
     bool resumes = false;
     double resume_s = 0;
@@ -83,8 +88,17 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
         return EXIT_DONE;
     char folder[4096];
     TrainerFigures figures = {0};
-    TrainerOptions trainer = {.folder = folder, .note = cli_note, .is_recorded = true, .trainee = "", .has_built_in_maps = true, .resume = run, .resume_s = resume_s,
-                              .width = options->width, .height = options->height, .view = window.view, .duration_s = options->duration_s};
+    TrainerOptions trainer = {.folder = folder,
+                              .note = cli_note,
+                              .is_recorded = true,
+                              .trainee = "",
+                              .has_built_in_maps = true,
+                              .resume = run,
+                              .resume_s = resume_s,
+                              .width = options->width,
+                              .height = options->height,
+                              .view = window.view,
+                              .duration_s = options->duration_s};
     if (!session_folder(options->sessions, folder, sizeof folder, faults))
         return EXIT_BAD_INPUT;
     int code = trainer_run(scene, open, &trainer, &figures, faults);

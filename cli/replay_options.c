@@ -41,11 +41,14 @@ const OptionTable replay_options = {
     .program = "seldinger replay",
     .does = "a recording shown, simulated again and compared, or made into a scene",
     .usage = "REC.h5 [options]",
-    .intro = "Shows a recording that `nav` or `run --record` wrote, in a window: play, stop, search (Left, Right, the strip below), and go on from any moment (F5) as a "
+    .intro = "Shows a recording that `nav` or `run --record` wrote, in a window: play, stop, search (Left, Right, the strip below), and go on from any moment "
+             "(F5) as a "
              "new session. With one of the first four options no window is opened.",
     .exits = "0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged",
     CLI_OPTIONS(options, ReplayOptions),
     .set_defaults = set_defaults,
-    .takes_argument = true, .argument = offsetof(ReplayOptions, recording),
-    .missing = "missing the recording to show", .too_many = "one recording at a time, not also ",
+    .takes_argument = true,
+    .argument = offsetof(ReplayOptions, recording),
+    .missing = "missing the recording to show",
+    .too_many = "one recording at a time, not also ",
 };

@@ -22,7 +22,8 @@ typedef struct ReportOptions {
 } ReportOptions;
 
 static const Option rows[] = {
-    {"html", "F.html", OPTION_FILE, OPTION_AT(ReportOptions, html), "the page, one file that needs nothing else", .otherwise = "SESSION.html, unless --pdf is given"},
+    {"html", "F.html", OPTION_FILE, OPTION_AT(ReportOptions, html), "the page, one file that needs nothing else",
+     .otherwise = "SESSION.html, unless --pdf is given"},
     {"pdf", "F.pdf", OPTION_FILE, OPTION_AT(ReportOptions, pdf), "the same on paper, printed by chromium where that is installed"},
     {"with", "FOLDER", OPTION_FOLDER, OPTION_AT(ReportOptions, with), "where earlier sessions lie", .otherwise = "the session's own folder"},
     CLI_QUIET(ReportOptions, quiet, "says nothing where all went well"),
@@ -48,14 +49,18 @@ static const OptionTable table = {
     .program = "seldinger report",
     .does = "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF",
     .usage = "SESSION.json|REC.h5 [options]",
-    .intro = "A page about a trainee's session: points and how they came about, errors, plots over time, the tip's path over the vessel, and earlier sessions of the same "
-             "trainee at the same exercise. The recording is looked for where the session says, beside it. Of a recording without a session file, as of a program "
-             "that was killed, the session file is made first, by simulating it again.",
+    .intro =
+        "A page about a trainee's session: points and how they came about, errors, plots over time, the tip's path over the vessel, and earlier sessions of "
+        "the same "
+        "trainee at the same exercise. The recording is looked for where the session says, beside it. Of a recording without a session file, as of a program "
+        "that was killed, the session file is made first, by simulating it again.",
     .exits = "0 done (also where recording, vessel or scene lack and the page is shorter for it); 2 wrong usage or bad input",
     CLI_OPTIONS(rows, ReportOptions),
     .check = check,
-    .takes_argument = true, .argument = offsetof(ReportOptions, session),
-    .missing = "takes one session file or recording", .too_many = "takes one session file or recording, not also ",
+    .takes_argument = true,
+    .argument = offsetof(ReportOptions, session),
+    .missing = "takes one session file or recording",
+    .too_many = "takes one session file or recording, not also ",
 };
 
 // Of a recording: the session file beside it, which may have to be made first.

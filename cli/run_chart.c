@@ -8,8 +8,21 @@
 #include <stdlib.h>
 
 // push and torque of each tool's hand
-enum { TIME, PUSH, TORQUE = PUSH + STEP_TOOLS_MAX, WALL_SUM = TORQUE + STEP_TOOLS_MAX, WALL_LARGEST, CANDIDATES, CONTACTS, DEEPEST, STEP_TIME, MILLISECOND,
-       ITERATIONS, RESIDUAL, COLUMNS };
+enum {
+    TIME,
+    PUSH,
+    TORQUE = PUSH + STEP_TOOLS_MAX,
+    WALL_SUM = TORQUE + STEP_TOOLS_MAX,
+    WALL_LARGEST,
+    CANDIDATES,
+    CONTACTS,
+    DEEPEST,
+    STEP_TIME,
+    MILLISECOND,
+    ITERATIONS,
+    RESIDUAL,
+    COLUMNS
+};
 enum { MOST_ROWS = 40000 };
 
 struct RunChart {
@@ -46,9 +59,16 @@ RunChart *run_chart_create(int64_t expected_steps)
 void run_chart_step(RunChart *chart, const Simulator *simulator)
 {
     const StepReport *r = simulator_last(simulator);
-    double now[COLUMNS] = {[TIME] = simulator_time_s(simulator), [WALL_SUM] = r->wall_force_sum, [WALL_LARGEST] = r->wall_force_max, [CANDIDATES] = r->candidates,
-                                 [CONTACTS] = r->active, [DEEPEST] = r->penetration * 1000, [STEP_TIME] = (double)simulator_step_ns(simulator) / 1000,
-                                 [MILLISECOND] = 1000, [ITERATIONS] = r->iterations, [RESIDUAL] = r->residual};
+    double now[COLUMNS] = {[TIME] = simulator_time_s(simulator),
+                           [WALL_SUM] = r->wall_force_sum,
+                           [WALL_LARGEST] = r->wall_force_max,
+                           [CANDIDATES] = r->candidates,
+                           [CONTACTS] = r->active,
+                           [DEEPEST] = r->penetration * 1000,
+                           [STEP_TIME] = (double)simulator_step_ns(simulator) / 1000,
+                           [MILLISECOND] = 1000,
+                           [ITERATIONS] = r->iterations,
+                           [RESIDUAL] = r->residual};
     int rows = chart->every > 1 ? 2 : 1;
     for (int k = 0; k < STEP_TOOLS_MAX; k++) {
         now[PUSH + k] = r->push[k];
@@ -78,8 +98,8 @@ static void name_row(const Scene *scene, ScriptRow *row, char *label)
         Command c = *script_row_command(row, k);
         if (c.push_mm_s == 0 && c.twist_deg_s == 0)
             continue;
-        length += snprintf(label + length, (size_t)(LABEL_SIZE - length), "%s%s%s%g mm/s", length > 0 ? "; " : "", scene->tool_count > 1 ? scene->tool[k].name : "",
-                           scene->tool_count > 1 ? " " : "", c.push_mm_s);
+        length += snprintf(label + length, (size_t)(LABEL_SIZE - length), "%s%s%s%g mm/s", length > 0 ? "; " : "",
+                           scene->tool_count > 1 ? scene->tool[k].name : "", scene->tool_count > 1 ? " " : "", c.push_mm_s);
         if (c.twist_deg_s != 0 && length < LABEL_SIZE)
             length += snprintf(label + length, (size_t)(LABEL_SIZE - length), ", %g°/s", c.twist_deg_s);
     }
@@ -113,9 +133,8 @@ bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const cha
         push[k] = (PictureLine){name, v[PUSH + k]};
         torque[k] = (PictureLine){name, v[TORQUE + k]};
     }
-    const PictureLine wall[] = {{"sum", v[WALL_SUM]}, {"largest", v[WALL_LARGEST]}},
-                      contacts[] = {{"candidates", v[CANDIDATES]}, {"with force", v[CONTACTS]}}, depth[] = {{NULL, v[DEEPEST]}},
-                      cost[] = {{"step", v[STEP_TIME]}, {"1 ms", v[MILLISECOND]}}, iterations[] = {{NULL, v[ITERATIONS]}},
+    const PictureLine wall[] = {{"sum", v[WALL_SUM]}, {"largest", v[WALL_LARGEST]}}, contacts[] = {{"candidates", v[CANDIDATES]}, {"with force", v[CONTACTS]}},
+                      depth[] = {{NULL, v[DEEPEST]}}, cost[] = {{"step", v[STEP_TIME]}, {"1 ms", v[MILLISECOND]}}, iterations[] = {{NULL, v[ITERATIONS]}},
                       residual[] = {{NULL, v[RESIDUAL]}};
     const PicturePanel panel[] = {{tools > 1 ? "push force of each hand [N]" : "push force at the hand [N]", tools, push, false},
                                   {tools > 1 ? "torque of each hand [N mm]" : "torque at the hand [N mm]", tools, torque, false},

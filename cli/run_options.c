@@ -4,15 +4,17 @@
 
 const char *const run_contact[] = {"lim", "lim_blend", "lim_switch", "mesh", "smooth_mesh", "flat_mesh", "grid", "tube", NULL};
 const ContactKind run_contact_kind[] = {CONTACT_LIM,         CONTACT_LIM_BLEND, CONTACT_LIM_SWITCH, CONTACT_MESH,
-                                         CONTACT_SMOOTH_MESH, CONTACT_FLAT_MESH, CONTACT_GRID,       CONTACT_TUBE};
+                                        CONTACT_SMOOTH_MESH, CONTACT_FLAT_MESH, CONTACT_GRID,       CONTACT_TUBE};
 
 static const Option options[] = {
     {"script", "F.csv", OPTION_FILE, OPTION_AT(RunOptions, script),
      "script of the hand (CSV t_s,push_mm_s,twist_deg_s) instead of the scene's; of several tools t_s,NAME.push_mm_s,NAME.twist_deg_s,…; a further column "
      "released, NAME.released, is 1 where no hand holds it"},
     {"device", "F.yaml", OPTION_FILE, OPTION_AT(RunOptions, device),
-     "instead of a script a device drives, by this map or (auto) a built-in one: the first tool, or that of the map's key `tool`; paced; repeated for up to 8 maps. "
-     "Needs --duration-s", .count = offsetof(RunOptions, device_count), .times = RUN_MAPS},
+     "instead of a script a device drives, by this map or (auto) a built-in one: the first tool, or that of the map's key `tool`; paced; repeated for up to 8 "
+     "maps. "
+     "Needs --duration-s",
+     .count = offsetof(RunOptions, device_count), .times = RUN_MAPS},
     {"duration-s", "S", OPTION_NUMBER, OPTION_AT(RunOptions, headless.duration_s), "simulated time", .most = SCRIPT_LONGEST_S, .unit = "s",
      .otherwise = "the script's; needed where there is no script"},
     {"settle-s", "S", OPTION_NUMBER, OPTION_AT(RunOptions, headless.settle_s),
@@ -49,10 +51,10 @@ static const char *check(void *structure)
     headless->scores = run->files.score;
     headless->has_moments = run->files.picture;
     headless->paced |= run->device_count > 0;
-    return headless->moment_count && !run->files.picture    ? "--picture-at goes with --picture F.png"
-           : run->device_count && run->script               ? "--device and --script are two hands; one of them"
-           : run->device_count && headless->duration_s < 0  ? "--device needs --duration-s S"
-                                                            : NULL;
+    return headless->moment_count && !run->files.picture   ? "--picture-at goes with --picture F.png"
+           : run->device_count && run->script              ? "--device and --script are two hands; one of them"
+           : run->device_count && headless->duration_s < 0 ? "--device needs --duration-s S"
+                                                           : NULL;
 }
 
 const OptionTable run_options = {
@@ -65,7 +67,11 @@ const OptionTable run_options = {
              "component, made perpendicular. docs/scene-format.md describes every key of a scene.",
     .exits = "0 done (also when stopped by SIGINT or SIGTERM); 2 wrong usage or bad input; 3 the run diverged, left the vessel, or a file could not "
              "be written to its end",
-    CLI_OPTIONS(options, RunOptions), .set_defaults = set_defaults, .check = check,
-    .takes_argument = true, .argument = offsetof(RunOptions, scene),
-    .missing = "missing the scene to run", .too_many = "one scene at a time, not also ",
+    CLI_OPTIONS(options, RunOptions),
+    .set_defaults = set_defaults,
+    .check = check,
+    .takes_argument = true,
+    .argument = offsetof(RunOptions, scene),
+    .missing = "missing the scene to run",
+    .too_many = "one scene at a time, not also ",
 };

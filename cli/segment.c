@@ -50,7 +50,8 @@ static bool draw_picture(const SegmentCommand *command, const Volume *volume, co
 #ifdef SELDINGER_RENDER
     PictureOptions picture = picture_default_options();
     picture.title = command->volume;
-    drawn = picture_of_tree(command->picture, &picture, volume->size, volume->origin, volume->axis, volume->value, 0, 0, tree, 0, NULL, message, sizeof message);
+    drawn =
+        picture_of_tree(command->picture, &picture, volume->size, volume->origin, volume->axis, volume->value, 0, 0, tree, 0, NULL, message, sizeof message);
 #else
     (void)volume;
     (void)tree;
@@ -111,12 +112,11 @@ static int call(void *structure, Faults *faults)
     if (trace && volume && faults->count == 0) {
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "tracking", command->quiet);
-        tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count, command->threads, &progress, &report,
-                         command->start ? "--start" : command->trace, faults);
+        tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count, command->threads, &progress,
+                         &report, command->start ? "--start" : command->trace, faults);
     }
     double track_s = seconds() - start - load_s;
-    bool good = tree && save(command, trace, &report, volume, tree, faults) &&
-                (!command->json || write_json(command, tree, &report, load_s, track_s, faults));
+    bool good = tree && save(command, trace, &report, volume, tree, faults) && (!command->json || write_json(command, tree, &report, load_s, track_s, faults));
     if (good && !command->quiet && !cli_is_standard_output(command->json))
         segment_report_print(stdout, tree, &report, load_s, track_s);
     if (good)

@@ -40,8 +40,14 @@ static const char *take_voxel(void *structure, const Option *option, const char 
 }
 
 #define AT(member) OPTION_AT(SynthCommand, member)
-#define SHAPE(name, default, text) {name, "X", OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option}
-#define COUNT(name, default, text) {name, "N", OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option}
+#define SHAPE(name, default, text)                                                                                                                             \
+    {                                                                                                                                                          \
+        name, "X", OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option                                                            \
+    }
+#define COUNT(name, default, text)                                                                                                                             \
+    {                                                                                                                                                          \
+        name, "N", OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option                                                            \
+    }
 static const Option options[] = {
     {"output", "F", OPTION_FILE, AT(output), "what to write, by its extension", .letter = 'o'},
     {"measure", "MODEL.h5", OPTION_FILE, AT(measure), "instead: how far a model fitted to this shape is from the truth"},
@@ -68,7 +74,8 @@ static const Option options[] = {
     SHAPE("crossing-deg", "0: side by side", "kissing: angle of the two vessels"),
     SHAPE("scale", "1", "of the whole shape"),
     {"cell-mm", "X", OPTION_NUMBER, AT(files.cell_mm), "grid of the triangles", .least = 0.005, .most = 10, .unit = "mm", .group = "surface"},
-    {"voxel-mm", "X|X,Y,Z", OPTION_NUMBER, AT(files.volume.voxel_mm), "edges along the grid's axes", .unit = "mm", .otherwise = "0.2", .take = take_voxel, .group = "volume"},
+    {"voxel-mm", "X|X,Y,Z", OPTION_NUMBER, AT(files.volume.voxel_mm), "edges along the grid's axes", .unit = "mm", .otherwise = "0.2", .take = take_voxel,
+     .group = "volume"},
     {"psf-mm", "X", OPTION_NUMBER, AT(files.volume.psf_mm), "standard deviation of the blur", .most = 10, .unit = "mm"},
     {"noise", "X", OPTION_NUMBER, AT(files.volume.noise), "standard deviation of the noise in contrasts (vessel 1, background 0)", .most = 10},
     {"rotate-deg", "X", OPTION_NUMBER, AT(files.volume.rotate_deg), "the grid is turned by this much about (1, 2, 3)", .least = -180, .most = 180},
@@ -79,16 +86,18 @@ static const Option options[] = {
     {"contrast-grey", "X", OPTION_NUMBER, AT(files.volume.contrast_grey),
      "grey values: whole numbers from 0 to 255, vessels so many levels brighter than the background", .least = 1, .most = 255, .otherwise = "not"},
     {"background-grey", "X", OPTION_NUMBER, AT(background_grey), "grey value of the background; needs --contrast-grey", .most = 255, .otherwise = "60"},
-    {"noise-grey", "X", OPTION_NUMBER, AT(noise_grey), "standard deviation of the noise in grey values instead of --noise; needs --contrast-grey", .most = 255, .otherwise = ""},
-    {"band-grey", "X", OPTION_NUMBER, AT(band_grey), "a slab across the trunk is brighter by so many grey values; needs --contrast-grey", .least = -255, .most = 255,
-     .otherwise = "0: none"},
+    {"noise-grey", "X", OPTION_NUMBER, AT(noise_grey), "standard deviation of the noise in grey values instead of --noise; needs --contrast-grey", .most = 255,
+     .otherwise = ""},
+    {"band-grey", "X", OPTION_NUMBER, AT(band_grey), "a slab across the trunk is brighter by so many grey values; needs --contrast-grey", .least = -255,
+     .most = 255, .otherwise = "0: none"},
     {"band-mm", "X", OPTION_NUMBER, AT(files.volume.band_mm), "thickness of this slab, placed by the seed", .least = 0.01, .most = 1000, .unit = "mm"},
     CLI_THREADS(SynthCommand, files.volume.threads),
 };
 
 static void set_defaults(void *structure)
 {
-    *(SynthCommand *)structure = (SynthCommand){.files = {.cell_mm = 0.25, .volume = volume_default_options()}, .gap_voxels = -1, .background_grey = -1, .noise_grey = -1};
+    *(SynthCommand *)structure =
+        (SynthCommand){.files = {.cell_mm = 0.25, .volume = volume_default_options()}, .gap_voxels = -1, .background_grey = -1, .noise_grey = -1};
 }
 
 // What was given in grey values, in contrasts. False where it needs a contrast in grey values.
@@ -144,7 +153,10 @@ const OptionTable synth_options = {
              "surface points, F-truth.h5, and F-neighbour.h5 that of a kissing neighbour, which is no part of the truth.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, SynthCommand),
-    .set_defaults = set_defaults, .check = check,
-    .takes_argument = true, .argument = offsetof(SynthCommand, shape),
-    .may_be_missing = true, .too_many = "one shape at a time, not also ",
+    .set_defaults = set_defaults,
+    .check = check,
+    .takes_argument = true,
+    .argument = offsetof(SynthCommand, shape),
+    .may_be_missing = true,
+    .too_many = "one shape at a time, not also ",
 };

@@ -84,10 +84,7 @@ double blobby_curvature(Vec3 gradient, const Sym3 *hessian)
     return (sym3_quadratic(hessian, gradient) - g2 * sym3_trace(hessian)) / (2 * g2 * sqrt(g2));
 }
 
-double blob_radius(double width, double iso_level)
-{
-    return width > iso_level ? width * sqrt(5 * (sqrt(width / iso_level) - 1)) : 0;
-}
+double blob_radius(double width, double iso_level) { return width > iso_level ? width * sqrt(5 * (sqrt(width / iso_level) - 1)) : 0; }
 
 // With s = sqrt(rho / T): s^5 - s^4 = r^2 / (5 T^2) = c. Convex for s > 1; both 1 + c and 1 + c^(1/5) lie above the root, from where
 // Newton comes down monotonously.
@@ -203,12 +200,9 @@ static Sym3 shape_operator(Vec3 n, double slope, const Sym3 *h)
     Vec3 hn = sym3_mul_vec(h, n);
     double nhn = vec3_dot(n, hn), s = 1 / slope;
     // P H P = H - n (Hn)' - (Hn) n' + (n'Hn) n n'
-    return (Sym3){s * (h->xx - 2 * n.x * hn.x + nhn * n.x * n.x),
-                  s * (h->xy - n.x * hn.y - n.y * hn.x + nhn * n.x * n.y),
-                  s * (h->xz - n.x * hn.z - n.z * hn.x + nhn * n.x * n.z),
-                  s * (h->yy - 2 * n.y * hn.y + nhn * n.y * n.y),
-                  s * (h->yz - n.y * hn.z - n.z * hn.y + nhn * n.y * n.z),
-                  s * (h->zz - 2 * n.z * hn.z + nhn * n.z * n.z)};
+    return (Sym3){s * (h->xx - 2 * n.x * hn.x + nhn * n.x * n.x),          s * (h->xy - n.x * hn.y - n.y * hn.x + nhn * n.x * n.y),
+                  s * (h->xz - n.x * hn.z - n.z * hn.x + nhn * n.x * n.z), s * (h->yy - 2 * n.y * hn.y + nhn * n.y * n.y),
+                  s * (h->yz - n.y * hn.z - n.z * hn.y + nhn * n.y * n.z), s * (h->zz - 2 * n.z * hn.z + nhn * n.z * n.z)};
 }
 
 static bool surface_frame(const Blobby *model, Vec3 x, Vec3 foot, SurfaceFrame *frame)
@@ -274,8 +268,7 @@ static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scal
                 continue;
             // within rounding of the same distance the smaller tangential rest decides
             double there = vec3_distance(x, p);
-            taken = there < size - 1e-13 * (1 + size) ||
-                    (there <= size + 1e-13 * (1 + size) && vec3_norm(next.tangent) < 0.9 * vec3_norm(best->tangent));
+            taken = there < size - 1e-13 * (1 + size) || (there <= size + 1e-13 * (1 + size) && vec3_norm(next.tangent) < 0.9 * vec3_norm(best->tangent));
         }
         if (!taken)
             break;
@@ -358,7 +351,7 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
     Vec3 to_foot = vec3_unit_or(vec3_sub(best.foot, x), vec3(0, 0, 0));
     double reach = 1.25 * fabs(best.gap);
     for (int k = 0; k < 14 && !warm && f > 0; k++) {
-        static const Vec3 way[14] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {1, 1, 1},
+        static const Vec3 way[14] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
                                      {1, 1, -1}, {1, -1, 1}, {1, -1, -1}, {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
         Vec3 d = vec3_unit(way[k]);
         if (vec3_dot(d, to_foot) < 0.8 && march_out(model, x, f, d, scale, reach, &other))
@@ -368,6 +361,9 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
         keep_closer(model, x, other, scale, &best, &least);
     pull_to_own_side(model, x, f, scale, &best, &least);
     double away = vec3_distance(x, best.foot), rest = vec3_norm(best.tangent);
-    return (SurfacePoint){.foot = best.foot, .normal = best.normal, .shape = best.shape, .distance = best.gap,
+    return (SurfacePoint){.foot = best.foot,
+                          .normal = best.normal,
+                          .shape = best.shape,
+                          .distance = best.gap,
                           .converged = fabs(best.field) < 1e-9 * best.slope && (away < 1e-6 || rest <= 1e-4 * away)};
 }

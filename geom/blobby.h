@@ -28,7 +28,8 @@ static inline Blobby blobby_of(const VesselTree *tree, int node)
 {
     if (vessel_tree_is_shared(tree)) {
         int64_t first = tree->seen_offset[node];
-        return (Blobby){(int)(tree->seen_offset[node + 1] - first), tree->blob_center, tree->blob_width, tree->iso_level, tree->blob_amplitude, tree->seen + first};
+        return (Blobby){
+            (int)(tree->seen_offset[node + 1] - first), tree->blob_center, tree->blob_width, tree->iso_level, tree->blob_amplitude, tree->seen + first};
     }
     int64_t first = tree->blob_offset[node];
     return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level, NULL, NULL};

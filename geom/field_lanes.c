@@ -13,11 +13,12 @@
 #endif
 
 _Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(VesselMemory, normal) == 8 * MEMORY_NORMAL &&
-              offsetof(VesselMemory, hessian) == 8 * MEMORY_HESSIAN && offsetof(VesselMemory, miss) == 8 * MEMORY_MISS &&
-              offsetof(VesselMemory, step) == 8 * MEMORY_STEP && offsetof(VesselMemory, trust) == 8 * MEMORY_TRUST &&
-              offsetof(VesselMemory, held_at) == 8 * MEMORY_HELD_AT && offsetof(VesselMemory, held_for2) == 8 * MEMORY_HELD_FOR2 &&
-              offsetof(VesselMemory, bound_at) == 8 * MEMORY_BOUND_AT && offsetof(VesselMemory, bound_for) == 8 * MEMORY_BOUND_FOR &&
-              offsetof(VesselMemory, down) == 8 * MEMORY_DOWN && offsetof(VesselMemory, up) == 8 * MEMORY_UP, "memories are rows of doubles");
+                   offsetof(VesselMemory, hessian) == 8 * MEMORY_HESSIAN && offsetof(VesselMemory, miss) == 8 * MEMORY_MISS &&
+                   offsetof(VesselMemory, step) == 8 * MEMORY_STEP && offsetof(VesselMemory, trust) == 8 * MEMORY_TRUST &&
+                   offsetof(VesselMemory, held_at) == 8 * MEMORY_HELD_AT && offsetof(VesselMemory, held_for2) == 8 * MEMORY_HELD_FOR2 &&
+                   offsetof(VesselMemory, bound_at) == 8 * MEMORY_BOUND_AT && offsetof(VesselMemory, bound_for) == 8 * MEMORY_BOUND_FOR &&
+                   offsetof(VesselMemory, down) == 8 * MEMORY_DOWN && offsetof(VesselMemory, up) == 8 * MEMORY_UP,
+               "memories are rows of doubles");
 _Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
 
 void field_directions(Vec3 *way, int count)
@@ -76,7 +77,10 @@ void field_turn_points(const ClearPoints *points, Vec3 axis, ClearPoints *turned
     }
 }
 
-#define KERNEL_TABLE(set) {load_##set, sample_##set, newton_##set, finish_##set, store_##set, pick_##set, bends_##set, is_clear_##set, look_##set}
+#define KERNEL_TABLE(set)                                                                                                                                      \
+    {                                                                                                                                                          \
+        load_##set, sample_##set, newton_##set, finish_##set, store_##set, pick_##set, bends_##set, is_clear_##set, look_##set                                 \
+    }
 
 #define KERNEL_TEXT "geom/field_kernel.inc"
 #include "base/each_simd.inc"

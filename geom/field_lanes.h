@@ -20,8 +20,23 @@ typedef struct FieldRow {
 } __attribute__((aligned(64))) FieldRow;
 
 // Places in a row of a VesselMemory.
-enum { MEMORY_FOOT = 0, MEMORY_PLACE = 3, MEMORY_NORMAL = 6, MEMORY_HESSIAN = 9, MEMORY_DOWN = 15, MEMORY_MISS = 16, MEMORY_STEP = 19, MEMORY_TRUST = 22,
-       MEMORY_UP = 23, MEMORY_WRITTEN = 24, MEMORY_HELD_AT = 24, MEMORY_HELD_FOR2 = 27, MEMORY_BOUND_AT = 28, MEMORY_BOUND_FOR = 31, MEMORY_ROW = 32 };
+enum {
+    MEMORY_FOOT = 0,
+    MEMORY_PLACE = 3,
+    MEMORY_NORMAL = 6,
+    MEMORY_HESSIAN = 9,
+    MEMORY_DOWN = 15,
+    MEMORY_MISS = 16,
+    MEMORY_STEP = 19,
+    MEMORY_TRUST = 22,
+    MEMORY_UP = 23,
+    MEMORY_WRITTEN = 24,
+    MEMORY_HELD_AT = 24,
+    MEMORY_HELD_FOR2 = 27,
+    MEMORY_BOUND_AT = 28,
+    MEMORY_BOUND_FOR = 31,
+    MEMORY_ROW = 32
+};
 enum { HIT_ROW = 10 };               // gap, normal, Hessian
 
 // Points in the unit ball: on two spheres about its middle, and on rings of the ball itself about the z axis.

@@ -296,7 +296,10 @@ static void set_whole_list(const FieldVessel *field, FieldBlock *b, int i, int n
 static Foot lane_foot(const FieldBlock *b, int i, int node)
 {
     const FootBatch *f = &b->foot;
-    return (Foot){.at = vec3(f->at.x[i], f->at.y[i], f->at.z[i]), .normal = vec3(f->nx[i], f->ny[i], f->nz[i]), .gap = f->gap[i], .node = node,
+    return (Foot){.at = vec3(f->at.x[i], f->at.y[i], f->at.z[i]),
+                  .normal = vec3(f->nx[i], f->ny[i], f->nz[i]),
+                  .gap = f->gap[i],
+                  .node = node,
                   .slope = sqrt(f->at.gx[i] * f->at.gx[i] + f->at.gy[i] * f->at.gy[i] + f->at.gz[i] * f->at.gz[i]),
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
@@ -423,10 +426,7 @@ static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle
 }
 
 // [mm] A sharply bent wall has other feet close by: the foot is not trusted over more than this of travel.
-static double bend_radius(const Foot *foot)
-{
-    return 0.15 / fmax(sqrt(sym3_norm2(&foot->hessian)), 1e-3);
-}
+static double bend_radius(const Foot *foot) { return 0.15 / fmax(sqrt(sym3_norm2(&foot->hessian)), 1e-3); }
 
 // Does the wall at a foot bend no more than a round vessel's does? Only there do the few points of room_about tell of its surroundings. In the lumen h is
 // the bend of the wall's offset through X, h / (1 - g h) that of the wall.
@@ -1174,8 +1174,8 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
         return NULL;
     SEL_ASSERT(tree->near_offset && tree->near && tree->seen_offset, "the tree is linked (vessel_tree_link)");
     SEL_ASSERT(tree->blob_count < INT32_MAX, "memories name blobs by 32 bits, and the one without weight");
-    field->vessel = (Vessel){.kind = "field", .query = field_query, .locate = field_locate, .inlet = field_inlet, .destroy = field_destroy,
-                             .primitives = tree->blob_count};
+    field->vessel =
+        (Vessel){.kind = "field", .query = field_query, .locate = field_locate, .inlet = field_inlet, .destroy = field_destroy, .primitives = tree->blob_count};
     field->tree = tree;
     field->kernels = field_kernels(isa);
     size_t rows = (size_t)tree->blob_count + 1, nodes = (size_t)tree->node_count;
@@ -1201,7 +1201,4 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
 
 Vessel *field_vessel_create(const VesselTree *tree) { return field_vessel_create_with(tree, 0); }
 
-Vessel *model_vessel_create(const VesselTree *tree)
-{
-    return tree && vessel_tree_is_shared(tree) ? field_vessel_create(tree) : lim_vessel_create(tree);
-}
+Vessel *model_vessel_create(const VesselTree *tree) { return tree && vessel_tree_is_shared(tree) ? field_vessel_create(tree) : lim_vessel_create(tree); }

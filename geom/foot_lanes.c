@@ -6,8 +6,10 @@
 
 #include <string.h>
 
-#define KERNEL_TABLE(set) \
-    {#set, gradient_##set, hessian_##set, predict_##set, newton_##set, finish_##set, estimate_##set, partner_##set, mix_##set, settle_##set, near_##set}
+#define KERNEL_TABLE(set)                                                                                                                                      \
+    {                                                                                                                                                          \
+#set, gradient_##set, hessian_##set, predict_##set, newton_##set, finish_##set, estimate_##set, partner_##set, mix_##set, settle_##set, near_##set     \
+    }
 
 #define KERNEL_TEXT "geom/blob_kernel.inc"
 #include "base/each_simd.inc"

@@ -231,8 +231,7 @@ static bool look_from(Search *s, int owner, int64_t blob)
     nearest_lattice_point(s, x, at);
     if (key_map_find(&s->known, lattice_key(at)) >= 0)
         return true;
-    if (!grow((void **)&s->is_held, s->place_count, &s->place_capacity, sizeof *s->is_held) ||
-        !grow((void **)&s->point, 0, &s->capacity, sizeof *s->point))
+    if (!grow((void **)&s->is_held, s->place_count, &s->place_capacity, sizeof *s->is_held) || !grow((void **)&s->point, 0, &s->capacity, sizeof *s->point))
         return false;
     bool held = flood_from(s, x, node, &failed);
     s->is_held[s->place_count] = held;
@@ -271,7 +270,10 @@ GhostLumens *ghost_lumens_find(const VesselTree *tree)
     double least = HUGE_VAL;
     for (int i = 0; i < tree->node_count; i++)
         least = fmin(least, tree->radius[i]);
-    Search s = {.tree = tree, .cell = CELL * least, .out = calloc(1, sizeof *s.out), .drops = calloc((size_t)tree->blob_count + 1, sizeof *s.drops),
+    Search s = {.tree = tree,
+                .cell = CELL * least,
+                .out = calloc(1, sizeof *s.out),
+                .drops = calloc((size_t)tree->blob_count + 1, sizeof *s.drops),
                 .tested = calloc((size_t)tree->blob_count + 1, sizeof *s.tested)};
     bool good = s.out && s.drops && s.tested;
     for (int i = 0; i < tree->node_count && good; i++)

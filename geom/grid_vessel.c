@@ -20,7 +20,10 @@ enum {
     KEY_BITS = 20,
     BLOCK_MAX = (1 << (KEY_BITS - 1)) - 2,   // a block's number along an axis; a lattice point's is 8 times that
     BLOCKS_MAX = 4000000,                    // held: 12 GB
-    IS_OUTSIDE = 0, IS_INSIDE, IS_OPEN, IS_HELD,     // values of the map; from IS_HELD on: 3 + the block
+    IS_OUTSIDE = 0,
+    IS_INSIDE,
+    IS_OPEN,
+    IS_HELD, // values of the map; from IS_HELD on: 3 + the block
 };
 
 typedef struct GridBlock {
@@ -197,8 +200,8 @@ static bool check_options(const GridVesselOptions *o, const TriangleMesh *surfac
     for (int v = 0; v < surface->vertex_count && faults->count == before; v++) {
         Vec3 p = surface->vertex[v];
         if (!(vec3_is_finite(p) && fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))) < most))
-            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y,
-                       p.z, most, o->cell_mm);
+            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y, p.z,
+                       most, o->cell_mm);
     }
     for (int t = 0; t < surface->triangle_count && faults->count == before; t++)
         for (int k = 0; k < 3; k++)

@@ -288,7 +288,10 @@ static bool project_in_section(const LimVessel *lim, int node, Vec3 x, SurfacePo
         if (fabs(y) + fabs(nu) > 1e-7)
             continue;
         gap = vec3_dot(vec3_sub(x, p), n);
-        *found = (SurfacePoint){.foot = vec3_add_scaled(p, -shift, d), .normal = n, .distance = gap, .converged = true,
+        *found = (SurfacePoint){.foot = vec3_add_scaled(p, -shift, d),
+                                .normal = n,
+                                .distance = gap,
+                                .converged = true,
                                 .shape = {k * t.x * t.x, k * t.x * t.y, k * t.x * t.z, k * t.y * t.y, k * t.y * t.z, k * t.z * t.z}};
         return true;
     }
@@ -427,7 +430,7 @@ static void project_batch(const LimVessel *lim, LaneBatch *batch)
 
 enum { LOOKS = 14 };
 #define C 0.57735026918962573   // 1 / sqrt 3
-static const Vec3 look[LOOKS] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {C, C, C},
+static const Vec3 look[LOOKS] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {C, C, C},
                                  {C, C, -C}, {C, -C, C}, {C, -C, -C}, {-C, C, C}, {-C, C, -C}, {-C, -C, C}, {-C, -C, -C}};
 #undef C
 
@@ -806,10 +809,7 @@ static void choose_sources(const VesselTree *tree, NodeModel *model)
     }
 }
 
-static int near_groups_of(const VesselTree *tree, int node)
-{
-    return (tree->near_offset[node + 1] - tree->near_offset[node] + NEAR_GROUP - 1) / NEAR_GROUP;
-}
+static int near_groups_of(const VesselTree *tree, int node) { return (tree->near_offset[node + 1] - tree->near_offset[node] + NEAR_GROUP - 1) / NEAR_GROUP; }
 
 // A near node's plane, see NearGroup: within the mixed zone, or beyond, where base - e.y <= width.
 typedef struct NearPlane {
@@ -913,7 +913,7 @@ static double measure_room(const LimVessel *lim, int node)
         Vec3 foot = vec3_add_scaled(tree->center[node], (k / AROUND - 1) * reach, d), g;
         if (!(blobby_field(&blobs, foot) > 0))
             return 0;
-        for (int i = 0; i < 12; i++, step *= i > 4 ? 0.5 : 1)   // out, then closer and closer to the wall
+        for (int i = 0; i<12; i++, step *= i> 4 ? 0.5 : 1) // out, then closer and closer to the wall
             if (i < 5 ? blobby_field(&blobs, vec3_add_scaled(foot, step, out)) > 0 : true) {
                 Vec3 next = vec3_add_scaled(foot, step, out);
                 foot = blobby_field(&blobs, next) > 0 ? next : foot;

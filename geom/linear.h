@@ -39,10 +39,7 @@ static inline Vec3 vec3_add_scaled(Vec3 a, double s, Vec3 b) { return (Vec3){a.x
 // a + s (b - a)
 static inline Vec3 vec3_mix(Vec3 a, Vec3 b, double s) { return vec3_add_scaled(a, s, vec3_sub(b, a)); }
 static inline double vec3_dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-static inline Vec3 vec3_cross(Vec3 a, Vec3 b)
-{
-    return (Vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+static inline Vec3 vec3_cross(Vec3 a, Vec3 b) { return (Vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 static inline double vec3_norm2(Vec3 a) { return vec3_dot(a, a); }
 static inline double vec3_norm(Vec3 a) { return sqrt(vec3_dot(a, a)); }
 static inline double vec3_distance(Vec3 a, Vec3 b) { return vec3_norm(vec3_sub(a, b)); }
@@ -114,18 +111,15 @@ static inline void sym3_add_outer(Sym3 *s, double factor, Vec3 v)
 static inline double sym3_trace(const Sym3 *s) { return s->xx + s->yy + s->zz; }
 
 // Sum of the squares of all nine entries.
-static inline double sym3_norm2(const Sym3 *s)
-{
-    return s->xx * s->xx + s->yy * s->yy + s->zz * s->zz + 2 * (s->xy * s->xy + s->xz * s->xz + s->yz * s->yz);
-}
+static inline double sym3_norm2(const Sym3 *s) { return s->xx * s->xx + s->yy * s->yy + s->zz * s->zz + 2 * (s->xy * s->xy + s->xz * s->xz + s->yz * s->yz); }
 
 static inline Quat quat_identity(void) { return (Quat){1, 0, 0, 0}; }
 static inline bool quat_is_unit(Quat q) { return fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-9; }
 static inline Quat quat_conjugate(Quat q) { return (Quat){q.w, -q.x, -q.y, -q.z}; }
 static inline Quat quat_mul(Quat a, Quat b)
 {
-    return (Quat){a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-                  a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+    return (Quat){a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+                  a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 static inline Quat quat_unit(Quat q)
 {
@@ -139,8 +133,7 @@ static inline Vec3 quat_rotate(Quat q, Vec3 v)
 }
 static inline Mat3 quat_to_mat3(Quat q)
 {
-    double xx = q.x * q.x, yy = q.y * q.y, zz = q.z * q.z, xy = q.x * q.y, xz = q.x * q.z, yz = q.y * q.z, wx = q.w * q.x, wy = q.w * q.y,
-           wz = q.w * q.z;
+    double xx = q.x * q.x, yy = q.y * q.y, zz = q.z * q.z, xy = q.x * q.y, xz = q.x * q.z, yz = q.y * q.z, wx = q.w * q.x, wy = q.w * q.y, wz = q.w * q.z;
     return (Mat3){{{1 - 2 * (yy + zz), 2 * (xy - wz), 2 * (xz + wy)},
                    {2 * (xy + wz), 1 - 2 * (xx + zz), 2 * (yz - wx)},
                    {2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy)}}};

@@ -180,8 +180,11 @@ static bool make_lids(const TriangleMesh *mesh, const Borders *borders, MeshClos
         triangles += borders->edge[i].times;
     size_t rims = closure->rims > 0 ? (size_t)closure->rims : 0;
     double *length = calloc(rims + 1, sizeof *length);
-    *lids = (MeshLids){.middle_count = (int)rims, .triangle_count = triangles, .middle = calloc(rims + 1, sizeof *lids->middle),
-                       .middle_vertex = calloc(rims + 1, sizeof(int)), .triangle = calloc((size_t)triangles + 1, sizeof *lids->triangle)};
+    *lids = (MeshLids){.middle_count = (int)rims,
+                       .triangle_count = triangles,
+                       .middle = calloc(rims + 1, sizeof *lids->middle),
+                       .middle_vertex = calloc(rims + 1, sizeof(int)),
+                       .triangle = calloc((size_t)triangles + 1, sizeof *lids->triangle)};
     bool good = closure->rims >= 0 && length && lids->middle && lids->middle_vertex && lids->triangle;
     for (int i = 0, n = 0; good && i < borders->count; i++) {
         const OpenEdge *e = &borders->edge[i];

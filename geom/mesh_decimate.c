@@ -307,8 +307,8 @@ static bool open_decimation(Decimation *d, const TriangleMesh *mesh)
                       .collapse = malloc((3 * triangles + 1) * sizeof *d->collapse),
                       .sorted = malloc((3 * triangles + 1) * sizeof *d->sorted),
                       .mark = malloc((vertices + 1) * sizeof(int))};
-    if (!d->vertex || !d->quadric || !d->node || !d->into || !d->triangle || !d->first || !d->around || !d->is_fixed || !d->is_touched ||
-        !d->collapse || !d->sorted || !d->mark)
+    if (!d->vertex || !d->quadric || !d->node || !d->into || !d->triangle || !d->first || !d->around || !d->is_fixed || !d->is_touched || !d->collapse ||
+        !d->sorted || !d->mark)
         return false;
     for (int v = 0; v < mesh->vertex_count; v++) {
         d->vertex[v] = vec3_sub(mesh->vertex[v], mesh->vertex[0]);

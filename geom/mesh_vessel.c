@@ -862,8 +862,12 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
     }
     static const char *const kind[] = {[MESH_FACES] = "flat mesh", [MESH_CURVED] = "mesh", [MESH_SMOOTH] = "smooth mesh"};
     size_t vertices = (size_t)m->vertex_count, triangles = (size_t)m->triangle_count;
-    m->vessel = (Vessel){.kind = kind[options->normals], .query = mesh_query, .locate = mesh_locate, .inlet = mesh_inlet,
-                         .destroy = mesh_destroy, .primitives = m->triangle_count};
+    m->vessel = (Vessel){.kind = kind[options->normals],
+                         .query = mesh_query,
+                         .locate = mesh_locate,
+                         .inlet = mesh_inlet,
+                         .destroy = mesh_destroy,
+                         .primitives = m->triangle_count};
     size_t each_group = sizeof *m->group + (m->around ? sizeof *m->around : 0);
     size_t each_vertex = sizeof *m->vertex + sizeof *m->vertex_normal + sizeof *m->on_rim + sizeof *m->keeper + (m->smooth_normal ? sizeof(Vec3) : 0);
     size_t each_triangle = sizeof *m->corner + sizeof *m->across + sizeof *m->face + sizeof *m->group_of + (m->bend ? sizeof *m->bend : 0);

@@ -45,8 +45,8 @@ Vessel *plane_vessel_create(Vec3 point, Vec3 normal)
     PlaneVessel *plane = calloc(1, sizeof *plane);
     if (!plane)
         return NULL;
-    plane->vessel = (Vessel){.kind = "plane", .query = plane_query, .locate = plane_locate, .inlet = plane_inlet, .destroy = plane_destroy,
-                             .primitives = 1, .bytes = sizeof *plane};
+    plane->vessel = (Vessel){
+        .kind = "plane", .query = plane_query, .locate = plane_locate, .inlet = plane_inlet, .destroy = plane_destroy, .primitives = 1, .bytes = sizeof *plane};
     plane->point = point;
     plane->normal = vec3_scale(normal, 1 / length);
     SEL_ASSERT(fabs(vec3_norm2(plane->normal) - 1) < 1e-12, "normals are unit vectors");

@@ -78,7 +78,7 @@ typedef struct SheetMarch {
     struct SheetState {
         int node, point;
         double field;
-    } *state;
+    } * state;
     int *same, same_capacity;                // disjoint sets of states that are one
 } SheetMarch;
 
@@ -725,7 +725,4 @@ TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_
     return surface_of_nodes(tree, node, node + 1, cell_mm);
 }
 
-TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm)
-{
-    return tree ? surface_of_nodes(tree, 0, tree->node_count, cell_mm) : NULL;
-}
+TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm) { return tree ? surface_of_nodes(tree, 0, tree->node_count, cell_mm) : NULL; }

@@ -197,7 +197,7 @@ typedef struct Inlet {
     int split_count, split_capacity;
     struct Split {
         int a, b, vertex;    // a < b: ends of the edge, and the new vertex on it
-    } *split;
+    } * split;
     int vertex_capacity, triangle_count, triangle_capacity;
     int (*triangle)[3];
 } Inlet;
@@ -370,8 +370,12 @@ static bool cut_inlet(TriangleMesh *mesh, Inlet *inlet)
 static bool copy_mesh(const TriangleMesh *from, TriangleMesh *to)
 {
     size_t v = (size_t)from->vertex_count, t = (size_t)from->triangle_count;
-    *to = (TriangleMesh){from->vertex_count, from->triangle_count, malloc(v * sizeof *to->vertex), malloc(v * sizeof *to->normal),
-                         malloc(v * sizeof *to->node), malloc(t * sizeof *to->triangle)};
+    *to = (TriangleMesh){from->vertex_count,
+                         from->triangle_count,
+                         malloc(v * sizeof *to->vertex),
+                         malloc(v * sizeof *to->normal),
+                         malloc(v * sizeof *to->node),
+                         malloc(t * sizeof *to->triangle)};
     if (!to->vertex || !to->normal || !to->node || !to->triangle)
         return false;
     memcpy(to->vertex, from->vertex, v * sizeof *to->vertex);

@@ -6,7 +6,10 @@
 
 #define KERNEL_TEXT "geom/triangle_groups_kernel.inc"
 #include "base/each_simd.inc"
-#define KERNEL_TABLE(set) {#set, distances_##set, bounds_##set}
+#define KERNEL_TABLE(set)                                                                                                                                      \
+    {                                                                                                                                                          \
+#set, distances_##set, bounds_##set                                                                                                                    \
+    }
 static const GroupKernels kernel_table[SIMD_COUNT] = SIMD_EACH(KERNEL_TABLE);
 
 const GroupKernels *group_kernels(int isa) { return &kernel_table[simd_choose(isa)]; }
@@ -86,10 +89,7 @@ static void extent_of(const TriangleGroup *group, const GroupMesh *mesh, Vec3 or
 
 static Vec3 unit_axis(int axis) { return vec3(axis == 0, axis == 1, axis == 2); }
 
-static void put(double (*to)[GROUP_TRIANGLES], int lane, Vec3 v)
-{
-    to[0][lane] = v.x, to[1][lane] = v.y, to[2][lane] = v.z;
-}
+static void put(double (*to)[GROUP_TRIANGLES], int lane, Vec3 v) { to[0][lane] = v.x, to[1][lane] = v.y, to[2][lane] = v.z; }
 
 TriangleFrame triangle_frame(const Vec3 *vertex, const int *corner)
 {

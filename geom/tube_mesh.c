@@ -169,8 +169,7 @@ TriangleMesh *triangle_mesh_of_plane(Vec3 point, Vec3 normal, double half_width)
     for (int j = 0; j <= PARTS; j++)
         for (int i = 0; i <= PARTS; i++) {
             int here = j * (PARTS + 1) + i;
-            mesh->vertex[here] =
-                vec3_add_scaled(vec3_add_scaled(point, half_width * (2.0 * i / PARTS - 1), u), half_width * (2.0 * j / PARTS - 1), v);
+            mesh->vertex[here] = vec3_add_scaled(vec3_add_scaled(point, half_width * (2.0 * i / PARTS - 1), u), half_width * (2.0 * j / PARTS - 1), v);
             mesh->normal[here] = out;
             if (i == PARTS || j == PARTS)
                 continue;

@@ -248,15 +248,14 @@ static void check_pieces(const TubeOptions *o, const char *file, Faults *faults)
         else if (p->angle == 0 && (!isfinite(p->length) || !(p->length > 0)))
             faults_add(faults, file, 0, 0, "tube: path[%d] is %g mm long; a line's length is above 0 (and an arc's angle)", i, p->length);
         else if (p->angle > 0 && (!isfinite(p->arc_radius) || !(p->arc_radius > o->radius)))
-            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc of radius %g mm; it must be larger than the lumen's radius, %g mm", i,
-                       p->arc_radius, o->radius);
+            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc of radius %g mm; it must be larger than the lumen's radius, %g mm", i, p->arc_radius,
+                       o->radius);
         if (!isfinite(p->plane))
             faults_add(faults, file, 0, 0, "tube: path[%d] has an arc's plane that is no number; degrees are valid", i);
         parts += p->angle > 0 ? 1 + p->angle / (PI / 2) : 1;
     }
     if (!(parts < SEGMENTS_MAX))
-        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; fewer than %d lines and quarter turns are valid", parts,
-                   (int)SEGMENTS_MAX);
+        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; fewer than %d lines and quarter turns are valid", parts, (int)SEGMENTS_MAX);
 }
 
 static void check_polyline(const TubeOptions *o, const char *file, Faults *faults)
@@ -318,8 +317,15 @@ static int add_arc(Segment *out, Vec3 *p, Vec3 *t, Vec3 *n, double arc_radius, d
     double part = angle / parts, cs = same_cos(part), sn = same_sin(part), half_cs = same_cos(0.5 * part), half_sn = same_sin(0.5 * part);
     for (int k = 0; k < parts; k++) {
         SEL_ASSERT(part > 0 && part < 0.51 * PI && arc_radius > 0, "an arc is cut into parts of 90 degrees at most");
-        Segment s = {.start = *p, .tangent = *t, .normal = *n, .arc_radius = arc_radius, .angle = part,
-                     .cosine = cs, .sine = sn, .half_cosine = half_cs, .half_sine = half_sn};
+        Segment s = {.start = *p,
+                     .tangent = *t,
+                     .normal = *n,
+                     .arc_radius = arc_radius,
+                     .angle = part,
+                     .cosine = cs,
+                     .sine = sn,
+                     .half_cosine = half_cs,
+                     .half_sine = half_sn};
         s.binormal = vec3_cross(*t, *n);
         s.center = vec3_add_scaled(*p, arc_radius, *n);
         s.end_tangent = vec3_unit(vec3_add_scaled(vec3_scale(*t, cs), sn, *n));

@@ -72,9 +72,15 @@ static int find_runs(const Profile *p, const VesselBranches *branches, int index
         if (k == from)
             continue;
         double ratio = p->radius[most] / p->reference[most];
-        found[count++] = (Finding){.kind = kind, .branch = index, .node = branches->node[node_of + most], .along = p->along[most],
-                                   .length = p->along[k - 1] - p->along[from], .radius = p->radius[most], .reference = p->reference[most],
-                                   .degree = 100 * fabs(1 - ratio), .neck = NAN};
+        found[count++] = (Finding){.kind = kind,
+                                   .branch = index,
+                                   .node = branches->node[node_of + most],
+                                   .along = p->along[most],
+                                   .length = p->along[k - 1] - p->along[from],
+                                   .radius = p->radius[most],
+                                   .reference = p->reference[most],
+                                   .degree = 100 * fabs(1 - ratio),
+                                   .neck = NAN};
     }
     return count;
 }
@@ -114,7 +120,8 @@ static double neck_width(const VesselTree *tree, int sac, int vessel)
         return NAN;
     Vec3 axis = vec3_scale(to, 1 / way);
     for (int i = 0; i <= SECTIONS; i++) {
-        double s = start + (way - start) * i / SECTIONS, r = section_radius(&model, vec3_add_scaled(tree->center[vessel], s, axis), axis, 3 * tree->radius[sac]);
+        double s = start + (way - start) * i / SECTIONS,
+               r = section_radius(&model, vec3_add_scaled(tree->center[vessel], s, axis), axis, 3 * tree->radius[sac]);
         least = r > 0 ? fmin(least, r) : least;
     }
     return least < HUGE_VAL ? 2 * least : NAN;
@@ -153,8 +160,13 @@ static int find_sacs(const VesselTree *tree, const VesselBranches *branches, int
             for (int k = 0; of >= 0 && k < branches->branch[of].count; k++)
                 if (branches->node[branches->branch[of].first + k] == p)
                     along = branches->along[branches->branch[of].first + k];
-            found[count++] = (Finding){.kind = FINDING_ANEURYSM, .branch = of, .node = i, .along = along, .radius = tree->radius[i],
-                                       .reference = p >= 0 ? tree->radius[p] : 0, .neck = NAN};
+            found[count++] = (Finding){.kind = FINDING_ANEURYSM,
+                                       .branch = of,
+                                       .node = i,
+                                       .along = along,
+                                       .radius = tree->radius[i],
+                                       .reference = p >= 0 ? tree->radius[p] : 0,
+                                       .neck = NAN};
         }
     }
     for (int i = 0; i < tree->node_count; i++)

@@ -90,10 +90,7 @@ static void add_question(VesselMarch *job, int of, int ball, Vec3 x, int node)
     ask->memory[ask->count++] = (VesselMemory){.node = node};
 }
 
-static void put_questions(VesselMarch *job, double reach)
-{
-    vessel_query(job->vessel, job->ask.count, job->ask.point, reach, job->ask.memory, job->ask.hit);
-}
+static void put_questions(VesselMarch *job, double reach) { vessel_query(job->vessel, job->ask.count, job->ask.point, reach, job->ask.memory, job->ask.hit); }
 
 // Asks x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to other nodes than those that were asked before. False
 // where there is no room for all.

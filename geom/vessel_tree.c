@@ -42,9 +42,8 @@ VesselTree *vessel_tree_create(int node_count, int64_t point_count, int64_t blob
     tree->error = array(n, sizeof *tree->error);
     tree->neighbour_offset = array(n + 1, sizeof *tree->neighbour_offset);
     tree->neighbour = array(2 * n, sizeof *tree->neighbour);
-    if (!tree->center || !tree->radius || !tree->direction || !tree->height || !tree->parent || !tree->kind || !tree->point ||
-        !tree->point_offset || !tree->blob_center || !tree->blob_width || !tree->blob_offset || !tree->error || !tree->neighbour_offset ||
-        !tree->neighbour) {
+    if (!tree->center || !tree->radius || !tree->direction || !tree->height || !tree->parent || !tree->kind || !tree->point || !tree->point_offset ||
+        !tree->blob_center || !tree->blob_width || !tree->blob_offset || !tree->error || !tree->neighbour_offset || !tree->neighbour) {
         vessel_tree_free(tree);
         return NULL;
     }
@@ -99,13 +98,13 @@ static void check_offsets(const int64_t *offset, int node_count, int64_t total, 
     }
     for (int i = 0; i < node_count; i++)
         if (offset[i + 1] < offset[i]) {
-            faults_add(faults, file, 0, 0, "%s/offset[%d] is %lld, below the one before it (%lld); offsets never fall", name, i + 1,
-                       (long long)offset[i + 1], (long long)offset[i]);
+            faults_add(faults, file, 0, 0, "%s/offset[%d] is %lld, below the one before it (%lld); offsets never fall", name, i + 1, (long long)offset[i + 1],
+                       (long long)offset[i]);
             return;
         }
     if (offset[node_count] != total)
-        faults_add(faults, file, 0, 0, "%s/offset ends at %lld; the last offset is the number of rows, %lld", name,
-                   (long long)offset[node_count], (long long)total);
+        faults_add(faults, file, 0, 0, "%s/offset ends at %lld; the last offset is the number of rows, %lld", name, (long long)offset[node_count],
+                   (long long)total);
 }
 
 #define MOST_MM 1e9   // squares and products of lengths stay far from overflow
@@ -114,8 +113,7 @@ static void check_vectors(const Vec3 *v, int64_t count, const char *name, const 
 {
     for (int64_t i = 0; i < count; i++)
         if (!(fabs(v[i].x) < MOST_MM && fabs(v[i].y) < MOST_MM && fabs(v[i].z) < MOST_MM)) {
-            faults_add(faults, file, 0, 0, "%s[%lld] is (%g, %g, %g); coordinates are finite numbers below 1e9 mm", name, (long long)i, v[i].x,
-                       v[i].y, v[i].z);
+            faults_add(faults, file, 0, 0, "%s[%lld] is (%g, %g, %g); coordinates are finite numbers below 1e9 mm", name, (long long)i, v[i].x, v[i].y, v[i].z);
             return;
         }
 }

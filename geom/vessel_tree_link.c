@@ -73,10 +73,7 @@ static bool add_near(NearSearch *s, int node)
 }
 
 // The length of a way is the same from both of its ends, to the bit: so is who is near whom.
-static double way_length(const NearSearch *s, int from, Way way)
-{
-    return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]);
-}
+static double way_length(const NearSearch *s, int from, Way way) { return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]); }
 
 // How long a way and how far apart near nodes are at most, in sums of their radii: see vessel_tree_link.
 typedef struct NearLimits {

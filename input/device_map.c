@@ -12,8 +12,8 @@
 
 // GLFW's order of a gamepad's axes and buttons.
 static const char *const gamepad_axis[] = {"left_x", "left_y", "right_x", "right_y", "left_trigger", "right_trigger", NULL};
-static const char *const gamepad_button[] = {"a", "b", "x", "y", "left_bumper", "right_bumper", "back", "start", "guide", "left_thumb", "right_thumb",
-                                             "dpad_up", "dpad_right", "dpad_down", "dpad_left", NULL};
+static const char *const gamepad_button[] = {"a",     "b",          "x",           "y",       "left_bumper", "right_bumper", "back",      "start",
+                                             "guide", "left_thumb", "right_thumb", "dpad_up", "dpad_right",  "dpad_down",    "dpad_left", NULL};
 
 static int index_of(const char *const *names, const char *name)
 {
@@ -107,7 +107,8 @@ static void read_tool(YamlValue value, MapHand *hand)
     if (!*end && (number < 1 || number > TOOLS_MOST))
         yaml_fault(value, "'%s' is %.20s; expected 1 to %d, outermost first, or a tool's name", value.name, text, TOOLS_MOST);
     else if (strpbrk(text, "., \t") || strlen(text) >= sizeof hand->tool)
-        yaml_fault(value, "'%s' is '%.40s'; expected chosen, outer, inner, outermost, innermost, 1 to %d, a tool's name or its kind", value.name, text, TOOLS_MOST);
+        yaml_fault(value, "'%s' is '%.40s'; expected chosen, outer, inner, outermost, innermost, 1 to %d, a tool's name or its kind", value.name, text,
+                   TOOLS_MOST);
     else
         snprintf(hand->tool, sizeof hand->tool, "%s", text);
     hand->drives = !strcmp(text, "outer") ? DRIVES_OUTER : !strcmp(text, "inner") ? DRIVES_INNER : DRIVES_CHOSEN;
@@ -199,7 +200,8 @@ static void read_calibration(const YamlMap *control, MapAxis *axis)
     yaml_map_number(control, "logical_centre", false, raw_range, &axis->logical_centre);
     yaml_map_number(control, "logical_max", false, raw_range, &axis->logical_max);
     if (axis->logical_min >= axis->logical_max || axis->logical_min > axis->logical_centre || axis->logical_centre > axis->logical_max)
-        yaml_fault(control->value, "logical_min, logical_centre and logical_max of '%s' do not increase; use invert: true to reverse an axis", control->value.name);
+        yaml_fault(control->value, "logical_min, logical_centre and logical_max of '%s' do not increase; use invert: true to reverse an axis",
+                   control->value.name);
 }
 
 // What goes only with a rate, or only with counts.
@@ -223,10 +225,12 @@ static void check_kind(const YamlMap *control, const DeviceMap *map, const MapAx
 
 static void read_axis(YamlValue value, DeviceMap *map, const MapHand *usual, bool is_twist)
 {
-    static const char *const push_keys[] = {"source", "index", "mm_s", "mm_per_count", "kind", "logical_min", "logical_centre", "logical_max",
-                                            "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", "tool", NULL};
-    static const char *const twist_keys[] = {"source", "index", "deg_s", "deg_per_count", "kind", "logical_min", "logical_centre", "logical_max",
-                                             "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", "tool", NULL};
+    static const char *const push_keys[] = {"source",      "index",           "mm_s",      "mm_per_count", "kind",   "logical_min", "logical_centre",
+                                            "logical_max", "counts_per_wrap", "dead_zone", "exponent",     "invert", "optional",    "tool",
+                                            NULL};
+    static const char *const twist_keys[] = {"source",      "index",           "deg_s",     "deg_per_count", "kind",   "logical_min", "logical_centre",
+                                             "logical_max", "counts_per_wrap", "dead_zone", "exponent",      "invert", "optional",    "tool",
+                                             NULL};
     static const char *const kinds[] = {"deflection", "relative", "counter", NULL};
     YamlMap control = yaml_map(value, is_twist ? twist_keys : push_keys);
     if (!control.value.node)
@@ -237,8 +241,15 @@ static void read_axis(YamlValue value, DeviceMap *map, const MapHand *usual, boo
     }
     const char *rate = is_twist ? "deg_s" : "mm_s", *count = is_twist ? "deg_per_count" : "mm_per_count";
     MapAxis *axis = &map->axis[map->axis_count++];
-    *axis = (MapAxis){.is_twist = is_twist, .hand = hand_for(&control, map, usual), .is_rate = yaml_has(&control, rate), .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN,
-                      .counts_per_wrap = NAN, .dead_zone = 0.05, .exponent = 1};
+    *axis = (MapAxis){.is_twist = is_twist,
+                      .hand = hand_for(&control, map, usual),
+                      .is_rate = yaml_has(&control, rate),
+                      .logical_min = NAN,
+                      .logical_centre = NAN,
+                      .logical_max = NAN,
+                      .counts_per_wrap = NAN,
+                      .dead_zone = 0.05,
+                      .exponent = 1};
     read_source(map, &control, &axis->source);
     if (axis->is_rate == yaml_has(&control, count))
         yaml_fault(value, "'%s' has one of %s and %s", value.name, rate, count);
@@ -348,14 +359,20 @@ static void read_serial(YamlValue value, DeviceMap *map)
 
 static void read_map(YamlReader *reader, DeviceMap *map)
 {
-    static const char *const keys[] = {"seldinger_device", "name", "device", "tool", "push", "twist", "pedal", "contrast", "stop", "mark",
-                                       "choose_outer", "choose_inner", "lock", "let_go", "exchange", "force", "serial", NULL};
+    static const char *const keys[] = {"seldinger_device", "name",         "device", "tool",   "push",     "twist", "pedal",  "contrast", "stop", "mark",
+                                       "choose_outer",     "choose_inner", "lock",   "let_go", "exchange", "force", "serial", NULL};
     static const struct ButtonKey {
         const char *key;
         unsigned bit;
-    } buttons[] = {{"pedal", HAND_PEDAL}, {"contrast", HAND_CONTRAST}, {"stop", HAND_STOP}, {"mark", HAND_MARK},
-                 {"choose_outer", HAND_CHOOSE_OUTER}, {"choose_inner", HAND_CHOOSE_INNER}, {"lock", HAND_LOCK}, {"let_go", HAND_LET_GO},
-                 {"exchange", HAND_EXCHANGE}};
+    } buttons[] = {{"pedal", HAND_PEDAL},
+                   {"contrast", HAND_CONTRAST},
+                   {"stop", HAND_STOP},
+                   {"mark", HAND_MARK},
+                   {"choose_outer", HAND_CHOOSE_OUTER},
+                   {"choose_inner", HAND_CHOOSE_INNER},
+                   {"lock", HAND_LOCK},
+                   {"let_go", HAND_LET_GO},
+                   {"exchange", HAND_EXCHANGE}};
     YamlValue root = yaml_root(reader);
     if (!yaml_is_map(root))
         yaml_fault(root, "is not a device map; expected 'seldinger_device: 1' on the first line");
@@ -383,7 +400,8 @@ static void read_map(YamlReader *reader, DeviceMap *map)
         read_controls(yaml_get(&top, buttons[i].key, false), map, &usual, false, buttons[i].bit);
     read_force(yaml_get(&top, "force", false), map);
     if (!yaml_has(&top, "push") && !yaml_has(&top, "twist") && map->button_count == 0)
-        yaml_fault(root, "has none of push, twist, pedal, contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange; expected at least one of these");
+        yaml_fault(root,
+                   "has none of push, twist, pedal, contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange; expected at least one of these");
 }
 
 DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults)

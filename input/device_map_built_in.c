@@ -3,16 +3,16 @@
 
 #include <string.h>
 
-#define STICK_BUTTONS \
-    "pedal: {source: button_1, optional: true}\n" \
-    "contrast: {source: button_2, optional: true}\n" \
-    "stop: {source: button_3, optional: true}\n" \
+#define STICK_BUTTONS                                                                                                                                          \
+    "pedal: {source: button_1, optional: true}\n"                                                                                                              \
+    "contrast: {source: button_2, optional: true}\n"                                                                                                           \
+    "stop: {source: button_3, optional: true}\n"                                                                                                               \
     "mark: {source: button_4, optional: true}\n"
 
-#define PAD_BUTTONS \
-    "pedal: [{source: right_trigger, above: 0}, {source: a}]\n" \
-    "contrast: {source: x}\n" \
-    "stop: {source: b}\n" \
+#define PAD_BUTTONS                                                                                                                                            \
+    "pedal: [{source: right_trigger, above: 0}, {source: a}]\n"                                                                                                \
+    "contrast: {source: x}\n"                                                                                                                                  \
+    "stop: {source: b}\n"                                                                                                                                      \
     "mark: {source: y}\n"
 
 static const char *const texts[BUILT_IN_COUNT] = {
@@ -26,8 +26,7 @@ static const char *const texts[BUILT_IN_COUNT] = {
                          "twist:\n"
                          "  - {source: right_x, deg_s: 240, dead_zone: 0.15, exponent: 2}\n"
                          "  - {source: dpad_right, deg_s: 20}\n"
-                         "  - {source: dpad_left, deg_s: 20, invert: true}\n"
-                         PAD_BUTTONS,
+                         "  - {source: dpad_left, deg_s: 20, invert: true}\n" PAD_BUTTONS,
     [BUILT_IN_GAMEPAD_PAIR] = "seldinger_device: 1\n"
                               "name: gamepad, a tool in each stick\n"
                               "device: {gamepad: true}\n"
@@ -45,8 +44,7 @@ static const char *const texts[BUILT_IN_COUNT] = {
                               "choose_inner: {source: right_bumper}\n"
                               "lock: {source: start}\n"
                               "let_go: {source: back}\n"
-                              "exchange: {source: left_thumb}\n"
-                              PAD_BUTTONS,
+                              "exchange: {source: left_thumb}\n" PAD_BUTTONS,
     [BUILT_IN_JOYSTICK] = "seldinger_device: 1\n"
                           "name: joystick\n"
                           "device: {joystick: \"*\"}\n"

@@ -45,10 +45,11 @@ static bool find_tool(const DeviceMap *map, MapHand *hand, const ToolNames *tool
         index = !strcmp(hand->tool, "outermost") ? 0 : !strcmp(hand->tool, "innermost") ? tools->count - 1 : !*end && number <= tools->count ? number - 1 : -1;
     list_names(tools, names, sizeof names);
     if (of_kind > 1)
-        faults_add(faults, map->file, hand->line, hand->column, "'tool' is '%s', but the scene has %d of that kind; choose one: %s", hand->tool, of_kind, names);
-    else if (index < 0)
-        faults_add(faults, map->file, hand->line, hand->column, "'tool' is '%s', but the scene has no such tool; write %s, outermost, innermost, outer, inner or chosen", hand->tool,
+        faults_add(faults, map->file, hand->line, hand->column, "'tool' is '%s', but the scene has %d of that kind; choose one: %s", hand->tool, of_kind,
                    names);
+    else if (index < 0)
+        faults_add(faults, map->file, hand->line, hand->column,
+                   "'tool' is '%s', but the scene has no such tool; write %s, outermost, innermost, outer, inner or chosen", hand->tool, names);
     else
         hand->drives = DRIVES_TOOL + index;
     return of_kind <= 1 && index >= 0;

@@ -6,7 +6,7 @@ static void print_hid(FILE *out, const HidListing *listing)
 {
     char usage[32];
     fprintf(out, "%-14s %04x:%04x  %s", listing->info.path, (unsigned)listing->info.vendor_id, (unsigned)listing->info.product_id,
-           listing->info.product[0] ? listing->info.product : "(no name)");
+            listing->info.product[0] ? listing->info.product : "(no name)");
     for (int i = 0; i < listing->info.usage_count; i++) {
         hid_usage_name(listing->info.usage[i], usage, sizeof usage);
         fprintf(out, "%s%s%s", i ? ", " : " (", usage, i + 1 == listing->info.usage_count ? ")" : "");
@@ -24,7 +24,7 @@ static void print_hid(FILE *out, const HidListing *listing)
 static void print_encoder(FILE *out, const UsbDeviceInfo *device, const DeviceMap *map)
 {
     fprintf(out, "%-14s %04x:%04x  %s%s%s\n", device->path, (unsigned)device->vendor_id, (unsigned)device->product_id,
-           device->product[0] ? device->product : "(no name)", device->serial[0] ? ", serial " : "", device->serial);
+            device->product[0] ? device->product : "(no name)", device->serial[0] ? ", serial " : "", device->serial);
     if (!device->may_open)
         fprintf(out, "    not usable: %s\n", device->why);
     else if (map)
@@ -112,8 +112,8 @@ char *device_list_json(const DeviceList *list)
     cJSON *hid = cJSON_AddArrayToObject(object, "hid"), *usb = cJSON_AddArrayToObject(object, "usb");
     for (int i = 0; i < list->hid_count; i++) {
         const HidListing *one = &list->hid[i];
-        cJSON *item = device_json(one->info.path, one->info.vendor_id, one->info.product_id, one->info.product, one->info.serial,
-                                  one->is_usable, one->why, one->map);
+        cJSON *item =
+            device_json(one->info.path, one->info.vendor_id, one->info.product_id, one->info.product, one->info.serial, one->is_usable, one->why, one->map);
         cJSON *usages = cJSON_AddArrayToObject(item, "usages");
         for (int k = 0; k < one->info.usage_count; k++) {
             char name[32];

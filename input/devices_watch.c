@@ -112,9 +112,10 @@ static void show(Watched *watched)
         for (int h = 0; h < map->hand_count; h++) {
             HandPort *port = &watched->port[h];
             unsigned buttons = atomic_load(&port->buttons);
-            printf("  -> tool %s: push %.2f mm/s, twist %.1f deg/s, advanced %.3f mm, turned %.2f deg%s%s%s%s\n", map->hand[h].tool, atomic_load(&port->push_mm_s),
-                   atomic_load(&port->twist_deg_s), atomic_load(&port->advanced_mm), atomic_load(&port->turned_deg), buttons & HAND_PEDAL ? ", pedal" : "",
-                   buttons & HAND_CONTRAST ? ", contrast" : "", buttons & HAND_STOP ? ", stop" : "", buttons & HAND_MARK ? ", mark" : "");
+            printf("  -> tool %s: push %.2f mm/s, twist %.1f deg/s, advanced %.3f mm, turned %.2f deg%s%s%s%s\n", map->hand[h].tool,
+                   atomic_load(&port->push_mm_s), atomic_load(&port->twist_deg_s), atomic_load(&port->advanced_mm), atomic_load(&port->turned_deg),
+                   buttons & HAND_PEDAL ? ", pedal" : "", buttons & HAND_CONTRAST ? ", contrast" : "", buttons & HAND_STOP ? ", stop" : "",
+                   buttons & HAND_MARK ? ", mark" : "");
         }
     }
 }

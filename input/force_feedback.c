@@ -10,11 +10,33 @@
 #define PID(id) HID_USAGE(0x0f, id)
 
 // HID Usage Tables 1.4, section 18
-enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE = 0x26, DURATION = 0x50, GAIN = 0x52, TRIGGER_BUTTON = 0x53,
-       AXES_ENABLE = 0x55, DIRECTION_ENABLE = 0x56, DIRECTION = 0x57, MAGNITUDE = 0x70, SET_CONSTANT_FORCE = 0x73, EFFECT_OPERATION_REPORT = 0x77,
-       OP_START = 0x79, OP_STOP = 0x7b, LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, POOL = 0x7f,
-       BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99,
-       DEVICE_RESET = 0x9a, MANAGED = 0xa9, CREATE_NEW_EFFECT = 0xab };
+enum {
+    SET_EFFECT = 0x21,
+    BLOCK_INDEX = 0x22,
+    EFFECT_TYPE = 0x25,
+    CONSTANT_FORCE = 0x26,
+    DURATION = 0x50,
+    GAIN = 0x52,
+    TRIGGER_BUTTON = 0x53,
+    AXES_ENABLE = 0x55,
+    DIRECTION_ENABLE = 0x56,
+    DIRECTION = 0x57,
+    MAGNITUDE = 0x70,
+    SET_CONSTANT_FORCE = 0x73,
+    EFFECT_OPERATION_REPORT = 0x77,
+    OP_START = 0x79,
+    OP_STOP = 0x7b,
+    LOOP_COUNT = 0x7c,
+    DEVICE_GAIN = 0x7e,
+    POOL = 0x7f,
+    BLOCK_LOAD = 0x89,
+    LOAD_SUCCESS = 0x8c,
+    ENABLE_ACTUATORS = 0x97,
+    STOP_ALL = 0x99,
+    DEVICE_RESET = 0x9a,
+    MANAGED = 0xa9,
+    CREATE_NEW_EFFECT = 0xab
+};
 // once a millisecond; a tick slightly early after a late one is accepted, else every other report would be dropped
 enum { EFFECT_MS = 500, SHORTEST_MS = 10, LONGEST_MS = 1000, PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, STOP_ATTEMPTS = 2, MOST_FAILURES = 20 };
 
@@ -424,9 +446,11 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
         force->block[1] = 0, has_torque = false;
     force->effect_us = 1000 * (int64_t)pid_duration_ms(&force->layout);
     const HidField *field = &force->layout.magnitude.field;
-    snprintf(force->text, sizeof force->text, "constant force, %lld steps for %g N, at most %g N%s%s", (long long)field->logical_max,
-             map->force.full_scale_n, map->force.max_n,
-             has_torque ? ", and torque" : map->force.full_scale_n_mm > 0 ? "; no torque: no second effect or axis" : "",
+    snprintf(force->text, sizeof force->text, "constant force, %lld steps for %g N, at most %g N%s%s", (long long)field->logical_max, map->force.full_scale_n,
+             map->force.max_n,
+             has_torque                       ? ", and torque"
+             : map->force.full_scale_n_mm > 0 ? "; no torque: no second effect or axis"
+                                              : "",
              field->logical_min < 0 ? "" : "; one direction only: no sign");
     return true;
 }

@@ -14,8 +14,15 @@ typedef enum { HAND_ABSENT, HAND_READY, HAND_LOST } HandState;   // LOST: was th
 // unlock the pair, release the selected tool or hold it again, open the tray. While that is open, choose_outer and choose_inner move up and down in
 // it, exchange inserts the selected device, let_go closes it.
 enum {
-    HAND_PEDAL = 1, HAND_CONTRAST = 2, HAND_STOP = 4, HAND_MARK = 8,
-    HAND_CHOOSE_OUTER = 16, HAND_CHOOSE_INNER = 32, HAND_LOCK = 64, HAND_LET_GO = 128, HAND_EXCHANGE = 256
+    HAND_PEDAL = 1,
+    HAND_CONTRAST = 2,
+    HAND_STOP = 4,
+    HAND_MARK = 8,
+    HAND_CHOOSE_OUTER = 16,
+    HAND_CHOOSE_INNER = 32,
+    HAND_LOCK = 64,
+    HAND_LET_GO = 128,
+    HAND_EXCHANGE = 256
 };
 
 // The tool that a hand moves. The pair: the selected tool and its partner, the next one inside it; for the innermost the next one around it.

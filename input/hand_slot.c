@@ -147,7 +147,6 @@ void *hand_run_hid(void *argument)
     return NULL;
 }
 
-
 static void take_line(void *context, const EncoderLine *line)
 {
     HandSlot *slot = context;

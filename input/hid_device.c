@@ -102,7 +102,8 @@ static void *open_device(void *context, const char *path, char *why, size_t capa
         if (code == EACCES || code == EPERM)
             snprintf(why, capacity,
                      "%s may not be read and written by you; as root: echo '%s' >> /etc/udev/rules.d/70-seldinger.rules && udevadm control --reload; "
-                     "then plug it in again", path, rule);
+                     "then plug it in again",
+                     path, rule);
         else
             snprintf(why, capacity, "%s: %s", path, strerror(code));
         return NULL;
@@ -188,8 +189,15 @@ HidTransport *hid_transport_hidapi(void)
         free(hidapi);
         return NULL;
     }
-    *transport = (HidTransport){.context = hidapi, .list = list, .open = open_device, .descriptor = read_descriptor, .read = read_report, .write = write_report,
-                                .send_feature = send_feature, .get_feature = get_feature, .close = close_device};
+    *transport = (HidTransport){.context = hidapi,
+                                .list = list,
+                                .open = open_device,
+                                .descriptor = read_descriptor,
+                                .read = read_report,
+                                .write = write_report,
+                                .send_feature = send_feature,
+                                .get_feature = get_feature,
+                                .close = close_device};
     return transport;
 }
 

@@ -11,8 +11,20 @@
 enum { DEEPEST = 64, DEEPEST_PUSH = 16, LOCAL_USAGES = 512 };
 enum { TYPE_MAIN, TYPE_GLOBAL, TYPE_LOCAL };
 enum { MAIN_INPUT = 8, MAIN_OUTPUT = 9, MAIN_COLLECTION = 10, MAIN_FEATURE = 11, MAIN_END = 12 };
-enum { GLOBAL_PAGE, GLOBAL_LOGICAL_MIN, GLOBAL_LOGICAL_MAX, GLOBAL_PHYSICAL_MIN, GLOBAL_PHYSICAL_MAX, GLOBAL_EXPONENT, GLOBAL_UNIT, GLOBAL_SIZE, GLOBAL_ID,
-       GLOBAL_COUNT, GLOBAL_PUSH, GLOBAL_POP };
+enum {
+    GLOBAL_PAGE,
+    GLOBAL_LOGICAL_MIN,
+    GLOBAL_LOGICAL_MAX,
+    GLOBAL_PHYSICAL_MIN,
+    GLOBAL_PHYSICAL_MAX,
+    GLOBAL_EXPONENT,
+    GLOBAL_UNIT,
+    GLOBAL_SIZE,
+    GLOBAL_ID,
+    GLOBAL_COUNT,
+    GLOBAL_PUSH,
+    GLOBAL_POP
+};
 enum { LOCAL_USAGE, LOCAL_USAGE_MIN, LOCAL_USAGE_MAX, LOCAL_DELIMITER = 10 };
 
 // A value that may be read as signed or not: which, is known only when the other end of the range is (a maximum of 255 is often one byte, FF).
@@ -94,8 +106,7 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
         }
         reading->has_usage_min = false;
         if ((value & 0xffff) < (reading->usage_min & 0xffff) || (has_page && reading->usage_min_has_page && value >> 16 != reading->usage_min >> 16))
-            refuse(reading, "usages from 0x%x to 0x%x; expected a rising range on one page", (unsigned)reading->usage_min,
-                   (unsigned)value);
+            refuse(reading, "usages from 0x%x to 0x%x; expected a rising range on one page", (unsigned)reading->usage_min, (unsigned)value);
         else if (has_page || reading->usage_min_has_page) {
             uint32_t page = has_page ? value & 0xffff0000u : reading->usage_min & 0xffff0000u;
             add_usages(reading, page | (reading->usage_min & 0xffff), page | (value & 0xffff), true);
@@ -108,7 +119,12 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
         else
             reading->delimiter = (int)value;
         break;
-    case 3: case 4: case 5: case 7: case 8: case 9: break;    // designators and strings say nothing about the bits
+    case 3:
+    case 4:
+    case 5:
+    case 7:
+    case 8:
+    case 9: break; // designators and strings say nothing about the bits
     default: refuse(reading, "an unknown local item, tag %d", tag);
     }
 }
@@ -281,15 +297,22 @@ static void read_fields(Reading *reading, HidReportKind kind, uint32_t flags)
         refuse(reading, "report %d grows to %d bits; expected at most %d", report->id, report->bits + bits, HID_REPORT_BITS);
         return;
     }
-    HidField field = {.kind = kind, .report_id = global->report_id, .bit = report->bits, .size = (int)global->size, .count = (int)global->count,
-                      .unit = global->unit, .unit_exponent = global->unit_exponent, .flags = flags & 0x1ff,
+    HidField field = {.kind = kind,
+                      .report_id = global->report_id,
+                      .bit = report->bits,
+                      .size = (int)global->size,
+                      .count = (int)global->count,
+                      .unit = global->unit,
+                      .unit_exponent = global->unit_exponent,
+                      .flags = flags & 0x1ff,
                       .collection = reading->open_count ? reading->open[reading->open_count - 1] : -1};
     reading->has_field_without_id |= global->report_id == 0;
     report->bits += bits;
     choose_sign(global->logical_min, global->logical_max, &field.logical_min, &field.logical_max);
     choose_sign(global->physical_min, global->physical_max, &field.physical_min, &field.physical_max);
     if (field.logical_min > field.logical_max && !is_constant) {
-        refuse(reading, "a logical range from %lld to %lld; expected a minimum no greater than the maximum", (long long)field.logical_min, (long long)field.logical_max);
+        refuse(reading, "a logical range from %lld to %lld; expected a minimum no greater than the maximum", (long long)field.logical_min,
+               (long long)field.logical_max);
         return;
     }
     // 0 to 0, the state at the start, means that the physical range is the logical one (section 6.2.2.7)
@@ -311,7 +334,8 @@ static void open_collection(Reading *reading, uint32_t type)
                reading->open_count == DEEPEST ? (int)DEEPEST : (int)HID_COLLECTION_LIMIT);
         return;
     }
-    out->collection[out->collection_count] = (HidCollection){.type = (int)(type & 0xff), .usage = reading->usage_count ? full_usage(reading, 0).first : 0,
+    out->collection[out->collection_count] = (HidCollection){.type = (int)(type & 0xff),
+                                                             .usage = reading->usage_count ? full_usage(reading, 0).first : 0,
                                                              .parent = reading->open_count ? reading->open[reading->open_count - 1] : -1};
     reading->open[reading->open_count++] = out->collection_count++;
 }
@@ -539,13 +563,13 @@ static const struct UsageName {
     uint32_t usage;
     const char *name;
 } usage_names[] = {
-    {HID_USAGE(1, 0x01), "pointer"},      {HID_USAGE(1, 0x02), "mouse"},        {HID_USAGE(1, 0x04), "joystick"},     {HID_USAGE(1, 0x05), "gamepad"},
-    {HID_USAGE(1, 0x06), "keyboard"},     {HID_USAGE(1, 0x07), "keypad"},       {HID_USAGE(1, 0x08), "multi_axis"},   {HID_USAGE(1, 0x30), "X"},
-    {HID_USAGE(1, 0x31), "Y"},            {HID_USAGE(1, 0x32), "Z"},            {HID_USAGE(1, 0x33), "Rx"},           {HID_USAGE(1, 0x34), "Ry"},
-    {HID_USAGE(1, 0x35), "Rz"},           {HID_USAGE(1, 0x36), "slider"},       {HID_USAGE(1, 0x37), "dial"},         {HID_USAGE(1, 0x38), "wheel"},
-    {HID_USAGE(1, 0x39), "hat_switch"},   {HID_USAGE(1, 0x40), "Vx"},           {HID_USAGE(1, 0x41), "Vy"},           {HID_USAGE(1, 0x42), "Vz"},
-    {HID_USAGE(2, 0xba), "rudder"},       {HID_USAGE(2, 0xbb), "throttle"},     {HID_USAGE(2, 0xc4), "accelerator"},  {HID_USAGE(2, 0xc5), "brake"},
-    {HID_USAGE(2, 0xc6), "clutch"},       {HID_USAGE(2, 0xc8), "steering"},     {HID_USAGE(0x0c, 0x238), "ac_pan"},   {HID_USAGE(0x0f, 0x01), "force_feedback"},
+    {HID_USAGE(1, 0x01), "pointer"},    {HID_USAGE(1, 0x02), "mouse"},    {HID_USAGE(1, 0x04), "joystick"},    {HID_USAGE(1, 0x05), "gamepad"},
+    {HID_USAGE(1, 0x06), "keyboard"},   {HID_USAGE(1, 0x07), "keypad"},   {HID_USAGE(1, 0x08), "multi_axis"},  {HID_USAGE(1, 0x30), "X"},
+    {HID_USAGE(1, 0x31), "Y"},          {HID_USAGE(1, 0x32), "Z"},        {HID_USAGE(1, 0x33), "Rx"},          {HID_USAGE(1, 0x34), "Ry"},
+    {HID_USAGE(1, 0x35), "Rz"},         {HID_USAGE(1, 0x36), "slider"},   {HID_USAGE(1, 0x37), "dial"},        {HID_USAGE(1, 0x38), "wheel"},
+    {HID_USAGE(1, 0x39), "hat_switch"}, {HID_USAGE(1, 0x40), "Vx"},       {HID_USAGE(1, 0x41), "Vy"},          {HID_USAGE(1, 0x42), "Vz"},
+    {HID_USAGE(2, 0xba), "rudder"},     {HID_USAGE(2, 0xbb), "throttle"}, {HID_USAGE(2, 0xc4), "accelerator"}, {HID_USAGE(2, 0xc5), "brake"},
+    {HID_USAGE(2, 0xc6), "clutch"},     {HID_USAGE(2, 0xc8), "steering"}, {HID_USAGE(0x0c, 0x238), "ac_pan"},  {HID_USAGE(0x0f, 0x01), "force_feedback"},
 };
 enum { NAME_COUNT = sizeof usage_names / sizeof usage_names[0] };
 

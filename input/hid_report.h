@@ -22,8 +22,17 @@ enum { HID_REPORT_BYTES = HID_REPORT_BITS / 8 + 1 };   // with its id
 typedef enum { HID_INPUT, HID_OUTPUT, HID_FEATURE } HidReportKind;
 
 // Bits of a main item (section 6.2.2.5).
-enum { HID_CONSTANT = 1, HID_VARIABLE = 2, HID_RELATIVE = 4, HID_WRAP = 8, HID_NONLINEAR = 16, HID_NO_PREFERRED = 32, HID_NULL_STATE = 64,
-       HID_VOLATILE = 128, HID_BUFFERED = 256 };
+enum {
+    HID_CONSTANT = 1,
+    HID_VARIABLE = 2,
+    HID_RELATIVE = 4,
+    HID_WRAP = 8,
+    HID_NONLINEAR = 16,
+    HID_NO_PREFERRED = 32,
+    HID_NULL_STATE = 64,
+    HID_VOLATILE = 128,
+    HID_BUFFERED = 256
+};
 
 typedef struct HidUsageRange {
     uint32_t first, last;    // both included, of one page

@@ -114,7 +114,12 @@ static bool bind_hid_button(const DeviceMap *map, const MapButton *button, const
                             Faults *faults)
 {
     // as an axis without a scale; on above half of its range
-    MapAxis axis = {.source = button->source, .kind = AXIS_DEFLECTION, .is_rate = true, .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN,
+    MapAxis axis = {.source = button->source,
+                    .kind = AXIS_DEFLECTION,
+                    .is_rate = true,
+                    .logical_min = NAN,
+                    .logical_centre = NAN,
+                    .logical_max = NAN,
                     .counts_per_wrap = NAN};
     return bind_hid_axis(map, &axis, descriptor, device, bound, faults);
 }

@@ -27,8 +27,8 @@ static void check_speed(double speed, int fastest, const char *name, const char 
 {
     bool named = tools && tools->count > 1;
     if (fabs(speed) > fastest)
-        faults_add(faults, file, line, column, "%s%s%s %g is out of range; expected -%d to %d %s", named ? tools->name[tool] : "", named ? "." : "", name, speed, fastest,
-                   fastest, unit);
+        faults_add(faults, file, line, column, "%s%s%s %g is out of range; expected -%d to %d %s", named ? tools->name[tool] : "", named ? "." : "", name,
+                   speed, fastest, fastest, unit);
 }
 
 bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults)
@@ -49,7 +49,8 @@ bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolN
             faults_add(faults, file, line, column, "contrast_ml_s %g is out of range; expected 0 to %d ml/s", row->contrast_ml_s[k], SCRIPT_MOST_ML_S);
     }
     if (injecting > 1)
-        faults_add(faults, file, line, column, "contrast agent is injected through %d tools at once; expected one tool per row, since there is one injector", injecting);
+        faults_add(faults, file, line, column, "contrast agent is injected through %d tools at once; expected one tool per row, since there is one injector",
+                   injecting);
     return faults->count == already;
 }
 
@@ -87,7 +88,9 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
         const char *example = tools->name[0];
         if (dot && (*tool = find_word(column->name, name_length, tools->name)) >= 0)
             example = tools->name[*tool];
-        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s, NAME.released, NAME.exchange or NAME.contrast_ml_s, such as '%s.push_mm_s'",
+        faults_add(faults, file, line, column->column,
+                   "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s, NAME.released, NAME.exchange or "
+                   "NAME.contrast_ml_s, such as '%s.push_mm_s'",
                    shown, column->name, example);
         return false;
     }
@@ -110,7 +113,8 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
         return false;
     }
     if (!is_word(field[0].name, field[0].length, "t_s"))
-        faults_add(faults, file, line, field[0].column, "column 1 is headed '%.*s'; expected 't_s'", (int)(field[0].length < 40 ? field[0].length : 40), field[0].name);
+        faults_add(faults, file, line, field[0].column, "column 1 is headed '%.*s'; expected 't_s'", (int)(field[0].length < 40 ? field[0].length : 40),
+                   field[0].name);
     for (int i = 1; i < count; i++) {
         int tool, which;
         if (!read_column(&field[i], line, tools, file, &tool, &which, faults))
@@ -188,7 +192,8 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
                 if (columns.quantity[c] == RELEASED && value[1 + c] != 0 && value[1 + c] != 1)
                     faults_add(faults, file, table->line[i], 1, "released is %g; expected 0 (the tool is held) or 1 (it is released)", value[1 + c]);
                 if (columns.quantity[c] == EXCHANGE && (value[1 + c] < 0 || value[1 + c] > EXCHANGES_MOST || value[1 + c] != floor(value[1 + c])))
-                    faults_add(faults, file, table->line[i], 1, "exchange is %g; expected 0 (the scene's tool) or 1 to %d (those under its 'exchange:')", value[1 + c], EXCHANGES_MOST);
+                    faults_add(faults, file, table->line[i], 1, "exchange is %g; expected 0 (the scene's tool) or 1 to %d (those under its 'exchange:')",
+                               value[1 + c], EXCHANGES_MOST);
             }
             script_check_row(row, i ? row - 1 : NULL, tools, file, table->line[i], 1, faults);
             script->count = i + 1;

@@ -54,8 +54,8 @@ static void read_strings(libusb_device *device, const struct libusb_device_descr
     int code = libusb_open(device, &handle);
     info->may_open = code == 0;
     if (code == LIBUSB_ERROR_ACCESS)
-        snprintf(info->why, sizeof info->why,
-                 "no permission; add the udev rule SUBSYSTEM==\"usb\", ATTR{idVendor}==\"%04x\", TAG+=\"uaccess\"", (unsigned)descriptor->idVendor);
+        snprintf(info->why, sizeof info->why, "no permission; add the udev rule SUBSYSTEM==\"usb\", ATTR{idVendor}==\"%04x\", TAG+=\"uaccess\"",
+                 (unsigned)descriptor->idVendor);
     else if (code != 0)
         snprintf(info->why, sizeof info->why, "%s", libusb_strerror((enum libusb_error)code));
     if (code != 0)

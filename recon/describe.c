@@ -9,10 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void add_vector(cJSON *object, const char *name, Vec3 v)
-{
-    cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3));
-}
+static void add_vector(cJSON *object, const char *name, Vec3 v) { cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3)); }
 
 // {"least", "median", "largest"} of `count` values.
 static void add_spread(cJSON *object, const char *name, const double *value, int count)
@@ -96,10 +93,7 @@ bool describe_volume(cJSON *object, const char *path, Faults *faults)
     return true;
 }
 
-static void add_count(cJSON *object, const char *name, const MeshFinding *finding)
-{
-    cJSON_AddNumberToObject(object, name, finding->count);
-}
+static void add_count(cJSON *object, const char *name, const MeshFinding *finding) { cJSON_AddNumberToObject(object, name, finding->count); }
 
 bool describe_surface(cJSON *object, const char *path, Faults *faults)
 {

@@ -106,7 +106,12 @@ static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, con
     if (!heap_has_room(HEAP_ROOM_OF_HDF5))
         heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
     Hdf5Reader *reader = HEAP_ZEROED(1, sizeof *reader);
-    *reader = (Hdf5Reader){.source = *source, .file = -1, .name = name, .needs = needs, .faults = faults, .faults_before = faults->count,
+    *reader = (Hdf5Reader){.source = *source,
+                           .file = -1,
+                           .name = name,
+                           .needs = needs,
+                           .faults = faults,
+                           .faults_before = faults->count,
                            .left = source->length < HDF5_READER_MOST_BYTES ? source->length : HDF5_READER_MOST_BYTES,
                            .left_unpacked = source->length < HDF5_READER_MOST_BYTES / HDF5_READER_MOST_RATIO ? source->length * HDF5_READER_MOST_RATIO
                                                                                                              : HDF5_READER_MOST_BYTES};
@@ -246,7 +251,8 @@ static void print_size(char text[80], int rank, const uint64_t *size)
 {
     int used = 0;
     for (int i = 0; i < rank && used < 72; i++)
-        used += size[i] ? snprintf(text + used, 80 - (size_t)used, "%s%" PRIu64, i ? ", " : "(", size[i]) : snprintf(text + used, 80 - (size_t)used, "%sany", i ? ", " : "(");
+        used += size[i] ? snprintf(text + used, 80 - (size_t)used, "%s%" PRIu64, i ? ", " : "(", size[i])
+                        : snprintf(text + used, 80 - (size_t)used, "%sany", i ? ", " : "(");
     snprintf(text + used, 80 - (size_t)used, ")");
 }
 
@@ -423,8 +429,8 @@ static bool inspect_open(Hdf5Reader *reader, hid_t set, hid_t type, hid_t space,
         return false;
     const char *trouble = storage_trouble(reader, set, dataset, H5Tget_size(type));
     if (trouble)
-        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; expected data in this file, plain or compressed by deflate", dataset->path, value_count(dataset),
-                   trouble);
+        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; expected data in this file, plain or compressed by deflate",
+                   dataset->path, value_count(dataset), trouble);
     return !trouble;
 }
 
@@ -449,7 +455,8 @@ static bool is_finite(const Hdf5Reader *reader, const Hdf5Dataset *dataset, cons
     for (uint64_t i = 0; i < count; i++) {
         double value = dataset->type == HDF5_FLOAT ? (double)((const float *)values)[i] : ((const double *)values)[i];
         if (!isfinite(value)) {
-            faults_add(reader->faults, reader->name, 0, 0, "%s holds %g in row %" PRIu64 "; expected finite numbers", dataset->path, value, i / (count / dataset->size[0]));
+            faults_add(reader->faults, reader->name, 0, 0, "%s holds %g in row %" PRIu64 "; expected finite numbers", dataset->path, value,
+                       i / (count / dataset->size[0]));
             return false;
         }
     }
@@ -486,7 +493,8 @@ static void unshuffle(const unsigned char *from, size_t count, size_t value_byte
 }
 
 // Copies a chunk's values to their place in the dataset; chunks at its ends are clipped. Missing dimensions count as 1.
-static void place_chunk(const Hdf5Dataset *dataset, const Chunks *chunks, const hsize_t at[3], size_t value_bytes, const unsigned char *chunk, unsigned char *out)
+static void place_chunk(const Hdf5Dataset *dataset, const Chunks *chunks, const hsize_t at[3], size_t value_bytes, const unsigned char *chunk,
+                        unsigned char *out)
 {
     hsize_t size[3] = {1, 1, 1}, part[3] = {1, 1, 1}, used[3], first[3] = {0};
     for (int i = 0; i < dataset->rank; i++) {
@@ -517,8 +525,7 @@ static bool unpack_chunk(const Unpacking *u, hid_t set, const hsize_t at[3])
     const unsigned deflated = 1U << (u->packing.filter_count - 1);
     uint32_t left_out = 0;
     hsize_t stored = 0;
-    if (H5Dget_chunk_storage_size(set, at, &stored) < 0 || stored > most_stored(&u->chunks) ||
-        H5Dread_chunk(set, H5P_DEFAULT, at, &left_out, u->stored) < 0)
+    if (H5Dget_chunk_storage_size(set, at, &stored) < 0 || stored > most_stored(&u->chunks) || H5Dread_chunk(set, H5P_DEFAULT, at, &left_out, u->stored) < 0)
         return false;
     bool is_shuffled = u->packing.is_shuffled && !(left_out & 1);
     unsigned char *inflated = is_shuffled ? u->shuffled : u->plain;
@@ -573,8 +580,8 @@ static bool read_values(hid_t set, const Hdf5Dataset *dataset, void *out)
 {
     hid_t creation = H5Dget_create_plist(set);
     bool is_packed = creation >= 0 && H5Pget_nfilters(creation) != 0;
-    bool good = creation >= 0 && (is_packed ? read_packed(set, creation, dataset, out)
-                                            : H5Dread(set, memory_type(dataset->type), H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
+    bool good = creation >= 0 &&
+                (is_packed ? read_packed(set, creation, dataset, out) : H5Dread(set, memory_type(dataset->type), H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
     if (creation >= 0)
         H5Pclose(creation);
     return good;
@@ -609,7 +616,8 @@ void *hdf5_read(Hdf5Reader *reader, Hdf5Dataset *dataset)
 
 static bool is_one_text(hid_t type, hid_t space)
 {
-    return H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1 && (H5Tis_variable_str(type) > 0 || H5Tget_size(type) <= HDF5_READER_MOST_TEXT);
+    return H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1 &&
+           (H5Tis_variable_str(type) > 0 || H5Tget_size(type) <= HDF5_READER_MOST_TEXT);
 }
 
 static char *fixed_text(const Hdf5Reader *reader, hid_t type, hid_t set, hid_t attribute)

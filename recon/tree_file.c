@@ -24,7 +24,8 @@ typedef struct Reader {
 } Reader;
 
 enum { CENTER, RADIUS, DIRECTION, HEIGHT, PARENT, KIND, POINT, POINT_OFFSET, BLOB_CENTER, BLOB_WIDTH, BLOB_OFFSET, ERROR_MM, BLOB_AMPLITUDE, COLUMN_COUNT };
-static const Hdf5Dataset columns[COLUMN_COUNT] = {     // as docs/file-formats.md specifies
+static const Hdf5Dataset columns[COLUMN_COUNT] = {
+    // as docs/file-formats.md specifies
     [CENTER] = {"/nodes/center", HDF5_DOUBLE, 2, {0, 3}, false},
     [RADIUS] = {"/nodes/radius", HDF5_DOUBLE, 1, {0}, false},
     [DIRECTION] = {"/nodes/direction", HDF5_DOUBLE, 2, {0, 3}, false},
@@ -65,7 +66,8 @@ static int read_kernel(const Reader *reader)
     char *text = read_text(reader, "kernel");
     int kernel = text && strcmp(text, kernel_name[KERNEL_COMPACT]) == 0 ? KERNEL_COMPACT : KERNEL_CAUCHY;
     if (text && text[0] && strcmp(text, kernel_name[kernel]))
-        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; expected cauchy (one local model per node) or compact (shared blobs)", text);
+        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; expected cauchy (one local model per node) or compact (shared blobs)",
+                   text);
     free(text);
     return kernel;
 }
@@ -122,9 +124,18 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     }
     tree->iso_level = iso_level;
     void *const target[COLUMN_COUNT] = {
-        [CENTER] = tree->center,           [RADIUS] = tree->radius,         [DIRECTION] = tree->direction,     [HEIGHT] = tree->height,
-        [PARENT] = tree->parent,           [KIND] = tree->kind,             [POINT] = tree->point,             [POINT_OFFSET] = tree->point_offset,
-        [BLOB_CENTER] = tree->blob_center, [BLOB_WIDTH] = tree->blob_width, [BLOB_OFFSET] = tree->blob_offset, [ERROR_MM] = tree->error,
+        [CENTER] = tree->center,
+        [RADIUS] = tree->radius,
+        [DIRECTION] = tree->direction,
+        [HEIGHT] = tree->height,
+        [PARENT] = tree->parent,
+        [KIND] = tree->kind,
+        [POINT] = tree->point,
+        [POINT_OFFSET] = tree->point_offset,
+        [BLOB_CENTER] = tree->blob_center,
+        [BLOB_WIDTH] = tree->blob_width,
+        [BLOB_OFFSET] = tree->blob_offset,
+        [ERROR_MM] = tree->error,
         [BLOB_AMPLITUDE] = tree->blob_amplitude,
     };
     bool good = true;
@@ -133,8 +144,9 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     if (good && vessel_tree_validate(tree, reader->name, reader->faults)) {
         if (vessel_tree_link(tree))
             return tree;
-        faults_add(reader->faults, reader->name, 0, 0, "not enough memory for the links of %d nodes and their lists of %lld blobs; free some, or fit the tree again",
-                   tree->node_count, (long long)tree->blob_count);
+        faults_add(reader->faults, reader->name, 0, 0,
+                   "not enough memory for the links of %d nodes and their lists of %lld blobs; free some, or fit the tree again", tree->node_count,
+                   (long long)tree->blob_count);
     }
     vessel_tree_free(tree);
     return NULL;
@@ -144,7 +156,8 @@ static VesselTree *parse(const void *bytes, size_t length, bool has_rehearsal, c
 {
     TreeFileInfo held = {0};
     Reader reader = {.file = hdf5_reader_parse(bytes, length, has_rehearsal, name, "expected a tree (/nodes and /points) or a model (/blobs too)", faults),
-                     .name = name, .faults = faults};
+                     .name = name,
+                     .faults = faults};
     VesselTree *tree = reader.file ? read_tree(&reader, &held) : NULL;
     hdf5_reader_close(reader.file);
     if (tree && info)
@@ -225,16 +238,15 @@ static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *i
     const int32_t version = FORMAT_VERSION;
     int64_t n = tree->node_count, p = tree->point_count, b = tree->blob_count;
     bool good = make_group(file, "/nodes") && make_group(file, "/points") && write_text(file, "format", b > 0 ? "seldinger-model" : "seldinger-tree") &&
-                write_scalar(file, "version", H5T_NATIVE_INT32, &version) &&
-                write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) && write_text(file, "kernel", kernel_name[vessel_tree_is_shared(tree) ? KERNEL_COMPACT : KERNEL_CAUCHY]) &&
+                write_scalar(file, "version", H5T_NATIVE_INT32, &version) && write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) &&
+                write_text(file, "kernel", kernel_name[vessel_tree_is_shared(tree) ? KERNEL_COMPACT : KERNEL_CAUCHY]) &&
                 write_text(file, "source", info ? info->source : "") && write_text(file, "parameters", info ? info->parameters : "") &&
                 write_text(file, "created_by", info && info->created_by ? info->created_by : "seldinger " SELDINGER_VERSION);
     good = good && write_column(file, "/nodes/center", H5T_NATIVE_DOUBLE, 2, n, tree->center) &&
            write_column(file, "/nodes/radius", H5T_NATIVE_DOUBLE, 1, n, tree->radius) &&
            write_column(file, "/nodes/direction", H5T_NATIVE_DOUBLE, 2, n, tree->direction) &&
            write_column(file, "/nodes/height", H5T_NATIVE_DOUBLE, 1, n, tree->height) &&
-           write_column(file, "/nodes/parent", H5T_NATIVE_INT32, 1, n, tree->parent) &&
-           write_column(file, "/nodes/kind", H5T_NATIVE_UINT8, 1, n, tree->kind) &&
+           write_column(file, "/nodes/parent", H5T_NATIVE_INT32, 1, n, tree->parent) && write_column(file, "/nodes/kind", H5T_NATIVE_UINT8, 1, n, tree->kind) &&
            write_column(file, "/points/xyz", H5T_NATIVE_DOUBLE, 2, p, tree->point) &&
            write_column(file, "/points/offset", H5T_NATIVE_INT64, 1, n + 1, tree->point_offset);
     if (good && b > 0)

@@ -180,8 +180,8 @@ static void measure(Angioscope *scope, const TriangleMesh *mesh)
     double volume = 0, area = 0;
     for (int t = 0; t < mesh->triangle_count; t++) {
         const int *c = mesh->triangle[t];
-        Vec3 a = vec3_sub(mesh->vertex[c[0]], scope->origin), b = vec3_sub(mesh->vertex[c[1]], scope->origin),
-             d = vec3_sub(mesh->vertex[c[2]], scope->origin), across = vec3_cross(vec3_sub(b, a), vec3_sub(d, a));
+        Vec3 a = vec3_sub(mesh->vertex[c[0]], scope->origin), b = vec3_sub(mesh->vertex[c[1]], scope->origin), d = vec3_sub(mesh->vertex[c[2]], scope->origin),
+             across = vec3_cross(vec3_sub(b, a), vec3_sub(d, a));
         volume += vec3_dot(a, across) / 6;
         area += vec3_norm(across) / 2;
     }
@@ -490,7 +490,8 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
         nearest = fmin(nearest, distance);
     }
     int first = middle, end = middle;
-    for (double way = 0; first > 0 && middle - first < NODES / 2 - 1 + is_own * NODES / 2 && way < reach && vec3_is_finite(tool->node[first - 1].position); first--)
+    for (double way = 0; first > 0 && middle - first < NODES / 2 - 1 + is_own * NODES / 2 && way < reach && vec3_is_finite(tool->node[first - 1].position);
+         first--)
         way += vec3_distance(tool->node[first].position, tool->node[first - 1].position);
     for (double way = 0; end < last && end - middle < NODES / 2 && way < reach && vec3_is_finite(tool->node[end + 1].position); end++)
         way += vec3_distance(tool->node[end].position, tool->node[end + 1].position);
@@ -554,8 +555,8 @@ static void draw_inside(Angioscope *scope, const Pose *pose, int tool, ViewPort 
     glUseProgram(scope->program);
     glUniformMatrix4fv(glGetUniformLocation(scope->program, "clip"), 1, GL_FALSE, clip);
     glUniform3f(glGetUniformLocation(scope->program, "eye"), (float)eye.x, (float)eye.y, (float)eye.z);
-    glUniform4f(glGetUniformLocation(scope->program, "lamp"), (float)(1 / (lamp_reach * lamp_reach * radius * radius)), (float)(1 / fog),
-                (float)(1.35 * t), 0.12f);
+    glUniform4f(glGetUniformLocation(scope->program, "lamp"), (float)(1 / (lamp_reach * lamp_reach * radius * radius)), (float)(1 / fog), (float)(1.35 * t),
+                0.12f);
     glUniform3fv(glGetUniformLocation(scope->program, "dark"), 1, dark);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LESS);

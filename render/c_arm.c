@@ -17,10 +17,7 @@ bool patient_axes_are_sound(const PatientAxes *axes)
     return true;
 }
 
-static double within(double value, double least, double most, double otherwise)
-{
-    return isfinite(value) ? fmin(fmax(value, least), most) : otherwise;
-}
+static double within(double value, double least, double most, double otherwise) { return isfinite(value) ? fmin(fmax(value, least), most) : otherwise; }
 
 CArm c_arm_place(const XrayControl *xray, const PatientAxes *axes)
 {

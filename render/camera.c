@@ -145,8 +145,8 @@ void camera_frame_sphere(Camera *camera, int width, int height, double border, V
 Vec3 camera_project(const Camera *camera, Vec3 point)
 {
     Vec3 d = vec3_sub(point, camera->center);
-    return vec3(camera->width / 2.0 + vec3_dot(camera->right, d) / camera->mm_per_pixel,
-                camera->height / 2.0 - vec3_dot(camera->up, d) / camera->mm_per_pixel, vec3_dot(camera->back, d));
+    return vec3(camera->width / 2.0 + vec3_dot(camera->right, d) / camera->mm_per_pixel, camera->height / 2.0 - vec3_dot(camera->up, d) / camera->mm_per_pixel,
+                vec3_dot(camera->back, d));
 }
 
 void camera_matrix(const Camera *camera, Vec3 origin, float matrix[16])

@@ -98,8 +98,12 @@ Cine *cine_create(const CineShape *shape, int capacity)
     for (int i = 0; i < capacity; i++) {
         size_t at = (size_t)i * (size_t)node_count;
         Pose *pose = &cine->pose[i];
-        *pose = (Pose){.tool_count = shape->tool_count, .node_capacity = node_count, .node_count = node_count, .position = cine->position + at,
-                       .quaternion = cine->quaternion + at, .node = cine->node + at};
+        *pose = (Pose){.tool_count = shape->tool_count,
+                       .node_capacity = node_count,
+                       .node_count = node_count,
+                       .position = cine->position + at,
+                       .quaternion = cine->quaternion + at,
+                       .node = cine->node + at};
         for (int k = 0; k < shape->tool_count; k++) {
             pose->tool[k] = (PoseTool){.node_capacity = shape->tool_nodes[k], .node_count = shape->tool_nodes[k], .node = cine->tool_node + at};
             at += (size_t)shape->tool_nodes[k];
@@ -192,10 +196,7 @@ double cine_duration_s(const Cine *cine)
 
 // --- replay ---
 
-CinePlayer cine_player_start(const Cine *cine)
-{
-    return (CinePlayer){.is_playing = true, .loops = true, .speed = 1, .frame = cine->count > 0 ? 0 : -1};
-}
+CinePlayer cine_player_start(const Cine *cine) { return (CinePlayer){.is_playing = true, .loops = true, .speed = 1, .frame = cine->count > 0 ? 0 : -1}; }
 
 int cine_player_advance(CinePlayer *player, const Cine *cine, double dt_s)
 {
@@ -439,9 +440,17 @@ static const char *frame_fault(const Cine *cine, int index)
 {
     const Pose *pose = &cine->pose[index];
     const float *xray = (const float *)&pose->xray, *contrast = contrast_of(cine, index);
-    const double figures[] = {pose->time_s, pose->command.push_mm_s, pose->command.twist_deg_s, pose->inserted_mm, pose->report.residual,
-                              pose->report.cone_violation, pose->report.penetration, pose->report.proximal_force, pose->report.proximal_torque,
-                              pose->report.wall_force_max, pose->report.wall_force_sum};
+    const double figures[] = {pose->time_s,
+                              pose->command.push_mm_s,
+                              pose->command.twist_deg_s,
+                              pose->inserted_mm,
+                              pose->report.residual,
+                              pose->report.cone_violation,
+                              pose->report.penetration,
+                              pose->report.proximal_force,
+                              pose->report.proximal_torque,
+                              pose->report.wall_force_max,
+                              pose->report.wall_force_sum};
     for (int i = 0; i < XRAY_VALUES; i++)
         if (!isfinite(xray[i]))
             return "X-ray settings are finite numbers";
@@ -473,13 +482,15 @@ Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults 
     CineShape shape = {0};
     walk_head(&cursor, &shape, &count);
     if (!cursor.good || cursor.version < ONE_TOOL || cursor.version > SEVERAL_TOOLS) {
-        faults_add_at_byte(faults, name, 0, "is not a cine loop of version %d to %d; expected a file saved by the trainer is expected", ONE_TOOL, SEVERAL_TOOLS);
+        faults_add_at_byte(faults, name, 0, "is not a cine loop of version %d to %d; expected a file saved by the trainer is expected", ONE_TOOL,
+                           SEVERAL_TOOLS);
         return NULL;
     }
     if (count < 0 || cine_bytes(&shape, count > 0 ? count : 1) == 0 || (cursor.version > ONE_TOOL && shape.tool_count < 2)) {
-        faults_add_at_byte(faults, name, 12, "says %d tools of %d nodes, %d vessel nodes and %d images; 1 to %d (2 or more from version 2 on), each of 1 to %d nodes, 0 to %d, "
-                           "0 to %d, and 8 GB in all", shape.tool_count, nodes_of(&shape), shape.contrast_count, (int)count, STEP_TOOLS_MAX, MOST_NODES, MOST_CONTRAST,
-                           MOST_FRAMES);
+        faults_add_at_byte(faults, name, 12,
+                           "says %d tools of %d nodes, %d vessel nodes and %d images; 1 to %d (2 or more from version 2 on), each of 1 to %d nodes, 0 to %d, "
+                           "0 to %d, and 8 GB in all",
+                           shape.tool_count, nodes_of(&shape), shape.contrast_count, (int)count, STEP_TOOLS_MAX, MOST_NODES, MOST_CONTRAST, MOST_FRAMES);
         return NULL;
     }
     // with several tools centrelines have as many nodes as each image says, and so have the tools since version 3

@@ -33,7 +33,8 @@ typedef struct Film {
 
 FilmOptions film_default_options(void)
 {
-    return (FilmOptions){.width = 1280, .height = 720, .view = VIEW_FLUOROSCOPY, .has_panels = true, .to_s = HUGE_VAL, .fps = 30, .speed = 1, .lao_deg = NAN, .cra_deg = NAN};
+    return (FilmOptions){
+        .width = 1280, .height = 720, .view = VIEW_FLUOROSCOPY, .has_panels = true, .to_s = HUGE_VAL, .fps = 30, .speed = 1, .lao_deg = NAN, .cra_deg = NAN};
 }
 
 static void film_close(Film *film)
@@ -142,8 +143,12 @@ static void film_draw(Film *film, double time_s)
     PanelLayout layout = panel_layout(options->width, options->height, 1, options->view, options->has_panels);
     if (jumped)
         fluoroscope_forget(views_fluoroscope(film->views));
-    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(film->playback), .filling = playback_filling(film->playback),
-                        .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->controls.look,
+    ViewsFrame frame = {.pose = pose,
+                        .xray = &pose->xray,
+                        .contrast = playback_contrast(film->playback),
+                        .filling = playback_filling(film->playback),
+                        .pulse = (uint32_t)playback_pulses(film->playback)->count,
+                        .look = &film->controls.look,
                         .is_still = true};
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
     if (options->has_panels) {
@@ -172,8 +177,11 @@ static void take_earlier_pulses(Film *film, double time_s)
         playback_seek(film->playback, t);
         const PulseClock *pulses = playback_pulses(film->playback);
         const Pose *pose = playback_pose(film->playback);
-        FluoroscopeFrame frame = {.pose = pose, .xray = pose->xray, .contrast = playback_contrast(film->playback),
-                                  .filling = playback_filling(film->playback), .pulse = (uint32_t)pulses->count};
+        FluoroscopeFrame frame = {.pose = pose,
+                                  .xray = pose->xray,
+                                  .contrast = playback_contrast(film->playback),
+                                  .filling = playback_filling(film->playback),
+                                  .pulse = (uint32_t)pulses->count};
         if (pulses->count != drawn)
             fluoroscope_draw(views_fluoroscope(film->views), &frame, (ViewPort){film->canvas.framebuffer, 0, 0, film->options->height, film->options->height});
         drawn = pulses->count;

@@ -31,9 +31,10 @@ static bool tool_is_sound(const ToolLook *tool, int index, char *message, size_t
         const TubeStretch *stretch = &tool->stretch[i];
         bool is_tube = stretch->radius > 0 && isfinite(stretch->radius) && stretch->lumen >= 0 && stretch->lumen < stretch->radius;
         if (!is_tube || !(stretch->attenuation >= 0) || !isfinite(stretch->attenuation))
-            return message_fail(message, capacity,
-                                "stretch %d of tool %d has radius %g mm, lumen %g mm and attenuation %g / mm; finite, not negative, the lumen within the radius", i,
-                                index, stretch->radius, stretch->lumen, stretch->attenuation);
+            return message_fail(
+                message, capacity,
+                "stretch %d of tool %d has radius %g mm, lumen %g mm and attenuation %g / mm; finite, not negative, the lumen within the radius", i, index,
+                stretch->radius, stretch->lumen, stretch->attenuation);
     }
     return true;
 }
@@ -181,7 +182,7 @@ void fluoroscope_destroy(Fluoroscope *f)
     anatomy_free(&f->anatomy);
     lumen_layer_destroy(&f->lumen);
     layers_destroy(&f->programs);
-    Layer *layer[11] = {&f->anatomy_layer, &f->anatomy_next, &f->lumen_layer,   &f->roadmap_layer, &f->mask,           &f->still.bare,
+    Layer *layer[11] = {&f->anatomy_layer, &f->anatomy_next,  &f->lumen_layer,  &f->roadmap_layer, &f->mask,           &f->still.bare,
                         &f->still.base,    &f->still.picture, &f->turning.bare, &f->turning.base,  &f->turning.picture};
     for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);

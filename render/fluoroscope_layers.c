@@ -44,28 +44,26 @@ static const char *const ANATOMY_FRAGMENT =
 
 // Shared by the shaders that read the lumen. TAPS 4 is the detector's blur; a layer of half the resolution is blurred by its one tap. llvmpipe
 // executes both sides of a branch, so variants are compiled separately.
-#define TAPS_4                                                                                                                                             \
-    "#version 330 core\n"                                                                                                                                  \
-    "float tap(sampler2D layer, vec2 at) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"                                                                  \
-    "  vec2 g = vec2(h.x, -h.y);\n"                                                                                                                         \
+#define TAPS_4                                                                                                                                                 \
+    "#version 330 core\n"                                                                                                                                      \
+    "float tap(sampler2D layer, vec2 at) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"                                                                      \
+    "  vec2 g = vec2(h.x, -h.y);\n"                                                                                                                            \
     "  return 0.25 * (texture(layer, at + h).r + texture(layer, at - h).r + texture(layer, at + g).r + texture(layer, at - g).r); }\n"
 #define TAPS_1 "#version 330 core\nfloat tap(sampler2D layer, vec2 at) { return texture(layer, at).r; }\n"
 #define WITH_ROADMAP "#define ROADMAP\n"
 static const char *const LUMEN_HEAD[2][2] = {{TAPS_4, TAPS_4 WITH_ROADMAP}, {TAPS_1, TAPS_1 WITH_ROADMAP}};   // full or less than full resolution, roadmap
 
-static const char *const TOTAL_FRAGMENT =
-    "in vec2 at; out float result; uniform sampler2D anatomy, lumen; uniform float slant, contrast; uniform bvec2 has;\n"
-    "void main() { vec2 f = slant * (at - 0.5); result = has.x ? texture(anatomy, at).r : 0.0;\n"
-    "  if (has.y) result += contrast * max(tap(lumen, at), 0.0) * sqrt(1.0 + dot(f, f)); }\n";
+static const char *const TOTAL_FRAGMENT = "in vec2 at; out float result; uniform sampler2D anatomy, lumen; uniform float slant, contrast; uniform bvec2 has;\n"
+                                          "void main() { vec2 f = slant * (at - 0.5); result = has.x ? texture(anatomy, at).r : 0.0;\n"
+                                          "  if (has.y) result += contrast * max(tap(lumen, at), 0.0) * sqrt(1.0 + dot(f, f)); }\n";
 
-static const char *const OPACIFY_FRAGMENT =
-    "in vec2 at; out vec4 result; uniform sampler2D bare, lumen, roadmap; uniform float slant; uniform vec2 power;\n"
-    "void main() { vec2 f = slant * (at - 0.5); float along = sqrt(1.0 + dot(f, f)); vec4 b = texture(bare, at);\n"
-    "  b.xy *= exp2(-power * (max(tap(lumen, at), 0.0) * along));\n"
-    "#ifdef ROADMAP\n"
-    "  b.z = b.w * (1.0 - exp2(-0.45 * max(tap(roadmap, at), 0.0) * along));\n"
-    "#endif\n"
-    "  result = b; }\n";
+static const char *const OPACIFY_FRAGMENT = "in vec2 at; out vec4 result; uniform sampler2D bare, lumen, roadmap; uniform float slant; uniform vec2 power;\n"
+                                            "void main() { vec2 f = slant * (at - 0.5); float along = sqrt(1.0 + dot(f, f)); vec4 b = texture(bare, at);\n"
+                                            "  b.xy *= exp2(-power * (max(tap(lumen, at), 0.0) * along));\n"
+                                            "#ifdef ROADMAP\n"
+                                            "  b.z = b.w * (1.0 - exp2(-0.45 * max(tap(roadmap, at), 0.0) * along));\n"
+                                            "#endif\n"
+                                            "  result = b; }\n";
 
 static const char *const LIVE_HEAD = "#version 330 core\n";
 static const char *const DSA_HEAD = "#version 330 core\n#define SUBTRACTED\n";
@@ -85,20 +83,18 @@ static const char *const BAKE_FRAGMENT =
     "  float outside = length(max(q, 0.0)) + min(max(q.x, q.y), 0.0) - c, open = smoothstep(soft.y, -soft.y, outside);\n"
     "  result = vec4(r / room * vec2(open, sqrt(open)), 0.0, open); }\n";
 
-static const char *const TOOL_VERTEX =
-    "#version 330 core\n"
-    "layout(location = 0) in vec2 place; layout(location = 1) in vec3 profile; layout(location = 2) in vec2 density;\n"
-    "uniform float side; out vec3 tube; out vec2 d;\n"
-    "void main() { gl_Position = vec4(2.0 * place / side - 1.0, 0.0, 1.0); tube = profile; d = density; }\n";
+static const char *const TOOL_VERTEX = "#version 330 core\n"
+                                       "layout(location = 0) in vec2 place; layout(location = 1) in vec3 profile; layout(location = 2) in vec2 density;\n"
+                                       "uniform float side; out vec3 tube; out vec2 d;\n"
+                                       "void main() { gl_Position = vec4(2.0 * place / side - 1.0, 0.0, 1.0); tube = profile; d = density; }\n";
 // of each circle the integral of sqrt(r^2 - x^2) between pixel borders, of three pixels for the detector's blur
-static const char *const TOOL_FRAGMENT =
-    "#version 330 core\n"
-    "in vec3 tube; in vec2 d; out vec4 result; uniform vec2 power; uniform bool as_attenuation;\n"
-    "float chord(float r) { vec4 u = clamp((tube.x + vec4(-1.5, -0.5, 0.5, 1.5)) / r, -1.0, 1.0);\n"
-    "  vec4 area = r * r * (u * sqrt(max(1.0 - u * u, 0.0)) + asin(u));\n"
-    "  return 0.25 * (area.y - area.x) + 0.5 * (area.z - area.y) + 0.25 * (area.w - area.z); }\n"
-    "void main() { float a = d.x * chord(max(tube.y, 1e-6)); if (tube.z > 0.0) a += d.y * chord(tube.z);\n"
-    "  result = as_attenuation ? vec4(a) : vec4(exp(-power * a), 1.0, 1.0); }\n";
+static const char *const TOOL_FRAGMENT = "#version 330 core\n"
+                                         "in vec3 tube; in vec2 d; out vec4 result; uniform vec2 power; uniform bool as_attenuation;\n"
+                                         "float chord(float r) { vec4 u = clamp((tube.x + vec4(-1.5, -0.5, 0.5, 1.5)) / r, -1.0, 1.0);\n"
+                                         "  vec4 area = r * r * (u * sqrt(max(1.0 - u * u, 0.0)) + asin(u));\n"
+                                         "  return 0.25 * (area.y - area.x) + 0.5 * (area.z - area.y) + 0.25 * (area.w - area.z); }\n"
+                                         "void main() { float a = d.x * chord(max(tube.y, 1e-6)); if (tube.z > 0.0) a += d.y * chord(tube.z);\n"
+                                         "  result = as_attenuation ? vec4(a) : vec4(exp(-power * a), 1.0, 1.0); }\n";
 
 // nearest texels by interpolated coordinates: half the time of texelFetch on llvmpipe
 static const char *const SHOW_VERTEX =

@@ -10,12 +10,11 @@
 
 enum { FINE_TRIANGLES = 90000, COARSE_TRIANGLES = 25000 };
 
-static const char *const LUMEN_VERTEX =
-    "#version 330 core\n"
-    "layout(location = 0) in vec3 position; layout(location = 1) in float node;\n"
-    "uniform mat4 clip; uniform vec3 towards; uniform float shift; uniform samplerBuffer nodes; out float f;\n"
-    "void main() { gl_Position = clip * vec4(position, 1.0); vec2 n = texelFetch(nodes, int(node + 0.5)).xy;\n"
-    "  f = n.x + n.y * (dot(towards, position) + shift); }\n";
+static const char *const LUMEN_VERTEX = "#version 330 core\n"
+                                        "layout(location = 0) in vec3 position; layout(location = 1) in float node;\n"
+                                        "uniform mat4 clip; uniform vec3 towards; uniform float shift; uniform samplerBuffer nodes; out float f;\n"
+                                        "void main() { gl_Position = clip * vec4(position, 1.0); vec2 n = texelFetch(nodes, int(node + 0.5)).xy;\n"
+                                        "  f = n.x + n.y * (dot(towards, position) + shift); }\n";
 // the picture is seen from the detector: walls through which rays leave face the viewer
 static const char *const LUMEN_FRAGMENT = "#version 330 core\n"
                                           "uniform float facing; in float f; out float result;\n"

@@ -57,7 +57,7 @@ static bool make_context(GlContext *context, char *message, size_t capacity)
     EGLint count = 0;
     if (!eglChooseConfig(context->display, wanted, &config, 1, &count) || count < 1)
         return message_fail(message, capacity, "EGL has no configuration for desktop OpenGL");
-    const EGLint version[] = {EGL_CONTEXT_MAJOR_VERSION,       3, EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+    const EGLint version[] = {EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
                               EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     context->context = eglCreateContext(context->display, config, EGL_NO_CONTEXT, version);
     if (context->context == EGL_NO_CONTEXT)

@@ -42,7 +42,7 @@ struct Gui {
 
 static constexpr Color rgb(int r, int g, int b) { return Color{(uint8_t)r, (uint8_t)g, (uint8_t)b, 255}; }
 // marks: sky blue, bluish green, orange and vermilion of Okabe and Ito, lightened for a dark ground
-extern "C" const GuiColors gui_colors = {rgb(12, 14, 18),    rgb(23, 26, 32),    rgb(40, 45, 55),   rgb(56, 63, 77),    rgb(32, 84, 128), rgb(52, 58, 70),
+extern "C" const GuiColors gui_colors = {rgb(12, 14, 18),    rgb(23, 26, 32),    rgb(40, 45, 55),   rgb(56, 63, 77),   rgb(32, 84, 128),  rgb(52, 58, 70),
                                          rgb(222, 226, 233), rgb(146, 154, 168), rgb(86, 180, 233), rgb(40, 190, 145), rgb(240, 172, 30), rgb(255, 112, 64)};
 
 static ImU32 packed(Color c) { return IM_COL32(c.r, c.g, c.b, c.a); }
@@ -65,14 +65,30 @@ static void set_style(float scale)
     style.ScrollbarSize = whole(11 * scale);
     style.GrabMinSize = whole(10 * scale);
     style.WindowMinSize = ImVec2(4, 4);
-    const struct { int which; Color color; } colors[] = {
-        {ImGuiCol_Text, gui_colors.text}, {ImGuiCol_TextDisabled, gui_colors.dim}, {ImGuiCol_WindowBg, gui_colors.panel}, {ImGuiCol_ChildBg, {0, 0, 0, 0}},
-        {ImGuiCol_PopupBg, gui_colors.window}, {ImGuiCol_Border, gui_colors.line}, {ImGuiCol_FrameBg, gui_colors.frame},
-        {ImGuiCol_FrameBgHovered, gui_colors.frame_hot}, {ImGuiCol_FrameBgActive, gui_colors.frame_hot}, {ImGuiCol_SliderGrab, rgb(58, 108, 152)},
-        {ImGuiCol_SliderGrabActive, rgb(70, 130, 180)}, {ImGuiCol_ScrollbarBg, gui_colors.panel}, {ImGuiCol_ScrollbarGrab, gui_colors.frame_hot},
-        {ImGuiCol_ScrollbarGrabHovered, gui_colors.dim}, {ImGuiCol_ScrollbarGrabActive, gui_colors.dim}, {ImGuiCol_Tab, gui_colors.frame},
-        {ImGuiCol_TabHovered, gui_colors.frame_hot}, {ImGuiCol_TabActive, gui_colors.frame_on}, {ImGuiCol_TabUnfocused, gui_colors.frame},
-        {ImGuiCol_TabUnfocusedActive, gui_colors.frame_on}, {ImGuiCol_TextSelectedBg, gui_colors.frame_on}};
+    const struct {
+        int which;
+        Color color;
+    } colors[] = {{ImGuiCol_Text, gui_colors.text},
+                  {ImGuiCol_TextDisabled, gui_colors.dim},
+                  {ImGuiCol_WindowBg, gui_colors.panel},
+                  {ImGuiCol_ChildBg, {0, 0, 0, 0}},
+                  {ImGuiCol_PopupBg, gui_colors.window},
+                  {ImGuiCol_Border, gui_colors.line},
+                  {ImGuiCol_FrameBg, gui_colors.frame},
+                  {ImGuiCol_FrameBgHovered, gui_colors.frame_hot},
+                  {ImGuiCol_FrameBgActive, gui_colors.frame_hot},
+                  {ImGuiCol_SliderGrab, rgb(58, 108, 152)},
+                  {ImGuiCol_SliderGrabActive, rgb(70, 130, 180)},
+                  {ImGuiCol_ScrollbarBg, gui_colors.panel},
+                  {ImGuiCol_ScrollbarGrab, gui_colors.frame_hot},
+                  {ImGuiCol_ScrollbarGrabHovered, gui_colors.dim},
+                  {ImGuiCol_ScrollbarGrabActive, gui_colors.dim},
+                  {ImGuiCol_Tab, gui_colors.frame},
+                  {ImGuiCol_TabHovered, gui_colors.frame_hot},
+                  {ImGuiCol_TabActive, gui_colors.frame_on},
+                  {ImGuiCol_TabUnfocused, gui_colors.frame},
+                  {ImGuiCol_TabUnfocusedActive, gui_colors.frame_on},
+                  {ImGuiCol_TextSelectedBg, gui_colors.frame_on}};
     for (const auto &c : colors)
         style.Colors[c.which] = as_vector(c.color);
 }
@@ -80,8 +96,8 @@ static void set_style(float scale)
 static void make_fonts(Gui *gui, float scale)
 {
     // Latin with its extensions, Greek, Cyrillic, dashes and quotes, arrows, minus, the signs that the panel uses
-    static const ImWchar letters[] = {0x20, 0x17f, 0x391, 0x3c9, 0x400, 0x45f, 0x2010, 0x2027, 0x2190, 0x2193, 0x2212, 0x2212, 0x25a0, 0x25a0,
-                                      0x25b2, 0x25b2, 0x25cb, 0x25cf, 0x2713, 0x2717, 0};
+    static const ImWchar letters[] = {0x20,   0x17f,  0x391,  0x3c9,  0x400,  0x45f,  0x2010, 0x2027, 0x2190, 0x2193, 0x2212,
+                                      0x2212, 0x25a0, 0x25a0, 0x25b2, 0x25b2, 0x25cb, 0x25cf, 0x2713, 0x2717, 0};
     static const ImWchar large[] = {0x20, 0xff, 0x2010, 0x2027, 0x2212, 0x2212, 0};
     static const float pixels[GUI_FONTS] = {13, 15, 19, 28};
     ImGuiIO &io = ImGui::GetIO();
@@ -110,10 +126,11 @@ extern "C" Gui *gui_create(char *message, size_t capacity)
     io.IniFilename = nullptr;
     io.LogFilename = nullptr;
     io.ConfigWindowsMoveFromTitleBarOnly = true;
-    const struct { int imgui, key; } keys[] = {
-        {ImGuiKey_LeftArrow, WINDOW_KEY_LEFT}, {ImGuiKey_RightArrow, WINDOW_KEY_RIGHT}, {ImGuiKey_Home, WINDOW_KEY_HOME}, {ImGuiKey_End, WINDOW_KEY_END},
-        {ImGuiKey_Delete, WINDOW_KEY_DELETE}, {ImGuiKey_Backspace, WINDOW_KEY_BACKSPACE}, {ImGuiKey_Enter, WINDOW_KEY_ENTER},
-        {ImGuiKey_Escape, WINDOW_KEY_ESCAPE}, {ImGuiKey_A, 'A'}};
+    const struct {
+        int imgui, key;
+    } keys[] = {{ImGuiKey_LeftArrow, WINDOW_KEY_LEFT}, {ImGuiKey_RightArrow, WINDOW_KEY_RIGHT}, {ImGuiKey_Home, WINDOW_KEY_HOME},
+                {ImGuiKey_End, WINDOW_KEY_END},        {ImGuiKey_Delete, WINDOW_KEY_DELETE},    {ImGuiKey_Backspace, WINDOW_KEY_BACKSPACE},
+                {ImGuiKey_Enter, WINDOW_KEY_ENTER},    {ImGuiKey_Escape, WINDOW_KEY_ESCAPE},    {ImGuiKey_A, 'A'}};
     for (const auto &k : keys)
         io.KeyMap[k.imgui] = k.key;
     static_assert(WINDOW_KEYS <= IM_ARRAYSIZE(ImGuiIO::KeysDown), "ImGui holds every key");
@@ -315,8 +332,8 @@ static void copy_kept(const Gui *gui, const KeptWindow *kept)
 {
     int left = (int)kept->at.x, right = left + (int)kept->at.width, top = (int)kept->at.y, bottom = top + (int)kept->at.height;
     int to_top = gui->keep_height - top, to_bottom = gui->keep_height - bottom;   // OpenGL's rows go up
-    glBlitFramebuffer(left, gui->is_turned ? top : to_top, right, gui->is_turned ? bottom : to_bottom, left, to_top, right, to_bottom,
-                      GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    glBlitFramebuffer(left, gui->is_turned ? top : to_top, right, gui->is_turned ? bottom : to_bottom, left, to_top, right, to_bottom, GL_COLOR_BUFFER_BIT,
+                      GL_NEAREST);
 }
 
 static void draw_frame(Gui *gui, unsigned framebuffer)

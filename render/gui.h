@@ -15,7 +15,9 @@ extern "C" {
 #include <stddef.h>
 
 typedef struct Gui Gui;
-typedef struct GuiRect { float x, y, width, height; } GuiRect;
+typedef struct GuiRect {
+    float x, y, width, height;
+} GuiRect;
 typedef enum { GUI_SMALL, GUI_NORMAL, GUI_LARGE, GUI_HUGE, GUI_FONTS } GuiFont;   // 13, 15, 19 and 28 pixels times the scale
 
 typedef struct GuiColors {     // of everything; the marks are distinguishable for the colour-blind, and never shown by colour alone
@@ -53,7 +55,9 @@ void gui_text(Gui *gui, GuiFont font, Color color, const char *text);
 void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char *text);
 void gui_row(Gui *gui, GuiFont font, const char *label, Color color, const char *value);   // label left, value right, in one line
 
-typedef struct GuiPress { bool pressed, held; } GuiPress; // clicked in this frame; the mouse is down on it
+typedef struct GuiPress {
+    bool pressed, held;
+} GuiPress; // clicked in this frame; the mouse is down on it
 // `width` 0: all there is. `key` at its right end in small letters, where both fit. `is_on`: filled, with a tick.
 GuiPress gui_button(Gui *gui, const char *id, const char *label, const char *key, float width, bool is_on);
 // True while it is being moved. `format` as for printf of one double.

@@ -10,7 +10,7 @@
 #define KEY(name) WINDOW_KEY_##name, 0, 0
 #define ALT_K(letter) letter, WINDOW_ALT, 0
 #define ALT(name) WINDOW_KEY_##name, WINDOW_ALT, 0
-#define F(number) WINDOW_KEY_F1 + (number) - 1, 0, 0
+#define F(number) WINDOW_KEY_F1 + (number)-1, 0, 0
 
 const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_PUSH, GROUP_TOOL, ACTION_HOLD, KEY(UP), "Push", "push the tool into the patient while held"},
@@ -95,12 +95,14 @@ const char *const action_group_name[ACTION_GROUPS] = {"Tool", "X-ray", "C-arm an
 
 static const char *key_name(int key, char *text, size_t capacity)
 {
-    static const struct { int key; const char *name; } named[] = {
-        {WINDOW_KEY_SPACE, "Space"}, {WINDOW_KEY_UP, "Up"}, {WINDOW_KEY_DOWN, "Down"}, {WINDOW_KEY_LEFT, "Left"}, {WINDOW_KEY_RIGHT, "Right"},
-        {WINDOW_KEY_PAGE_UP, "Page up"}, {WINDOW_KEY_PAGE_DOWN, "Page down"}, {WINDOW_KEY_HOME, "Home"}, {WINDOW_KEY_END, "End"},
-        {WINDOW_KEY_INSERT, "Insert"}, {WINDOW_KEY_DELETE, "Delete"}, {WINDOW_KEY_BACKSPACE, "Backspace"}, {WINDOW_KEY_ENTER, "Enter"},
-        {WINDOW_KEY_TAB, "Tab"}, {WINDOW_KEY_ESCAPE, "Esc"}, {WINDOW_KEY_SHIFT, "Shift"}, {WINDOW_KEY_CTRL, "Ctrl"}, {WINDOW_KEY_ALT, "Alt"},
-        {WINDOW_KEY_KEYPAD_ADD, "Keypad +"}, {WINDOW_KEY_KEYPAD_SUBTRACT, "Keypad -"}};
+    static const struct {
+        int key;
+        const char *name;
+    } named[] = {{WINDOW_KEY_SPACE, "Space"}, {WINDOW_KEY_UP, "Up"},           {WINDOW_KEY_DOWN, "Down"},           {WINDOW_KEY_LEFT, "Left"},
+                 {WINDOW_KEY_RIGHT, "Right"}, {WINDOW_KEY_PAGE_UP, "Page up"}, {WINDOW_KEY_PAGE_DOWN, "Page down"}, {WINDOW_KEY_HOME, "Home"},
+                 {WINDOW_KEY_END, "End"},     {WINDOW_KEY_INSERT, "Insert"},   {WINDOW_KEY_DELETE, "Delete"},       {WINDOW_KEY_BACKSPACE, "Backspace"},
+                 {WINDOW_KEY_ENTER, "Enter"}, {WINDOW_KEY_TAB, "Tab"},         {WINDOW_KEY_ESCAPE, "Esc"},          {WINDOW_KEY_SHIFT, "Shift"},
+                 {WINDOW_KEY_CTRL, "Ctrl"},   {WINDOW_KEY_ALT, "Alt"},         {WINDOW_KEY_KEYPAD_ADD, "Keypad +"}, {WINDOW_KEY_KEYPAD_SUBTRACT, "Keypad -"}};
     for (size_t i = 0; i < sizeof named / sizeof named[0]; i++)
         if (named[i].key == key)
             return named[i].name;
@@ -213,19 +215,14 @@ void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured)
             if (!event->is_repeat && ((!is_captured && !(event->modifiers & WINDOW_SUPER)) || passes_capture(event->key)))
                 key_down(state, event);
             break;
-        case WINDOW_KEY_UP_EVENT:
-            key_up(state, event->key);
-            break;
+        case WINDOW_KEY_UP_EVENT: key_up(state, event->key); break;
         case WINDOW_TEXT_EVENT:
             if (!is_captured && !event->is_repeat && !is_keypad)
                 character_typed(state, event->character);
             break;
-        case WINDOW_FOCUS_LOST_EVENT:
-            key_state_release(state);
-            break;
+        case WINDOW_FOCUS_LOST_EVENT: key_state_release(state); break;
         case WINDOW_SCROLL_EVENT:
-        case WINDOW_DEVICE_EVENT:
-            break;
+        case WINDOW_DEVICE_EVENT: break;
         }
     }
     if (!input->has_focus)

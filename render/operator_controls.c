@@ -9,8 +9,14 @@ static float clamped(double value, double least, double most) { return (float)fm
 
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point)
 {
-    OperatorControls controls = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .contrast_ml_s = 3, .view = VIEW_FLUOROSCOPY,
-                 .look = vessel_scene_default_look(scene), .patient = patient_axes_lps(), .tool_count = tool_count};
+    OperatorControls controls = {.xray = xray_default_control(),
+                                 .push_mm_s = 10,
+                                 .twist_deg_s = 120,
+                                 .contrast_ml_s = 3,
+                                 .view = VIEW_FLUOROSCOPY,
+                                 .look = vessel_scene_default_look(scene),
+                                 .patient = patient_axes_lps(),
+                                 .tool_count = tool_count};
     Vec3 low = vec3(0, 0, 0), high = low;
     for (int i = 0; i < count; i++)
         for (int k = 0; k < 3; k++) {
@@ -171,7 +177,7 @@ Command controls_command(const OperatorControls *controls, const PanelActions *a
 Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions)
 {
     return controls->tool_count < 2 ? (Command){0, 0}
-                                : command_by(controls, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
+                                    : command_by(controls, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
 }
 
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons)

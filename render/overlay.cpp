@@ -122,8 +122,7 @@ extern "C" void overlay_text_size(Overlay *overlay, TextSize size, const char *t
 
 extern "C" void overlay_image(Overlay *overlay, unsigned texture, double x, double y, double width, double height, bool is_bottom_up)
 {
-    overlay->list->AddImage((ImTextureID)(intptr_t)texture, at(x, y), at(x + width, y + height), at(0, is_bottom_up ? 1 : 0),
-                            at(1, is_bottom_up ? 0 : 1));
+    overlay->list->AddImage((ImTextureID)(intptr_t)texture, at(x, y), at(x + width, y + height), at(0, is_bottom_up ? 1 : 0), at(1, is_bottom_up ? 0 : 1));
 }
 
 extern "C" void overlay_push_clip(Overlay *overlay, double x, double y, double width, double height)

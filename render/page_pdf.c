@@ -38,8 +38,16 @@ static bool browser_prints(const char *browser, const char *html, const char *pd
     snprintf(print, sizeof print, "--print-to-pdf=%s", pdf);
     snprintf(url, sizeof url, "file://%s", html);
     snprintf(profile, sizeof profile, "--user-data-dir=%s.profile", html);
-    const char *argument[] = {browser, "--headless", "--disable-gpu", "--no-pdf-header-footer", "--print-to-pdf-no-header", profile, print,
-                              geteuid() == 0 ? "--no-sandbox" : url, geteuid() == 0 ? url : NULL, NULL};
+    const char *argument[] = {browser,
+                              "--headless",
+                              "--disable-gpu",
+                              "--no-pdf-header-footer",
+                              "--print-to-pdf-no-header",
+                              profile,
+                              print,
+                              geteuid() == 0 ? "--no-sandbox" : url,
+                              geteuid() == 0 ? url : NULL,
+                              NULL};
     pid_t child = fork();
     if (child == 0) {
         setpgid(0, 0);

@@ -28,8 +28,8 @@ void panel_draw_briefing(Panel *panel, const PanelState *state)
 {
     Gui *gui = panel->gui;
     panel->briefing_at = (GuiRect){0};
-    bool is_wanted = panel->briefing == BRIEFING_OPEN || (panel->briefing == BRIEFING_AT_BEGIN && panel->is_interactive && panel->has_hints &&
-                                                          panel_has_more_lines(state->instructions));
+    bool is_wanted = panel->briefing == BRIEFING_OPEN ||
+                     (panel->briefing == BRIEFING_AT_BEGIN && panel->is_interactive && panel->has_hints && panel_has_more_lines(state->instructions));
     if (!is_wanted || !panel_text(state->instructions)[0])
         return;
     char text[4200];

@@ -8,10 +8,7 @@
 const char *const panel_sign[MARK_BAD + 1] = {"", "\u2713 ", "\u25b2 ", "\u2717 "};
 const char *const panel_mode_name[PANEL_CINE + 1] = {"LIVE", "LAST IMAGE", "DSA", "ROADMAP", "CINE"};
 
-Color panel_mark_color(PanelMark mark)
-{
-    return (const Color[]){gui_colors.text, gui_colors.good, gui_colors.warning, gui_colors.bad}[mark];
-}
+Color panel_mark_color(PanelMark mark) { return (const Color[]){gui_colors.text, gui_colors.good, gui_colors.warning, gui_colors.bad}[mark]; }
 
 const char *panel_text(const char *text) { return text ? text : ""; }
 

@@ -64,7 +64,8 @@ static void draw_stiffness(Gui *gui, GuiRect at, const PanelTrayDevice *device)
     float before = NAN, words_end = -HUGE_VALF;
     double begin = 0;
     for (int i = 0; i < count; i++) {
-        float left = at.x + margin + (float)((at.width - 2 * margin) * begin / total), right = at.x + margin + (float)((at.width - 2 * margin) * device->end_mm[i] / total);
+        float left = at.x + margin + (float)((at.width - 2 * margin) * begin / total),
+              right = at.x + margin + (float)((at.width - 2 * margin) * device->end_mm[i] / total);
         float y = bottom - (bottom - top) * (float)((log10(device->bending_n_mm2[i] / low) + (high > low ? 0 : 0.15)) / decades);
         gui_draw_fill(gui, (GuiRect){left, y, fmaxf(right - left, 1), thick}, gui_colors.accent);
         if (!isnan(before))
@@ -104,10 +105,12 @@ static void draw_list(Panel *panel, const PanelTray *tray)
 
 static void draw_sliders(Panel *panel)
 {
-    static const struct { const char *id, *format, *tip; float least, most; } slider[] = {
-        {"tip length", "bend %.0f mm long", "from the tip back to where the bend begins", 1, 80},
-        {"tip angle", "keeps %.0f\u00b0", "the angle that stays when the core has sprung back; keys: Left, Right", 5, 330},
-        {"tip mandrel", "mandrel R %.1f mm", "radius of the mandrel for bending the tip: the thinner, the tighter the final bend", 0.3f, 10}};
+    static const struct {
+        const char *id, *format, *tip;
+        float least, most;
+    } slider[] = {{"tip length", "bend %.0f mm long", "from the tip back to where the bend begins", 1, 80},
+                  {"tip angle", "keeps %.0f\u00b0", "the angle that stays when the core has sprung back; keys: Left, Right", 5, 330},
+                  {"tip mandrel", "mandrel R %.1f mm", "radius of the mandrel for bending the tip: the thinner, the tighter the final bend", 0.3f, 10}};
     Gui *gui = panel->gui;
     float gap = floorf(4 * gui_scale(gui)), width = floorf((gui_width(gui) - 2 * gap) / 3);
     for (int i = 0; i < 3; i++) {

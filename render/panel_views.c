@@ -89,13 +89,15 @@ static float banner(Panel *panel, GuiRect at, float y, Color ground, const char 
 
 static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
 {
-    static const struct { unsigned bit; const char *text; } warning[] = {
-        {WARN_OUTSIDE, "The tool is outside the vessel: forces are not to be trusted"},
-        {WARN_STALLED, "The simulation has stopped"},
-        {WARN_DEVICE_LOST, "A device is lost: the tool stands still until it is back"},
-        {WARN_NOT_CONVERGED, "Contact forces did not converge in the last step"},
-        {WARN_SLOW, "Simulation slower than real time"},
-        {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may come late"}};
+    static const struct {
+        unsigned bit;
+        const char *text;
+    } warning[] = {{WARN_OUTSIDE, "The tool is outside the vessel: forces are not to be trusted"},
+                   {WARN_STALLED, "The simulation has stopped"},
+                   {WARN_DEVICE_LOST, "A device is lost: the tool stands still until it is back"},
+                   {WARN_NOT_CONVERGED, "Contact forces did not converge in the last step"},
+                   {WARN_SLOW, "Simulation slower than real time"},
+                   {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may come late"}};
     float y = at.y + floorf(52 * gui_scale(panel->gui));
     char text[300], line[280];
     if (state->is_finished && panel_first_line(state->instructions, line, sizeof line)) {
@@ -127,7 +129,8 @@ static void draw_force_legend(Panel *panel, GuiRect at, double full_scale_n)
     char text[32];
     for (int i = 0; i < STEPS; i++) {
         float top = bottom - height * (float)(i + 1) / STEPS;
-        gui_draw_fill(gui, (GuiRect){x, top, width, height / STEPS + 1}, vessel_scene_force_color(full_scale_n * (i + 0.5) / STEPS, full_scale_n, gui_colors.dim));
+        gui_draw_fill(gui, (GuiRect){x, top, width, height / STEPS + 1},
+                      vessel_scene_force_color(full_scale_n * (i + 0.5) / STEPS, full_scale_n, gui_colors.dim));
     }
     snprintf(text, sizeof text, "%g N", full_scale_n);
     label_right(panel, x - pad / 2, bottom - height, GUI_SMALL, gui_colors.text, text);

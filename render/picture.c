@@ -3,10 +3,7 @@
 
 #include "render/gl_context.h"
 
-PictureOptions picture_default_options(void)
-{
-    return (PictureOptions){.width = 1600, .height = 1000, .inset = true, .worst_count = 9, .arrows = true};
-}
+PictureOptions picture_default_options(void) { return (PictureOptions){.width = 1600, .height = 1000, .inset = true, .worst_count = 9, .arrows = true}; }
 
 bool picture_available(char *message, size_t capacity)
 {

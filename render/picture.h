@@ -25,7 +25,7 @@ typedef struct PictureOptions {
     bool inset;                // close-up of the tip in a corner; default true
     double inset_radius;       // [mm] of the sphere the close-up shows; 0 (default): chosen from the lumen (4 to 12 mm)
     double force_full_scale;   // [N] top of the colour map of wall force; 0 (default): the largest force shown, rounded up
-    double distance_full_scale;// [mm] ends of the diverging map of `picture_of_fit`; 0 (default): the 98th percentile of |distance|, rounded up
+    double distance_full_scale; // [mm] ends of the diverging map of `picture_of_fit`; 0 (default): the 98th percentile of |distance|, rounded up
     int worst_count;           // `picture_of_fit`: close-ups of the local models with the largest error; 0 to 12, default 9
     bool arrows;               // wall forces as arrows; default true
 } PictureOptions;
@@ -36,7 +36,7 @@ bool picture_available(char *message, size_t capacity);
 
 // --- a run ---
 typedef struct PictureScene {
-    const TriangleMesh *vessel;// NULL: no vessel drawn (rigs, planes)
+    const TriangleMesh *vessel; // NULL: no vessel drawn (rigs, planes)
     int target_count;
     const SceneTarget *target; // wire spheres with names
     bool has_entry;            // a sheath: its mouth is marked, the tool behind it is drawn grey
@@ -60,11 +60,10 @@ typedef struct PictureTool {   // the tool at one moment
 
 // Large view of the vessel (translucent) with the tool (coloured by wall force), arrows, targets, scale bar, legend, and a close-up of the tip. With
 // several tools, the near half of a tool is cut away where another lies inside; the legend lists them with their reactions.
-bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message,
-                    size_t capacity);
+bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message, size_t capacity);
 // Up to 6 moments side by side, same camera, same colour scale.
-bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool,
-                        char *message, size_t capacity);
+bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool, char *message,
+                        size_t capacity);
 
 // --- an angiogram and its tree ---
 typedef struct PictureProjection {
@@ -89,15 +88,15 @@ typedef struct PictureMark {
 
 // The same from a voxel grid (layout of recon's Volume: value (size[2], size[1], size[0]), voxel (i,j,k) at origin + i axis[0] + …) and a tree:
 // three maximum-intensity projections, branches coloured by their order (vessel_branches.h). `tree` may be NULL. Without marks the tree's root is marked.
-bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value,
-                     float low, float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity);
+bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low,
+                     float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity);
 
 // --- a fit ---
 // The fitted surface coloured by the signed distance of the data (blue: outside the model, red: inside), a histogram, and slices through the
 // worst local models with blobs, contour and points. `tree` must be a model; `distance` (tree->point_count) [mm] signed, > 0 inside, of each point to
 // its own node's model, NULL: Taubin's distance is computed here. `mesh` may be NULL (points alone).
-bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance,
-                    char *message, size_t capacity);
+bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance, char *message,
+                    size_t capacity);
 
 // The model's surface with each vertex coloured by `error` (mesh->vertex_count) [mm] (geom/tree_surface.h: signed distance of the data point next to it,
 // > 0 inside; NaN grey), and the local models' d_a (tree->error) in voxels as a histogram with the borders of the paper's Table 4: half, one, two.

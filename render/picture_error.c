@@ -25,8 +25,8 @@ static double find_scale(const PictureOptions *options, int count, const double 
     return options->distance_full_scale > 0 ? options->distance_full_scale : scale > 0 ? picture_page_scale_end(scale) : 0.1;
 }
 
-bool picture_page_error_surface(PicturePage *page, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
-                         int width, int height)
+bool picture_page_error_surface(PicturePage *page, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x,
+                                double y, int width, int height)
 {
     Camera camera = {0};
     camera_orient(&camera, options->view, options->up, mesh->vertex_count, mesh->vertex);
@@ -109,7 +109,8 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
     bool drawn = picture_page_error_surface(&page, options, mesh, error, scale, gap, top, (int)(left - 2 * gap), (int)(page.height - top - gap));
     if (drawn) {
         picture_page_title(&page, gap, 18 * s, page.width - 2 * gap, options->title ? options->title : "distance of the surface to the data");
-        picture_page_color_bar(&page, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale, "data to surface [mm]: blue outside the model, red inside");
+        picture_page_color_bar(&page, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale,
+                               "data to surface [mm]: blue outside the model, red inside");
         picture_page_text(&page, left, top + 90 * s, TEXT_NORMAL, SHEET_INK, "local models by distance to their data (Table 4)");
         picture_page_class_chart(&page, left, top + 120 * s, column, 240 * s, tree->node_count, tree->error, voxel_mm);
         drawn = picture_page_save(&page, path);

@@ -149,8 +149,7 @@ static void draw_contour(FitDrawing *drawing, const Slice *slice, int node, Colo
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
             double u = slice->half * (2.0 * i / SLICE_CELLS - 1), v = slice->half * (1 - 2.0 * j / SLICE_CELLS);
-            drawing->field[j * n + i] =
-                (float)blobby_field(&model, vec3_add_scaled(vec3_add_scaled(slice->center, u, slice->along), v, slice->across));
+            drawing->field[j * n + i] = (float)blobby_field(&model, vec3_add_scaled(vec3_add_scaled(slice->center, u, slice->along), v, slice->across));
         }
     double cell = slice->side / SLICE_CELLS;
     for (int j = 0; j < SLICE_CELLS; j++)
@@ -265,10 +264,9 @@ static bool draw_fit(FitDrawing *drawing)
     picture_page_color_bar(page, left, y, column, 12 * s, map_diverging, -1, -drawing->full_scale, drawing->full_scale, title);
     y += 66 * s;
     picture_page_text(page, left, y, TEXT_NORMAL, SHEET_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
-               (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99),
-               percentile(drawing, 1));
+                      (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99), percentile(drawing, 1));
     picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f a node", tree->node_count, (long long)tree->blob_count,
-               (double)tree->blob_count / tree->node_count);
+                      (double)tree->blob_count / tree->node_count);
     y += 56 * s;
     if (worst < 1)
         return true;
@@ -290,8 +288,8 @@ static bool draw_fit(FitDrawing *drawing)
     return true;
 }
 
-bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance,
-                    char *message, size_t capacity)
+bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance, char *message,
+                    size_t capacity)
 {
     if (!tree || tree->node_count < 1 || !vessel_tree_is_model(tree))
         return message_fail(message, capacity, "the tree has no fitted model to draw");

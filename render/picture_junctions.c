@@ -11,8 +11,8 @@
 
 enum { CELLS = 96, COLUMNS = 6, ROWS = 4, NEAR_MOST = 400, GREY = 128 };
 
-static const Color CAPPED = {200, 30, 30, 255}, NARROW = {225, 140, 20, 255}, OPEN = {150, 154, 160, 255}, LINE = {20, 110, 190, 255}, DATA = {214, 120, 0, 255},
-                   LUMEN = {70, 160, 230, 60};
+static const Color CAPPED = {200, 30, 30, 255}, NARROW = {225, 140, 20, 255}, OPEN = {150, 154, 160, 255}, LINE = {20, 110, 190, 255},
+                   DATA = {214, 120, 0, 255}, LUMEN = {70, 160, 230, 60};
 
 typedef struct JunctionCell {
     const VesselTree *tree;
@@ -142,9 +142,12 @@ static void draw_wall(JunctionDrawing *drawing, const JunctionCell *cell)
             drawing->field[j * n + i] = (float)field_in_plane(cell, cell->half * (2.0 * i / CELLS - 1), cell->half * (1 - 2.0 * j / CELLS));
     for (int j = 0; j < CELLS; j++)
         for (int i = 0; i < CELLS; i++) {
-            const double corner[4][2] = {{cell->x + i * pixel, cell->y + j * pixel}, {cell->x + (i + 1) * pixel, cell->y + j * pixel},
-                                         {cell->x + (i + 1) * pixel, cell->y + (j + 1) * pixel}, {cell->x + i * pixel, cell->y + (j + 1) * pixel}};
-            const double f[4] = {drawing->field[j * n + i], drawing->field[j * n + i + 1], drawing->field[(j + 1) * n + i + 1], drawing->field[(j + 1) * n + i]};
+            const double corner[4][2] = {{cell->x + i * pixel, cell->y + j * pixel},
+                                         {cell->x + (i + 1) * pixel, cell->y + j * pixel},
+                                         {cell->x + (i + 1) * pixel, cell->y + (j + 1) * pixel},
+                                         {cell->x + i * pixel, cell->y + (j + 1) * pixel}};
+            const double f[4] = {drawing->field[j * n + i], drawing->field[j * n + i + 1], drawing->field[(j + 1) * n + i + 1],
+                                 drawing->field[(j + 1) * n + i]};
             double cut[4][2];
             int cuts = 0;
             for (int k = 0; k < 4; k++) {
@@ -194,7 +197,8 @@ static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const Reac
     Color color = clearance < 0 ? CAPPED : clearance < tool ? NARROW : OPEN;
     find_plane(of, junction, &cell);
     find_near(in, &cell);
-    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance, junction->apart ? ", apart" : "");
+    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance,
+                      junction->apart ? ", apart" : "");
     overlay_fill(page->overlay, cell.x, cell.y, cell.side, cell.side, SHEET_PANEL);
     overlay_push_clip(page->overlay, cell.x, cell.y, cell.side, cell.side);
     draw_image(drawing, &cell);
@@ -207,7 +211,7 @@ static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const Reac
     if (drawing->what->value)
         overlay_fill(page->overlay, cell.x + 2 * s, cell.y + cell.side - 32 * s, 0.35 * cell.side + 12 * s, 30 * s, (Color){0, 0, 0, 130});
     picture_page_scale_bar(page, cell.x + 6 * s, cell.y + cell.side - 6 * s, 0.35 * cell.side, 2 * cell.half / cell.side,
-                    drawing->what->value ? (Color){255, 255, 255, 255} : SHEET_INK);
+                           drawing->what->value ? (Color){255, 255, 255, 255} : SHEET_INK);
 }
 
 // --- Pages ---
@@ -255,10 +259,11 @@ static void draw_head(JunctionDrawing *drawing, const char *title, int first, in
     PicturePage *page = drawing->page;
     double s = page->scale;
     picture_page_title(page, 20 * s, 14 * s, page->width - 40 * s, title);
-    picture_page_text(page, 20 * s, 42 * s, TEXT_SMALL, SHEET_MUTED,
-               "junctions %d to %d of %d, narrowest first: section through parent's axis and branch; wall %s, centreline blue, data orange; frame red: capped, "
-               "orange: less than %.2f mm",
-               first + 1, end, count, drawing->what->value ? "light blue over the image" : "black, lumen tinted", drawing->what->tool_radius);
+    picture_page_text(
+        page, 20 * s, 42 * s, TEXT_SMALL, SHEET_MUTED,
+        "junctions %d to %d of %d, narrowest first: section through parent's axis and branch; wall %s, centreline blue, data orange; frame red: capped, "
+        "orange: less than %.2f mm",
+        first + 1, end, count, drawing->what->value ? "light blue over the image" : "black, lumen tinted", drawing->what->tool_radius);
 }
 
 static bool draw_page(JunctionDrawing *drawing, const PictureOptions *options, int first, int end, int count)

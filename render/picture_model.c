@@ -25,8 +25,8 @@ bool picture_model_error(const char *path, const char *title, const VesselTree *
     double *error = mesh ? malloc(((size_t)mesh->vertex_count + 1) * sizeof *error) : NULL;
     PictureOptions options = picture_default_options();
     options.title = title;
-    bool drawn = error && surface_point_error(mesh, model, error, NULL) &&
-                 picture_of_error(path, &options, model, mesh, error, voxel_mm, message, sizeof message);
+    bool drawn =
+        error && surface_point_error(mesh, model, error, NULL) && picture_of_error(path, &options, model, mesh, error, voxel_mm, message, sizeof message);
     if (!drawn)
         faults_add(faults, path, 0, 0, "no picture: %s", message);
     free(error);

@@ -13,16 +13,27 @@ static PictureTool tool_of(const Pose *pose, const ToolLooks *looks, double *rad
         radius[i] = pose->node[i].radius;
         force[i] = pose->node[i].force;
     }
-    return (PictureTool){.node_count = pose->node_count, .position = pose->position, .radius = radius, .force = force,
-                         .first_free_node = pose->first_free_node, .time_s = pose->time_s, .inserted_mm = pose->inserted_mm,
-                         .push_force_n = pose->report.proximal_force, .torque_n_mm = pose->report.proximal_torque, .pose = pose, .looks = looks};
+    return (PictureTool){.node_count = pose->node_count,
+                         .position = pose->position,
+                         .radius = radius,
+                         .force = force,
+                         .first_free_node = pose->first_free_node,
+                         .time_s = pose->time_s,
+                         .inserted_mm = pose->inserted_mm,
+                         .push_force_n = pose->report.proximal_force,
+                         .torque_n_mm = pose->report.proximal_torque,
+                         .pose = pose,
+                         .looks = looks};
 }
 
 static bool draw(const char *path, const char *title, const Scene *scene, OpenVessel *open, int count, const PictureTool *tool, char *message, size_t capacity)
 {
     PictureOptions options = picture_default_options();
-    PictureScene shown = {.vessel = open_vessel_mesh(scene, open), .target_count = scene->target_count, .target = scene->target,
-                          .has_entry = scene->wire.has_sheath, .entry = scene->wire.start};
+    PictureScene shown = {.vessel = open_vessel_mesh(scene, open),
+                          .target_count = scene->target_count,
+                          .target = scene->target,
+                          .has_entry = scene->wire.has_sheath,
+                          .entry = scene->wire.start};
     options.title = title;
     if (count == 0)
         snprintf(message, capacity, "the run ended before the first moment of --picture-at");

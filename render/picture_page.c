@@ -12,10 +12,7 @@
 const Color SHEET_INK = {34, 37, 42, 255}, SHEET_MUTED = {104, 108, 115, 255}, SHEET_FAINT = {206, 207, 205, 255};
 const Color SHEET_PAPER = {255, 255, 255, 255}, SHEET_PANEL = {248, 248, 246, 255};
 
-double picture_page_scale_of(const PictureOptions *options)
-{
-    return fmin(fmax(fmin(options->width / 1.6, options->height) / 1000, 0.6), 4);
-}
+double picture_page_scale_of(const PictureOptions *options) { return fmin(fmax(fmin(options->width / 1.6, options->height) / 1000, 0.6), 4); }
 
 bool picture_page_open(PicturePage *page, const PictureOptions *options, int height, char *message, size_t capacity)
 {
@@ -185,7 +182,7 @@ void picture_page_scale_bar(PicturePage *page, double x, double y, double longes
 }
 
 void picture_page_color_bar(PicturePage *page, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
-                     const char *title)
+                            const char *title)
 {
     double s = page->scale, text_height;
     overlay_text_size(page->overlay, TEXT_SMALL, title, NULL, &text_height);

@@ -54,11 +54,11 @@ void picture_page_label(PicturePage *page, double x, double y, double anchor, Te
 void picture_page_scale_bar(PicturePage *page, double x, double y, double longest, double mm_per_pixel, Color color);
 // `map` over [low, high] with ticks at round values; `title` above it.
 void picture_page_color_bar(PicturePage *page, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
-                     const char *title);
+                            const char *title);
 
 // A panel of the surface, each vertex in the colour of its `error` (mesh->vertex_count) [mm], +-scale at the ends, NaN grey: discs that overlap, opaque.
-bool picture_page_error_surface(PicturePage *page, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
-                         int width, int height);
+bool picture_page_error_surface(PicturePage *page, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x,
+                                double y, int width, int height);
 
 // A round number at or above x for the end of a scale: 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8.
 double picture_page_scale_end(double x);

@@ -183,7 +183,7 @@ static void add_stretch(RunDrawing *drawing, int first, int last, bool is_open, 
         is_hollow |= drawing->lumen[i] > 0;
     if (is_hollow)
         primitives_pipe(&drawing->primitives, count, drawing->point + first, drawing->radius + first, drawing->lumen + first, drawing->color + first, inside,
-                    is_open ? &camera->back : NULL);
+                        is_open ? &camera->back : NULL);
     else
         primitives_tube(&drawing->primitives, count, drawing->point + first, drawing->radius + first, drawing->color + first);
 }
@@ -235,8 +235,7 @@ static void add_targets(RunDrawing *drawing, const Camera *camera)
     for (int i = 0; i < drawing->scene->target_count; i++) {
         const SceneTarget *target = &drawing->scene->target[i];
         primitives_circle(&drawing->primitives, target->point, camera->back, target->radius, line, TARGET_COLOR);
-        const Vec3 tilted[2] = {vec3_unit(vec3_add_scaled(camera->right, 0.35, camera->back)),
-                                vec3_unit(vec3_add_scaled(camera->up, 0.35, camera->back))};
+        const Vec3 tilted[2] = {vec3_unit(vec3_add_scaled(camera->right, 0.35, camera->back)), vec3_unit(vec3_add_scaled(camera->up, 0.35, camera->back))};
         for (int k = 0; k < 2; k++)
             primitives_circle(&drawing->primitives, target->point, tilted[k], target->radius, 0.6 * line, TARGET_COLOR);
     }
@@ -276,8 +275,7 @@ static void label_panel(RunDrawing *drawing, const Camera *camera, double x, dou
         double width, height, away = is_target ? drawing->scene->target[i].radius / camera->mm_per_pixel + 4 * s : 8 * s;
         overlay_text_size(page->overlay, TEXT_NORMAL, name, &width, &height);
         bool fits_right = p.x + away + width < camera->width - 4 * s;
-        double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s),
-               top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
+        double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s), top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
         picture_page_label(page, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : SHEET_MUTED, name);
     }
 }
@@ -341,7 +339,7 @@ static void force_bar(RunDrawing *drawing, double x, double y, double width)
 {
     bool milli = drawing->force_scale < 1;
     picture_page_color_bar(drawing->page, x, y, width, 14 * drawing->page->scale, color_sequential, 0, 0, drawing->force_scale * (milli ? 1000 : 1),
-                    milli ? "wall force on a node [mN]" : "wall force on a node [N]");
+                           milli ? "wall force on a node [mN]" : "wall force on a node [N]");
 }
 
 static void readings_text(char *text, size_t capacity, const PictureTool *tool)
@@ -379,7 +377,7 @@ static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x
     for (int i = 0; tool->force && i < tool->node_count; i++)
         touching += vec3_norm2(tool->force[i]) > 0;
     picture_page_text(page, x, y, TEXT_NORMAL, SHEET_INK, "largest %.3g %s, %d nodes touch the wall", largest < 1 ? 1000 * largest : largest,
-               largest < 1 ? "mN" : "N", touching);
+                      largest < 1 ? "mN" : "N", touching);
     Vec3 tip = tool->position[tool->node_count - 1];
     picture_page_text(page, x, y + line, TEXT_NORMAL, SHEET_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
     overlay_push_clip(page->overlay, x, y, width, page->height - y);
@@ -387,7 +385,7 @@ static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x
         const SceneTarget *target = &drawing->scene->target[i];
         double away = vec3_distance(tip, target->point);
         picture_page_text(page, x, y + (2 + i) * line, TEXT_NORMAL, TARGET_COLOR, "%s: %.1f mm from the tip%s", target->name, away,
-                   away <= target->radius ? ", reached" : "");
+                          away <= target->radius ? ", reached" : "");
     }
     overlay_pop_clip(page->overlay);
     return (2 + targets) * line;
@@ -468,7 +466,7 @@ static int emptiest_corner(const RunDrawing *drawing, const Camera *camera, cons
     for (int i = 0; i < drawing->frame_count + tool_nodes; i++) {
         bool is_tool = i >= drawing->frame_count;
         Vec3 p = camera_project(camera, is_tool ? tool->position[first_free(tool) + i - drawing->frame_count] : drawing->frame_point[i]);
-        bool left = p.x < side, right = p.x > camera->width - side, upper = p.y < side, lower = p.y > camera->height - side;
+        bool left = p.x<side, right = p.x> camera->width - side, upper = p.y<side, lower = p.y> camera->height - side;
         int weight = is_tool ? 50 : 1;
         hidden[0] += weight * (left && upper);
         hidden[1] += weight * (right && upper);
@@ -496,8 +494,7 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     overlay_push_clip(page->overlay, x, y, whole->width, header);
     if (tool->label)
         picture_page_text(page, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
-    picture_page_text(page, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s",
-               text);
+    picture_page_text(page, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s", text);
     overlay_pop_clip(page->overlay);
     double top = y + header;
     if (!draw_panel(drawing, whole, &drawing->style, tool, x, top))
@@ -622,14 +619,13 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
     return drawn;
 }
 
-bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message,
-                    size_t capacity)
+bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message, size_t capacity)
 {
     return draw(path, options, scene, 1, tool, true, message, capacity);
 }
 
-bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool,
-                        char *message, size_t capacity)
+bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool, char *message,
+                        size_t capacity)
 {
     return draw(path, options, scene, tool_count, tool, false, message, capacity);
 }

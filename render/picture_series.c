@@ -186,7 +186,8 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
     float(*point)[2] = malloc((4 * (size_t)count + 4) * sizeof *point);
     if (!point)
         drawn = message_fail(message, capacity, "not enough memory for a chart of %d samples", count);
-    Chart chart = {.x = left, .width = page.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = fmax(time_s[count - 1], time_s[0] + LEAST_SPAN)};
+    Chart chart = {
+        .x = left, .width = page.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = fmax(time_s[count - 1], time_s[0] + LEAST_SPAN)};
     if (!(chart.t1 > chart.t0))
         chart.t1 = chart.t0 + 1;
     for (int k = 0; drawn && k < panel_count; k++) {

@@ -25,8 +25,7 @@ static bool check_projections(int count, const PictureProjection *projection, in
         const PictureProjection *p = &projection[k];
         if (p->width < 1 || p->height < 1 || p->width > 16384 || p->height > 16384 || !p->value)
             return message_fail(message, capacity, "projection %d has %d x %d pixels; expected 1 to 16384 per side", k, p->width, p->height);
-        if (!vec3_is_finite(p->origin) || !vec3_is_finite(p->across) || !vec3_is_finite(p->up) || !(vec3_norm(p->across) > 0) ||
-            !(vec3_norm(p->up) > 0))
+        if (!vec3_is_finite(p->origin) || !vec3_is_finite(p->across) || !vec3_is_finite(p->up) || !(vec3_norm(p->across) > 0) || !(vec3_norm(p->up) > 0))
             return message_fail(message, capacity, "projection %d has no pixel size; expected steps above 0 mm", k);
     }
     for (int k = 0; k < polyline_count; k++)
@@ -116,8 +115,7 @@ static void draw_axes(PicturePage *page, const Panel *panel)
     for (int way = 0; way < 2; way++) {
         Vec3 step = way ? p->up : p->across;
         int pixels = way ? p->height : p->width;
-        double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size,
-               tick = tick_step(high - low, 6);
+        double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size, tick = tick_step(high - low, 6);
         for (double k = ceil(low / tick); k * tick <= high; k++) {
             char text[32];
             picture_page_format_tick(text, sizeof text, k * tick, tick);
@@ -145,8 +143,8 @@ static void draw_axes(PicturePage *page, const Panel *panel)
     }
 }
 
-static bool draw_projection(PicturePage *page, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline,
-                            int mark_count, const PictureMark *mark)
+static bool draw_projection(PicturePage *page, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline, int mark_count,
+                            const PictureMark *mark)
 {
     unsigned texture = upload(page, panel->image, low, high);
     int longest = 1;
@@ -228,7 +226,10 @@ static double lay_out(const PictureOptions *page, int count, const PictureProjec
     for (int first = 0; first < count; first += best_columns) {
         double x = left, tallest = 0;
         for (int k = first; k < count && k < first + best_columns; k++) {
-            panel[k] = (Panel){.image = &projection[k], .x = x, .y = y + head, .pixels_per_mm = best,
+            panel[k] = (Panel){.image = &projection[k],
+                               .x = x,
+                               .y = y + head,
+                               .pixels_per_mm = best,
                                .width = best * projection[k].width * vec3_norm(projection[k].across),
                                .height = best * projection[k].height * vec3_norm(projection[k].up)};
             x += panel[k].width + left + between;
@@ -241,8 +242,8 @@ static double lay_out(const PictureOptions *page, int count, const PictureProjec
 
 // `low`, `high`: values drawn black and white; equal (0, 0): from the images' percentiles.
 static bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
-                            float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
-                            size_t capacity)
+                                   float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
+                                   size_t capacity)
 {
     if (!check_projections(projection_count, projection, polyline_count, polyline, message, capacity))
         return false;
@@ -307,7 +308,8 @@ static bool cut_into_branches(const VesselTree *tree, Branches *branches)
     for (int i = 1; good && i < tree->node_count; i++) {
         if (cut->of_node[i] >= 0)
             continue;
-        branches->line[branches->count++] = (PicturePolyline){.count = 2, .point = branches->point + used, .radius = branches->radius + used, .color = SAC_COLOR};
+        branches->line[branches->count++] =
+            (PicturePolyline){.count = 2, .point = branches->point + used, .radius = branches->radius + used, .color = SAC_COLOR};
         branches->point[used] = tree->center[tree->parent[i]];
         branches->radius[used++] = tree->radius[i];
         branches->point[used] = tree->center[i];
@@ -328,8 +330,8 @@ static const char *axis_name(Vec3 step)
     return "oblique";
 }
 
-bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value,
-                     float low, float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity)
+bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low,
+                     float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity)
 {
     static const int plane[3][2] = {{0, 1}, {0, 2}, {1, 2}};
     PictureProjection projection[3];
@@ -375,8 +377,7 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
         mark = &root;
         mark_count = 1;
     }
-    drawn =
-        drawn && picture_of_projections(path, options, 3, projection, low, high, branches.count, branches.line, mark_count, mark, message, capacity);
+    drawn = drawn && picture_of_projections(path, options, 3, projection, low, high, branches.count, branches.line, mark_count, mark, message, capacity);
     for (int k = 0; k < 3; k++)
         free(image[k]);
     free_branches(&branches);

@@ -48,8 +48,7 @@ static bool reserve(Primitives *primitives, int vertices, int indices)
 static void add_vertex(Primitives *primitives, Vec3 p, Vec3 n, Color color)
 {
     Vec3 d = vec3_sub(p, primitives->origin);
-    primitives->vertex[primitives->vertex_count++] =
-        (PrimitiveVertex){{(float)d.x, (float)d.y, (float)d.z}, {(float)n.x, (float)n.y, (float)n.z}, color};
+    primitives->vertex[primitives->vertex_count++] = (PrimitiveVertex){{(float)d.x, (float)d.y, (float)d.z}, {(float)n.x, (float)n.y, (float)n.z}, color};
 }
 
 // A ring of vertices; `lean` tilts the normals along the tangent (cos and sin of the angle from the radial direction). With `join` it is
@@ -80,8 +79,7 @@ static void add_ring(Primitives *primitives, Vec3 center, Vec3 tangent, Vec3 nor
 static Vec3 spline(const Vec3 p[4], double t)
 {
     Vec3 result = {0, 0, 0};
-    const double w[4] = {(-t + 2 * t * t - t * t * t) / 2, (2 - 5 * t * t + 3 * t * t * t) / 2, (t + 4 * t * t - 3 * t * t * t) / 2,
-                         (-t * t + t * t * t) / 2};
+    const double w[4] = {(-t + 2 * t * t - t * t * t) / 2, (2 - 5 * t * t + 3 * t * t * t) / 2, (t + 4 * t * t - 3 * t * t * t) / 2, (-t * t + t * t * t) / 2};
     for (int k = 0; k < 4; k++)
         result = vec3_add_scaled(result, w[k], p[k]);
     return result;
@@ -157,7 +155,8 @@ static void sew(Primitives *primitives, uint32_t row, uint32_t next, uint32_t co
 }
 
 // An arc of vertices; normals along `facing`, or where that is zero away from the axis (`side` 1) or towards it (-1).
-static uint32_t add_arc(Primitives *primitives, Vec3 center, const Vec3 axis[2], double radius, const double angle[2], int sides, Vec3 facing, double side, Color color)
+static uint32_t add_arc(Primitives *primitives, Vec3 center, const Vec3 axis[2], double radius, const double angle[2], int sides, Vec3 facing, double side,
+                        Color color)
 {
     uint32_t first = (uint32_t)primitives->vertex_count;
     for (int k = 0; k <= sides; k++) {
@@ -169,7 +168,7 @@ static uint32_t add_arc(Primitives *primitives, Vec3 center, const Vec3 axis[2],
 }
 
 void primitives_pipe(Primitives *primitives, int count, const Vec3 *point, const double *radius, const double *lumen, const Color *color, Color inside,
-                 const Vec3 *open_towards)
+                     const Vec3 *open_towards)
 {
     int all = primitives->sides > 2 ? primitives->sides : USUAL_SIDES, sides = open_towards ? (all + 1) / 2 : all, rings = (count - 1) * SUBDIVISIONS + 1;
     uint32_t row = (uint32_t)sides + 1;
@@ -192,7 +191,8 @@ void primitives_pipe(Primitives *primitives, int count, const Vec3 *point, const
         const Vec3 axis[2] = {normal, vec3_cross(tangent, normal)}, none = {0, 0, 0};
         double out = radius[from] + t * (radius[from + 1] - radius[from]), in = lumen[from] + t * (lumen[from + 1] - lumen[from]);
         Color c = mix_color(color[from], color[from + 1], t);
-        PipeRing ring = {.outer = add_arc(primitives, x, axis, out, angle, sides, none, 1, c), .inner = add_arc(primitives, x, axis, in, angle, sides, none, -1, inside)};
+        PipeRing ring = {.outer = add_arc(primitives, x, axis, out, angle, sides, none, 1, c),
+                         .inner = add_arc(primitives, x, axis, in, angle, sides, none, -1, inside)};
         ring.cut = (uint32_t)primitives->vertex_count;
         for (int k = 0; k < 4 && open_towards; k++)          // first cut: outer, inner; second: inner, outer
             add_vertex(primitives, vec3_add_scaled(x, (k < 2 ? 1 : -1) * (k % 3 == 0 ? out : in), axis[1]), normal, c);

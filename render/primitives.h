@@ -31,7 +31,7 @@ void primitives_free(Primitives *primitives);   // a zeroed list is valid
 void primitives_tube(Primitives *primitives, int count, const Vec3 *point, const double *radius, const Color *color);
 // The same with a lumen and flat ends; the lumen's wall has the colour `inside`. With `open_towards` only the half away from that direction is drawn.
 void primitives_pipe(Primitives *primitives, int count, const Vec3 *point, const double *radius, const double *lumen, const Color *color, Color inside,
-                 const Vec3 *open_towards);
+                     const Vec3 *open_towards);
 // The tip of the head lies at `tip`.
 void primitives_arrow(Primitives *primitives, Vec3 tail, Vec3 tip, double radius, Color color);
 void primitives_sphere(Primitives *primitives, Vec3 center, double radius, Color color);

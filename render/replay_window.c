@@ -108,7 +108,8 @@ static const ScoreFigures *score_now(ReplayWindow *replay)
     int64_t different = rescore_first_different(replay->rescore);
     if (different >= 0 && !replay->has_told_difference) {
         replay->has_told_difference = true;
-        panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING, "simulated again, the recording gives another state: the score stops there");
+        panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING,
+                      "simulated again, the recording gives another state: the score stops there");
     }
     return rescore_at(replay->rescore, playback_time_s(replay->playback));
 }
@@ -116,8 +117,13 @@ static const ScoreFigures *score_now(ReplayWindow *replay)
 static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayout *layout)
 {
     const Pose *pose = playback_pose(replay->playback);
-    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(replay->playback), .filling = playback_filling(replay->playback),
-                        .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->controls.look, .scope_tool = replay->controls.grip.chosen + 1};
+    ViewsFrame frame = {.pose = pose,
+                        .xray = &pose->xray,
+                        .contrast = playback_contrast(replay->playback),
+                        .filling = playback_filling(replay->playback),
+                        .pulse = (uint32_t)playback_pulses(replay->playback)->count,
+                        .look = &replay->controls.look,
+                        .scope_tool = replay->controls.grip.chosen + 1};
     views_draw(replay->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
     PanelState *state = &replay->shown.state;

@@ -12,8 +12,8 @@
 static PatientAxes patient_of(const Scene *scene, const TriangleMesh *mesh)
 {
     if (vec3_norm(scene->patient_superior) > 0)
-        return (PatientAxes){.right = vec3_cross(scene->patient_anterior, scene->patient_superior), .anterior = scene->patient_anterior,
-                             .superior = scene->patient_superior};
+        return (PatientAxes){
+            .right = vec3_cross(scene->patient_anterior, scene->patient_superior), .anterior = scene->patient_anterior, .superior = scene->patient_superior};
     if (!mesh || (scene->source != SOURCE_SHAPE && scene->source != SOURCE_TUBE))
         return patient_axes_lps();
     Camera camera = {0};
@@ -45,7 +45,8 @@ static double contrast_rate(const VesselTree *tree)
     return fmax(1, fmin(20, 3 * radius * radius));
 }
 
-static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, OperatorControls *controls, char *note, size_t capacity, Faults *faults)
+static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, OperatorControls *controls, char *note, size_t capacity,
+                     Faults *faults)
 {
     if (!open->mesh && open->tree)
         open->mesh = isosurface_of_tree(open->tree, live_cell(open->tree));
@@ -64,7 +65,8 @@ static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const
         faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", note);
         return NULL;
     }
-    *controls = mesh ? controls_create(views_scene(views), scene->tool_count, mesh->vertex_count, mesh->vertex) : controls_create(views_scene(views), scene->tool_count, pose->node_count, pose->position);
+    *controls = mesh ? controls_create(views_scene(views), scene->tool_count, mesh->vertex_count, mesh->vertex)
+                     : controls_create(views_scene(views), scene->tool_count, pose->node_count, pose->position);
     controls->patient = options.patient;
     controls->xray.lao_deg = (float)scene->lao;
     controls->xray.cra_deg = (float)scene->cra;

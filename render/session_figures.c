@@ -198,8 +198,8 @@ static void widen(const RoadMap *map, Vec3 point, double margin, double box[4])
 static PatientAxes patient_of(const Scene *scene, const VesselTree *tree)
 {
     if (scene && vec3_norm(scene->patient_superior) > 0)
-        return (PatientAxes){.right = vec3_cross(scene->patient_anterior, scene->patient_superior), .anterior = scene->patient_anterior,
-                             .superior = scene->patient_superior};
+        return (PatientAxes){
+            .right = vec3_cross(scene->patient_anterior, scene->patient_superior), .anterior = scene->patient_anterior, .superior = scene->patient_superior};
     if (!scene || !tree || (scene->source != SOURCE_SHAPE && scene->source != SOURCE_TUBE))
         return patient_axes_lps();
     Camera camera = {0};
@@ -322,9 +322,10 @@ static void draw_marks(const SessionPage *page, const RoadMap *map)
         const SceneTarget *target = &page->scene->target[page->scene->exercise->target];
         double r = fmax(target->radius * map->mm, 4);
         place(map, target->point, &x, &y);
-        fprintf(out, "<g class=\"o2\"><circle class=\"mark\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/><path class=\"mark\" d=\"M%.1f %.1fh-6m%.1f 0h6\"/></g>"
-                     "<text class=\"label\" text-anchor=\"%s\" x=\"%.1f\" y=\"%.1f\">", x, y, r, x - r, y, 2 * r + 6,
-                x > 0.6 * VIEW_WIDTH ? "end" : "start", x > 0.6 * VIEW_WIDTH ? x - r - 9 : x + r + 9, y + 4);
+        fprintf(out,
+                "<g class=\"o2\"><circle class=\"mark\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/><path class=\"mark\" d=\"M%.1f %.1fh-6m%.1f 0h6\"/></g>"
+                "<text class=\"label\" text-anchor=\"%s\" x=\"%.1f\" y=\"%.1f\">",
+                x, y, r, x - r, y, 2 * r + 6, x > 0.6 * VIEW_WIDTH ? "end" : "start", x > 0.6 * VIEW_WIDTH ? x - r - 9 : x + r + 9, y + 4);
         page_text(out, target->name);
         fprintf(out, "</text>\n");
     }
@@ -389,9 +390,11 @@ void session_trend_figure(const SessionPage *page)
     if (count < 2)
         return;
     double step = count > 1 ? (double)(WIDTH - 20) / (count - 1) : 0;
-    fprintf(out, "<figure id=\"figure-trend\"><svg role=\"img\" aria-labelledby=\"trend-t trend-d\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\">\n"
-                 "<title id=\"trend-t\">Points over sessions</title><desc id=\"trend-d\">Points of %d sessions, from %.0f to %.0f.</desc>\n", WIDTH + LEFT + 16,
-            HEIGHT + TOP + 36, WIDTH + LEFT + 16, HEIGHT + TOP + 36, count, page->earlier[0].figures.points, page->earlier[count - 1].figures.points);
+    fprintf(out,
+            "<figure id=\"figure-trend\"><svg role=\"img\" aria-labelledby=\"trend-t trend-d\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\">\n"
+            "<title id=\"trend-t\">Points over sessions</title><desc id=\"trend-d\">Points of %d sessions, from %.0f to %.0f.</desc>\n",
+            WIDTH + LEFT + 16, HEIGHT + TOP + 36, WIDTH + LEFT + 16, HEIGHT + TOP + 36, count, page->earlier[0].figures.points,
+            page->earlier[count - 1].figures.points);
     for (int k = 0; k <= 4; k++)
         fprintf(out, "<path class=\"grid\" d=\"M%d %d h%d\"/><text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">%d</text>\n", LEFT,
                 TOP + HEIGHT - HEIGHT * k / 4, WIDTH, LEFT - 6, TOP + HEIGHT - HEIGHT * k / 4 + 4, 25 * k);

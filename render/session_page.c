@@ -19,8 +19,8 @@ static const char own_style[] =
     "tr.own{background:var(--panel);font-weight:600}td.mark-letter{color:var(--bad);font-weight:700}meter{width:7rem}\n"
     "@media print{body{font-size:10pt}section{break-inside:auto}figure{max-width:100%}}\n";
 
-static const char *const part_words[PART_COUNT] = {"Time",           "Fluoroscopy time",   "Contrast agent",
-                                                   "Path of the tip", "Largest wall force", "Wall force over time"};
+static const char *const part_words[PART_COUNT] = {
+    "Time", "Fluoroscopy time", "Contrast agent", "Path of the tip", "Largest wall force", "Wall force over time"};
 static const char *const part_unit[PART_COUNT] = {"s", "s", "ml", "times the straight distance", "N", "N s"};
 
 static void figures_of(const ScoreFigures *f, double figure[PART_COUNT])
@@ -100,10 +100,12 @@ static void print_figures(const SessionPage *page)
     FILE *out = page->out;
     const ScoreFigures *f = &page->session->figures;
     fprintf(out,
-            "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Path of the tip</dt><dd>%.0f mm; straight distance to the target %.0f mm; efficiency %.0f %%</dd>\n"
+            "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Path of the tip</dt><dd>%.0f mm; straight distance to the target %.0f mm; efficiency %.0f "
+            "%%</dd>\n"
             "<dt>%s</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
             "N (mean over 20 ms)</dd>\n",
-            f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n, f->wall_impulse_n_s, f->tip_force_peak_n);
+            f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n,
+            f->wall_impulse_n_s, f->tip_force_peak_n);
     if (f->has_xray)
         fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
                 (long long)f->pulses, f->dose_area_cm2, f->contrast_ml);
@@ -240,7 +242,9 @@ void session_page(const SessionPage *page)
     fprintf(out, "%s</section>\n<section id=\"path\"><h2>Path of the tip</h2>\n", page->run ? "" : "<p>The recording was not found.</p>");
     session_path_figure(page);
     fprintf(out, "%s</section>\n",
-            !page->run ? "<p>The recording was not found.</p>" : page->run->frame_count < 1 ? "<p>The recording is too long for it, or holds no pictures.</p>" : "");
+            !page->run                   ? "<p>The recording was not found.</p>"
+            : page->run->frame_count < 1 ? "<p>The recording is too long for it, or holds no pictures.</p>"
+                                         : "");
     print_figures(page);
     print_tools(page);
     print_earlier(page);

@@ -32,12 +32,11 @@ static const char *const LIGHT = "const vec3 key = vec3(-0.36, 0.55, 0.754), fil
                                  "float lit(vec3 n) { return 0.38 + 0.5 * max(dot(n, key), 0.0) + 0.17 * max(dot(n, fill), 0.0); }\n"
                                  "float shine(vec3 n, float p) { return pow(max(dot(n, normalize(key + vec3(0, 0, 1))), 0.0), p); }\n";
 
-static const char *const MESH_VERTEX =
-    "#version 330 core\n"
-    "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
-    "uniform mat4 clip; uniform mat3 eye; out vec3 n; out vec4 c; out float depth;\n"
-    "void main() { gl_Position = clip * vec4(position, 1.0); n = eye * normal; c = color;\n"
-    "  depth = 0.5 + 0.5 * gl_Position.z; }\n";
+static const char *const MESH_VERTEX = "#version 330 core\n"
+                                       "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
+                                       "uniform mat4 clip; uniform mat3 eye; out vec3 n; out vec4 c; out float depth;\n"
+                                       "void main() { gl_Position = clip * vec4(position, 1.0); n = eye * normal; c = color;\n"
+                                       "  depth = 0.5 + 0.5 * gl_Position.z; }\n";
 
 static const char *const SHELL_FRAGMENT =
     "in vec3 n; in vec4 c; in float depth; out vec4 result;\n"
@@ -62,11 +61,10 @@ static const char *const SOLID_FRAGMENT = "in vec3 n; in vec4 c; in float depth;
                                           "  vec3 k = c.rgb * (0.55 + 0.55 * lit(m)) + vec3(0.22 * shine(m, 30.0));\n"
                                           "  result = vec4(mix(k, haze, haze_amount * depth), 1.0); }\n";
 
-static const char *const POINT_VERTEX =
-    "#version 330 core\n"
-    "layout(location = 0) in vec3 position; layout(location = 2) in vec4 color; layout(location = 3) in float size;\n"
-    "uniform mat4 clip; out vec4 c;\n"
-    "void main() { gl_Position = clip * vec4(position, 1.0); gl_PointSize = size; c = color; }\n";
+static const char *const POINT_VERTEX = "#version 330 core\n"
+                                        "layout(location = 0) in vec3 position; layout(location = 2) in vec4 color; layout(location = 3) in float size;\n"
+                                        "uniform mat4 clip; out vec4 c;\n"
+                                        "void main() { gl_Position = clip * vec4(position, 1.0); gl_PointSize = size; c = color; }\n";
 
 static const char *const POINT_FRAGMENT = "in vec4 c; out vec4 result;\n"
                                           "void main() { vec2 p = 2.0 * gl_PointCoord - 1.0; float r = dot(p, p); if (r > 1.0) discard;\n"
@@ -74,14 +72,26 @@ static const char *const POINT_FRAGMENT = "in vec4 c; out vec4 result;\n"
 
 ShellStyle shell_style_glass(void)
 {
-    return (ShellStyle){.front = {0.90f, 0.66f, 0.62f}, .back = {0.86f, 0.60f, 0.57f}, .front_opacity = 0.22f, .back_opacity = 0.34f, .rim = 0.9f,
-                        .rim_power = 2.2f, .haze = {0.98f, 0.98f, 0.97f}, .haze_amount = 0.35f};
+    return (ShellStyle){.front = {0.90f, 0.66f, 0.62f},
+                        .back = {0.86f, 0.60f, 0.57f},
+                        .front_opacity = 0.22f,
+                        .back_opacity = 0.34f,
+                        .rim = 0.9f,
+                        .rim_power = 2.2f,
+                        .haze = {0.98f, 0.98f, 0.97f},
+                        .haze_amount = 0.35f};
 }
 
 ShellStyle shell_style_solid(void)
 {
-    return (ShellStyle){.front = {0.80f, 0.80f, 0.78f}, .back = {0.62f, 0.60f, 0.58f}, .front_opacity = 1, .back_opacity = 1, .rim = 1,
-                        .rim_power = 2, .haze = {0.98f, 0.98f, 0.97f}, .haze_amount = 0.35f};
+    return (ShellStyle){.front = {0.80f, 0.80f, 0.78f},
+                        .back = {0.62f, 0.60f, 0.58f},
+                        .front_opacity = 1,
+                        .back_opacity = 1,
+                        .rim = 1,
+                        .rim_power = 2,
+                        .haze = {0.98f, 0.98f, 0.97f},
+                        .haze_amount = 0.35f};
 }
 
 static unsigned make_program(const char *vertex, const char *fragment, char *message, size_t capacity)

@@ -124,8 +124,10 @@ static void offer_recovery(Trainer *trainer)
     Faults *faults = found.count > 0 ? calloc(1, sizeof *faults) : NULL;
     if (faults) {
         const char *slash = strrchr(found.path[found.count - 1], '/');
-        snprintf(text, sizeof text, found.count > 1 ? "%d sessions were interrupted, the last is %s. Their reports can still be made: the sessions are simulated again." :
-                 "%d session was interrupted: %s. Its report can still be made: the session is simulated again.", found.count, slash ? slash + 1 : "");
+        snprintf(text, sizeof text,
+                 found.count > 1 ? "%d sessions were interrupted, the last is %s. Their reports can still be made: the sessions are simulated again."
+                                 : "%d session was interrupted: %s. Its report can still be made: the session is simulated again.",
+                 found.count, slash ? slash + 1 : "");
         bool wanted = is_answered_yes(trainer, (PanelQuestion){"Recover interrupted sessions?", text, "Recover", "Not now"});
         trainer->progress = "Simulating the session again";
         for (int i = 0; wanted && i < found.count; i++) {
@@ -154,9 +156,18 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
         hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
     trainer->controls.grip = (HandGrip){.chosen = trainer->controls.grip.chosen};    // a new session: nothing is locked or released
     session_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
-    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .trainee = trainer->trainee, .date = trainer->date, .hand_count = count, .hand = hand, .grip = trainer->controls.grip, .xray = trainer->controls.xray,
-                                  .resume = resume, .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S, .paused = trainer->is_paused,
-                                  .progress = trainer->figures->frames > 0 ? show_progress : NULL, .progress_context = trainer};
+    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL,
+                                  .trainee = trainer->trainee,
+                                  .date = trainer->date,
+                                  .hand_count = count,
+                                  .hand = hand,
+                                  .grip = trainer->controls.grip,
+                                  .xray = trainer->controls.xray,
+                                  .resume = resume,
+                                  .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S,
+                                  .paused = trainer->is_paused,
+                                  .progress = trainer->figures->frames > 0 ? show_progress : NULL,
+                                  .progress_context = trainer};
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
         return false;
     trainer->controls.grip.released = trainer->session.resumed_released;
@@ -469,7 +480,10 @@ static void tell_exchanges(Trainer *trainer, const Pose *pose)
     for (int k = 0; k < pose->tool_count; k++) {
         const SceneTool *device = scene_device(trainer->scene, k, pose->tool[k].fitted);
         if (trainer->fitted[k] >= 0 && pose->tool[k].fitted != trainer->fitted[k])
-            say(trainer, MARK_GOOD, "%s is now: %s", trainer->scene->tool[k].name, device && device->title[0] ? device->title : pose->tool[k].fitted ? "the spare one" : "the first one");
+            say(trainer, MARK_GOOD, "%s is now: %s", trainer->scene->tool[k].name,
+                device && device->title[0] ? device->title
+                : pose->tool[k].fitted     ? "the spare one"
+                                           : "the first one");
         if (trainer->fitted[k] >= 0 && is_refused && grip->fitted[k] != pose->tool[k].fitted) {
             say(trainer, MARK_WARNING, "%s was not exchanged: %s", trainer->scene->tool[k].name, step_exchange_refusal(pose->refusal));
             grip->fitted[k] = pose->tool[k].fitted;
@@ -513,7 +527,8 @@ static bool restart(Trainer *trainer, Faults *faults)
     bool whole = end_session(trainer, faults);
     panel_forget_samples(trainer->panel);
     fluoroscope_forget(views_fluoroscope(trainer->views));
-    say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "a new session; the last one is saved" : "a new session; the last one could not be saved: %s", faults->text[0]);
+    say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "a new session; the last one is saved" : "a new session; the last one could not be saved: %s",
+        faults->text[0]);
     faults_clear(faults);
     trainer->is_paused = false;
     session_date(time(NULL), trainer->date);
@@ -538,8 +553,8 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
         say(trainer, MARK_GOOD, "bookmark %.0f", (double)trainer->controls.xray.bookmark);
     }
     if (actions->pressed[ACTION_SAVE])
-        say(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING, trainer->session.record_path[0] ? "recorded up to now in %s" : "this session is not recorded%s",
-            trainer->session.record_path);
+        say(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING,
+            trainer->session.record_path[0] ? "recorded up to now in %s" : "this session is not recorded%s", trainer->session.record_path);
     if (actions->pressed[ACTION_FULL_SCREEN] & 1)
         window_set_full_screen(trainer->window, !window_is_full_screen(trainer->window));
     if (actions->pressed[ACTION_SCREENSHOT])
@@ -606,8 +621,8 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     const LessonView *lesson = moment->extra;
     const Pose *pose = moment->pose;
     pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
-    ViewsFrame frame = {.pose = pose, .xray = xray,
-                        .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
+    ViewsFrame frame = {
+        .pose = pose, .xray = xray, .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
     trainer_cine_frame(&trainer->cine, passed_s, lesson->concentration, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
@@ -677,7 +692,8 @@ static void run_window(Trainer *trainer, Faults *faults)
         drive_by_pads(trainer);
         XrayControl xray = controls_xray(&trainer->controls, &actions, buttons_of_hands(trainer));
         realtime_set_xray(trainer->session.realtime, &xray);
-        goes_on = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) && !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
+        goes_on = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) &&
+                  !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
         if (!goes_on || !visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, trainer->controls.view, panel_has_panels(trainer->panel));
@@ -758,7 +774,12 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
         faults_add(faults, scene->path, 0, 0, "not enough memory for a session");
         return code;
     }
-    *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .keyboard = {[1] = {.drives = DRIVES_PARTNER}}, .begun_s = clock_s(CLOCK_MONOTONIC)};
+    *trainer = (Trainer){.options = options,
+                         .scene = scene,
+                         .open = open,
+                         .figures = figures,
+                         .keyboard = {[1] = {.drives = DRIVES_PARTNER}},
+                         .begun_s = clock_s(CLOCK_MONOTONIC)};
     for (int k = 0; k < scene->tool_count; k++)
         trainer->own_devices[k] = scene_device_count(scene, k);
     snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);

@@ -11,7 +11,8 @@ bool trainer_figures_write(const char *path, const TrainerFigures *figures, Faul
     cJSON_AddNumberToObject(out, "frames", (double)figures->frames);
     cJSON_AddNumberToObject(out, "frames_skipped", (double)figures->frames_skipped);
     static const char *const quantile[] = {"median", "p99", "max"}, *const step_quantile[] = {"median", "p999", "max"};
-    cJSON *frame = cJSON_AddObjectToObject(out, "frame_cpu_ms"), *step = cJSON_AddObjectToObject(out, "step_us"), *late = cJSON_AddObjectToObject(out, "late_us");
+    cJSON *frame = cJSON_AddObjectToObject(out, "frame_cpu_ms"), *step = cJSON_AddObjectToObject(out, "step_us"),
+          *late = cJSON_AddObjectToObject(out, "late_us");
     for (int i = 0; i < 3; i++) {
         cJSON_AddNumberToObject(frame, quantile[i], figures->frame_cpu_ms[i]);
         cJSON_AddNumberToObject(step, step_quantile[i], figures->step_us[i]);

@@ -14,8 +14,9 @@ static void name_device(TrainerPanel *panel, const Scene *scene, int k, int whic
     const WireOptions wire = scene_device_wire(scene, k, which);
     const WireSection *tip = wire.section_count ? &wire.section[wire.section_count - 1] : NULL;
     const char *title = scene_device(scene, k, which)->title;
-    snprintf(panel->tool[k], sizeof panel->tool[k], "%s%s%s %.2f mm x %.0f mm%s", title, title[0] ? ": " : "", tip && tip->inner_diameter > 0 ? "catheter" : "wire",
-             tip ? tip->diameter : 0, wire_length(&wire), tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+    snprintf(panel->tool[k], sizeof panel->tool[k], "%s%s%s %.2f mm x %.0f mm%s", title, title[0] ? ": " : "",
+             tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0, wire_length(&wire),
+             tip && tip->rest_curvature != 0 ? ", curved tip" : "");
     panel->fitted[k] = which;
 }
 
@@ -217,7 +218,8 @@ void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, 
     if (flow_ml_s < 0.01 * asked)
         snprintf(panel->warning, sizeof panel->warning, "Next to no contrast agent goes through %s: its lumen is full%s", name, way);
     else
-        snprintf(panel->warning, sizeof panel->warning, "The injector's pressure brings %.2g of %.2g ml/s through the lumen of %s%s", flow_ml_s, asked, name, way);
+        snprintf(panel->warning, sizeof panel->warning, "The injector's pressure brings %.2g of %.2g ml/s through the lumen of %s%s", flow_ml_s, asked, name,
+                 way);
     panel->state.warning = panel->warning;
 }
 

@@ -26,8 +26,8 @@ typedef struct TrainerPanel {
 // Scene, exercise, tool: constant data of a session.
 void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee);
 // Pose, score and controls of now. `figures` NULL: no real time (a recording).
-void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score,
-                        const RealtimeFigures *figures, const XrayControl *xray);
+void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score, const RealtimeFigures *figures,
+                        const XrayControl *xray);
 // Settings of the controls and the views; to be called after drawing them.
 void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, Views *views, const XrayControl *xray);
 // Actual flow of the requested contrast agent, and the tool (-1: none has a lumen); to be called after trainer_panel_views.

@@ -92,8 +92,11 @@ static void show_device(PanelTrayDevice *shown, const TrayDevice *device, char *
         snprintf(what, capacity, "wire, %s core, %s mm thick, %.0f mm long", tool_core_name[device->tool.core], outer, wire_length(wire));
     else
         snprintf(what, capacity, "%s, outside %s mm, lumen %s mm, %.0f mm long", kind[device->tool.kind], outer, inner, wire_length(wire));
-    *shown = (PanelTrayDevice){.name = device->title, .what = what, .can_be_shaped = is_wire && device->tool.core == CORE_STEEL,
-                                .remark = is_wire && device->tool.core == CORE_NITINOL ? "Nitinol springs back from a bend by hand: this tip cannot be shaped" : NULL};
+    *shown = (PanelTrayDevice){.name = device->title,
+                               .what = what,
+                               .can_be_shaped = is_wire && device->tool.core == CORE_STEEL,
+                               .remark =
+                                   is_wire && device->tool.core == CORE_NITINOL ? "Nitinol springs back from a bend by hand: this tip cannot be shaped" : NULL};
     draw_rest_shape(shown, wire);
     draw_stiffness(shown, wire);
 }
@@ -107,10 +110,7 @@ static double length_of(const Pose *pose, int tool)
 }
 
 // [mm] of a tool beyond the hub of the outermost one; of that itself beyond the sheath's mouth.
-static double beyond_hub(const Pose *pose, int tool)
-{
-    return pose->tool[tool].inserted_mm + (tool > 0 ? length_of(pose, 0) - pose->tool[0].inserted_mm : 0);
-}
+static double beyond_hub(const Pose *pose, int tool) { return pose->tool[tool].inserted_mm + (tool > 0 ? length_of(pose, 0) - pose->tool[0].inserted_mm : 0); }
 
 // NULL if the tool is withdrawn.
 static const char *why_still_in(char *text, const Scene *scene, const Pose *pose, int tool)
@@ -134,7 +134,8 @@ static const char *why_too_long_or_short(char *text, const Scene *scene, const P
         // over which the outermost one comes back to the mouth: from there on they are outside
         double outside = length_of(pose, m) - (tool > 0 ? beyond_hub(pose, m) : pose->tool[m].inserted_mm);
         if (outside < length) {
-            snprintf(text, TRAY_WORDS, "'%s' within is too short for it: %.0f mm of that are outside, this is %.0f mm long. An exchange over a wire takes a wire that long",
+            snprintf(text, TRAY_WORDS,
+                     "'%s' within is too short for it: %.0f mm of that are outside, this is %.0f mm long. An exchange over a wire takes a wire that long",
                      scene->tool[m].name, outside, length);
             return text;
         }
@@ -156,7 +157,8 @@ static const char *why_not(TrainerTray *tray, int index, const TrayDevice *devic
     if (!is_new && device->which == pose->tool[tool].fitted)
         return "it is the tool that you have now";
     if (is_new && scene_device_count(scene, tool) > EXCHANGES_MOST) {
-        snprintf(text, TRAY_WORDS, "a session has room for %d devices beside the first one of '%s'; the existing ones can be inserted again", EXCHANGES_MOST, scene->tool[tool].name);
+        snprintf(text, TRAY_WORDS, "a session has room for %d devices beside the first one of '%s'; the existing ones can be inserted again", EXCHANGES_MOST,
+                 scene->tool[tool].name);
         return text;
     }
     return why_too_long_or_short(text, scene, pose, tool, wire_length(&device->tool.wire));
@@ -197,7 +199,8 @@ TipShaping trainer_tray_tip(const TrainerTray *tray)
 
 static bool is_same_tip(const PanelTrayChoice *a, const PanelTrayChoice *b)
 {
-    return a->device == b->device && a->is_shaped == b->is_shaped && fabs(a->length_mm - b->length_mm) + fabs(a->angle_deg - b->angle_deg) + fabs(a->mandrel_mm - b->mandrel_mm) < 1e-9;
+    return a->device == b->device && a->is_shaped == b->is_shaped &&
+           fabs(a->length_mm - b->length_mm) + fabs(a->angle_deg - b->angle_deg) + fabs(a->mandrel_mm - b->mandrel_mm) < 1e-9;
 }
 
 // The chosen wire as set by the sliders; if it cannot keep that shape, unchanged, with the reason.
@@ -212,8 +215,8 @@ static void shape_chosen(TrainerTray *tray)
     const TipShaped *how = &tray->shaped.tool.tip_shaped;
     tray->shaped_shown.note = is_kept ? NULL : why;
     tray->shaped_shown.remark = is_kept ? tray->remark : NULL;
-    snprintf(tray->remark, sizeof tray->remark, "Bent by %.0f\u00b0 round the mandrel it springs back to %.0f\u00b0, with a radius of %.1f mm", how->bent_angle / per_degree,
-             tip.angle / per_degree, how->rest_radius);
+    snprintf(tray->remark, sizeof tray->remark, "Bent by %.0f\u00b0 round the mandrel it springs back to %.0f\u00b0, with a radius of %.1f mm",
+             how->bent_angle / per_degree, tip.angle / per_degree, how->rest_radius);
 }
 
 void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, const PanelTrayChoice *choice)

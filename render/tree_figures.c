@@ -100,8 +100,8 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     }
     Vec3 root = tree->center[0];
     fprintf(out, "<circle class=\"root\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>root</title></circle>\n", place_x(p, root), place_y(p, root));
-    fprintf(out, "<path class=\"axis\" d=\"M0 %.1f h%.1f m0 -4 v8 M0 %.1f v8\"/><text x=\"%.1f\" y=\"%.1f\">%g mm</text>\n</svg>\n", height + 18, bar * p->scale,
-            height + 14, bar * p->scale + 6, height + 22, bar);
+    fprintf(out, "<path class=\"axis\" d=\"M0 %.1f h%.1f m0 -4 v8 M0 %.1f v8\"/><text x=\"%.1f\" y=\"%.1f\">%g mm</text>\n</svg>\n", height + 18,
+            bar * p->scale, height + 14, bar * p->scale + 6, height + 22, bar);
     free(side);
 }
 
@@ -202,17 +202,22 @@ void tree_page_error_figure(const Report *report)
     for (int k = 0; k < BINS; k++)
         most = bin[k] > most ? bin[k] : most;
     Chart c = {.left = 48, .top = 26, .width = 560, .height = 180, .x_high = end, .y_high = 1.08 * most};
-    fprintf(out,
-            "<svg class=\"histogram\" role=\"img\" aria-labelledby=\"fit-t fit-d\" viewBox=\"0 0 624 250\" width=\"624\" height=\"250\">"
-            "<title id=\"fit-t\">Local models by their distance to the data</title><desc id=\"fit-d\">Histogram of d_a in voxels over %d local models: C1 %d, C2 "
-            "%d, C3 %d, C4 %d.</desc>\n",
-            tree->node_count, class_count[0], class_count[1], class_count[2], class_count[3]);
+    fprintf(
+        out,
+        "<svg class=\"histogram\" role=\"img\" aria-labelledby=\"fit-t fit-d\" viewBox=\"0 0 624 250\" width=\"624\" height=\"250\">"
+        "<title id=\"fit-t\">Local models by their distance to the data</title><desc id=\"fit-d\">Histogram of d_a in voxels over %d local models: C1 %d, C2 "
+        "%d, C3 %d, C4 %d.</desc>\n",
+        tree->node_count, class_count[0], class_count[1], class_count[2], class_count[3]);
     draw_axes(out, &c, 6, 5, "d_a [voxels]");
     for (int k = 0; k < BINS; k++) {
         double x = end * k / BINS;
         if (bin[k] > 0)
-            fprintf(out, "<rect class=\"c%d\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n", x < 0.5 ? 1 : x < 1 ? 2 : x < 2 ? 3 : 4, chart_x(&c, x) + 0.5,
-                    chart_y(&c, bin[k]), c.width / BINS - 1, c.top + c.height - chart_y(&c, bin[k]));
+            fprintf(out, "<rect class=\"c%d\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n",
+                    x < 0.5 ? 1
+                    : x < 1 ? 2
+                    : x < 2 ? 3
+                            : 4,
+                    chart_x(&c, x) + 0.5, chart_y(&c, bin[k]), c.width / BINS - 1, c.top + c.height - chart_y(&c, bin[k]));
     }
     for (int k = 0; k < 4; k++) {
         double x = k < 3 ? border[k] : end, low = k > 0 ? border[k - 1] : 0;

@@ -33,8 +33,8 @@ static void print_summary(const Report *report)
     item(report, "File", report->name);
     item(report, "Made from", report->info->source && *report->info->source ? report->info->source : "not said");
     item(report, "Made by", report->info->created_by && *report->info->created_by ? report->info->created_by : "not said");
-    fprintf(out, "<dt>Vessels</dt><dd>%d branches, %.0f mm of centreline, radius %.2f to %.2f mm; %d nodes, %lld points on the wall</dd>\n", report->branches->count,
-            length, report->branches->count > 0 ? least : 0, largest, tree->node_count, (long long)tree->point_count);
+    fprintf(out, "<dt>Vessels</dt><dd>%d branches, %.0f mm of centreline, radius %.2f to %.2f mm; %d nodes, %lld points on the wall</dd>\n",
+            report->branches->count, length, report->branches->count > 0 ? least : 0, largest, tree->node_count, (long long)tree->point_count);
     fprintf(out, "<dt>Candidates</dt><dd>%d narrow, %d wide, %d aneurysm%s</dd>\n", by_kind[FINDING_STENOSIS], by_kind[FINDING_DILATATION],
             by_kind[FINDING_ANEURYSM], by_kind[FINDING_ANEURYSM] == 1 ? "" : "s");
     if (vessel_tree_is_model(tree))
@@ -53,8 +53,9 @@ static void print_tree(const Report *report)
     fprintf(out, "<p class=\"key\">Order: ");
     for (int i = 1; i <= highest && i <= 6; i++)
         fprintf(out, "<span class=\"o%d\">%d%s</span>", i, i, i == 6 && highest > 6 ? " and more" : "");
-    fprintf(out, "</p>\n<figcaption>Projections along the three axes. Numbers are branches, the ring is the root; S narrow places, D wide places, A aneurysms. A "
-                 "branch continues at a fork through the wider child; what leaves it is one order higher.</figcaption></figure></section>\n");
+    fprintf(out,
+            "</p>\n<figcaption>Projections along the three axes. Numbers are branches, the ring is the root; S narrow places, D wide places, A aneurysms. A "
+            "branch continues at a fork through the wider child; what leaves it is one order higher.</figcaption></figure></section>\n");
 }
 
 static void print_finding(const Report *report, int index)
@@ -90,16 +91,20 @@ static void print_findings(const Report *report)
     if (report->finding_count == 0) {
         fprintf(out, "<p>None found.</p>\n");
     } else {
-        fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Mark</th><th scope=\"col\" class=\"words\">Kind</th><th scope=\"col\">Branch</th><th "
-                     "scope=\"col\">At [mm]</th><th scope=\"col\">x, y, z [mm]</th><th scope=\"col\">Radius [mm]</th><th scope=\"col\">Reference [mm]</th><th "
-                     "scope=\"col\" class=\"words\">Size</th></tr></thead><tbody>\n");
+        fprintf(
+            out,
+            "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Mark</th><th scope=\"col\" class=\"words\">Kind</th><th scope=\"col\">Branch</th><th "
+            "scope=\"col\">At [mm]</th><th scope=\"col\">x, y, z [mm]</th><th scope=\"col\">Radius [mm]</th><th scope=\"col\">Reference [mm]</th><th "
+            "scope=\"col\" class=\"words\">Size</th></tr></thead><tbody>\n");
         for (int i = 0; i < report->finding_count; i++)
             print_finding(report, i);
         fprintf(out, "</tbody></table></div>\n");
     }
     fprintf(out,
-            "<p>Found by rule, not by a reader. Narrow: radius below %.0f %% of the reference; wide: above %.0f %%. The reference is the mean of the median radii on "
-            "either side (2 to 8 branch radii away); within that of a branch’s ends, and where it leaves its parent, nothing is judged. Aneurysms are the nodes marked "
+            "<p>Found by rule, not by a reader. Narrow: radius below %.0f %% of the reference; wide: above %.0f %%. The reference is the mean of the median "
+            "radii on "
+            "either side (2 to 8 branch radii away); within that of a branch’s ends, and where it leaves its parent, nothing is judged. Aneurysms are the "
+            "nodes marked "
             "as such in the tree; the neck is the narrowest section between vessel and sac, given as the width of a circle of its area.</p></section>\n",
             100 * options.narrow, 100 * options.wide);
 }
@@ -108,9 +113,10 @@ static void print_branches(const Report *report)
 {
     FILE *out = report->out;
     const VesselBranches *all = report->branches;
-    fprintf(out, "<section id=\"branches\"><h2>Branches</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Branch</th><th scope=\"col\">Order</th><th "
-                 "scope=\"col\">Leaves</th><th scope=\"col\">Nodes</th><th scope=\"col\">Length [mm]</th><th scope=\"col\">Mean radius [mm]</th><th "
-                 "scope=\"col\">Least</th><th scope=\"col\">Largest</th><th scope=\"col\">Tortuosity</th></tr></thead><tbody>\n");
+    fprintf(out,
+            "<section id=\"branches\"><h2>Branches</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Branch</th><th scope=\"col\">Order</th><th "
+            "scope=\"col\">Leaves</th><th scope=\"col\">Nodes</th><th scope=\"col\">Length [mm]</th><th scope=\"col\">Mean radius [mm]</th><th "
+            "scope=\"col\">Least</th><th scope=\"col\">Largest</th><th scope=\"col\">Tortuosity</th></tr></thead><tbody>\n");
     for (int i = 0; i < all->count; i++) {
         const VesselBranch *b = &all->branch[i];
         fprintf(out, "<tr><th scope=\"row\">%d</th><td>%d</td><td>", i + 1, b->order);
@@ -156,9 +162,10 @@ static void print_worst(const Report *report)
             worst[k] = worst[k - 1];
         worst[at] = i;
     }
-    fprintf(out, "<div class=\"scroll\"><table><caption>Local models furthest from their data</caption><thead><tr><th scope=\"col\">Node</th><th "
-                 "scope=\"col\">Branch</th><th scope=\"col\">x, y, z [mm]</th><th scope=\"col\">Radius [mm]</th><th scope=\"col\">Blobs</th><th scope=\"col\">d_a "
-                 "[mm]</th><th scope=\"col\">d_a [voxels]</th></tr></thead><tbody>\n");
+    fprintf(out,
+            "<div class=\"scroll\"><table><caption>Local models furthest from their data</caption><thead><tr><th scope=\"col\">Node</th><th "
+            "scope=\"col\">Branch</th><th scope=\"col\">x, y, z [mm]</th><th scope=\"col\">Radius [mm]</th><th scope=\"col\">Blobs</th><th scope=\"col\">d_a "
+            "[mm]</th><th scope=\"col\">d_a [voxels]</th></tr></thead><tbody>\n");
     for (int k = 0; k < count; k++) {
         int i = worst[k], of = report->branches->of_node[i];
         Vec3 c = tree->center[i];
@@ -184,7 +191,8 @@ static void print_fit(const Report *report)
     fprintf(out, "<figure id=\"figure-fit\">\n");
     tree_page_error_figure(report);
     fprintf(out,
-            "<figcaption>d_a of a local model is the distance to it that 90 %% of its data points keep. Classes of Kerrien et al. 2017, Table 4: C1 under half a voxel, C2 "
+            "<figcaption>d_a of a local model is the distance to it that 90 %% of its data points keep. Classes of Kerrien et al. 2017, Table 4: C1 under half "
+            "a voxel, C2 "
             "under one, C3 under two, C4 beyond; voxel %g mm%s.</figcaption></figure>\n",
             report->voxel, report->voxel_is_known ? "" : " (assumed: the file does not say)");
     print_worst(report);
@@ -199,8 +207,11 @@ static void print_page(const Report *report)
                  "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\"/>\n"
                  "<title>Vessel report: ");
     page_text(out, report->name);
-    fprintf(out, "</title>\n<style>\n%s</style></head>\n<body><header><h1>Vessel %s report</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not "
-                 "a medical device:</strong> not for diagnosis or treatment. All values were measured automatically on a %s and have not been checked.</p></header>\n<main>\n",
+    fprintf(out,
+            "</title>\n<style>\n%s</style></head>\n<body><header><h1>Vessel %s report</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and "
+            "research. Not "
+            "a medical device:</strong> not for diagnosis or treatment. All values were measured automatically on a %s and have not been "
+            "checked.</p></header>\n<main>\n",
             page_style, model ? "model" : "tree", model ? "fitted model" : "tracked tree");
     print_summary(report);
     print_tree(report);

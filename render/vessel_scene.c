@@ -52,8 +52,7 @@ struct VesselScene {
 };
 
 static const Color TARGET_COLOR = {102, 190, 255, 255}, ARROW_COLOR = {120, 235, 200, 255}, SHEATH_COLOR = {150, 156, 166, 255},
-                   TOOL_COLOR = {196, 203, 214, 255},
-                   LUMEN_COLOR = {16, 18, 24, 255};
+                   TOOL_COLOR = {196, 203, 214, 255}, LUMEN_COLOR = {16, 18, 24, 255};
 static const double sheath_shown_mm = 12;
 
 Color vessel_scene_force_color(double force_n, double full_scale_n, Color without)
@@ -142,8 +141,7 @@ void vessel_scene_destroy(VesselScene *scene)
 
 VesselSceneLook vessel_scene_default_look(const VesselScene *scene)
 {
-    return (VesselSceneLook){.camera = scene->home, .show_model = true, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5,
-                             .font_scale = 1};
+    return (VesselSceneLook){.camera = scene->home, .show_model = true, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5, .font_scale = 1};
 }
 
 // --- camera ---
@@ -446,7 +444,11 @@ void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLo
 static VesselSceneLabel label_at(const VesselScene *scene, VesselSceneLabelKind kind, const char *name, Vec3 place, double radius)
 {
     Vec3 p = camera_project(&scene->projection, place);
-    return (VesselSceneLabel){.kind = kind, .name = name, .x = p.x, .y = p.y, .radius = radius,
+    return (VesselSceneLabel){.kind = kind,
+                              .name = name,
+                              .x = p.x,
+                              .y = p.y,
+                              .radius = radius,
                               .is_in_view = p.x >= 0 && p.y >= 0 && p.x <= scene->projection.width && p.y <= scene->projection.height};
 }
 

@@ -119,6 +119,13 @@ void free_camera_look_from(FreeCamera *camera, LookFrom from)
 
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth)
 {
-    return (Camera){.right = right_of(camera), .up = up_of(camera), .back = back_of(camera), .center = camera->focus,
-                    .mm_per_pixel = mm_per_pixel(camera, width, height), .near_depth = depth, .far_depth = -depth, .width = width, .height = height};
+    return (Camera){.right = right_of(camera),
+                    .up = up_of(camera),
+                    .back = back_of(camera),
+                    .center = camera->focus,
+                    .mm_per_pixel = mm_per_pixel(camera, width, height),
+                    .near_depth = depth,
+                    .far_depth = -depth,
+                    .width = width,
+                    .height = height};
 }

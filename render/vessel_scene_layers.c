@@ -35,12 +35,11 @@ struct VesselLayers {
     bool is_drawn;
 };
 
-static const char *const WALL_VERTEX =
-    "#version 330 core\n"
-    "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal;\n"
-    "uniform mat4 clip; uniform mat3 eye; uniform vec4 plane; out vec3 n; out float depth; out float cut;\n"
-    "void main() { vec4 p = clip * vec4(position, 1.0); gl_Position = p; n = eye * normal; depth = 0.5 + 0.5 * p.z;\n"
-    "  cut = plane.w - dot(plane.xyz, position); gl_ClipDistance[0] = cut; }\n";
+static const char *const WALL_VERTEX = "#version 330 core\n"
+                                       "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal;\n"
+                                       "uniform mat4 clip; uniform mat3 eye; uniform vec4 plane; out vec3 n; out float depth; out float cut;\n"
+                                       "void main() { vec4 p = clip * vec4(position, 1.0); gl_Position = p; n = eye * normal; depth = 0.5 + 0.5 * p.z;\n"
+                                       "  cut = plane.w - dot(plane.xyz, position); gl_ClipDistance[0] = cut; }\n";
 
 static const char *const WALL_FRAGMENT =
     "#version 330 core\n"
@@ -68,11 +67,10 @@ static const char *const SCREEN_VERTEX = "#version 330 core\n"
                                          "void main() { vec2 p = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;\n"
                                          "  gl_Position = vec4(p, 0.0, 1.0); }\n";
 
-static const char *const JOIN_FRAGMENT =
-    "#version 330 core\n"
-    "uniform sampler2D front, back; uniform vec3 background; out vec4 result;\n"
-    "void main() { ivec2 p = ivec2(gl_FragCoord.xy); vec4 f = texelFetch(front, p, 0), b = texelFetch(back, p, 0);\n"
-    "  result = vec4(f.rgb + (1.0 - f.a) * (b.rgb + (1.0 - b.a) * background), 1.0); }\n";
+static const char *const JOIN_FRAGMENT = "#version 330 core\n"
+                                         "uniform sampler2D front, back; uniform vec3 background; out vec4 result;\n"
+                                         "void main() { ivec2 p = ivec2(gl_FragCoord.xy); vec4 f = texelFetch(front, p, 0), b = texelFetch(back, p, 0);\n"
+                                         "  result = vec4(f.rgb + (1.0 - f.a) * (b.rgb + (1.0 - b.a) * background), 1.0); }\n";
 
 static const void *at_byte(size_t offset) { return (const void *)(uintptr_t)offset; }
 
@@ -277,8 +275,7 @@ static void draw_walls(const VesselLayers *layers, const LayersKey *key)
         }
         if (smooth) {
             glBindFramebuffer(GL_DRAW_FRAMEBUFFER, layers->layer[k].framebuffer);
-            glBlitFramebuffer(0, 0, layers->width, layers->height, 0, 0, layers->width, layers->height,
-                              GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+            glBlitFramebuffer(0, 0, layers->width, layers->height, 0, 0, layers->width, layers->height, GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT, GL_NEAREST);
         }
     }
     glDisable(GL_CLIP_DISTANCE0);

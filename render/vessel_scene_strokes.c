@@ -61,8 +61,11 @@ bool strokes_create(Strokes *strokes, char *message, size_t capacity)
         GLint size;
         GLenum type;
         size_t offset;
-    } field[5] = {{2, GL_FLOAT, offsetof(StrokeVertex, x)}, {4, GL_FLOAT, offsetof(StrokeVertex, across)}, {2, GL_FLOAT, offsetof(StrokeVertex, side)},
-                  {3, GL_FLOAT, offsetof(StrokeVertex, facing)}, {4, GL_UNSIGNED_BYTE, offsetof(StrokeVertex, color)}};
+    } field[5] = {{2, GL_FLOAT, offsetof(StrokeVertex, x)},
+                  {4, GL_FLOAT, offsetof(StrokeVertex, across)},
+                  {2, GL_FLOAT, offsetof(StrokeVertex, side)},
+                  {3, GL_FLOAT, offsetof(StrokeVertex, facing)},
+                  {4, GL_UNSIGNED_BYTE, offsetof(StrokeVertex, color)}};
     for (unsigned k = 0; k < 5; k++) {
         glEnableVertexAttribArray(k);
         glVertexAttribPointer(k, field[k].size, field[k].type, field[k].type == GL_UNSIGNED_BYTE, sizeof(StrokeVertex),
@@ -134,8 +137,8 @@ static StrokePoint project(const Camera *camera, Vec3 x, double half, Color colo
     // hairlines below a pixel stay a pixel wide and grow fainter
     double least = fmax(half, 0.5);
     Color faded = color_with_alpha(color, color.a / 255.0 * fmin(half / least, 1));
-    return (StrokePoint){.pixel = {p.x, camera->height - p.y, depth}, .eye = {p.x * camera->mm_per_pixel, -p.y * camera->mm_per_pixel, p.z},
-                         .half = least, .color = faded};
+    return (StrokePoint){
+        .pixel = {p.x, camera->height - p.y, depth}, .eye = {p.x * camera->mm_per_pixel, -p.y * camera->mm_per_pixel, p.z}, .half = least, .color = faded};
 }
 
 // Sides and facing normals from the pieces before and after each point.
@@ -169,9 +172,14 @@ static void orient_points(StrokePoint *point, int count)
 static StrokeVertex corner_of(const StrokePoint *p, double across, double past, const double along[2])
 {
     double out = across * p->stretch;
-    return (StrokeVertex){.x = (float)(p->pixel.x + out * p->side[0] + past * along[0]), .y = (float)(p->pixel.y + out * p->side[1] + past * along[1]),
-                          .across = (float)across, .past = (float)past, .half = (float)p->half, .depth = (float)p->pixel.z,
-                          .side = {(float)p->side[0], (float)p->side[1]}, .facing = {(float)p->facing.x, (float)p->facing.y, (float)p->facing.z},
+    return (StrokeVertex){.x = (float)(p->pixel.x + out * p->side[0] + past * along[0]),
+                          .y = (float)(p->pixel.y + out * p->side[1] + past * along[1]),
+                          .across = (float)across,
+                          .past = (float)past,
+                          .half = (float)p->half,
+                          .depth = (float)p->pixel.z,
+                          .side = {(float)p->side[0], (float)p->side[1]},
+                          .facing = {(float)p->facing.x, (float)p->facing.y, (float)p->facing.z},
                           .color = p->color};
 }
 
@@ -179,8 +187,8 @@ static void add_quad(Strokes *strokes, const StrokePoint *a, const StrokePoint *
 {
     double reach = fmax(a->half, b->half) + 1;
     const Camera *camera = &strokes->camera;
-    if (fmax(a->pixel.x, b->pixel.x) < -2 * reach || fmin(a->pixel.x, b->pixel.x) > camera->width + 2 * reach ||
-        fmax(a->pixel.y, b->pixel.y) < -2 * reach || fmin(a->pixel.y, b->pixel.y) > camera->height + 2 * reach)
+    if (fmax(a->pixel.x, b->pixel.x) < -2 * reach || fmin(a->pixel.x, b->pixel.x) > camera->width + 2 * reach || fmax(a->pixel.y, b->pixel.y) < -2 * reach ||
+        fmin(a->pixel.y, b->pixel.y) > camera->height + 2 * reach)
         return;
     if (!reserve_quads(strokes, 1))
         return;

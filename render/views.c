@@ -45,8 +45,14 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
     const TriangleMesh *mesh = fine ? fine : options->mesh;
     TriangleMesh *coarse = mesh ? mesh_decimate(mesh, COARSE_TRIANGLES, HUGE_VAL) : NULL;
     const Scene *scene = options->scene;
-    VesselSceneOptions shown = {.vessel = mesh, .coarse = coarse, .tree = options->tree, .tools = views ? &views->tools : NULL, .target_count = scene->target_count,
-                                .target = scene->target, .has_entry = scene->wire.has_sheath, .entry = scene->wire.start,
+    VesselSceneOptions shown = {.vessel = mesh,
+                                .coarse = coarse,
+                                .tree = options->tree,
+                                .tools = views ? &views->tools : NULL,
+                                .target_count = scene->target_count,
+                                .target = scene->target,
+                                .has_entry = scene->wire.has_sheath,
+                                .entry = scene->wire.start,
                                 .entry_direction = scene->wire.direction};
     if (!mesh) {
         shown.frame_count = options->pose->node_count;
@@ -82,7 +88,11 @@ void views_destroy(Views *views)
 static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port, bool is_cleared)
 {
     if (view == VIEW_FLUOROSCOPY) {
-        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .filling = frame->filling, .pulse = frame->pulse,
+        FluoroscopeFrame xray = {.pose = frame->pose,
+                                 .xray = *frame->xray,
+                                 .contrast = frame->contrast,
+                                 .filling = frame->filling,
+                                 .pulse = frame->pulse,
                                  .leaves_surroundings = is_cleared};
         fluoroscope_draw(views->fluoroscope, &xray, port);
     } else if (view == VIEW_3D) {

@@ -75,14 +75,30 @@ static void add_event(Window *w, WindowEvent event)
 // Letters by the user's layout, so that W A S D are where they are printed; everything else by its place.
 static int key_named(int key, int scancode)
 {
-    static const struct { int glfw, key; } special[] = {
-        {GLFW_KEY_UP, WINDOW_KEY_UP}, {GLFW_KEY_DOWN, WINDOW_KEY_DOWN}, {GLFW_KEY_LEFT, WINDOW_KEY_LEFT}, {GLFW_KEY_RIGHT, WINDOW_KEY_RIGHT},
-        {GLFW_KEY_PAGE_UP, WINDOW_KEY_PAGE_UP}, {GLFW_KEY_PAGE_DOWN, WINDOW_KEY_PAGE_DOWN}, {GLFW_KEY_HOME, WINDOW_KEY_HOME},
-        {GLFW_KEY_END, WINDOW_KEY_END}, {GLFW_KEY_INSERT, WINDOW_KEY_INSERT}, {GLFW_KEY_DELETE, WINDOW_KEY_DELETE},
-        {GLFW_KEY_BACKSPACE, WINDOW_KEY_BACKSPACE}, {GLFW_KEY_ENTER, WINDOW_KEY_ENTER}, {GLFW_KEY_KP_ENTER, WINDOW_KEY_ENTER},
-        {GLFW_KEY_TAB, WINDOW_KEY_TAB}, {GLFW_KEY_ESCAPE, WINDOW_KEY_ESCAPE}, {GLFW_KEY_LEFT_SHIFT, WINDOW_KEY_SHIFT},
-        {GLFW_KEY_RIGHT_SHIFT, WINDOW_KEY_SHIFT}, {GLFW_KEY_LEFT_CONTROL, WINDOW_KEY_CTRL}, {GLFW_KEY_RIGHT_CONTROL, WINDOW_KEY_CTRL},
-        {GLFW_KEY_LEFT_ALT, WINDOW_KEY_ALT}, {GLFW_KEY_KP_ADD, WINDOW_KEY_KEYPAD_ADD}, {GLFW_KEY_KP_SUBTRACT, WINDOW_KEY_KEYPAD_SUBTRACT}};
+    static const struct {
+        int glfw, key;
+    } special[] = {{GLFW_KEY_UP, WINDOW_KEY_UP},
+                   {GLFW_KEY_DOWN, WINDOW_KEY_DOWN},
+                   {GLFW_KEY_LEFT, WINDOW_KEY_LEFT},
+                   {GLFW_KEY_RIGHT, WINDOW_KEY_RIGHT},
+                   {GLFW_KEY_PAGE_UP, WINDOW_KEY_PAGE_UP},
+                   {GLFW_KEY_PAGE_DOWN, WINDOW_KEY_PAGE_DOWN},
+                   {GLFW_KEY_HOME, WINDOW_KEY_HOME},
+                   {GLFW_KEY_END, WINDOW_KEY_END},
+                   {GLFW_KEY_INSERT, WINDOW_KEY_INSERT},
+                   {GLFW_KEY_DELETE, WINDOW_KEY_DELETE},
+                   {GLFW_KEY_BACKSPACE, WINDOW_KEY_BACKSPACE},
+                   {GLFW_KEY_ENTER, WINDOW_KEY_ENTER},
+                   {GLFW_KEY_KP_ENTER, WINDOW_KEY_ENTER},
+                   {GLFW_KEY_TAB, WINDOW_KEY_TAB},
+                   {GLFW_KEY_ESCAPE, WINDOW_KEY_ESCAPE},
+                   {GLFW_KEY_LEFT_SHIFT, WINDOW_KEY_SHIFT},
+                   {GLFW_KEY_RIGHT_SHIFT, WINDOW_KEY_SHIFT},
+                   {GLFW_KEY_LEFT_CONTROL, WINDOW_KEY_CTRL},
+                   {GLFW_KEY_RIGHT_CONTROL, WINDOW_KEY_CTRL},
+                   {GLFW_KEY_LEFT_ALT, WINDOW_KEY_ALT},
+                   {GLFW_KEY_KP_ADD, WINDOW_KEY_KEYPAD_ADD},
+                   {GLFW_KEY_KP_SUBTRACT, WINDOW_KEY_KEYPAD_SUBTRACT}};
     for (size_t i = 0; i < sizeof special / sizeof special[0]; i++)
         if (special[i].glfw == key)
             return special[i].key;
@@ -132,8 +148,8 @@ static void on_character(GLFWwindow *window, unsigned character)
     Window *w = glfwGetWindowUserPointer(window);
     // GLFW tells the key before its character
     const WindowInput *input = &w->input;
-    bool is_repeat = input->event_count > 0 && input->event[input->event_count - 1].kind == WINDOW_KEY_DOWN_EVENT &&
-                     input->event[input->event_count - 1].is_repeat;
+    bool is_repeat =
+        input->event_count > 0 && input->event[input->event_count - 1].kind == WINDOW_KEY_DOWN_EVENT && input->event[input->event_count - 1].is_repeat;
     add_event(w, (WindowEvent){.kind = WINDOW_TEXT_EVENT, .character = character, .is_repeat = is_repeat});
 }
 

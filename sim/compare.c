@@ -274,8 +274,8 @@ PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, do
     if (missing > 0) {
         difference.differs = true;
         size_t used = strlen(difference.remark);
-        snprintf(difference.remark + used, sizeof difference.remark - used, "%s%d of %d golden rows have no counterpart, the first at %g s",
-                 used ? "; " : "", missing, golden->row_count, first_missing);
+        snprintf(difference.remark + used, sizeof difference.remark - used, "%s%d of %d golden rows have no counterpart, the first at %g s", used ? "; " : "",
+                 missing, golden->row_count, first_missing);
     }
     return difference;
 }

@@ -180,11 +180,16 @@ TriangleMesh *contact_surface_load(const char *path, double scale, NoteFunction 
         note(path, text);
     TriangleMesh *mesh = NULL;
     if (check.nonmanifold_edges.count)
-        faults_add(faults, path, 0, 0, "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be distinguished; an edge has "
-                   "one or two", check.nonmanifold_edges.count, check.nonmanifold_edges.first);
+        faults_add(faults, path, 0, 0,
+                   "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be distinguished; an edge has "
+                   "one or two",
+                   check.nonmanifold_edges.count, check.nonmanifold_edges.first);
     else if ((mesh = calloc(1, sizeof *mesh)) != NULL) {
-        *mesh = (TriangleMesh){.vertex_count = surface->vertex_count, .triangle_count = surface->triangle_count, .vertex = surface->vertex,
-                               .triangle = surface->triangle, .normal = calloc((size_t)surface->vertex_count, sizeof(Vec3)),
+        *mesh = (TriangleMesh){.vertex_count = surface->vertex_count,
+                               .triangle_count = surface->triangle_count,
+                               .vertex = surface->vertex,
+                               .triangle = surface->triangle,
+                               .normal = calloc((size_t)surface->vertex_count, sizeof(Vec3)),
                                .node = calloc((size_t)surface->vertex_count, sizeof(int))};
         surface->vertex = NULL;
         surface->triangle = NULL;

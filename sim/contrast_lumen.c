@@ -61,8 +61,11 @@ double lumen_annulus_share(double ratio)
 static bool make_bore(Bore *bore, const WireOptions *wire, int node_count, const double *s)
 {
     size_t count = (size_t)wire->section_count;
-    *bore = (Bore){.section_count = wire->section_count, .is_open = count > 0, .node_count = node_count,
-                   .end = calloc(3 * count + 1, sizeof *bore->end), .s = calloc((size_t)node_count + 1, sizeof *bore->s)};
+    *bore = (Bore){.section_count = wire->section_count,
+                   .is_open = count > 0,
+                   .node_count = node_count,
+                   .end = calloc(3 * count + 1, sizeof *bore->end),
+                   .s = calloc((size_t)node_count + 1, sizeof *bore->s)};
     if (!bore->end || !bore->s)
         return false;
     bore->outer = bore->end + count;

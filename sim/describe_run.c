@@ -5,10 +5,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-static void add_vector(cJSON *object, const char *name, Vec3 v)
-{
-    cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3));
-}
+static void add_vector(cJSON *object, const char *name, Vec3 v) { cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3)); }
 
 // When which device took a tool's place.
 static void add_recorded_exchanges(cJSON *tool, const RecordedRun *run, int index)

@@ -87,8 +87,8 @@ static void read_texts(const YamlMap *map, Exercise *exercise)
 
 static void read_rules(YamlValue value, ExerciseRules *rules)
 {
-    static const char *const keys[] = {"tip_force_n", "tip_length_mm", "wall_force_n", "wrong_branch_mm", "blind_mm", "contrast_ml",
-                                       "wire_behind_mm", "kick_mm_s", "buckling", NULL};
+    static const char *const keys[] = {"tip_force_n", "tip_length_mm",  "wall_force_n", "wrong_branch_mm", "blind_mm",
+                                       "contrast_ml", "wire_behind_mm", "kick_mm_s",    "buckling",        NULL};
     const NumberRange limit = {0, largest, false};
     YamlMap map = yaml_map(value, keys);
     yaml_map_number(&map, "tip_force_n", false, limit, &rules->tip_force_n);
@@ -105,8 +105,8 @@ static void read_rules(YamlValue value, ExerciseRules *rules)
 
 void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
 {
-    static const char *const keys[] = {"title", "instructions", "target", "tool",    "exchange",     "stays", "hold_s",
-                                       "time_limit_s", "rules", "par", "weights", "error_points", NULL};
+    static const char *const keys[] = {"title",        "instructions", "target", "tool",    "exchange",     "stays", "hold_s",
+                                       "time_limit_s", "rules",        "par",    "weights", "error_points", NULL};
     *exercise = exercise_default();
     YamlMap map = yaml_map(value, keys);
     if (!map.value.node)

@@ -77,8 +77,7 @@ static VesselTree *fit_shape(const Scene *scene, int threads, const Progress *pr
     // exact samples allow a tighter fit than an angiogram's
     options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
     options.threads = threads;
-    VesselTree *sampled =
-        shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
+    VesselTree *sampled = shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
     VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &options, progress, faults) : NULL;
     vessel_tree_free(sampled);
     return model;

@@ -113,9 +113,6 @@ void lesson_publish(void *context, void *out)
     contrast_injection_read(lesson->injection, view->concentration);
 }
 
-size_t lesson_view_bytes(const Lesson *lesson)
-{
-    return sizeof(LessonView) + (size_t)contrast_injection_node_count(lesson->injection) * sizeof(float);
-}
+size_t lesson_view_bytes(const Lesson *lesson) { return sizeof(LessonView) + (size_t)contrast_injection_node_count(lesson->injection) * sizeof(float); }
 
 const Score *lesson_score(const Lesson *lesson) { return lesson->score; }

@@ -37,7 +37,8 @@ static bool take_over(LiveSession *session, const LiveSessionOptions *options, F
     session->resumed_s = simulator_time_s(session->simulator);
     if (verdict.first_different < 0)
         return true;
-    faults_add(faults, session->scene->path, 0, 0, "the recording cannot be resumed: step %lld gives another state than the recorded one; see `seldinger replay --verify`",
+    faults_add(faults, session->scene->path, 0, 0,
+               "the recording cannot be resumed: step %lld gives another state than the recorded one; see `seldinger replay --verify`",
                (long long)verdict.first_different);
     return false;
 }

@@ -25,8 +25,10 @@ static bool open_tree(VesselTree *tree, ContactKind contact, const char *path, O
         return false;
     }
     if (contact_is_local(contact) && vessel_tree_is_shared(tree)) {
-        faults_add(faults, path, 0, 0, "holds one field of shared blobs, where contact '%s' needs a local model for each node; `seldinger fit --preset local` makes "
-                   "these, contact 'lim' takes either", contact_name[contact]);
+        faults_add(faults, path, 0, 0,
+                   "holds one field of shared blobs, where contact '%s' needs a local model for each node; `seldinger fit --preset local` makes "
+                   "these, contact 'lim' takes either",
+                   contact_name[contact]);
         return false;
     }
     LimVesselOptions local = lim_vessel_default_options();
@@ -79,8 +81,8 @@ static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *fa
     vessel_query(vessel, 1, &x, 1, &memory, &hit);
     if (!(hit.flags & VESSEL_OPEN_END) && hit.gap > 0)
         return true;
-    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside the mesh %s; put the sheath's entry into its lumen",
-               x.x, x.y, x.z, scene->mesh_path);
+    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside the mesh %s; put the sheath's entry into its lumen", x.x,
+               x.y, x.z, scene->mesh_path);
     return false;
 }
 
@@ -123,22 +125,27 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
     int before = faults->count;
     *out = (OpenVessel){0};
     bool as_mesh = scene->contact == CONTACT_MESH || scene->contact == CONTACT_SMOOTH_MESH || scene->contact == CONTACT_FLAT_MESH,
-          as_surface = as_mesh || scene->contact == CONTACT_GRID;
+         as_surface = as_mesh || scene->contact == CONTACT_GRID;
     bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
     const char *name = contact_name[scene->contact];
     if (scene->source == SOURCE_NONE)
         return true;
     if (scene->contact == CONTACT_TUBE && !exact)
-        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, mesh, smooth_mesh, "
+        faults_add(faults, scene->path, 0, 0,
+                   "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, mesh, smooth_mesh, "
                    "flat_mesh and grid, a mesh the last four");
     else if (contact_is_fitted(scene->contact) && scene->source == SOURCE_MESH)
-        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
-                   "flat_mesh and grid", name);
+        faults_add(faults, scene->path, 0, 0,
+                   "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
+                   "flat_mesh and grid",
+                   name);
     else if (as_surface && scene->source == SOURCE_PLANE)
         faults_add(faults, scene->path, 0, 0, "contact '%s' needs a bounded wall; use 'tube' for a plane, which is the exact plane", name);
     else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())
-        faults_add(faults, scene->path, 0, 0, "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
-                   "build again, or take another contact", name);
+        faults_add(faults, scene->path, 0, 0,
+                   "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
+                   "build again, or take another contact",
+                   name);
     return faults->count == before && open_source(scene, options, out, faults) &&
            (!as_surface || scene->source == SOURCE_MESH || turn_into_surface(scene, options, out, faults));
 }

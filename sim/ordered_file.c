@@ -473,7 +473,8 @@ static bool make_index(OrderedFile *file, Set *set, size_t bytes, haddr_t chunk)
         return false;
     for (size_t i = 0; i < WORD; i++)      // it may lie on a buffered page, whose copy must match
         if ((page = page_of(file, set->root_field + i)))
-            page->disk[(set->root_field + i) % ORDERED_FILE_PAGE] = page->wanted[(set->root_field + i) % ORDERED_FILE_PAGE] = (unsigned char)(set->root >> 8 * i);
+            page->disk[(set->root_field + i) % ORDERED_FILE_PAGE] = page->wanted[(set->root_field + i) % ORDERED_FILE_PAGE] =
+                (unsigned char)(set->root >> 8 * i);
     return page != NULL;
 }
 

@@ -125,7 +125,10 @@ void pose_fill_single_tool(Pose *pose)
     tool->push_n = pose->report.proximal_force;
     tool->torque_n_mm = pose->report.proximal_torque;
     for (int j = 0; j < pose->node_count; j++)
-        tool->node[j] = (ToolNode){.s = pose->node[j].s, .position = pose->position[j], .orientation = pose->quaternion[j], .radius = pose->node[j].radius,
+        tool->node[j] = (ToolNode){.s = pose->node[j].s,
+                                   .position = pose->position[j],
+                                   .orientation = pose->quaternion[j],
+                                   .radius = pose->node[j].radius,
                                    .carrier = j < pose->first_free_node ? -1 : 0};
 }
 
@@ -185,8 +188,11 @@ void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)
     pose->time_s = run->time_s[step];
     pose->command = commands.tool[0];
     pose->xray = run->xray ? run->xray[step] : xray_default_control();
-    pose->report = (StepReport){.flags = run->flags[step], .proximal_force = run->proximal[2 * step], .proximal_torque = run->proximal[2 * step + 1],
-                                .wall_force_max = run->wall_force[2 * step], .wall_force_sum = run->wall_force[2 * step + 1]};
+    pose->report = (StepReport){.flags = run->flags[step],
+                                .proximal_force = run->proximal[2 * step],
+                                .proximal_torque = run->proximal[2 * step + 1],
+                                .wall_force_max = run->wall_force[2 * step],
+                                .wall_force_sum = run->wall_force[2 * step + 1]};
     for (int k = 0; k < pose->tool_count; k++) {
         PoseTool *tool = &pose->tool[k];
         tool->command = commands.tool[k];
@@ -217,8 +223,11 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
     memcpy(pose->quaternion, at.quaternion, (size_t)at.node_count * sizeof *pose->quaternion);
     for (int i = 0; i < at.node_count; i++) {
         const float *force = at.force + 3 * i;
-        pose->node[i] = (NodeReport){.s = at.s[i], .radius = at.radius[i], .force = vec3((double)force[0], (double)force[1], (double)force[2]),
-                                     .gap = (double)at.gap[i], .vessel_node = at.vessel_node[i]};
+        pose->node[i] = (NodeReport){.s = at.s[i],
+                                     .radius = at.radius[i],
+                                     .force = vec3((double)force[0], (double)force[1], (double)force[2]),
+                                     .gap = (double)at.gap[i],
+                                     .vessel_node = at.vessel_node[i]};
     }
     for (int k = 0; k < pose->tool_count; k++) {
         pose->tool[k].inserted_mm = run->tool[k].inserted[row];

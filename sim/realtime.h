@@ -31,7 +31,12 @@ typedef struct RealtimeOptions {
 } RealtimeOptions;
 RealtimeOptions realtime_default_options(void);
 
-typedef enum { REALTIME_RUNNING, REALTIME_PAUSED, REALTIME_DIVERGED, REALTIME_UNRECORDED } RealtimeState;   // the last: the recording failed, and
+typedef enum {
+    REALTIME_RUNNING,
+    REALTIME_PAUSED,
+    REALTIME_DIVERGED,
+    REALTIME_UNRECORDED
+} RealtimeState; // the last: the recording failed, and
                                                                                                              // the session stopped with it
 typedef struct RealtimeFigures {
     RealtimeState state;

@@ -41,8 +41,8 @@ static double unit_of(const Reader *reader, const char *name)
 {
     static const struct {
         const char *leaf, *unit;
-    } known[] = {{"position", "motion_length_mm"}, {"gap_mm", "motion_length_mm"},    {"s_mm", "motion_length_mm"},
-                 {"quaternion", "motion_turn"},    {"force_n", "motion_force_n"}, {"radius_mm", "motion_radius_mm"}};
+    } known[] = {{"position", "motion_length_mm"}, {"gap_mm", "motion_length_mm"}, {"s_mm", "motion_length_mm"},
+                 {"quaternion", "motion_turn"},    {"force_n", "motion_force_n"},  {"radius_mm", "motion_radius_mm"}};
     const char *leaf = strrchr(name, '/') + 1;
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         if (!strcmp(leaf, known[i].leaf))
@@ -181,8 +181,8 @@ static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
     run->exchange = read_dataset(reader, "/exchange", HDF5_UINT8, 3, size);
     for (uint64_t i = 0; run->exchange && i < 2 * size[0] * size[1]; i++)
         if (run->exchange[i] > EXCHANGES_MOST) {
-            faults_add(reader->faults, reader->path, 0, 0, "/exchange names device %d in step %llu; expected 0 to %d", run->exchange[i], (unsigned long long)(i / size[1] / 2),
-                       EXCHANGES_MOST);
+            faults_add(reader->faults, reader->path, 0, 0, "/exchange names device %d in step %llu; expected 0 to %d", run->exchange[i],
+                       (unsigned long long)(i / size[1] / 2), EXCHANGES_MOST);
             break;
         }
     return (int64_t)size[0];
@@ -242,8 +242,8 @@ static XrayControl *read_xray(const Reader *reader, uint64_t *count)
         return (XrayControl *)value;
     XrayControl *xray = shape[1] == XRAY_VALUES_BEFORE_TOOLS ? calloc((size_t)shape[0] + 1, sizeof *xray) : NULL;
     if (!xray)
-        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; expected %d, or %d in older recordings", (unsigned long long)shape[1], XRAY_VALUES,
-                   XRAY_VALUES_BEFORE_TOOLS);
+        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; expected %d, or %d in older recordings", (unsigned long long)shape[1],
+                   XRAY_VALUES, XRAY_VALUES_BEFORE_TOOLS);
     for (uint64_t i = 0; xray && i < shape[0]; i++)
         memcpy(&xray[i], value + i * XRAY_VALUES_BEFORE_TOOLS, XRAY_VALUES_BEFORE_TOOLS * sizeof *value);
     free(value);
@@ -300,7 +300,8 @@ static int64_t read_nodes(const Reader *reader, uint64_t nodes, RecordedRun *run
     run->s = read_dataset(reader, "/wire/s_mm", HDF5_DOUBLE, 1, s);
     run->radius = read_dataset(reader, "/wire/radius_mm", HDF5_DOUBLE, 1, radius);
     if (run->s && run->radius && (radius[0] != nodes || s[0] != nodes))
-        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; expected equal numbers", (unsigned long long)nodes, (unsigned long long)radius[0]);
+        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; expected equal numbers", (unsigned long long)nodes,
+                   (unsigned long long)radius[0]);
     return INT64_MAX;
 }
 
@@ -321,11 +322,12 @@ static void check_numbers(const Reader *reader, const RecordedRun *run)
                     are_numbers(at.radius, at.node_count);
         for (int k = 0; good && run->frame_nodes && k < run->tool_count; k++) {
             RecordedToolFrame own = recorded_run_tool_frame(run, k, i);
-            good = are_numbers(&own.position->x, 3 * own.node_count) && are_numbers(&own.quaternion->w, 4 * own.node_count) && are_numbers(own.s, own.node_count) &&
-                   are_numbers(own.radius, own.node_count);
+            good = are_numbers(&own.position->x, 3 * own.node_count) && are_numbers(&own.quaternion->w, 4 * own.node_count) &&
+                   are_numbers(own.s, own.node_count) && are_numbers(own.radius, own.node_count);
         }
         if (!good) {
-            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has a node that is not a number; expected finite positions, rotations, lengths and radii", (long long)i);
+            faults_add(reader->faults, reader->path, 0, 0,
+                       "frame %lld has a node that is not a number; expected finite positions, rotations, lengths and radii", (long long)i);
             return;
         }
     }
@@ -336,7 +338,8 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
 {
     for (int64_t i = 0; i < run->frame_count; i++) {
         if (i ? run->frame_step[i] <= run->frame_step[i - 1] : run->frame_step[i] < 0) {
-            faults_add(reader->faults, reader->path, 0, 0, "frame %lld refers to step %lld; expected rising steps from 0", (long long)i, (long long)run->frame_step[i]);
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld refers to step %lld; expected rising steps from 0", (long long)i,
+                       (long long)run->frame_step[i]);
             return;
         }
         if (run->frame_nodes && (run->frame_nodes[i] < 2 || run->frame_nodes[i] > run->node_count)) {
@@ -411,8 +414,8 @@ static void check_times(const Reader *reader, const RecordedRun *run)
         double due = (i > 0 ? run->time_s[0] : dt) + (double)i * dt;
         bool is_due = i > 0 ? fabs(run->time_s[i] - due) < 0.01 * dt : run->time_s[0] > 0 && run->time_s[0] < MOST_TIME_S;
         if (!is_due) {
-            faults_add(reader->faults, reader->path, 0, 0, "/time_s holds %g s in row %lld; expected rows %g s apart, starting at %g s", run->time_s[i], (long long)i, dt,
-                       i > 0 ? run->time_s[0] : dt);
+            faults_add(reader->faults, reader->path, 0, 0, "/time_s holds %g s in row %lld; expected rows %g s apart, starting at %g s", run->time_s[i],
+                       (long long)i, dt, i > 0 ? run->time_s[0] : dt);
             return;
         }
     }
@@ -423,8 +426,9 @@ static void check_xray(const Reader *reader, const RecordedRun *run)
 {
     static const struct {
         float least, most;
-    } valid[XRAY_VALUES] = {{0, 1}, {0, 1000}, {-360, 360}, {-360, 360}, {0, 1e4F}, {-1e5F, 1e5F}, {-1e5F, 1e5F}, {-1e5F, 1e5F}, {0, 1}, {0, 1}, {0, 1}, {0, 1},
-                            {0, 1000}, {XRAY_LIVE, XRAY_ROADMAP}, {0, 1e9F}, {0, 1e9F}, {0, TOOLS_MOST}};
+    } valid[XRAY_VALUES] = {{0, 1},        {0, 1000}, {-360, 360},    {-360, 360}, {0, 1e4F}, {-1e5F, 1e5F}, {-1e5F, 1e5F},
+                            {-1e5F, 1e5F}, {0, 1},    {0, 1},         {0, 1},      {0, 1},    {0, 1000},     {XRAY_LIVE, XRAY_ROADMAP},
+                            {0, 1e9F},     {0, 1e9F}, {0, TOOLS_MOST}};
     for (int64_t i = 0; i < run->step_count; i++) {
         float value[XRAY_VALUES];
         memcpy(value, &run->xray[i], sizeof value);
@@ -591,8 +595,13 @@ RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame)
 {
     SEL_REQUIRE(frame >= 0 && frame < run->frame_count, "the frame is one of the run's");
     size_t nodes = (size_t)run->node_count, first = (size_t)frame * nodes;
-    RecordedFrame at = {.node_count = run->frame_nodes ? run->frame_nodes[frame] : run->node_count, .s = run->s, .radius = run->radius,
-                        .position = run->position + first, .quaternion = run->quaternion + first, .force = run->force + 3 * first, .gap = run->gap + first,
+    RecordedFrame at = {.node_count = run->frame_nodes ? run->frame_nodes[frame] : run->node_count,
+                        .s = run->s,
+                        .radius = run->radius,
+                        .position = run->position + first,
+                        .quaternion = run->quaternion + first,
+                        .force = run->force + 3 * first,
+                        .gap = run->gap + first,
                         .vessel_node = run->vessel_node + first};
     if (run->frame_nodes) {
         at.s += first;
@@ -613,6 +622,10 @@ RecordedToolFrame recorded_run_tool_frame(const RecordedRun *run, int tool, int6
     const RecordedTool *t = &run->tool[tool];
     int device = recorded_run_fitted(run, tool, run->frame_step[frame]);
     size_t profile = (size_t)device * (size_t)t->node_count, first = (size_t)frame * (size_t)t->node_count;
-    return (RecordedToolFrame){.node_count = t->device_nodes[device], .s = t->s + profile, .radius = t->radius + profile, .position = t->position + first,
-                               .quaternion = t->quaternion + first, .carrier = t->carrier + first};
+    return (RecordedToolFrame){.node_count = t->device_nodes[device],
+                               .s = t->s + profile,
+                               .radius = t->radius + profile,
+                               .position = t->position + first,
+                               .quaternion = t->quaternion + first,
+                               .carrier = t->carrier + first};
 }

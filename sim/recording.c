@@ -50,11 +50,15 @@ static const char *const tool_step_name[TOOL_STEP_COLUMNS] = {"command", "proxim
 // Per frame; from COUNT on only with several tools, then for each of them …
 enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, ONE_TOOL_COLUMNS, COUNT = ONE_TOOL_COLUMNS, ARC, RADIUS, FRAME_COLUMNS };
 enum { OWN_POSITION, OWN_QUATERNION, OWN_CARRIER, TOOL_FRAME_COLUMNS };      // … these
-enum { MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS + 1, MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS };
+enum {
+    MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS + 1,
+    MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS
+};
 
 static int step_column_of(int tool, int which)
 {
-    SEL_ASSERT(tool >= 0 && tool <= STEP_TOOLS_MAX && which >= 0 && which < TOOL_STEP_COLUMNS, "a tool has columns of its own, and what is exchanged stands behind all");
+    SEL_ASSERT(tool >= 0 && tool <= STEP_TOOLS_MAX && which >= 0 && which < TOOL_STEP_COLUMNS,
+               "a tool has columns of its own, and what is exchanged stands behind all");
     return tool == 0 ? which : STEP_COLUMNS + (tool - 1) * TOOL_STEP_COLUMNS + which;
 }
 
@@ -456,7 +460,8 @@ static bool create_datasets(Recording *recording)
     bool good = create_all(file, recording->step_column, steps);
     ordered_file_start_page(file);
     good = good && create_all(file, recording->frame_column, frames) && create_all(file, recording->motion_column, motions);
-    good = good && link_all(file, recording->step_column, steps) && link_all(file, recording->frame_column, frames) && link_all(file, recording->motion_column, motions);
+    good = good && link_all(file, recording->step_column, steps) && link_all(file, recording->frame_column, frames) &&
+           link_all(file, recording->motion_column, motions);
     for (int i = 0; good && has_several(recording) && i < TOOL_STEP_COLUMNS; i++) {
         char name[40];
         snprintf(name, sizeof name, "/tools/0/%s", tool_step_name[i]);
@@ -493,9 +498,10 @@ static bool create_groups(const Recording *recording, const char *above)
 static bool create_motion(const Recording *recording)
 {
     hid_t file = recording->file;
-    return recording->key_every == 0 || (create_group(file, "/motion") && create_groups(recording, "/motion") && write_number(file, "motion_ms", recording->options.pose_ms) &&
-                                         write_number(file, "motion_length_mm", length_grid_mm) && write_number(file, "motion_turn", turn_grid) &&
-                                         write_number(file, "motion_force_n", node_force_grid_n) && write_number(file, "motion_radius_mm", radius_grid_mm));
+    return recording->key_every == 0 ||
+           (create_group(file, "/motion") && create_groups(recording, "/motion") && write_number(file, "motion_ms", recording->options.pose_ms) &&
+            write_number(file, "motion_length_mm", length_grid_mm) && write_number(file, "motion_turn", turn_grid) &&
+            write_number(file, "motion_force_n", node_force_grid_n) && write_number(file, "motion_radius_mm", radius_grid_mm));
 }
 
 static bool build_file(Recording *recording, const Scene *scene)
@@ -506,7 +512,8 @@ static bool build_file(Recording *recording, const Scene *scene)
     bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 2) &&
                 write_text(file, "created_by", NULL, "seldinger " SELDINGER_VERSION) && write_number(file, "step_ms", scene->dt) &&
                 write_number(file, "frame_ms", recording->options.frame_ms);
-    return good && create_groups(recording, "") && create_motion(recording) && create_datasets(recording) && write_tools(recording, scene) && write_scene(recording, scene);
+    return good && create_groups(recording, "") && create_motion(recording) && create_datasets(recording) && write_tools(recording, scene) &&
+           write_scene(recording, scene);
 }
 
 // --- the writer's thread ---
@@ -566,10 +573,10 @@ static bool take_row(Recording *recording, Column *column, const unsigned char *
 // A value in units. NaN (the node does not exist) repeats the node before it, which compresses to nothing.
 static int32_t in_units(const Column *column, const unsigned char *row, size_t i, int32_t otherwise)
 {
-    double value = column->value_bytes == 1                 ? (double)((const int8_t *)row)[i]
-                   : column->grid == 0                      ? (double)((const int32_t *)(const void *)row)[i]
+    double value = column->value_bytes == 1                ? (double)((const int8_t *)row)[i]
+                   : column->grid == 0                     ? (double)((const int32_t *)(const void *)row)[i]
                    : column->value_bytes == sizeof(double) ? ((const double *)(const void *)row)[i] / column->grid
-                                                            : (double)((const float *)(const void *)row)[i] / column->grid;
+                                                           : (double)((const float *)(const void *)row)[i] / column->grid;
     return isnan(value) ? otherwise : (int32_t)fmax(-MOTION_MOST, fmin(MOTION_MOST, rint(value)));
 }
 
@@ -628,7 +635,8 @@ static void set_tail(Ring *ring, long long tail) { atomic_store_explicit(&ring->
 
 static bool drain(Recording *recording, long long steps, long long frames)
 {
-    SEL_REQUIRE(steps - atomic_load(&recording->steps.tail) <= STEP_RING && frames - atomic_load(&recording->frames.tail) <= FRAME_RING, "no row was overwritten before it was taken");
+    SEL_REQUIRE(steps - atomic_load(&recording->steps.tail) <= STEP_RING && frames - atomic_load(&recording->frames.tail) <= FRAME_RING,
+                "no row was overwritten before it was taken");
     bool good = true;
     for (long long i = atomic_load_explicit(&recording->steps.tail, memory_order_relaxed); good && i < steps; i++) {
         good = take_steps(recording, i);

@@ -46,7 +46,8 @@ bool recording_export_rows(const RecordedRun *run, const char *path, Faults *fau
         faults_add(faults, path, 0, 0, "cannot be written: out of memory");
         return false;
     }
-    fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s%s\n", several ? "tool," : "", several ? ",carrier" : "", run->exchange ? ",exchange" : "");
+    fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s%s\n", several ? "tool," : "", several ? ",carrier" : "",
+            run->exchange ? ",exchange" : "");
     for (int64_t k = 0; k < run->frame_count; k++)
         (several ? print_tool_rows : print_frame_rows)(text.stream, run, k);
     return output_text_write(&text, path, faults);

@@ -31,8 +31,8 @@ static bool save(const RecordedRun *run, const Scene *scene, const OpenVessel *o
         faults_add(faults, recording, 0, 0, "cannot be scored: step %lld gives another state than the recorded one; see `seldinger replay --verify`",
                    (long long)rescore_first_different(rescore));
     else
-        good = session_files_save(scene, run->trainee ? run->trainee : "", "not known: the session was interrupted",
-                                    date, rescore_score(rescore), recording, faults);
+        good = session_files_save(scene, run->trainee ? run->trainee : "", "not known: the session was interrupted", date, rescore_score(rescore), recording,
+                                  faults);
     rescore_free(rescore);
     return good;
 }

@@ -114,8 +114,8 @@ static void print_row(FILE *stream, const RecordedRun *run, double t_s, const To
 
 static bool is_same(const ToolCommands *a, const ToolCommands *b)
 {
-    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released && memcmp(a->fitted, b->fitted, sizeof a->fitted) == 0 && !(a->contrast_ml_s < b->contrast_ml_s) &&
-           !(a->contrast_ml_s > b->contrast_ml_s) && a->contrast_tool == b->contrast_tool;
+    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released && memcmp(a->fitted, b->fitted, sizeof a->fitted) == 0 &&
+           !(a->contrast_ml_s < b->contrast_ml_s) && !(a->contrast_ml_s > b->contrast_ml_s) && a->contrast_tool == b->contrast_tool;
 }
 
 char *replay_script(const RecordedRun *run, size_t *length)

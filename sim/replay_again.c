@@ -70,7 +70,9 @@ bool replay_is_of(const RecordedRun *run, const Scene *scene, const char *record
 {
     if (run->scene_text && !strcmp(run->scene_text, scene->text) && run->step_ms == scene->dt)
         return true;
-    faults_add(faults, recording, 0, 0, "is a recording of another scene than %s, of an older state of it, or with devices added from the tray; `seldinger replay` goes on from any (F5)",
-               scene->path);
+    faults_add(
+        faults, recording, 0, 0,
+        "is a recording of another scene than %s, of an older state of it, or with devices added from the tray; `seldinger replay` goes on from any (F5)",
+        scene->path);
     return false;
 }

@@ -52,13 +52,14 @@ static void add_times(cJSON *summary, const StepProfile *profile)
     }
 }
 
-static const char *const energy_name[] = {"hand", "load", "elastic", "kinetic", "friction", "damping", "numerical", "wall", "work", "gained", "gained_most_in_a_step",
-                                          "gained_most_at_s"};
+static const char *const energy_name[] = {
+    "hand", "load", "elastic", "kinetic", "friction", "damping", "numerical", "wall", "work", "gained", "gained_most_in_a_step", "gained_most_at_s"};
 
 static void add_energy(cJSON *summary, const EnergyBalance *e)
 {
     cJSON *energy = cJSON_AddObjectToObject(summary, "energy_mj");
-    double value[] = {e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->work, e->gained, e->gained_most, e->gained_at_s};
+    double value[] = {e->hand,      e->load, e->elastic, e->kinetic, e->friction,    e->damping,
+                      e->numerical, e->wall, e->work,    e->gained,  e->gained_most, e->gained_at_s};
     add_numbers(energy, (int)(sizeof value / sizeof *value), energy_name, value);
 }
 
@@ -148,14 +149,13 @@ static char *run_summary_json(Simulator *simulator, const DriveReport *drive, co
                 (const char *const[]){"iterations_median", "iterations_max", "not_converged_steps", "residual_max", "linearised_again_steps", "limited_steps",
                                       "model_disagrees_steps"},
                 (double[]){histogram_quantile(&profile->iterations, 0.5), (double)profile->iterations.largest, (double)totals->not_converged_steps,
-                           totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps,
-                           (double)totals->disagreeing_steps});
+                           totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps, (double)totals->disagreeing_steps});
     part = cJSON_AddObjectToObject(summary, "exchanges");
     add_numbers(part, 2, (const char *const[]){"done", "refused"}, (double[]){(double)totals->exchanges, (double)totals->refused_exchanges});
     part = cJSON_AddObjectToObject(summary, "proximal");
-    add_numbers(part, 6, (const char *const[]){"force_n", "torque_n_mm", "force_least_n", "force_most_n", "slip_steps", "slipped_mm"},
-                (double[]){last->proximal_force, last->proximal_torque, totals->push_least, totals->push_most, (double)totals->hand_slip_steps,
-                           totals->hand_slipped});
+    add_numbers(
+        part, 6, (const char *const[]){"force_n", "torque_n_mm", "force_least_n", "force_most_n", "slip_steps", "slipped_mm"},
+        (double[]){last->proximal_force, last->proximal_torque, totals->push_least, totals->push_most, (double)totals->hand_slip_steps, totals->hand_slipped});
     part = cJSON_AddObjectToObject(summary, "wall_force_n");
     add_numbers(part, 2, (const char *const[]){"max", "sum_final"}, (double[]){last->wall_force_max, last->wall_force_sum});
     add_vector(summary, "tip_mm", state->position[state->node_count - 1]);
@@ -195,8 +195,8 @@ static bool write_tools(FILE *stream, Simulator *simulator, const NodeReport *no
                     wall = node[c];
             Quat q = own[i].orientation;
             Vec3 x = own[i].position, f = wall.force;
-            fprintf(stream, "%s,%d,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%d,%s\n", scene->tool[k].name, i, own[i].s, x.x, x.y, x.z,
-                    q.w, q.x, q.y, q.z, f.x, f.y, f.z, wall.gap, wall.vessel_node, own[i].carrier < 0 ? "-" : scene->tool[own[i].carrier].name);
+            fprintf(stream, "%s,%d,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%d,%s\n", scene->tool[k].name, i, own[i].s, x.x, x.y,
+                    x.z, q.w, q.x, q.y, q.z, f.x, f.y, f.z, wall.gap, wall.vessel_node, own[i].carrier < 0 ? "-" : scene->tool[own[i].carrier].name);
         }
         free(own);
     }
@@ -222,8 +222,8 @@ static char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t 
     for (int i = 0; i < state->node_count; i++) {
         Vec3 x = state->position[i], force = node[i].force;
         Quat q = state->orientation[i];
-        fprintf(stream, "%d,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%d\n", i, node[i].s, x.x, x.y, x.z, q.w, q.x, q.y,
-                q.z, force.x, force.y, force.z, node[i].gap, node[i].vessel_node);
+        fprintf(stream, "%d,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%d\n", i, node[i].s, x.x, x.y, x.z, q.w, q.x, q.y, q.z,
+                force.x, force.y, force.z, node[i].gap, node[i].vessel_node);
     }
     if (fclose(stream) != 0) {
         free(text);
@@ -252,25 +252,27 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     for (int k = 0; scene->tool_count > 1 && k < scene->tool_count; k++)
         fprintf(out, "tool %s: %.2f mm inserted, push %.4f N, torque %.4f N mm\n", scene->tool[k].name, stepper_tool_inserted(simulator_stepper(simulator), k),
                 last->push[k], last->torque[k]);
-    fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active,
-            totals->contacts_max, last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
+    fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active, totals->contacts_max,
+            last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
     if (totals->self_contacts_max)
         fprintf(out, "the tool touches itself at %d places (at most %d), %.4f mm deep at most\n", last->self_contacts, totals->self_contacts_max,
                 totals->self_overlap_max);
-    fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64
-            " did not converge\n", totals->further_linearisations, totals->limited_steps, totals->not_converged_steps);
+    fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64 " did not converge\n",
+            totals->further_linearisations, totals->limited_steps, totals->not_converged_steps);
     if (totals->hand_slip_steps)
-        fprintf(out, "the hand slipped in %" PRId64 " steps, %.2f mm along the tool: it holds no more than %g N\n", totals->hand_slip_steps, totals->hand_slipped,
-                scene->wire.hand_limit);
+        fprintf(out, "the hand slipped in %" PRId64 " steps, %.2f mm along the tool: it holds no more than %g N\n", totals->hand_slip_steps,
+                totals->hand_slipped, scene->wire.hand_limit);
     if (totals->exchanges)
         fprintf(out, "%" PRId64 " tools were exchanged\n", totals->exchanges);
     if (totals->refused_exchanges)
         fprintf(out, "%" PRId64 " exchanges were refused, the last because %s\n", totals->refused_exchanges, step_exchange_refusal(totals->refusal));
     const EnergyBalance *e = simulator_energy(simulator);
     if (e->watched)
-        fprintf(out, "energy [mJ]: hand %.4g, loads %.4g = elastic %.4g, kinetic %.2g, friction %.4g, damping %.4g, numerical %.4g (the wall gave %.3g); single steps "
-                     "gained %.2g, at most %.2g at %.3f s\n", e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->gained,
-                e->gained_most, e->gained_at_s);
+        fprintf(
+            out,
+            "energy [mJ]: hand %.4g, loads %.4g = elastic %.4g, kinetic %.2g, friction %.4g, damping %.4g, numerical %.4g (the wall gave %.3g); single steps "
+            "gained %.2g, at most %.2g at %.3f s\n",
+            e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->gained, e->gained_most, e->gained_at_s);
     if (drive->deadline_misses)
         fprintf(out, "SLOWED: %" PRId64 " deadlines missed, the worst by %.2f ms; simulated time fell %.3f s behind real time\n", drive->deadline_misses,
                 drive->latest_s * 1000, drive->slowed_s);
@@ -296,8 +298,10 @@ void run_print_warnings(FILE *out, const Simulator *simulator, const DriveReport
     if (totals->flags & STEP_OUT_OF_VESSEL)
         fprintf(out, "%s: warning: the tool passed an open end of the vessel\n", path);
     if (totals->disagreeing_steps > 0)
-        fprintf(out, "%s: warning: in %lld of %lld steps two parts of the vessel's model put the wall at different places; "
-                        "fit the model again with this version\n", path, (long long)totals->disagreeing_steps, (long long)totals->steps);
+        fprintf(out,
+                "%s: warning: in %lld of %lld steps two parts of the vessel's model put the wall at different places; "
+                "fit the model again with this version\n",
+                path, (long long)totals->disagreeing_steps, (long long)totals->steps);
     const EnergyBalance *energy = simulator_energy(simulator);
     if (simulator_gains_energy(simulator))
         fprintf(out, "%s: warning: single steps gained %.3g mJ that nobody gave, of %.4g mJ of work (most: %.3g mJ at %.3f s)\n", path, energy->gained,

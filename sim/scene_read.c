@@ -336,8 +336,8 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
 {
     const NumberRange any = {-1e9, 1e9, false};
     if (yaml_is_list(item))
-        return yaml_count(item, 3, 3) == 3 && yaml_number(yaml_item(item, 0), any, &row->t_s) && yaml_number(yaml_item(item, 1), any, &row->command.push_mm_s) &&
-               yaml_number(yaml_item(item, 2), any, &row->command.twist_deg_s);
+        return yaml_count(item, 3, 3) == 3 && yaml_number(yaml_item(item, 0), any, &row->t_s) &&
+               yaml_number(yaml_item(item, 1), any, &row->command.push_mm_s) && yaml_number(yaml_item(item, 2), any, &row->command.twist_deg_s);
     YamlMap map = yaml_map(item, keys->key);
     bool good = yaml_map_number(&map, "t_s", true, any, &row->t_s);
     bool bare = yaml_map_number(&map, "push_mm_s", false, any, &row->command.push_mm_s);
@@ -347,7 +347,8 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
     for (int k = 0; k < tools; k++) {
         const char *const *key = keys->key + NAMED_KEYS + KEYS_OF_TOOL * k, *push = key[0], *twist = key[1];
         Command *command = script_row_command(row, k);
-        bool has_push = yaml_map_number(&map, push, false, any, &command->push_mm_s), has_twist = yaml_map_number(&map, twist, false, any, &command->twist_deg_s);
+        bool has_push = yaml_map_number(&map, push, false, any, &command->push_mm_s),
+             has_twist = yaml_map_number(&map, twist, false, any, &command->twist_deg_s);
         if (yaml_has(&map, push) != yaml_has(&map, twist))
             yaml_fault(item, "'%s' needs '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
         bool has_release = read_released(&map, key[2], k, row);
@@ -464,8 +465,8 @@ static void read_fluoroscopy(Reading *reading, YamlValue value)
 
 static void read_scene(Reading *reading)
 {
-    static const char *const keys[] = {"seldinger", "vessel", "wire", "tools", "sheath", "rig", "simulation", "script", "targets", "exercise", "fluoroscopy",
-                                       "verify", NULL};
+    static const char *const keys[] = {"seldinger", "vessel",  "wire",     "tools",       "sheath", "rig", "simulation",
+                                       "script",    "targets", "exercise", "fluoroscopy", "verify", NULL};
     YamlValue root = yaml_root(reading->reader);
     YamlMap map = yaml_map(root, keys);
     int version;

@@ -16,7 +16,8 @@
 // Of a catheter: polymer with 20 % by weight of barium sulphate, 1.24 g/cm3, at 60 keV 5.10 cm2/g of the salt and 0.20 of the polymer (NIST XCOM): 0.15 /mm.
 // With 30 % it is 0.23; tungsten and bismuth go higher.
 static const double catheter_attenuation = 0.15;
-static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // [1/mm], [1/mm], [mm]: chosen by appearance (docs/design.md, "X-ray attenuation")
+static const double wire_attenuation = 0.55, marker_attenuation = 1.2,
+                    marker_length = 3; // [1/mm], [1/mm], [mm]: chosen by appearance (docs/design.md, "X-ray attenuation")
 static const double hand_limit_n = 20;       // about the grip of two fingers
 static const double valve_n = 0.2;           // of a haemostatic valve that is open for a tool to slide: an assumption
 // A lumen lined with PTFE. Handbooks give PTFE on steel 0.04 to 0.1; of the wires that Schroeder measured (Cardiovasc Intervent Radiol 1993;16:93-97) a
@@ -44,9 +45,17 @@ static bool tool_number(const ToolSource *source, const char *key, NumberRange r
 
 static void read_section(YamlValue value, ToolKind kind, WireSection *section)
 {
-    static const char *const keys[] = {"length_mm",     "diameter_mm",          "inner_diameter_mm",        "young_modulus_gpa", "poisson_ratio",
-                                       "density_g_cm3", "rest_curvature_1_mm", "rest_curvature_plane_deg", "friction",
-                                       "attenuation_1_mm", NULL};
+    static const char *const keys[] = {"length_mm",
+                                       "diameter_mm",
+                                       "inner_diameter_mm",
+                                       "young_modulus_gpa",
+                                       "poisson_ratio",
+                                       "density_g_cm3",
+                                       "rest_curvature_1_mm",
+                                       "rest_curvature_plane_deg",
+                                       "friction",
+                                       "attenuation_1_mm",
+                                       NULL};
     YamlMap map = yaml_map(value, keys);
     double young = 0, density = 6.45, plane = 0;
     *section = (WireSection){.poisson_ratio = 0.3, .friction = -1, .attenuation = kind == TOOL_WIRE ? wire_attenuation : catheter_attenuation};
@@ -63,7 +72,8 @@ static void read_section(YamlValue value, ToolKind kind, WireSection *section)
     yaml_map_number(&map, "density_g_cm3", false, (NumberRange){0, 100, true}, &density);
     bool bent = yaml_map_number(&map, "rest_curvature_1_mm", false, (NumberRange){-10, 10, false}, &section->rest_curvature);
     if (bent && fabs(section->rest_curvature) * section->diameter / 2 >= 1)
-        yaml_fault(yaml_get(&map, "rest_curvature_1_mm", false), "a rest bend of radius %g mm is tighter than the tool's own radius %g mm; expected a curvature below %g 1/mm",
+        yaml_fault(yaml_get(&map, "rest_curvature_1_mm", false),
+                   "a rest bend of radius %g mm is tighter than the tool's own radius %g mm; expected a curvature below %g 1/mm",
                    1 / fabs(section->rest_curvature), section->diameter / 2, 2 / section->diameter);
     yaml_map_number(&map, "rest_curvature_plane_deg", false, (NumberRange){-36000, 36000, false}, &plane);
     yaml_map_number(&map, "friction", false, friction_range, &section->friction);
@@ -87,7 +97,8 @@ static void read_rest(Reading *reading, YamlValue list, SceneTool *tool, double 
     }
     for (int i = 0; piece && i < count; i++)
         if (scene_read_piece(yaml_item(list, i), &piece[i]) && piece[i].angle > 0 && piece[i].arc_radius < thickest)
-            yaml_fault(yaml_item(list, i), "an arc of radius %g mm is smaller than the tool's diameter, %g mm; use a larger radius", piece[i].arc_radius, thickest);
+            yaml_fault(yaml_item(list, i), "an arc of radius %g mm is smaller than the tool's diameter, %g mm; use a larger radius", piece[i].arc_radius,
+                       thickest);
     double length = piece ? rest_shape_length(piece, count) : 0;
     if (total > 0 && length > total + 0.01)
         yaml_fault(list, "'rest' is %g mm long, the %s %g mm; expected at most the tool's length (the rest of it stays straight)", length,
@@ -109,7 +120,8 @@ static bool read_length(YamlValue value, WireSection *first, double *total)
     if (!yaml_number(value, length_range, &wanted))
         return !value.node;
     if (wanted <= beyond) {
-        yaml_fault(value, "'%s' is %g, but the sections beyond the first are %g mm long; expected more than that, since it sets the first one's length", value.name, wanted, beyond);
+        yaml_fault(value, "'%s' is %g, but the sections beyond the first are %g mm long; expected more than that, since it sets the first one's length",
+                   value.name, wanted, beyond);
         return false;
     }
     first->length = wanted - beyond;
@@ -126,10 +138,12 @@ static void read_shaped_tip(YamlValue value, SceneTool *tool)
     TipShaping tip = {0};
     double angle = 0;
     char why[FAULT_LENGTH / 2];
-    bool good = yaml_map_number(&map, "length_mm", true, length_range, &tip.length) && yaml_map_number(&map, "angle_deg", true, (NumberRange){0, 360, true}, &angle) &&
+    bool good = yaml_map_number(&map, "length_mm", true, length_range, &tip.length) &&
+                yaml_map_number(&map, "angle_deg", true, (NumberRange){0, 360, true}, &angle) &&
                 yaml_map_number(&map, "mandrel_mm", true, (NumberRange){0, 100, true}, &tip.mandrel);
     if (tool->kind != TOOL_WIRE) {
-        yaml_fault(value, "'%s' of a %s; only a wire's tip can be shaped by hand; a catheter's shape is given by 'rest'", value.name, tool_kind_name[tool->kind]);
+        yaml_fault(value, "'%s' of a %s; only a wire's tip can be shaped by hand; a catheter's shape is given by 'rest'", value.name,
+                   tool_kind_name[tool->kind]);
         return;
     }
     if (tool->core == CORE_NITINOL) {
@@ -244,8 +258,8 @@ void scene_read_wire(Reading *reading, YamlValue value)
 
 static YamlMap device_map_of(YamlReader *reader)
 {
-    static const char *const keys[] = {"seldinger",  "title",         "kind",        "source", "uncertainty", "bending_n_mm2", "goes_through", "elements",
-                                       "core",       "sections",   "rest",          "shaped_tip", "damping",     "tip_marker", "hand_limit_n", "valve_n", "friction_inside", NULL};
+    static const char *const keys[] = {"seldinger", "title", "kind",       "source",  "uncertainty", "bending_n_mm2", "goes_through", "elements",        "core",
+                                       "sections",  "rest",  "shaped_tip", "damping", "tip_marker",  "hand_limit_n",  "valve_n",      "friction_inside", NULL};
     YamlValue root = yaml_root(reader);
     strcpy(root.name, "device");
     return yaml_map(root, keys);
@@ -269,7 +283,8 @@ static void check_device(const ToolSource *source, const SceneTool *tool, bool s
         return;
     double bending = wire_stiffness(&tool->wire.section[0]).bending;
     if (fabs(bending - quoted) > 0.01 * quoted)
-        yaml_fault(yaml_get(device, "bending_n_mm2", false), "'bending_n_mm2' is %g, but modulus and diameters of the first section give %.4g; expected agreement within 1 %%", quoted, bending);
+        yaml_fault(yaml_get(device, "bending_n_mm2", false),
+                   "'bending_n_mm2' is %g, but modulus and diameters of the first section give %.4g; expected agreement within 1 %%", quoted, bending);
 }
 
 static void read_name(Reading *reading, YamlValue value, int index)
@@ -284,7 +299,9 @@ static void read_name(Reading *reading, YamlValue value, int index)
     }
     for (const char *c = name; *c; c++)
         if (*c == '.' || *c == ',' || isspace((unsigned char)*c) || iscntrl((unsigned char)*c)) {
-            yaml_fault(value, "the tool's name '%s' has a dot, a comma or a space; scripts head their columns NAME.push_mm_s, so write 'guide_catheter', not 'guide catheter'",
+            yaml_fault(value,
+                       "the tool's name '%s' has a dot, a comma or a space; scripts head their columns NAME.push_mm_s, so write 'guide_catheter', not 'guide "
+                       "catheter'",
                        name);
             return;
         }
@@ -326,8 +343,8 @@ static void read_device(Reading *reading, ToolSource *source, SceneTool *tool, T
 
 static void read_exchange(Reading *reading, YamlValue list, int index)
 {
-    static const char *const keys[] = {"device", "title", "core", "length_mm", "friction_inside", "elements", "sections", "rest", "shaped_tip", "damping", "tip_marker", "hand_limit_n", "valve_n",
-                                       NULL};
+    static const char *const keys[] = {"device", "title",      "core",    "length_mm",  "friction_inside", "elements", "sections",
+                                       "rest",   "shaped_tip", "damping", "tip_marker", "hand_limit_n",    "valve_n",  NULL};
     Scene *scene = reading->scene;
     int count = list.node ? yaml_count(list, 1, EXCHANGES_MOST) : 0;
     for (int i = 0; i < count; i++) {
@@ -347,8 +364,8 @@ static void read_exchange(Reading *reading, YamlValue list, int index)
 
 static void read_entry(Reading *reading, YamlValue value, int index)
 {
-    static const char *const keys[] = {"name", "title", "kind", "device", "core", "length_mm", "inserted_mm", "friction_inside", "elements", "sections", "rest", "shaped_tip", "damping",
-                                       "tip_marker", "hand_limit_n", "valve_n", "exchange", NULL};
+    static const char *const keys[] = {"name",     "title", "kind",       "device",  "core",       "length_mm",    "inserted_mm", "friction_inside", "elements",
+                                       "sections", "rest",  "shaped_tip", "damping", "tip_marker", "hand_limit_n", "valve_n",     "exchange",        NULL};
     ToolReading *read = &reading->tool[index];
     ToolSource source = {.own = yaml_map(value, keys)};
     read->whole = value;
@@ -391,8 +408,8 @@ static void check_lumen(const ToolReading *read, const SceneTool *inner, const T
     for (int i = 0; i < outer->wire.section_count; i++)
         narrowest = fmin(narrowest, outer->wire.section[i].inner_diameter);
     if (narrowest <= 0)
-        yaml_fault(read->whole, "'%s' lies in '%s', which is solid; give each section of '%s' an 'inner_diameter_mm' above %g", inner_name, outer_name, outer_name,
-                   thickest);
+        yaml_fault(read->whole, "'%s' lies in '%s', which is solid; give each section of '%s' an 'inner_diameter_mm' above %g", inner_name, outer_name,
+                   outer_name, thickest);
     else if (thickest >= narrowest)
         yaml_fault(read->whole, "'%s' is up to %g mm thick, but the lumen of '%s' around it is only %g mm wide; expected a thinner tool, or a wider lumen",
                    inner_name, thickest, outer_name, narrowest);
@@ -407,10 +424,13 @@ static void check_hub(const ToolReading *read, const SceneTool *inner, const Too
         return;
     YamlValue place = read->inserted.node ? read->inserted : read->whole;
     if (read->length > behind)
-        yaml_fault(place, "'%s' is %g mm long with %g mm inserted, so its proximal end lies within '%s', which has %g mm outside; make it at least %g mm long or insert at most %g mm",
+        yaml_fault(place,
+                   "'%s' is %g mm long with %g mm inserted, so its proximal end lies within '%s', which has %g mm outside; make it at least %g mm long or "
+                   "insert at most %g mm",
                    inner_name, read->length, inner->wire.inserted, outer_name, behind, least, read->length - behind);
     else
-        yaml_fault(place, "'%s' is %g mm long, but '%s' around it has %g mm outside; make it at least %g mm long", inner_name, read->length, outer_name, behind, least);
+        yaml_fault(place, "'%s' is %g mm long, but '%s' around it has %g mm outside; make it at least %g mm long", inner_name, read->length, outer_name, behind,
+                   least);
 }
 
 // Each of them fits into all that may be around it, and around all that may be within.
@@ -418,7 +438,8 @@ static void check_exchanges(const Reading *reading)
 {
     const Scene *scene = reading->scene;
     if (scene->exchange_count > 0 && scene->tool_count == 1)
-        yaml_fault(reading->exchange[0].whole, "the scene has one tool; an exchange needs two or more, since a tool is exchanged over the one within it or inside the one around it");
+        yaml_fault(reading->exchange[0].whole,
+                   "the scene has one tool; an exchange needs two or more, since a tool is exchanged over the one within it or inside the one around it");
     for (int i = 0; i < scene->exchange_count; i++) {
         const SceneExchange *e = &scene->exchange[i];
         if (e->tool > 0)

@@ -6,11 +6,16 @@
 
 #include <stdlib.h>
 
-const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling", "blind", "contrast",
-                                                        "wire_lost",    "kick",      "tip_moved", NULL};
-const char *const score_error_words[ERROR_COUNT] = {"wrong branch",          "tip force above the limit", "wall force above the limit",
-                                                    "buckling at the sheath", "tool moved without X-rays", "too much contrast agent",
-                                                    "wire lost in the catheter", "tip jumped while its hand rested",
+const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling",  "blind",
+                                                       "contrast",     "wire_lost", "kick",       "tip_moved", NULL};
+const char *const score_error_words[ERROR_COUNT] = {"wrong branch",
+                                                    "tip force above the limit",
+                                                    "wall force above the limit",
+                                                    "buckling at the sheath",
+                                                    "tool moved without X-rays",
+                                                    "too much contrast agent",
+                                                    "wire lost in the catheter",
+                                                    "tip jumped while its hand rested",
                                                     "tip left the place that it should keep"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
@@ -297,7 +302,8 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
         if (k == 0)
             continue;
         // an exchangeable tool comes out on purpose; the error is advancing the tool around it without it
-        bool judged = rules->wire_behind_mm > 0 && (scene_device_count(score->scene, k) == 1 || tool->episode[ERROR_WIRE_LOST].is_on || commands->tool[k - 1].push_mm_s > 0);
+        bool judged = rules->wire_behind_mm > 0 &&
+                      (scene_device_count(score->scene, k) == 1 || tool->episode[ERROR_WIRE_LOST].is_on || commands->tool[k - 1].push_mm_s > 0);
         judge(score, ERROR_WIRE_LOST, k, own->spare_mm < tool->hub_limit || (judged && own->behind_mm > rules->wire_behind_mm),
               own->spare_mm > tool->hub_limit && !(judged && own->behind_mm > AGAIN * rules->wire_behind_mm), QUIET_MS, score->dt, now_s);
     }

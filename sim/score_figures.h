@@ -7,8 +7,18 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef enum { ERROR_WRONG_BRANCH, ERROR_TIP_FORCE, ERROR_WALL_FORCE, ERROR_BUCKLING, ERROR_BLIND, ERROR_CONTRAST, ERROR_WIRE_LOST,
-               ERROR_KICK, ERROR_TIP_MOVED, ERROR_COUNT } ScoreError;
+typedef enum {
+    ERROR_WRONG_BRANCH,
+    ERROR_TIP_FORCE,
+    ERROR_WALL_FORCE,
+    ERROR_BUCKLING,
+    ERROR_BLIND,
+    ERROR_CONTRAST,
+    ERROR_WIRE_LOST,
+    ERROR_KICK,
+    ERROR_TIP_MOVED,
+    ERROR_COUNT
+} ScoreError;
 extern const char *const score_error_name[ERROR_COUNT + 1];    // in files: "wrong_branch", "tip_force", …; NULL at the end
 extern const char *const score_error_words[ERROR_COUNT];       // on screens: "wrong branch", "tip force above the limit", …
 

@@ -12,7 +12,10 @@ static const struct Figure {
     double most;                 // from 0
     bool is_later;               // missing in older versions
 } figure_table[] = {
-#define FIGURE(name, most) {#name, offsetof(ScoreFigures, name), most, false}
+#define FIGURE(name, most)                                                                                                                                     \
+    {                                                                                                                                                          \
+#name, offsetof(ScoreFigures, name), most, false                                                                                                       \
+    }
     FIGURE(points, 100),
     FIGURE(start_s, 1e7),
     FIGURE(time_s, 1e7),
@@ -39,9 +42,16 @@ enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
 static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors", "tools"};
 // Of a tool. An episode still in progress is not written.
 static const struct Figure tool_table[] = {
-#define FIGURE(name, most) {#name, offsetof(ScoreToolFigures, name), most, false}
-    FIGURE(inserted_mm, 1e12), FIGURE(withdrawn_mm, 1e12), FIGURE(tip_force_peak_n, 1e12), FIGURE(kick_peak_mm_s, 1e12),
-    FIGURE(behind_mm, 1e9), FIGURE(spare_mm, 1e9),
+#define FIGURE(name, most)                                                                                                                                     \
+    {                                                                                                                                                          \
+#name, offsetof(ScoreToolFigures, name), most, false                                                                                                   \
+    }
+    FIGURE(inserted_mm, 1e12),
+    FIGURE(withdrawn_mm, 1e12),
+    FIGURE(tip_force_peak_n, 1e12),
+    FIGURE(kick_peak_mm_s, 1e12),
+    FIGURE(behind_mm, 1e9),
+    FIGURE(spare_mm, 1e9),
     {"strayed_mm", offsetof(ScoreToolFigures, strayed_mm), 1e9, true},
 #undef FIGURE
 };
@@ -238,5 +248,6 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
         sum += f->error[i].count;
     }
     if (sum != f->error_total)
-        faults_add(reading->faults, reading->file, 0, 0, "'score.error_total' is %d; expected %lld, the sum of the error counts", f->error_total, (long long)sum);
+        faults_add(reading->faults, reading->file, 0, 0, "'score.error_total' is %d; expected %lld, the sum of the error counts", f->error_total,
+                   (long long)sum);
 }

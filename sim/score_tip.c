@@ -24,8 +24,15 @@ static bool find_element(ScoreTip *tip, const WireOptions *options, double tip_l
         if (wire.total_length - wire.s[i] > tip_length) {
             tip->element = i;
             tip->s = wire.s[i];
-            tip->rest = (BeamInput){.length = r.length[i], .extend = r.extend[i], .axial = r.axial[i], .near = r.near[i], .far = r.far[i],
-                                    .twist = r.twist[i], .half_w = r.half_w[i], .half_y = r.half_y[i], .half_z = r.half_z[i]};
+            tip->rest = (BeamInput){.length = r.length[i],
+                                    .extend = r.extend[i],
+                                    .axial = r.axial[i],
+                                    .near = r.near[i],
+                                    .far = r.far[i],
+                                    .twist = r.twist[i],
+                                    .half_w = r.half_w[i],
+                                    .half_y = r.half_y[i],
+                                    .half_z = r.half_z[i]};
         }
     }
     free(scratch);

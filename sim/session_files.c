@@ -34,7 +34,7 @@ static bool make_folders(char *path)
 bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
 {
     const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
-    int length = wanted         ? snprintf(out, capacity, "%s", wanted)
+    int length = wanted          ? snprintf(out, capacity, "%s", wanted)
                  : data && *data ? snprintf(out, capacity, "%s/seldinger/sessions", data)
                  : home && *home ? snprintf(out, capacity, "%s/.local/share/seldinger/sessions", home)
                                  : snprintf(out, capacity, "sessions");
@@ -69,7 +69,7 @@ void session_file_beside(const char *recording, const char *extension, char *out
 }
 
 bool session_files_save(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
-                          Faults *faults)
+                        Faults *faults)
 {
     char path[4096];
     const char *name = strrchr(recording, '/');

@@ -13,7 +13,7 @@ void session_file_name(const char *folder, const char *scene_path, const char *e
 void session_file_beside(const char *recording, const char *extension, char *out, size_t capacity);
 // Writes the session file beside a recording that is closed. False with faults.
 bool session_files_save(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
-                          Faults *faults);
+                        Faults *faults);
 
 typedef struct CutOff {
     int count;

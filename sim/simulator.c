@@ -9,9 +9,8 @@
 #include <time.h>
 
 const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "judge", "correct"};
-const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",        "not_converged", "deep",            "fully_inserted",
-                                                     "fully_withdrawn", "out_of_vessel", "detection_unsure", "limited",
-                                                     "model_disagrees", "hand_slips"};
+const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",      "not_converged",    "deep",    "fully_inserted",  "fully_withdrawn",
+                                                     "out_of_vessel", "detection_unsure", "limited", "model_disagrees", "hand_slips"};
 
 struct Simulator {
     const Scene *scene;
@@ -49,10 +48,16 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
     if (simulator)
         simulator->target = calloc((size_t)scene->target_count + 1, sizeof *simulator->target);
     if (simulator && simulator->target) {
-        StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options, .self_contact = scene->self_contact, .follows_touch = scene->follows_touch,
+        StepperOptions options = {.wire = scene->wire,
+                                  .vessel = vessel,
+                                  .wall_friction = scene->friction,
+                                  .contact = scene->contact_options,
+                                  .self_contact = scene->self_contact,
+                                  .follows_touch = scene->follows_touch,
                                   .dt = scene->dt};
         WireOptions inner[TOOLS_MOST];
-        SEL_REQUIRE(scene->tool_count <= TOOLS_MOST && scene->exchange_count <= TOOLS_MOST * EXCHANGES_MOST, "a scene was checked for its number of tools and devices");
+        SEL_REQUIRE(scene->tool_count <= TOOLS_MOST && scene->exchange_count <= TOOLS_MOST * EXCHANGES_MOST,
+                    "a scene was checked for its number of tools and devices");
         for (int k = 1; k < scene->tool_count; k++)
             inner[k - 1] = scene_tool_wire(scene, k), options.inner_friction[k - 1] = scene->tool[k - 1].friction_inside;
         options.inner_count = scene->tool_count > 1 ? scene->tool_count - 1 : 0;
@@ -194,10 +199,7 @@ static void accumulate(Simulator *simulator)
     measure_targets(simulator);
 }
 
-void simulator_step(Simulator *simulator, Command command)
-{
-    simulator_step_tools(simulator, &(ToolCommands){.tool = {command}});
-}
+void simulator_step(Simulator *simulator, Command command) { simulator_step_tools(simulator, &(ToolCommands){.tool = {command}}); }
 
 // A refused exchange is not retried until the command changes.
 static void exchange(Simulator *simulator, const ToolCommands *commands)

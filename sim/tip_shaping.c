@@ -54,7 +54,8 @@ static void append(WireSection *out, int *count, const WireSection *section, dou
 }
 
 // The section from `begin` on, which lies within the part that is shaped: bent until the angle is reached, then straight.
-static void shape_section(WireSection *out, int *count, const WireSection *section, double length, const TipShaping *shaping, double *angle_left, TipShaped *shaped)
+static void shape_section(WireSection *out, int *count, const WireSection *section, double length, const TipShaping *shaping, double *angle_left,
+                          TipShaped *shaped)
 {
     double bent = 1 / (shaping->mandrel + section->diameter / 2), kept = tip_kept_curvature(bent, tip_core_diameter(section));
     double arc = *angle_left <= 0 ? 0 : kept > 0 ? fmin(length, *angle_left / kept) : length;
@@ -67,7 +68,8 @@ static void shape_section(WireSection *out, int *count, const WireSection *secti
         shaped->rest_radius = 1 / kept;
 }
 
-WireSection *tip_shaped_sections(const WireSection *section, int count, const TipShaping *shaping, int *shaped_count, TipShaped *shaped, char *why, size_t capacity)
+WireSection *tip_shaped_sections(const WireSection *section, int count, const TipShaping *shaping, int *shaped_count, TipShaped *shaped, char *why,
+                                 size_t capacity)
 {
     double total = 0, begin = 0, angle_left = shaping->angle;
     for (int i = 0; i < count; i++)
@@ -99,7 +101,8 @@ WireSection *tip_shaped_sections(const WireSection *section, int count, const Ti
     if (angle_left >= shaping->angle)
         snprintf(why, capacity, "a mandrel of radius %g mm does not make the core yield, so it springs back; use a thinner mandrel", shaping->mandrel);
     else
-        snprintf(why, capacity, "%g mm of the tip, bent round a mandrel of radius %g mm, keep %.0f degrees, not %.0f; use a longer tip, a smaller angle or a thinner mandrel",
+        snprintf(why, capacity,
+                 "%g mm of the tip, bent round a mandrel of radius %g mm, keep %.0f degrees, not %.0f; use a longer tip, a smaller angle or a thinner mandrel",
                  shaping->length, shaping->mandrel, (shaping->angle - angle_left) / per_degree, shaping->angle / per_degree);
     return NULL;
 }

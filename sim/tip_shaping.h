@@ -30,6 +30,7 @@ double tip_kept_curvature(double curvature, double core_diameter);
 double tip_core_diameter(const WireSection *section);
 // Copies the sections with the last `length` straight but for the bend, in the direction of plane angle 0. The caller frees them. NULL with a message
 // in `why` if the wire cannot keep that shape: too short, a mandrel too thick to make it yield, or too little length for the angle.
-WireSection *tip_shaped_sections(const WireSection *section, int count, const TipShaping *shaping, int *shaped_count, TipShaped *shaped, char *why, size_t capacity);
+WireSection *tip_shaped_sections(const WireSection *section, int count, const TipShaping *shaping, int *shaped_count, TipShaped *shaped, char *why,
+                                 size_t capacity);
 
 #endif

@@ -184,7 +184,9 @@ static void print_quoted(FILE *stream, const char *text)
 
 static void print_section(FILE *stream, const WireSection *s)
 {
-    fprintf(stream, "{length_mm: %.17g, diameter_mm: %.17g, inner_diameter_mm: %.17g, young_modulus_gpa: %.17g, poisson_ratio: %.17g, density_g_cm3: %.17g, attenuation_1_mm: %.17g",
+    fprintf(stream,
+            "{length_mm: %.17g, diameter_mm: %.17g, inner_diameter_mm: %.17g, young_modulus_gpa: %.17g, poisson_ratio: %.17g, density_g_cm3: %.17g, "
+            "attenuation_1_mm: %.17g",
             s->length, s->diameter, s->inner_diameter, s->young_modulus / 1000, s->poisson_ratio, s->density * 1000, s->attenuation);
     if (s->rest_curvature != 0)
         fprintf(stream, ", rest_curvature_1_mm: %.17g, rest_curvature_plane_deg: %.17g", s->rest_curvature, s->rest_plane / per_degree);
@@ -208,10 +210,11 @@ static char *print_device(const TrayDevice *device, const TipShaping *tip)
         name_shaped(title, sizeof title, device, tip);
     fputs("{title: ", stream);
     print_quoted(stream, title);
-    fprintf(stream, ", core: %s, elements: %d, friction_inside: %.17g, hand_limit_n: %.17g, valve_n: %.17g, damping: {mass_1_s: %.17g, stiffness_s: %.17g}, "
-                    "tip_marker: {length_mm: %.17g, attenuation_1_mm: %.17g}, ",
-            tool_core_name[tool->core], wire->elements, tool->friction_inside, wire->hand_limit, wire->valve_friction, wire->damping_mass * 1000, wire->damping_stiffness / 1000,
-            tool->marker_length, tool->marker_attenuation);
+    fprintf(stream,
+            ", core: %s, elements: %d, friction_inside: %.17g, hand_limit_n: %.17g, valve_n: %.17g, damping: {mass_1_s: %.17g, stiffness_s: %.17g}, "
+            "tip_marker: {length_mm: %.17g, attenuation_1_mm: %.17g}, ",
+            tool_core_name[tool->core], wire->elements, tool->friction_inside, wire->hand_limit, wire->valve_friction, wire->damping_mass * 1000,
+            wire->damping_stiffness / 1000, tool->marker_length, tool->marker_attenuation);
     if (tip->length > 0)
         fprintf(stream, "shaped_tip: {length_mm: %.17g, angle_deg: %.17g, mandrel_mm: %.17g}, ", tip->length, tip->angle / per_degree, tip->mandrel);
     fputs("sections: [", stream);

@@ -158,9 +158,7 @@ static double value_now(VerifyMeasure *m, const VerifyCase *c, Vec3 *point)
         Vec3 away = vec3_sub(*point, c->origin);
         return c->has_axis ? vec3_dot(away, c->axis) : vec3_norm(away);
     }
-    case VERIFY_TANGENT:
-        point_at(m, c, point, &tangent);
-        return vec3_angle(tangent, c->axis) * deg;
+    case VERIFY_TANGENT: point_at(m, c, point, &tangent); return vec3_angle(tangent, c->axis) * deg;
     case VERIFY_TWIST: return twist_between(m, c) * deg;
     case VERIFY_PUSH_FORCE: return simulator_last(m->simulator)->push[c->tool];
     case VERIFY_PUSH_TORQUE: return simulator_last(m->simulator)->torque[c->tool];

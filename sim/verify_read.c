@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const verify_quantity_name[] = {"position_mm",       "tangent_deg",       "twist_deg",    "push_force_n",     "push_torque_n_mm",
-                                            "elastic_energy_mj", "kinetic_energy_mj", "wall_force_n", "wall_moment_n_mm", "wall_centre_mm",
-                                            "contacts",          "penetration_mm",    "fastest_mm_s", NULL};
+const char *const verify_quantity_name[] = {
+    "position_mm",  "tangent_deg",      "twist_deg",      "push_force_n", "push_torque_n_mm", "elastic_energy_mj", "kinetic_energy_mj",
+    "wall_force_n", "wall_moment_n_mm", "wall_centre_mm", "contacts",     "penetration_mm",   "fastest_mm_s",      NULL};
 const char *const verify_take_name[] = {"last", "change", "mean", "least", "most", "jump", "frequency", "decay", NULL};
 
 static const double longest_s = 1e5, largest = 1e12;
@@ -124,8 +124,8 @@ static void read_tolerance(const YamlMap *map, const VerifyPlan *plan, VerifyCas
 
 static void read_case(YamlValue value, const VerifyTools *tools, const VerifyPlan *plan, VerifyCase *c)
 {
-    static const char *const keys[] = {"name",  "quantity", "tool", "take",  "s_mm",      "from_s_mm", "axis",      "origin_mm",         "t_s",
-                                       "from_t_s", "level",    "scale", "reference", "tolerance", "tolerance_percent", "order", "floor", NULL};
+    static const char *const keys[] = {"name",     "quantity", "tool",  "take",      "s_mm",      "from_s_mm",         "axis",  "origin_mm", "t_s",
+                                       "from_t_s", "level",    "scale", "reference", "tolerance", "tolerance_percent", "order", "floor",     NULL};
     YamlMap map = yaml_map(value, keys);
     const char *name;
     c->scale = 1;

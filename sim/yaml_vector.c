@@ -38,7 +38,4 @@ bool yaml_map_vector(const YamlMap *map, const char *key, bool required, double 
     return read_vector(yaml_get(map, key, required), largest, vector);
 }
 
-bool yaml_map_unit_vector(const YamlMap *map, const char *key, bool required, Vec3 *vector)
-{
-    return read_unit_vector(yaml_get(map, key, required), vector);
-}
+bool yaml_map_unit_vector(const YamlMap *map, const char *key, bool required, Vec3 *vector) { return read_unit_vector(yaml_get(map, key, required), vector); }

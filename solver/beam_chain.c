@@ -129,10 +129,12 @@ INLINE void transpose(const double *row0, const double *row1, const double *row2
 }
 
 // A block's entries in rows of a tile, row-major.
-#define BLOCK_ROWS(tt, tr, rt, rr)                                                                                                                   \
-    {tt(0, 0), tt(0, 1), tt(0, 2), tr(0, 0), tr(0, 1), tr(0, 2), tt(1, 0), tt(1, 1), tt(1, 2), tr(1, 0), tr(1, 1), tr(1, 2),                         \
-     tt(2, 0), tt(2, 1), tt(2, 2), tr(2, 0), tr(2, 1), tr(2, 2), rt(0, 0), rt(0, 1), rt(0, 2), rr(0, 0), rr(0, 1), rr(0, 2),                         \
-     rt(1, 0), rt(1, 1), rt(1, 2), rr(1, 0), rr(1, 1), rr(1, 2), rt(2, 0), rt(2, 1), rt(2, 2), rr(2, 0), rr(2, 1), rr(2, 2)}
+#define BLOCK_ROWS(tt, tr, rt, rr)                                                                                                                             \
+    {                                                                                                                                                          \
+        tt(0, 0), tt(0, 1), tt(0, 2), tr(0, 0), tr(0, 1), tr(0, 2), tt(1, 0), tt(1, 1), tt(1, 2), tr(1, 0), tr(1, 1), tr(1, 2), tt(2, 0), tt(2, 1), tt(2, 2),  \
+            tr(2, 0), tr(2, 1), tr(2, 2), rt(0, 0), rt(0, 1), rt(0, 2), rr(0, 0), rr(0, 1), rr(0, 2), rt(1, 0), rt(1, 1), rt(1, 2), rr(1, 0), rr(1, 1),        \
+            rr(1, 2), rt(2, 0), rt(2, 1), rt(2, 2), rr(2, 0), rr(2, 1), rr(2, 2)                                                                               \
+    }
 
 INLINE void scatter_diagonal(const Tile *t, double *block)
 {
@@ -147,8 +149,8 @@ INLINE void scatter_diagonal(const Tile *t, double *block)
 #undef RR
     for (int l = 0; l < LANES; l += 4)
         UNROLL_ROWS
-        for (int k = 0; k < BLOCK_ENTRIES; k += 4)
-            transpose(row[k] + l, row[k + 1] + l, row[k + 2] + l, row[k + 3] + l, block + l * BLOCK_ENTRIES + k, BLOCK_ENTRIES);
+    for (int k = 0; k < BLOCK_ENTRIES; k += 4)
+        transpose(row[k] + l, row[k + 1] + l, row[k + 2] + l, row[k + 3] + l, block + l * BLOCK_ENTRIES + k, BLOCK_ENTRIES);
 }
 
 INLINE void scatter_lower(const Tile *t, double *block)
@@ -164,8 +166,8 @@ INLINE void scatter_lower(const Tile *t, double *block)
 #undef RR
     for (int l = 0; l < LANES; l += 4)
         UNROLL_ROWS
-        for (int k = 0; k < BLOCK_ENTRIES; k += 4)
-            transpose(row[k] + l, row[k + 1] + l, row[k + 2] + l, row[k + 3] + l, block + l * BLOCK_ENTRIES + k, BLOCK_ENTRIES);
+    for (int k = 0; k < BLOCK_ENTRIES; k += 4)
+        transpose(row[k] + l, row[k + 1] + l, row[k + 2] + l, row[k + 3] + l, block + l * BLOCK_ENTRIES + k, BLOCK_ENTRIES);
 }
 
 // Six rows as two fours that share two.

@@ -44,10 +44,7 @@ INLINE double angle_over_sine(double z, double *slope)
     return 1 + z * (a1 + z * (a2 + z * (a3 + z * (a4 + z * (a5 + z * (a6 + z * a7))))));
 }
 
-INLINE Vec3 first_axis(Quat q)
-{
-    return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
-}
+INLINE Vec3 first_axis(Quat q) { return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)); }
 
 typedef struct Bend {        // an angle from the chord e to a tangent t
     Vec3 t, n, angle;        // n = e x t
@@ -186,14 +183,14 @@ INLINE Coupling coupling(Vec3 e, Vec3 sum, Vec3 tangent, double s, double invers
     UNROLL
     for (int i = 0; i < 3; i++)
         UNROLL
-        for (int j = 0; j < 3; j++)
-            k.m[i][j] = i == j ? -v.v[i] * across.v[j] - w.v[i] * v.v[j] : skew[i][j] - v.v[i] * across.v[j] - w.v[i] * v.v[j];
+    for (int j = 0; j < 3; j++)
+        k.m[i][j] = i == j ? -v.v[i] * across.v[j] - w.v[i] * v.v[j] : skew[i][j] - v.v[i] * across.v[j] - w.v[i] * v.v[j];
     return k;
 }
 
 // Rows of the tangent, main part times `scale`, geometric part of the tension `pull` >= 0, row k at [k * stride].
-INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near1, double near2, double far, double twist, double scale,
-                         double pull, bool is_curved, double *restrict n, int n_stride, double *restrict f, int f_stride)
+INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near1, double near2, double far, double twist, double scale, double pull,
+                         bool is_curved, double *restrict n, int n_stride, double *restrict f, int f_stride)
 {
     double inverse = o->inverse, ka = axial * scale, kt = twist * scale;
     double c1 = near1 * scale + pull * length * (4.0 / 30), c2 = near2 * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);

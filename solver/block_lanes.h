@@ -17,11 +17,14 @@
 
 // Columns have room for a right-hand side behind the last row and are padded to eights.
 #define BLOCK_COLUMN(size) (((size) + 8) / 8 * 8)
-#define BLOCK_PANEL(size) ((size) * BLOCK_COLUMN(size))
+#define BLOCK_PANEL(size) ((size)*BLOCK_COLUMN(size))
 
 // Tables of a kernel by block_size_index() and simd_level(). Its name has the SIZE before the instruction set.
 #define BLOCK_VARIANT(name) SIMD_JOIN(name, SIZE)
-#define BLOCK_FORMS(name) {SIMD_FORMS(name##_6), SIMD_FORMS(name##_8), SIMD_FORMS(name##_10), SIMD_FORMS(name##_12)}
+#define BLOCK_FORMS(name)                                                                                                                                      \
+    {                                                                                                                                                          \
+        SIMD_FORMS(name##_6), SIMD_FORMS(name##_8), SIMD_FORMS(name##_10), SIMD_FORMS(name##_12)                                                               \
+    }
 enum { BLOCK_SIZES = 4 };
 static inline int block_size_index(int size) { return (size - 6) / 2; }
 

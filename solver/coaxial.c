@@ -92,7 +92,8 @@ static double before_border(double p, double w, double *slope)
 static Border border_at(const double soft_at[2], int tool, double place, double length)
 {
     bool end = 2 * place > length;
-    double p = end ? length - place : place, soft = soft_at[end], slope, x = before_border(p, soft, &slope) / length, near = -(slope - x) / length, far = -x / length;
+    double p = end ? length - place : place, soft = soft_at[end], slope, x = before_border(p, soft, &slope) / length, near = -(slope - x) / length,
+           far = -x / length;
     return (Border){end ? 1 - x : x, {end ? far : near, end ? near : far}, fabs(p) < soft ? (end ? -0.5 : 0.5) / (soft * length) : 0, tool};
 }
 
@@ -137,7 +138,8 @@ static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
 {
     double length = rest->strained_length[k], end = span->s1 + length, spread = span->spreads_twist ? span->spread : fmax(span->spread, length);
     double start = end - spread, axial = 0, torsion = 0;
-    const CoaxialSection *last = span->tool->section + span->tool->count - 1, *back = coaxial_section_at(span->tool, start), *first = coaxial_section_at(span->tool, span->s1);
+    const CoaxialSection *last = span->tool->section + span->tool->count - 1, *back = coaxial_section_at(span->tool, start),
+                         *first = coaxial_section_at(span->tool, span->s1);
     const CoaxialSection *section = back;
     for (double at = start;; section++) {
         double to = section == last ? end : fmin(section->end, end), from = span->spreads_twist ? at : fmax(at, span->s1);
@@ -160,7 +162,9 @@ CoaxialSprings coaxial_springs(const CoaxialSpan *span)
     CoaxialRest rest;
     rest.strained_length[0] = fmax(span->s2 - span->s1, LENGTH_MIN);
     strain(span, 0, &rest);
-    return (CoaxialSprings){rest.strained_length[0], rest.axial[0], rest.torsion[0],
+    return (CoaxialSprings){rest.strained_length[0],
+                            rest.axial[0],
+                            rest.torsion[0],
                             {rest.axial_end[0][1] - rest.axial_end[0][0], rest.torsion_end[0][1] - rest.torsion_end[0][0]}};
 }
 
@@ -330,8 +334,8 @@ static CoaxialChord rest_chord(const double angle[2])
 static void bend_with_carrier(CoaxialRest *rest, int k)
 {
     const CoaxialSlope *by_end = &rest->slope[4 * k + COAXIAL_S2];
-    double slope[QUANTITIES] = {by_end->flexibility[0], by_end->flexibility[1], by_end->flexibility[2], by_end->angle[0][0], by_end->angle[0][1],
-                                by_end->angle[1][0], by_end->angle[1][1], by_end->waste};
+    double slope[QUANTITIES] = {by_end->flexibility[0], by_end->flexibility[1], by_end->flexibility[2], by_end->angle[0][0],
+                                by_end->angle[0][1],    by_end->angle[1][0],    by_end->angle[1][1],    by_end->waste};
     slope_add(&rest->slope[4 * k + COAXIAL_S1], 1, slope);
     slope_add(&rest->slope[4 * k + COAXIAL_S2], -1, slope);
     slope_add(&rest->slope[COAXIAL_S1], -1, slope);
@@ -429,10 +433,7 @@ static bool has_tips(const CoaxialInput *in)
 }
 
 // Does the tool's column have to be known? A tip's length is the carrier's.
-static bool is_wanted(const CoaxialInput *in, int k)
-{
-    return !in->span[k].is_fixed || (in->span[k].has_tip && !in->span[0].is_fixed);
-}
+static bool is_wanted(const CoaxialInput *in, int k) { return !in->span[k].is_fixed || (in->span[k].has_tip && !in->span[0].is_fixed); }
 
 INLINE Two seen_from(Quat q, Vec3 v)
 {
@@ -488,8 +489,15 @@ void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
         turn += rest->torsion[k] * own_turn[k];
     }
     length /= axial, turn /= torsion;
-    BeamInput beam = {.x1 = in->x1, .x2 = in->x2, .q1 = in->q1, .q2 = in->q2, .length = rest->length, .extend = length - rest->arc, .axial = axial,
-                      .far = rest->far, .twist = torsion};
+    BeamInput beam = {.x1 = in->x1,
+                      .x2 = in->x2,
+                      .q1 = in->q1,
+                      .q2 = in->q2,
+                      .length = rest->length,
+                      .extend = length - rest->arc,
+                      .axial = axial,
+                      .far = rest->far,
+                      .twist = torsion};
     BeamEnds ends = {rest->near1, rest->near2, rest->chord[0].turn, rest->chord[1].turn, -turn};
     BeamOutput *o = &out->beam;
     if (rest->is_curved)
@@ -630,10 +638,7 @@ static void add_soft(const CoaxialRest *rest, CoaxialTangent *t)
     }
 }
 
-INLINE void put_rows(double (*row)[COAXIAL_COLUMNS], int column, Vec3 v)
-{
-    row[0][column] = v.x, row[1][column] = v.y, row[2][column] = v.z;
-}
+INLINE void put_rows(double (*row)[COAXIAL_COLUMNS], int column, Vec3 v) { row[0][column] = v.x, row[1][column] = v.y, row[2][column] = v.z; }
 
 // Angle of a chord at the node where the rest chord turns by w, and the same for a moment backwards: B of beam_equations.h and its transpose.
 INLINE Vec3 by_turn(Vec3 e, Vec3 t, Vec3 w) { return vec3_add_scaled(vec3_scale(w, vec3_dot(e, t)), -vec3_dot(e, w), t); }

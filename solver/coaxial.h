@@ -15,7 +15,10 @@
 enum {
     COAXIAL_TOOLS_MAX = 4,
     COAXIAL_UNKNOWNS = 4,    // of a tool in an element, in this order
-    COAXIAL_S1 = 0, COAXIAL_PHI1 = 1, COAXIAL_S2 = 2, COAXIAL_PHI2 = 3,
+    COAXIAL_S1 = 0,
+    COAXIAL_PHI1 = 1,
+    COAXIAL_S2 = 2,
+    COAXIAL_PHI2 = 3,
     COAXIAL_COLUMNS = COAXIAL_TOOLS_MAX * COAXIAL_UNKNOWNS,
     COAXIAL_BORDERS_MAX = 12,      // section borders inside one element, of all its tools; those past them do not cut (the energy then jumps as they pass)
 };

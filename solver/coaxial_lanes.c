@@ -50,20 +50,20 @@ INLINE void put_blocks(CoaxialTile *t, int l, const double n[N_ROWS], const doub
     UNROLL
     for (int i = 0; i < 3; i++)
         UNROLL
-        for (int j = 0; j < 3; j++) {
-            int turned = (3 + i) * (4 + i) / 2, sym = SYM[i][j];
-            t->k21[6 * i + j][l] = f[F_TT + sym];
-            t->k21[6 * i + 3 + j][l] = n[N_TR + 3 * i + j];
-            t->k21[6 * (3 + j) + i][l] = f[F_TR + 3 * i + j];
-            t->k21[6 * (3 + i) + 3 + j][l] = n[N_FAR + 3 * i + j];
-            t->k11[(3 + j) * (4 + j) / 2 + i][l] = -n[N_TR + 3 * i + j];
-            t->k22[(3 + j) * (4 + j) / 2 + i][l] = -f[F_TR + 3 * i + j];
-            if (j > i)
-                continue;
-            t->k11[i * (i + 1) / 2 + j][l] = t->k22[i * (i + 1) / 2 + j][l] = -f[F_TT + sym];
-            t->k11[turned + 3 + j][l] = n[N_RR + sym];
-            t->k22[turned + 3 + j][l] = f[F_RR + sym];
-        }
+    for (int j = 0; j < 3; j++) {
+        int turned = (3 + i) * (4 + i) / 2, sym = SYM[i][j];
+        t->k21[6 * i + j][l] = f[F_TT + sym];
+        t->k21[6 * i + 3 + j][l] = n[N_TR + 3 * i + j];
+        t->k21[6 * (3 + j) + i][l] = f[F_TR + 3 * i + j];
+        t->k21[6 * (3 + i) + 3 + j][l] = n[N_FAR + 3 * i + j];
+        t->k11[(3 + j) * (4 + j) / 2 + i][l] = -n[N_TR + 3 * i + j];
+        t->k22[(3 + j) * (4 + j) / 2 + i][l] = -f[F_TR + 3 * i + j];
+        if (j > i)
+            continue;
+        t->k11[i * (i + 1) / 2 + j][l] = t->k22[i * (i + 1) / 2 + j][l] = -f[F_TT + sym];
+        t->k11[turned + 3 + j][l] = n[N_RR + sym];
+        t->k22[turned + 3 + j][l] = f[F_RR + sym];
+    }
 }
 
 INLINE Vec3 turned_into(Quat q, Vec3 v) { return quat_rotate(quat_conjugate(q), v); }
@@ -79,8 +79,15 @@ INLINE void find_lane(CoaxialTile *t, int l, const int count, double scale)
     Mixed m;
     mix(t, l, count, &m);
     Quat q1 = {t->q1[0][l], t->q1[1][l], t->q1[2][l], t->q1[3][l]}, q2 = {t->q2[0][l], t->q2[1][l], t->q2[2][l], t->q2[3][l]};
-    BeamInput beam = {.x1 = get3(t->x1, l), .x2 = get3(t->x2, l), .q1 = q1, .q2 = q2, .length = t->length[0][l], .extend = m.length, .axial = m.all_axial,
-                      .far = m.far, .twist = m.all_torsion};
+    BeamInput beam = {.x1 = get3(t->x1, l),
+                      .x2 = get3(t->x2, l),
+                      .q1 = q1,
+                      .q2 = q2,
+                      .length = t->length[0][l],
+                      .extend = m.length,
+                      .axial = m.all_axial,
+                      .far = m.far,
+                      .twist = m.all_torsion};
     BeamOutput o;
     element_between(&beam, (BeamEnds){m.near, m.near, {1, 0, 0, 0}, {1, 0, 0, 0}, -m.turn}, false, &o);
     double n[N_ROWS], f[F_ROWS], pull = o.tension > 0 ? o.tension : 0;
@@ -165,7 +172,8 @@ INLINE void find_lane(CoaxialTile *t, int l, const int count, double scale)
 void coaxial_tile_find(CoaxialTile *tile, double scale)
 {
     SEL_ASSERT(tile->lanes > 0 && tile->lanes <= LANES && tile->count > 0 && tile->count <= COAXIAL_TOOLS_MAX, "a tile holds elements of some tools");
-    static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {SIMD_FORMS(find_1), SIMD_FORMS(find_2), SIMD_FORMS(find_3), SIMD_FORMS(find_4)};
+    static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {SIMD_FORMS(find_1), SIMD_FORMS(find_2), SIMD_FORMS(find_3),
+                                                                                          SIMD_FORMS(find_4)};
     // lanes without an element compute the first one's
     for (int l = tile->lanes; l < LANES; l++)
         for (double(*row)[LANES] = tile->x1; row < tile->k11; row++)

@@ -25,7 +25,8 @@ typedef struct CoaxialTile {
     double force[12][COAXIAL_LANES];                           // gradient with the nodes' unknowns
     double by_slide[COAXIAL_INNER_MAX][COAXIAL_CROSS][COAXIAL_LANES];     // tangent: nodes' unknowns with S …
     double by_turn[COAXIAL_INNER_MAX][3][COAXIAL_LANES];       // … and rotation 2 with phi (rotation 1: the opposite)
-    double slide_slide[COAXIAL_INNER_MAX][COAXIAL_INNER_MAX][COAXIAL_LANES], slide_turn[COAXIAL_INNER_MAX][COAXIAL_LANES], turn_turn[COAXIAL_INNER_MAX][COAXIAL_LANES];
+    double slide_slide[COAXIAL_INNER_MAX][COAXIAL_INNER_MAX][COAXIAL_LANES], slide_turn[COAXIAL_INNER_MAX][COAXIAL_LANES],
+        turn_turn[COAXIAL_INNER_MAX][COAXIAL_LANES];
     double slide_force[COAXIAL_INNER_MAX][COAXIAL_LANES], turn_force[COAXIAL_INNER_MAX][COAXIAL_LANES];      // gradient with S and phi
     double bent[COAXIAL_LANES];                                // [1/mm] curvature at the middle
     double moment[COAXIAL_TOOLS_MAX][3][COAXIAL_LANES], tension[COAXIAL_TOOLS_MAX][COAXIAL_LANES];   // [N mm], [N] there of tool i and all inside it

@@ -34,7 +34,8 @@ bool contact_is_free(const BlockChain *chain, int node, int r)
     SEL_ASSERT(node >= 0 && node < chain->count && r >= 0 && r < chain->size, "an unknown is one of the chain's");
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
-    const double *d = chain->diag + block * (size_t)node, *before = chain->lower + block * (size_t)(node > 0 ? node - 1 : 0), *after = chain->lower + block * (size_t)node;
+    const double *d = chain->diag + block * (size_t)node, *before = chain->lower + block * (size_t)(node > 0 ? node - 1 : 0),
+                 *after = chain->lower + block * (size_t)node;
     if (d[(n + 1) * r] != 1)
         return true;
     bool any = false;

@@ -78,7 +78,8 @@ Mat3 contact_pairs_block(const ContactPairs *pairs, int k, int l);
 bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole, ContactSolve solve);
 
 // The block form on the chain of the contacts' nodes. False where these are not few, or the chain is not positive definite.
-bool contact_condensed(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
+bool contact_condensed(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
+                       ContactReport *report);
 // The contacts [0, count) with the wall on a chain that is not factored yet. False where it is not positive definite.
 bool contact_walls(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
 // The same after b has changed by `change` (M, n), with the same matrix and states, which is quick and good where little changes. False where it cannot.

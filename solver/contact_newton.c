@@ -373,7 +373,7 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
                       : !block_lu_factor_solve(s->lu, chain->count, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta,
-                                             chain == s->small ? block_condenser_live(s->condenser) : NULL, &exact))
+                                               chain == s->small ? block_condenser_live(s->condenser) : NULL, &exact))
             return false;
     }
     s->inexact |= !exact;
@@ -452,8 +452,8 @@ bool contact_newton_again(ContactSolver *s, const BlockChain *chain, const doubl
     return finite;
 }
 
-ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
-                             const ContactOptions *options, double *u)
+ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, const ContactOptions *options,
+                             double *u)
 {
     SEL_ASSERT(chain->count <= s->node_count && chain->size == s->matrix.size, "the solver was made for such a chain");
     SEL_ASSERT(b != s->rhs && u != s->best_u, "what the solve overwrites is not what it was given");

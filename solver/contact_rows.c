@@ -60,7 +60,13 @@ static ContactRow pair_end(const ContactPair *p, int e, int stride)
 {
     const ContactEnd *end = &p->end[e];
     double sign = e ? -1 : 1;
-    ContactRow c = {.node = end->node, .chain_node = end->node, .stride = stride, .nodes = 2, .normal = p->normal, .gap = p->gap, .radius = sign * end->radius,
+    ContactRow c = {.node = end->node,
+                    .chain_node = end->node,
+                    .stride = stride,
+                    .nodes = 2,
+                    .normal = p->normal,
+                    .gap = p->gap,
+                    .radius = sign * end->radius,
                     .friction = fmax(0, p->friction)};
     for (int k = 0; k < 2; k++) {
         c.weight[k] = sign * end->weight[k];
@@ -84,8 +90,16 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slide
     int count = set->count, behind = set->count + set->pair_count;
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
-        ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
-                        .normal = p->normal, .gap = p->gap, .radius = p->tool_radius, .friction = fmax(0, p->friction)};
+        ContactRow c = {.node = p->node,
+                        .chain_node = p->node,
+                        .stride = chain->size,
+                        .point = i,
+                        .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1,
+                        .weight = {1, 0},
+                        .normal = p->normal,
+                        .gap = p->gap,
+                        .radius = p->tool_radius,
+                        .friction = fmax(0, p->friction)};
         if (c.nodes == 2)
             for (int e = 0; e < 2; e++) {
                 c.weight[e] = e ? p->xi : 1 - p->xi;
@@ -99,8 +113,16 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slide
     }
     for (int i = 0; i < set->slide_count; i++) {
         const ContactSlide *p = &set->slide[i];
-        ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .slide = p->unknown, .point = i, .nodes = 1, .weight = {1, 0},
-                        .normal = {0, 0, 1}, .radius = p->radius, .bound = p->bound};
+        ContactRow c = {.node = p->node,
+                        .chain_node = p->node,
+                        .stride = chain->size,
+                        .slide = p->unknown,
+                        .point = i,
+                        .nodes = 1,
+                        .weight = {1, 0},
+                        .normal = {0, 0, 1},
+                        .radius = p->radius,
+                        .bound = p->bound};
         slide_stiffness(chain, p->give, &c);
         Vec3 force = vec3(c.mask[0] & 1 ? p->force[0] : 0, c.mask[0] & 2 ? p->force[1] : 0, 0);
         c.force = c.inert || !vec3_is_finite(force) ? none : contact_project(&c, force);

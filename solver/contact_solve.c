@@ -7,10 +7,7 @@
 
 #include <stdlib.h>
 
-ContactOptions contact_default_options(void)
-{
-    return (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
-}
+ContactOptions contact_default_options(void) { return (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6}; }
 
 ContactSolver *contact_solver_create(int node_count, int size, int contact_capacity)
 {
@@ -42,7 +39,8 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
     s->factor = block_factor_create(node_count, size);
     s->pointwise = pointwise_work_create(node_count, size, contact_capacity);
     bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain && s->side && s->braced_factor;
-    if (!s->row || !s->spare || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
+    if (!s->row || !s->spare || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu ||
+        !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
     }
@@ -95,10 +93,7 @@ void contact_solver_destroy(ContactSolver *s)
     free(s);
 }
 
-bool contact_needs_factor(const ContactSet *set, const ContactOptions *options)
-{
-    return set->slide_count == 0 || options->form == CONTACT_POINTWISE;
-}
+bool contact_needs_factor(const ContactSet *set, const ContactOptions *options) { return set->slide_count == 0 || options->form == CONTACT_POINTWISE; }
 
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u)

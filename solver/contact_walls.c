@@ -7,8 +7,7 @@
 static const double FULL_SHARE = 1.25;
 
 // Does the block form on the chain of the contacts' nodes, where these are few. False where it cannot.
-bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
-                            ContactReport *report)
+bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
 {
     SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs stand behind all other rows");
     bool *keep = block_condenser_keep(s->condenser);
@@ -35,7 +34,8 @@ bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *
         return false;
     for (int i = 0; i < count; i++) {
         s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
-        SEL_ASSERT(s->row[i].nodes == 1 || s->row[i].node + 1 == block_condenser_place(s->condenser, s->row[i].chain_node + 1), "neighbours are neighbours in the condensed chain too");
+        SEL_ASSERT(s->row[i].nodes == 1 || s->row[i].node + 1 == block_condenser_place(s->condenser, s->row[i].chain_node + 1),
+                   "neighbours are neighbours in the condensed chain too");
     }
     for (int i = s->banded; i < count; i++)
         s->row[i].far->node = block_condenser_place(s->condenser, s->row[i].far->chain_node);

@@ -225,7 +225,8 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
     if (d[0] >= 0)
         return;
     f[0] = -d[0] / w->m[0][0];
-    const double a[3] = {w->m[1][1] - w->m[1][0] * w->m[0][1] / w->m[0][0], w->m[1][2] - w->m[1][0] * w->m[0][2] / w->m[0][0], w->m[2][2] - w->m[2][0] * w->m[0][2] / w->m[0][0]};
+    const double a[3] = {w->m[1][1] - w->m[1][0] * w->m[0][1] / w->m[0][0], w->m[1][2] - w->m[1][0] * w->m[0][2] / w->m[0][0],
+                         w->m[2][2] - w->m[2][0] * w->m[0][2] / w->m[0][0]};
     const double c[2] = {d[1] - w->m[1][0] * d[0] / w->m[0][0], d[2] - w->m[2][0] * d[0] / w->m[0][0]};
     double scale = a[0] + a[2];
     if (!(mu > 0) || !(scale > 0))
@@ -491,8 +492,8 @@ static int prepare_pairs(ContactSolver *s, const BlockFactor *factor, int count,
     return pairs;
 }
 
-ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
-                                const ContactOptions *options, double *u)
+ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, const ContactOptions *options,
+                                double *u)
 {
     ContactReport report = {0};
     PointwiseWork *w = s->pointwise;

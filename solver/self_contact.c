@@ -129,10 +129,7 @@ static Vec3 done(const Stepper *s, int node, int from)
     return vec3(k[0], k[1], k[2]);
 }
 
-static Vec3 by_speed(const Stepper *s, int node, int from)
-{
-    return vec3_scale(from ? s->state.spin[node] : s->state.velocity[node], s->dt);
-}
+static Vec3 by_speed(const Stepper *s, int node, int from) { return vec3_scale(from ? s->state.spin[node] : s->state.velocity[node], s->dt); }
 
 typedef Vec3 (*Motion)(const Stepper *, int, int);
 
@@ -170,10 +167,7 @@ static double largest_travel(const Stepper *s, Motion motion)
 
 // --- the curve ---
 
-static Vec3 tangent_of(Quat q)
-{
-    return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
-}
+static Vec3 tangent_of(Quat q) { return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)); }
 
 // Places and tangents at the iterate, or where the solution has them.
 static void lay_curve(Stepper *s, bool would_go)
@@ -593,9 +587,11 @@ static void fill_set(Stepper *s)
         if (s->is_iterate)
             gap -= vec3_dot(pair_motion(s, n->end, n->normal, done), n->normal);
         c->near_of[s->set.pair_count] = k;
-        s->set.pair[s->set.pair_count++] =
-            (ContactPair){.end = {n->end[0], n->end[1]}, .normal = n->normal, .gap = gap, .force = force,
-                          .friction = 0.5 * (friction_of(s, n->element[0]) + friction_of(s, n->element[1]))};
+        s->set.pair[s->set.pair_count++] = (ContactPair){.end = {n->end[0], n->end[1]},
+                                                         .normal = n->normal,
+                                                         .gap = gap,
+                                                         .force = force,
+                                                         .friction = 0.5 * (friction_of(s, n->element[0]) + friction_of(s, n->element[1]))};
     }
 }
 

@@ -51,8 +51,8 @@ double sheath_straightening(const BeamRest *rest, int index, double coordinate)
 
 double sheath_outside(double length, double coordinate) { return fmax(length + coordinate, 0.01 * length); }
 
-void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
-                    double ahead, SheathElement *element)
+void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2, double ahead,
+                    SheathElement *element)
 {
     SEL_ASSERT(index >= 0 && index < rest->count, "the element at the mouth is one of the chain's");
     SEL_ASSERT(fabs(vec3_norm2(direction) - 1) < 1e-9, "the sheath's direction is a unit vector");
@@ -76,8 +76,16 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     }
     double k0 = vec3_norm(rest_outside), quarter = 0.25 * k0 * outside;
     Vec3 plane = k0 > 0 ? vec3_scale(rest_outside, 1 / k0) : vec3(0, 0, 1);
-    BeamInput in = {.x1 = mouth, .x2 = x2, .q1 = q1, .q2 = q2, .length = outside, .axial = rest->axial[index], .twist = rest->twist[index],
-                    .half_w = same_cos(quarter), .half_y = same_sin(quarter) * plane.y, .half_z = same_sin(quarter) * plane.z};
+    BeamInput in = {.x1 = mouth,
+                    .x2 = x2,
+                    .q1 = q1,
+                    .q2 = q2,
+                    .length = outside,
+                    .axial = rest->axial[index],
+                    .twist = rest->twist[index],
+                    .half_w = same_cos(quarter),
+                    .half_y = same_sin(quarter) * plane.y,
+                    .half_z = same_sin(quarter) * plane.z};
     in.extend = length - beam_arc_rest(outside, k0, &slope) + coordinate;
     beam_bending(outside, bending, rest->shear[index], &in.near, &in.far);
     beam_bending_slope(outside, bending, rest->shear[index], &near_slope, &far_slope);
@@ -86,8 +94,9 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
 
     double by_length = out.tension * (out.bow / outside + slope) - own;
     by_length += 0.5 * near_slope * (vec3_norm2(out.angle1) + vec3_norm2(out.angle2)) + far_slope * vec3_dot(out.angle1, out.angle2);
-    by_length += 0.5 * softer * (vec3_dot(out.angle1, vec3_add(vec3_scale(out.angle1, in.near), vec3_scale(out.angle2, in.far))) +
-                                 vec3_dot(out.angle2, vec3_add(vec3_scale(out.angle2, in.near), vec3_scale(out.angle1, in.far))));
+    by_length += 0.5 * softer *
+                 (vec3_dot(out.angle1, vec3_add(vec3_scale(out.angle1, in.near), vec3_scale(out.angle2, in.far))) +
+                  vec3_dot(out.angle2, vec3_add(vec3_scale(out.angle2, in.near), vec3_scale(out.angle1, in.far))));
     // a longer arc turns the rest chord in both nodes' frames
     by_length += 0.5 * (vec3_dot(quat_rotate(q1, rest_here), out.chord1) - vec3_dot(quat_rotate(q2, rest_here), out.chord2));
     // what the linearisation in phi at the new length misses where the curvature stays
@@ -108,8 +117,7 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     };
 }
 
-void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent,
-                    double *length_column)
+void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent, double *length_column)
 {
     SEL_ASSERT(element->outside > 0 && scale > 0, "some of the element is outside, and its stiffness counts");
     BeamTangent full;
@@ -141,8 +149,8 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
     across = vec3_add_scaled(across, -vec3_dot(across, e), e);
     Vec3 first = vec3_add_scaled(vec3_scale(w, vec3_dot(e, t1)), -vec3_dot(t1, w), e);
     Vec3 second = vec3_add_scaled(vec3_scale(w, -vec3_dot(e, t2)), vec3_dot(t2, w), e);
-    double through[12] = {k * vec3_norm2(element->curvature), 0, 0, vec3_dot(direction, first), 0, 0,
-                          across.x, across.y, across.z, second.x, second.y, second.z};
+    double through[12] = {
+        k * vec3_norm2(element->curvature), 0, 0, vec3_dot(direction, first), 0, 0, across.x, across.y, across.z, second.x, second.y, second.z};
     for (int i = 0; i < 12; i++)
         length_column[i] = through[i];
     length_column[0] += element->border;

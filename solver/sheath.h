@@ -27,8 +27,8 @@ double sheath_outside(double length, double coordinate);
 // `index`: the element. `coordinate` [mm] of its inner node along the line, 0 at the mouth, negative inside (a little past the mouth
 // is allowed); q1 of that node (aligned with the line); x2, q2 of the outer one. `ahead` [mm]: by how much the inner node will have moved
 // at the step's end; lengths, hence stiffness, are taken there, because near the mouth they change fast.
-void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
-                    double ahead, SheathElement *element);
+void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2, double ahead,
+                    SheathElement *element);
 
 // [N] what straightening a length of wire takes, EI k0^2 / 2, at the mouth, where the inner node is at `coordinate`.
 double sheath_straightening(const BeamRest *rest, int index, double coordinate);
@@ -39,7 +39,6 @@ Vec3 sheath_rest_curvature(const BeamRest *rest, int index, Quat q);
 // Tangent with the inner node's unknowns (axial displacement, rotation about the line) in places 0 and 3 of its block, the rest
 // of it zero: k11 and k22 to be added, k21 to be written. `length_column` (12: inner block, outer block): the part of the axial
 // unknown's column that comes through l (without scale); displacements of the inner node count from `ahead` there.
-void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent,
-                    double *length_column);
+void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent, double *length_column);
 
 #endif

@@ -39,10 +39,7 @@ static void load_inertia(Stepper *s, double rate)
     }
 }
 
-static void add_vec(double *at, Vec3 v)
-{
-    at[0] += v.x, at[1] += v.y, at[2] += v.z;
-}
+static void add_vec(double *at, Vec3 v) { at[0] += v.x, at[1] += v.y, at[2] += v.z; }
 
 // The elements between free nodes, their inertia and gravity.
 static void free_nodes(Stepper *s, double scale, double inertia)
@@ -271,8 +268,8 @@ double stepper_stiffness_damping(Stepper *s)
     for (int r = 0; r < 6; r++)
         for (int c = 0; c < 6; c++) {
             int k = 6 * r + c;
-            work += a[r] * (with.k11[k] - without.k11[k]) * a[c] + b[r] * (with.k22[k] - without.k22[k]) * b[c] +
-                    2 * b[r] * (with.k21[k] - without.k21[k]) * a[c];
+            work +=
+                a[r] * (with.k11[k] - without.k11[k]) * a[c] + b[r] * (with.k22[k] - without.k22[k]) * b[c] + 2 * b[r] * (with.k21[k] - without.k21[k]) * a[c];
         }
     return work;
 }
@@ -288,4 +285,3 @@ double stepper_strain_force(const Stepper *s)
     sheath_element(rest, 0, s->mouth, s->axis[0], coordinate, w->orientation[0], w->position[1], w->orientation[1], 0, &e);
     return e.axial_gradient;
 }
-

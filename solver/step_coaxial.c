@@ -13,7 +13,6 @@ enum { NODAL = 12 };
 static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
 static const double SOFT = 0.02;         // … over which, to either side, a border of one tool passes one of another. Less than where a node joins the chain
 
-
 // Does the section of the tool that carries node c change there, or end?
 static bool is_border(const Stepper *s, int c)
 {
@@ -826,7 +825,8 @@ static void strained(const Stepper *s, int c, double *u)
     if (c < s->first_free)
         return;
     Quat turn = turned_as_a_whole(s, c);
-    Vec3 was = vec3_sub(s->start_position[c + 1], s->start_position[c]), is = vec3_sub(w->position[c + 1], w->position[c]), stretch = vec3_sub(is, quat_rotate(turn, was));
+    Vec3 was = vec3_sub(s->start_position[c + 1], s->start_position[c]), is = vec3_sub(w->position[c + 1], w->position[c]),
+         stretch = vec3_sub(is, quat_rotate(turn, was));
     for (int node = 0; node < 2; node++) {
         put(u + node * n, vec3_scale(stretch, node ? 0.5 : -0.5));
         Quat q = quat_mul(w->orientation[c + node], quat_conjugate(quat_mul(turn, s->start_orientation[c + node])));

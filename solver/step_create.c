@@ -26,9 +26,10 @@ static bool allocate_scratch(Stepper *s)
     BeamRest *r = &s->beam.rest;
     BeamPose *p = &s->beam.pose, *q = &s->start_pose;
     BeamInertia *i = &s->beam.inertia;
-    double **array[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z, &r->curvature, &r->bending,
-                        &r->shear, &p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz, &q->x, &q->y, &q->z, &q->qw, &q->qx, &q->qy, &q->qz,
-                        &i->mass, &i->lateral, &i->excess, &i->ax, &i->ay, &i->az, &i->tx, &i->ty, &i->tz, &s->beam.drag};
+    double **array[] = {&r->length,    &r->extend,  &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z,
+                        &r->curvature, &r->bending, &r->shear, &p->x,    &p->y,   &p->z,     &p->qw,     &p->qx,     &p->qy,
+                        &p->qz,        &q->x,       &q->y,     &q->z,    &q->qw,  &q->qx,    &q->qy,     &q->qz,     &i->mass,
+                        &i->lateral,   &i->excess,  &i->ax,    &i->ay,   &i->az,  &i->tx,    &i->ty,     &i->tz,     &s->beam.drag};
     for (size_t k = 0; k < sizeof array / sizeof *array; k++)
         *array[k] = take(&at, padded);
     for (size_t k = 0; k < m; k++) {
@@ -105,9 +106,9 @@ static bool allocate(Stepper *s)
     s->set.slide = calloc(inner + 1, sizeof *s->set.slide);
     s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity + (int)inner);
     s->carrier = calloc(m, sizeof *s->carrier);
-    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_force || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
-        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier || !s->set.slide || !block_chain_create(&s->chain, s->wire.node_count, size) ||
-        !allocate_scratch(s))
+    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_force || !s->start_orientation || !s->slot_place ||
+        !s->query_point || !s->query_place || !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier ||
+        !s->set.slide || !block_chain_create(&s->chain, s->wire.node_count, size) || !allocate_scratch(s))
         return false;
     s->state.node_count = s->wire.node_count;
     s->state.position = (Vec3 *)s->memory;

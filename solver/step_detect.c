@@ -44,8 +44,8 @@ static bool place_slot(Stepper *s, int k)
     const Vec3 *x = s->state.position;
     double length = s->wire.length[i];
     if (i + 1 == s->first_free)
-        return i + 2 < s->state.node_count && slot_place_at_mouth(slot, length, stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x[i + 1],
-                                                                  tangent_at(s, i + 1), &s->slot_place[k]);
+        return i + 2 < s->state.node_count &&
+               slot_place_at_mouth(slot, length, stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x[i + 1], tangent_at(s, i + 1), &s->slot_place[k]);
     if (s->tool_count > 1 && s->carrier[i] != s->carrier[i + 1])
         return slot_place_beyond(slot, length, length - tools_span_length(s, i), x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1), &s->slot_place[k]);
     s->slot_place[k] = slot_place(slot, length, x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1));
@@ -127,10 +127,7 @@ static double radius_of(const Stepper *s, int point)
 }
 
 // The first contact point that may be free: nodes from first_free on, slots from the mouth's element on.
-static int first_slot(const Stepper *s)
-{
-    return s->state.node_count + s->slot_start[s->first_free > 0 ? s->first_free - 1 : 0];
-}
+static int first_slot(const Stepper *s) { return s->state.node_count + s->slot_start[s->first_free > 0 ? s->first_free - 1 : 0]; }
 
 bool stepper_escapes(const Stepper *s)
 {
@@ -191,7 +188,10 @@ static double deepest_there(Stepper *s, bool would_go)
         if (p == s->point_count)
             break;
         double far = would_go ? travel(s, p) : travelled(s, p);
-        if (far < (s->room[p] < HUGE_VAL ? s->room[p] : would_go ? OVERSHOOT_TRAVEL : 0) || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
+        if (far < (s->room[p] < HUGE_VAL ? s->room[p]
+                   : would_go            ? OVERSHOOT_TRAVEL
+                                         : 0) ||
+            (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
         ask_there(s, p, would_go ? vec3_add(place_of(s, p), motion(s, p)) : place_of(s, p), &count);
     }
@@ -562,8 +562,12 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     if (!s->is_iterate && !touches) {
         int node = c->node;
         bool is_between = p || touches;
-        look_ahead(s->dt, touches ? touch.place.tangent : p ? p->tangent : tangent_at(s, point),
-                   is_between ? vec3_mix(s->state.velocity[node], s->state.velocity[node + 1], touches ? touch.place.weight : p->weight) : s->state.velocity[node], c);
+        look_ahead(
+            s->dt,
+            touches ? touch.place.tangent
+            : p     ? p->tangent
+                    : tangent_at(s, point),
+            is_between ? vec3_mix(s->state.velocity[node], s->state.velocity[node + 1], touches ? touch.place.weight : p->weight) : s->state.velocity[node], c);
     }
     if (p && at_mouth(s, c->node)) {
         lean_on_sheath(s, point - nodes, c);
@@ -767,7 +771,8 @@ void stepper_share_forces(const Stepper *s, NodeReport *node)
         int i = s->slot[k].element;
         double w = s->slot[k].weight;
         SlotPlace place;
-        if (at_mouth(s, i) && slot_place_at_mouth(&s->slot[k], s->wire.length[i], stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x2, s->axis[0], &place))
+        if (at_mouth(s, i) &&
+            slot_place_at_mouth(&s->slot[k], s->wire.length[i], stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x2, s->axis[0], &place))
             w = place.weight;
         if (s->touch[s->state.node_count + k] != 0 && touch_at(s, s->state.node_count + k, s->touch[s->state.node_count + k], &touch))
             i = touch.element, w = touch.xi;

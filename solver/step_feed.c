@@ -33,7 +33,8 @@ static Vec3 mouth_curvature(const Stepper *s, int node)
     const WireState *w = &s->state;
     const BeamRest *r = &s->beam.rest;
     SheathElement e;
-    sheath_element(r, node, s->mouth, s->axis[0], stepper_sheath_coordinate(s, node), w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
+    sheath_element(r, node, s->mouth, s->axis[0], stepper_sheath_coordinate(s, node), w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0,
+                   &e);
     Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
     return vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
 }
@@ -71,10 +72,7 @@ int stepper_count_held(const Stepper *s, double advance)
 }
 
 // The share of its length by which the tool is squeezed between hand and mouth, where it slides freely.
-double stepper_squeeze(const Stepper *s, const Vec3 *position)
-{
-    return 1 - vec3_distance(position[1], position[0]) / s->wire.length[0];
-}
+double stepper_squeeze(const Stepper *s, const Vec3 *position) { return 1 - vec3_distance(position[1], position[0]) / s->wire.length[0]; }
 
 // The command with what is owed from before; no advance into a tool that is squeezed too much.
 static StepCommand stalled(Stepper *s, StepCommand command)

@@ -25,9 +25,19 @@ BeamInput stepper_beam(const Stepper *s, int i)
     SEL_ASSERT(i >= 0 && i + 1 < s->state.node_count, "the element is one of the chain's");
     const BeamRest *r = &s->beam.rest;
     const WireState *w = &s->state;
-    return (BeamInput){.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1], .length = r->length[i],
-                       .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i], .twist = r->twist[i], .half_w = r->half_w[i],
-                       .half_y = r->half_y[i], .half_z = r->half_z[i]};
+    return (BeamInput){.x1 = w->position[i],
+                       .x2 = w->position[i + 1],
+                       .q1 = w->orientation[i],
+                       .q2 = w->orientation[i + 1],
+                       .length = r->length[i],
+                       .extend = r->extend[i],
+                       .axial = r->axial[i],
+                       .near = r->near[i],
+                       .far = r->far[i],
+                       .twist = r->twist[i],
+                       .half_w = r->half_w[i],
+                       .half_y = r->half_y[i],
+                       .half_z = r->half_z[i]};
 }
 
 double tools_span_length(const Stepper *s, int c)

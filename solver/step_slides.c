@@ -89,8 +89,14 @@ void tools_slides(Stepper *s)
             double force[2] = {change * last[0], change * last[1]};
             SEL_REQUIRE(s->set.slide_count < s->capacity * s->state.inner_count, "there is room for a slide of each inner tool at each node");
             SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a bound, and a radius at which tools touch");
-            s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c, .unknown = unknown_of(k), .radius = radius, .bound = bound, .give = GIVE,
-                                                                 .slip = {slip[0], radius * slip[1]}, .held = {force[0], force[1]}, .force = {force[0], force[1]}};
+            s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c,
+                                                                .unknown = unknown_of(k),
+                                                                .radius = radius,
+                                                                .bound = bound,
+                                                                .give = GIVE,
+                                                                .slip = {slip[0], radius * slip[1]},
+                                                                .held = {force[0], force[1]},
+                                                                .force = {force[0], force[1]}};
         }
     }
 }

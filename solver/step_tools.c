@@ -34,8 +34,8 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
         return false;
     t->line_inertia = t->line_mass + sections;
     double *at = t->rest_memory;
-    double **array[] = {&t->rest.length, &t->rest.extend, &t->rest.axial, &t->rest.near, &t->rest.far, &t->rest.twist, &t->rest.half_w, &t->rest.half_y,
-                        &t->rest.half_z, &t->rest.curvature, &t->rest.bending, &t->rest.shear};
+    double **array[] = {&t->rest.length, &t->rest.extend, &t->rest.axial,  &t->rest.near,      &t->rest.far,     &t->rest.twist,
+                        &t->rest.half_w, &t->rest.half_y, &t->rest.half_z, &t->rest.curvature, &t->rest.bending, &t->rest.shear};
     for (size_t k = 0; k < sizeof array / sizeof *array; k++, at += padded)
         *array[k] = at;
     wire_rest(&t->wire, o, &t->rest);
@@ -44,7 +44,11 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
         const WireSection *section = &o->section[i];
         WireStiffness stiffness = wire_stiffness(section);
         end += section->length;
-        t->section[i] = (CoaxialSection){end, stiffness.bending, stiffness.axial, stiffness.torsion, stiffness.shear,
+        t->section[i] = (CoaxialSection){end,
+                                         stiffness.bending,
+                                         stiffness.axial,
+                                         stiffness.torsion,
+                                         stiffness.shear,
                                          {section->rest_curvature * same_cos(section->rest_plane), section->rest_curvature * same_sin(section->rest_plane)}};
         t->line_mass[i] = stiffness.line_mass;
         t->line_inertia[i] = stiffness.line_inertia;
@@ -280,9 +284,13 @@ static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
     struct {
         void *base;
         size_t size;
-    } by_node[] = {{w->position, sizeof(Vec3)}, {w->orientation, sizeof(Quat)}, {w->velocity, sizeof(Vec3)}, {w->spin, sizeof(Vec3)},
-                   {w->slide, inner}, {w->angle, inner}, {w->slide_velocity, inner}, {w->slide_spin, inner}, {w->slide_force, 3 * inner}},
-      by_point[] = {{s->force, sizeof(Vec3)}, {s->start_force, sizeof(Vec3)}, {s->clearance, sizeof(double)}, {s->met, sizeof(WallMet)}, {s->place, sizeof(VesselMemory)}};
+    } by_node[] = {{w->position, sizeof(Vec3)}, {w->orientation, sizeof(Quat)}, {w->velocity, sizeof(Vec3)}, {w->spin, sizeof(Vec3)},    {w->slide, inner},
+                   {w->angle, inner},           {w->slide_velocity, inner},     {w->slide_spin, inner},      {w->slide_force, 3 * inner}},
+      by_point[] = {{s->force, sizeof(Vec3)},
+                    {s->start_force, sizeof(Vec3)},
+                    {s->clearance, sizeof(double)},
+                    {s->met, sizeof(WallMet)},
+                    {s->place, sizeof(VesselMemory)}};
     for (size_t i = 0; i < sizeof by_node / sizeof *by_node; i++)
         change_gap(by_node[i].base, by_node[i].size, count, node, nodes);
     for (size_t i = 0; i < sizeof by_point / sizeof *by_point; i++) {
@@ -292,17 +300,16 @@ static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
 }
 
 // Makes room for chain node c, or takes it out; its element is the one before it.
-static void shift(Stepper *s, int c, int slots, bool opens)
-{
-    shift_at(s, c, opens ? 1 : -1, s->slot_start[c - 1], opens ? slots : -slots);
-}
+static void shift(Stepper *s, int c, int slots, bool opens) { shift_at(s, c, opens ? 1 : -1, s->slot_start[c - 1], opens ? slots : -slots); }
 
 // --- the outermost tool's exchange ---
 
 // `turn` [rad] of the node about the line against the hub.
 static Inside inside_at_node(const Stepper *s, int c, double turn)
 {
-    Inside at = {.x = stepper_sheath_coordinate(s, c), };
+    Inside at = {
+        .x = stepper_sheath_coordinate(s, c),
+    };
     const WireState *w = &s->state;
     for (int k = 0; k < w->inner_count; k++) {
         int i = c * w->inner_count + k;
@@ -379,13 +386,16 @@ static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *n
 {
     const WireState *w = &s->state;
     double s1 = material_at(s, c, k), span = c + 1 < w->node_count && lies_at(s, c + 1, k) ? material_at(s, c + 1, k) - s1 : tools_span_length(s, c);
-    double xi = fmin(1, fmax(0, (at - s1) / span)), phi1 = turned_at(s, c, k), phi2 = c + 1 < w->node_count && lies_at(s, c + 1, k) ? turned_at(s, c + 1, k) : phi1;
+    double xi = fmin(1, fmax(0, (at - s1) / span)), phi1 = turned_at(s, c, k),
+           phi2 = c + 1 < w->node_count && lies_at(s, c + 1, k) ? turned_at(s, c + 1, k) : phi1;
     Vec3 t1 = quat_rotate(w->orientation[c], vec3(1, 0, 0)), t2 = quat_rotate(w->orientation[c + 1], vec3(1, 0, 0));
     Slot slot = slot_shifted(&(Slot){.element = c}, span, xi);
     node->position = slot_place(&slot, span, w->position[c], t1, w->position[c + 1], t2).position;
-    Quat a = quat_mul(w->orientation[c], quat_from_rotation_vector(vec3(phi1, 0, 0))), b = quat_mul(w->orientation[c + 1], quat_from_rotation_vector(vec3(phi2, 0, 0)));
+    Quat a = quat_mul(w->orientation[c], quat_from_rotation_vector(vec3(phi1, 0, 0))),
+         b = quat_mul(w->orientation[c + 1], quat_from_rotation_vector(vec3(phi2, 0, 0)));
     double same = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -1 : 1;
-    node->orientation = quat_unit((Quat){a.w + xi * (same * b.w - a.w), a.x + xi * (same * b.x - a.x), a.y + xi * (same * b.y - a.y), a.z + xi * (same * b.z - a.z)});
+    node->orientation =
+        quat_unit((Quat){a.w + xi * (same * b.w - a.w), a.x + xi * (same * b.x - a.x), a.y + xi * (same * b.y - a.y), a.z + xi * (same * b.z - a.z)});
     node->carrier = c + 1 < s->first_free ? -1 : s->carrier[c + 1];
 }
 

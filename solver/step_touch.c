@@ -19,7 +19,8 @@ static const double STIFF = 0.02;        // [1/mm] bend of the weak spring …
 static const double FIRM = 0.1;          // … which makes up to this where the gap bends less: nothing tells there where the tool touches
 static const double REACH_OUT = 1.2;     // of half a cell: as far as the offset goes
 static const double LEAVES = 1.1;        // of half a cell: further out the contact goes over to the next point
-static const double STRIDE = 5, STRIDE_LEAST = 0.02, STRIDE_MAX = 0.1;        // of what the tool slides, [mm]: so far the offset goes besides; further the wall was not asked
+static const double STRIDE = 5, STRIDE_LEAST = 0.02,
+                    STRIDE_MAX = 0.1; // of what the tool slides, [mm]: so far the offset goes besides; further the wall was not asked
 // Phi = 12 EI / (kappa G A L^2) above which the cubic through the nodes is not the tool's line: elements that are hardly longer than thick shear instead.
 static const double SHEARS = 2;
 static const double BLEND = 0.5;          // of half a cell
@@ -141,7 +142,8 @@ static void lean(const Stepper *s, const Touch *t, Vec3 normal, Vec3 turns, Cont
 void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, const Touch *asked, ContactPoint *c)
 {
     Vec3 along = asked->place.tangent, turns = sym3_mul_vec(&hit->hessian, along);
-    double slope = vec3_dot(hit->normal, along), bend = fmax(0, vec3_dot(along, turns) + vec3_dot(hit->normal, asked->bend)), stiff = fmax(STIFF, FIRM - bend), roll = 1 / (bend + stiff);
+    double slope = vec3_dot(hit->normal, along), bend = fmax(0, vec3_dot(along, turns) + vec3_dot(hit->normal, asked->bend)), stiff = fmax(STIFF, FIRM - bend),
+           roll = 1 / (bend + stiff);
     double wish = asked->offset - (slope + stiff * asked->offset) * roll, most = REACH_OUT * asked->half;
     bool rolls = fabs(wish) < most;
     wish = rolls ? wish : wish > 0 ? most : -most;

@@ -72,7 +72,7 @@ void tools_from_slips(Stepper *s);
 double tools_slipped(const Stepper *s, int c, int k, int about);
 void tools_keep_slides(Stepper *s);                // the forces of this step's solution, for the next step
 double tools_friction_work(const Stepper *s);      // [mJ] that it took in this step …
-double tools_friction_start_work(const Stepper *s);// … or would have with the forces of its start
+double tools_friction_start_work(const Stepper *s); // … or would have with the forces of its start
 
 // Does a node of the solution come to lie behind the tip that it came out of? Then it leaves the chain, and the step begins anew. Whether one did.
 bool tools_leave_back(Stepper *s);

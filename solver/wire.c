@@ -17,10 +17,7 @@ enum { ELEMENTS_MAX = 10000 };
 static const double REST_ANGLE_MAX = 2;          // [rad] of one element at rest
 static const double REST_ANGLE_AIM = 0.3;        // … where there are enough elements
 
-WireOptions wire_default_options(void)
-{
-    return (WireOptions){.elements = 200, .damping_mass = 1e-4, .damping_stiffness = 0.2, .direction = {1, 0, 0}};
-}
+WireOptions wire_default_options(void) { return (WireOptions){.elements = 200, .damping_mass = 1e-4, .damping_stiffness = 0.2, .direction = {1, 0, 0}}; }
 
 WireStiffness wire_stiffness(const WireSection *section)
 {
@@ -49,10 +46,7 @@ static bool complain(char *why, int capacity, const char *what, int index, doubl
 }
 
 // Comparisons are written so that NaN fails them.
-static bool within(double value, double low, double high)
-{
-    return value >= low && value <= high;
-}
+static bool within(double value, double low, double high) { return value >= low && value <= high; }
 
 static bool check_section(const WireSection *s, int i, char *why, int capacity)
 {
@@ -276,8 +270,12 @@ void wire_rest(const Wire *wire, const WireOptions *options, BeamRest *rest)
         rest->half_z[i] = same_sin(quarter) * same_cos(plane);
         // what the element's own formula gives at rest, so that rest is free of force to rounding
         double half = 2 * quarter, chord = half > 0 ? length * same_sin(half) / half : length;
-        BeamInput in = {.x2 = {chord, 0, 0}, .q1 = {same_cos(quarter), 0, 0, -same_sin(quarter)}, .q2 = {same_cos(quarter), 0, 0, same_sin(quarter)},
-                        .length = length, .half_w = same_cos(quarter), .half_z = same_sin(quarter)};
+        BeamInput in = {.x2 = {chord, 0, 0},
+                        .q1 = {same_cos(quarter), 0, 0, -same_sin(quarter)},
+                        .q2 = {same_cos(quarter), 0, 0, same_sin(quarter)},
+                        .length = length,
+                        .half_w = same_cos(quarter),
+                        .half_z = same_sin(quarter)};
         BeamOutput out;
         beam_element(&in, &out);
         rest->extend[i] = chord + out.bow;

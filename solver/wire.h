@@ -43,7 +43,7 @@ typedef struct WireOptions {
     int section_count;       // proximal to distal
     const WireSection *section;
     double damping_mass;     // [1/ms]
-    double damping_stiffness;// [ms]
+    double damping_stiffness; // [ms]
     Vec3 gravity;            // [mm/ms2]
     // where it starts
     bool has_sheath;         // else rig: straight from start along direction (with rest curvature: stressed, it springs)

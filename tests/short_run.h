@@ -12,12 +12,12 @@
 #define WHOLE_OR_SHORT(whole, shorter) (WHOLE_RUN ? (whole) : (shorter))
 
 // Skips a test of numbers alone, whose code others go through; for cmocka's tests.
-#define NEED_WHOLE_RUNS()                                         \
-    do {                                                          \
-        if (!WHOLE_RUN) {                                         \
-            print_message("skipped: a sanitizer is watching\n"); \
-            skip();                                               \
-        }                                                         \
+#define NEED_WHOLE_RUNS()                                                                                                                                      \
+    do {                                                                                                                                                       \
+        if (!WHOLE_RUN) {                                                                                                                                      \
+            print_message("skipped: a sanitizer is watching\n");                                                                                               \
+            skip();                                                                                                                                            \
+        }                                                                                                                                                      \
     } while (0)
 
 #endif

@@ -18,7 +18,8 @@ enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
 FieldFitOptions field_fit_default_options(void)
 {
-    return (FieldFitOptions){.tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 6.5, .levels = LEVELS};
+    return (FieldFitOptions){
+        .tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 6.5, .levels = LEVELS};
 }
 
 static bool check_options(const FieldFitOptions *o, Faults *faults)
@@ -27,9 +28,14 @@ static bool check_options(const FieldFitOptions *o, Faults *faults)
     const struct {
         const char *name;
         double value, least, most;
-    } range[] = {{"tolerance", o->tolerance, 1e-4, 1}, {"tolerance without voxel", o->tolerance_unknown, 1e-4, 1},
-                 {"tolerance in voxels", o->tolerance_voxels, 0, 10}, {"voxel-mm", o->voxel_mm, 0, 100}, {"least reach in voxels", o->least_reach_voxels, 0, 10},
-                 {"target-mm", o->target_mm, 0, 100}, {"significance", o->significance, 0, 100}, {"levels", o->levels, 0, LEVELS}};
+    } range[] = {{"tolerance", o->tolerance, 1e-4, 1},
+                 {"tolerance without voxel", o->tolerance_unknown, 1e-4, 1},
+                 {"tolerance in voxels", o->tolerance_voxels, 0, 10},
+                 {"voxel-mm", o->voxel_mm, 0, 100},
+                 {"least reach in voxels", o->least_reach_voxels, 0, 10},
+                 {"target-mm", o->target_mm, 0, 100},
+                 {"significance", o->significance, 0, 100},
+                 {"levels", o->levels, 0, LEVELS}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
             faults_add(faults, "fit", 0, 0, "%s is %g; expected %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
@@ -134,7 +140,10 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     }
     for (int level = 0; level < options->levels && !s.failed; level++) {
         bool known = options->voxel_mm > 0, given = options->target_mm > 0;
-        FieldRefine how = {level_reach[level], given ? 0 : known ? options->tolerance : options->tolerance_unknown,
+        FieldRefine how = {level_reach[level],
+                           given   ? 0
+                           : known ? options->tolerance
+                                   : options->tolerance_unknown,
                            given ? TARGET_SHARE * options->target_mm : options->tolerance_voxels * options->voxel_mm,
                            options->least_reach_voxels * options->voxel_mm, options->significance};
         model->knee = level_knee[level];

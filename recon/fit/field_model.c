@@ -39,8 +39,8 @@ bool field_model_add(FieldModel *model, int owner, Vec3 center, double reach, do
         model->blob = more;
         model->capacity = capacity;
     }
-    model->blob[model->count++] = (FieldBlob){.center = center, .reach = reach, .amplitude = amplitude, .owner = owner, .birth = center, .birth_reach = reach,
-                                              .moved = true};
+    model->blob[model->count++] =
+        (FieldBlob){.center = center, .reach = reach, .amplitude = amplitude, .owner = owner, .birth = center, .birth_reach = reach, .moved = true};
     return true;
 }
 

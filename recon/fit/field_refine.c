@@ -231,8 +231,13 @@ static int take_candidates(Job *job)
 int field_refine(FieldModel *model, const FieldRefine *how)
 {
     size_t n = (size_t)model->tree->node_count, tiles = (size_t)model->rows->first[n] + 1;
-    Job job = {.model = model, .how = how, .residual = calloc(tiles, sizeof *job.residual), .noise = calloc(n, sizeof *job.noise),
-               .found = calloc(n, sizeof *job.found), .count = calloc(n, sizeof *job.count), .failed = calloc(n, sizeof *job.failed)};
+    Job job = {.model = model,
+               .how = how,
+               .residual = calloc(tiles, sizeof *job.residual),
+               .noise = calloc(n, sizeof *job.noise),
+               .found = calloc(n, sizeof *job.found),
+               .count = calloc(n, sizeof *job.count),
+               .failed = calloc(n, sizeof *job.failed)};
     bool good = job.residual && job.noise && job.found && job.count && job.failed;
     void (*const stage[])(void *, long) = {measure_residuals, measure_noise, find_candidates};
     for (int k = 0; k < 3 && good; k++) {

@@ -367,7 +367,8 @@ static Row *collect_rows(const Job *job, int *first)
             int cell = job->cell[i][k];
             Vec3 x = vec3_sub(is_data ? d->point[k] : d->at[k - d->data], tree->center[cell]);
             // in a cell wider than the vessel that the guard is of, its field rises more slowly
-            float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]), low = is_data ? 0 : d->bound[k - d->data][0], high = is_data ? 0 : d->bound[k - d->data][1];
+            float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]), low = is_data ? 0 : d->bound[k - d->data][0],
+                  high = is_data ? 0 : d->bound[k - d->data][1];
             row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, low * scale, high < 0 ? high * scale : high, is_data};
         }
     }
@@ -405,7 +406,8 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
 {
     size_t n = (size_t)tree->node_count;
     *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
-    Job job = {.tree = tree, .draft = calloc(n, sizeof *job.draft), .cell = calloc(n, sizeof *job.cell), .rows = rows, .dropped = calloc(n, sizeof *job.dropped)};
+    Job job = {
+        .tree = tree, .draft = calloc(n, sizeof *job.draft), .cell = calloc(n, sizeof *job.cell), .rows = rows, .dropped = calloc(n, sizeof *job.dropped)};
     bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.draft && job.cell && job.dropped;
     if (good) {
         parallel_for(threads, tree->node_count, draft_node, &job, NULL);

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { REGION_BLOBS = 28, UNKNOWNS = 5};
+enum { REGION_BLOBS = 28, UNKNOWNS = 5 };
 static const double LEAST_SLOPE = 0.5;
 // Priors: a blob's position and size are tied to their initial values, as strongly as by a few points a hundredth of a radius off.
 static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.03, LEAST_BASE = 0.1;
@@ -428,8 +428,8 @@ static int compare_places(const void *a, const void *b)
 static unsigned morton_of(const VesselTree *tree, const FieldBlob *b)
 {
     Vec3 x = vec3_scale(vec3_sub(b->birth, tree->center[b->owner]), 1 / tree->radius[b->owner]);
-    unsigned code = 0, at[3] = {(unsigned)fmax(0, fmin(15, 6 * (x.x + 1.3))), (unsigned)fmax(0, fmin(15, 6 * (x.y + 1.3))),
-                                (unsigned)fmax(0, fmin(15, 6 * (x.z + 1.3)))};
+    unsigned code = 0,
+             at[3] = {(unsigned)fmax(0, fmin(15, 6 * (x.x + 1.3))), (unsigned)fmax(0, fmin(15, 6 * (x.y + 1.3))), (unsigned)fmax(0, fmin(15, 6 * (x.z + 1.3)))};
     for (unsigned bit = 4; bit-- > 0;)
         for (int k = 0; k < 3; k++)
             code = code << 1 | (at[k] >> bit & 1);
@@ -538,7 +538,10 @@ static bool make_regions(Sweep *s, bool shift)
 double field_model_solve(FieldModel *model, int steps, bool shift)
 {
     size_t blobs = (size_t)model->count + 1;
-    Sweep s = {.model = model, .steps = steps, .order = malloc(blobs * sizeof *s.order), .region_of = malloc(blobs * sizeof *s.region_of),
+    Sweep s = {.model = model,
+               .steps = steps,
+               .order = malloc(blobs * sizeof *s.order),
+               .region_of = malloc(blobs * sizeof *s.region_of),
                .local_of = malloc(blobs * sizeof *s.local_of)};
     s.region = calloc(blobs, sizeof *s.region);
     s.batch = malloc(blobs * sizeof *s.batch);

@@ -12,7 +12,10 @@ typedef struct FitKernels {
     void (*mean)(const float *, const float *, const float *, const float *, const float *, int, const LaneBlob *, float (*)[FIELD_LANES]);
 } FitKernels;
 
-#define KERNEL_TABLE(set) {sum_##set, columns_##set, gram_##set, mean_##set}
+#define KERNEL_TABLE(set)                                                                                                                                      \
+    {                                                                                                                                                          \
+        sum_##set, columns_##set, gram_##set, mean_##set                                                                                                       \
+    }
 
 #define KERNEL_TEXT "recon/fit/fit_kernel.inc"
 #include "base/each_simd.inc"
@@ -26,13 +29,13 @@ void fit_lanes_sum(const float *x, const float *y, const float *z, int rows, int
 }
 
 void fit_lanes_columns(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, const float *scale, const float *bend,
-                         const float *const n[3], float *column, int stride)
+                       const float *const n[3], float *column, int stride)
 {
     kernels()->columns(x, y, z, rows, sloped, blob, scale, bend, n[0], n[1], n[2], column, stride);
 }
 
 void fit_lanes_mean(const float *x, const float *y, const float *z, const float *weight, const float *value, int rows, const LaneBlob *ball,
-                      float sum[4][FIELD_LANES])
+                    float sum[4][FIELD_LANES])
 {
     kernels()->mean(x, y, z, weight, value, rows, ball, sum);
 }

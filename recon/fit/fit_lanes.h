@@ -14,11 +14,11 @@ void fit_lanes_sum(const float *x, const float *y, const float *z, int rows, int
 // Derivatives by a blob's amplitude, centre (in units of its reach) and logarithm of its reach: five columns, each of `rows` entries scale * df, then of
 // `sloped` entries bend * d(n.g). `stride` entries from column to column.
 void fit_lanes_columns(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, const float *scale, const float *bend,
-                         const float *const n[3], float *column, int stride);
+                       const float *const n[3], float *column, int stride);
 // product (stride, stride) = J'J for J (rows, stride), stride a multiple of FIELD_LANES; only its upper triangle is right.
 void fit_lanes_gram(const float *row, int rows, int stride, float *product);
 // Sums over a tile's data within `reach` of (x, y, z): of w, w^2, w e, w e^2 with w = (1 - d^2/reach^2)^3 and the values e; counts as above. Adds to sum, lane by lane.
 void fit_lanes_mean(const float *x, const float *y, const float *z, const float *weight, const float *value, int rows, const LaneBlob *ball,
-                      float sum[4][FIELD_LANES]);
+                    float sum[4][FIELD_LANES]);
 
 #endif

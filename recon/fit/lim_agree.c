@@ -73,7 +73,10 @@ static void agree_on_node(void *context, long index)
     int node = (int)index, count = 0;
     double most = 0;
     int64_t first = tree->blob_offset[node];
-    Blobby model = {.count = (int)(tree->blob_offset[node + 1] - first), .center = tree->blob_center + first, .width = tree->blob_width + first, .iso_level = tree->iso_level};
+    Blobby model = {.count = (int)(tree->blob_offset[node + 1] - first),
+                    .center = tree->blob_center + first,
+                    .width = tree->blob_width + first,
+                    .iso_level = tree->iso_level};
     Vec3 along = tree->direction[node], e1, e2, wall;
     lim_frame(tree, node, &e1, &e2);
     bool good = model.count > 0 && blobby_field(&model, tree->center[node]) > 0;

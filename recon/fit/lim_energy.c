@@ -33,9 +33,11 @@ typedef struct LimKernels {
     void (*dot_lanes)(const float *, const float *, int, float *);
     bool (*solve)(double *, int, int, double *);
 } LimKernels;
-#define KERNEL_TABLE(set) \
-    {add_##set, sum_##set, taubin_##set, approach_##set, feet_##set, moving_energy_##set, total_energy_##set, residuals_##set, columns_##set, gram_##set, \
-     dot_lanes_##set, solve_##set}
+#define KERNEL_TABLE(set)                                                                                                                                      \
+    {                                                                                                                                                          \
+        add_##set, sum_##set, taubin_##set, approach_##set, feet_##set, moving_energy_##set, total_energy_##set, residuals_##set, columns_##set, gram_##set,   \
+            dot_lanes_##set, solve_##set                                                                                                                       \
+    }
 
 #define KERNEL_TEXT "recon/fit/lim_energy_kernel.inc"
 #include "base/each_simd.inc"
@@ -52,10 +54,9 @@ bool lim_points_create(LimPoints *points, int count)
         return false;
     memset(points->memory, 0, (n * ARRAYS + LIM_LANES) * sizeof(float));
     float *next = points->memory;
-    float **array[ARRAYS] = {&points->x,    &points->y,    &points->z,    &points->f,      &points->g[0], &points->g[1],
-                             &points->g[2], &points->h[0], &points->h[1], &points->h[2],   &points->h[3], &points->h[4],
-                             &points->h[5], &points->weight, &points->bend, &points->low, &points->high,
-                             &points->given[0], &points->given[1], &points->given[2]};
+    float **array[ARRAYS] = {&points->x,    &points->y,    &points->z,    &points->f,        &points->g[0],     &points->g[1],    &points->g[2],
+                             &points->h[0], &points->h[1], &points->h[2], &points->h[3],     &points->h[4],     &points->h[5],    &points->weight,
+                             &points->bend, &points->low,  &points->high, &points->given[0], &points->given[1], &points->given[2]};
     for (int i = 0; i < ARRAYS; i++, next += n)
         *array[i] = next;
     return true;
@@ -80,10 +81,7 @@ void lim_points_reset(LimPoints *points, double iso_level)
 
 void lim_points_add(LimPoints *points, const LimBlob *blob, double sign) { kernels()->add(points, blob, sign); }
 
-void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level)
-{
-    kernels()->sum(points, blobs, count, iso_level);
-}
+void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level) { kernels()->sum(points, blobs, count, iso_level); }
 
 void lim_points_taubin(const LimPoints *points, float *distance) { kernels()->taubin(points, distance); }
 
@@ -124,10 +122,7 @@ void lim_energy_total(const LimPoints *points, double *distance, double *bend)
 
 void lim_energy_residuals(const LimPoints *points, double beta, float *residual) { kernels()->residuals(points, (float)beta, residual); }
 
-void lim_energy_columns(const LimPoints *points, const LimBlob *blob, double beta, float *column)
-{
-    kernels()->columns(points, blob, (float)beta, column);
-}
+void lim_energy_columns(const LimPoints *points, const LimBlob *blob, double beta, float *column) { kernels()->columns(points, blob, (float)beta, column); }
 
 double lim_energy_dot(const float *a, const float *b, int padded)
 {

@@ -28,9 +28,24 @@ static const double AGREES = 0.03;
 
 LimFitOptions lim_fit_default_options(void)
 {
-    return (LimFitOptions){.alpha = 0, .beta = 1e-4, .s = 2, .iso_level = 0.1, .max_blobs = 100, .target_mm = 0, .topological_distance = 2,
-                           .max_loops = 2, .line_searches = 4, .voxel_mm = 0.2, .weigh_distance = true, .project_points = true,
-                           .sweep_all_blobs = true, .give_up_splits = 3, .extend_inlet = true, .guard_shape = true, .agree = true, .max_points = 300};
+    return (LimFitOptions){.alpha = 0,
+                           .beta = 1e-4,
+                           .s = 2,
+                           .iso_level = 0.1,
+                           .max_blobs = 100,
+                           .target_mm = 0,
+                           .topological_distance = 2,
+                           .max_loops = 2,
+                           .line_searches = 4,
+                           .voxel_mm = 0.2,
+                           .weigh_distance = true,
+                           .project_points = true,
+                           .sweep_all_blobs = true,
+                           .give_up_splits = 3,
+                           .extend_inlet = true,
+                           .guard_shape = true,
+                           .agree = true,
+                           .max_points = 300};
 }
 
 LimFitOptions lim_fit_paper_options(void)
@@ -53,12 +68,18 @@ static bool check_options(const LimFitOptions *o, Faults *faults)
     const struct {
         const char *name;
         double value, least, most;
-    } range[] = {{"alpha", o->alpha, 0, 1},          {"beta", o->beta, 0, 10},
-                 {"s", o->s, 0.1, 10},               {"iso-level", o->iso_level, 1e-4, 10},
-                 {"max-blobs", o->max_blobs, 2, 1000}, {"target-mm", o->target_mm, 0, 100},
-                 {"voxel-mm", o->voxel_mm, 0, 100}, {"topological-distance", o->topological_distance, 0, 50},
-                 {"max-loops", o->max_loops, 1, 100}, {"line-searches", o->line_searches, 1, 100},
-                 {"give-up-splits", o->give_up_splits, 0, 1000}, {"max-points", o->max_points, 50, 100000}};
+    } range[] = {{"alpha", o->alpha, 0, 1},
+                 {"beta", o->beta, 0, 10},
+                 {"s", o->s, 0.1, 10},
+                 {"iso-level", o->iso_level, 1e-4, 10},
+                 {"max-blobs", o->max_blobs, 2, 1000},
+                 {"target-mm", o->target_mm, 0, 100},
+                 {"voxel-mm", o->voxel_mm, 0, 100},
+                 {"topological-distance", o->topological_distance, 0, 50},
+                 {"max-loops", o->max_loops, 1, 100},
+                 {"line-searches", o->line_searches, 1, 100},
+                 {"give-up-splits", o->give_up_splits, 0, 1000},
+                 {"max-points", o->max_points, 50, 100000}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
             faults_add(faults, "fit", 0, 0, "%s is %g; expected %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
@@ -460,8 +481,12 @@ static bool weigh_points(const VesselTree *tree, int node, Gather *gather)
 static LimFitTask task_of(const Job *job, int node, Gather *gather, double *start_radius)
 {
     const VesselTree *tree = job->tree, *first = job->first;
-    LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .weight = gather->weight, .center = tree->center[node],
-                       .direction = tree->direction[node], .radius = tree->radius[node]};
+    LimFitTask task = {.point_count = gather->point_count,
+                       .point = gather->point,
+                       .weight = gather->weight,
+                       .center = tree->center[node],
+                       .direction = tree->direction[node],
+                       .radius = tree->radius[node]};
     if (job->options->guard_shape) {
         task.guard_count = gather->guard_count;
         task.guard = gather->guard;

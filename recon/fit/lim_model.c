@@ -153,10 +153,7 @@ static void fit_set_points(Fit *fit)
         find_pairs(fit);
 }
 
-static void fit_refresh_sums(Fit *fit)
-{
-    lim_points_sum(&fit->points, fit->model.blob, fit->model.count, fit->options->iso_level);
-}
+static void fit_refresh_sums(Fit *fit) { lim_points_sum(&fit->points, fit->model.blob, fit->model.count, fit->options->iso_level); }
 
 // The slope between the data and the surface, |g| - d/2 f_nn with d = f / |g|: the slope at the point itself is smaller outside, where it
 // would weigh noise more than inside; that made vessels 0.03 mm too wide at 0.1 mm of noise.
@@ -557,10 +554,7 @@ static int worst_point(Fit *fit, double *worst_distance, double *mean_square)
     return worst;
 }
 
-static Vec3 point_of(const Fit *fit, int i)
-{
-    return vec3((double)fit->points.given[0][i], (double)fit->points.given[1][i], (double)fit->points.given[2][i]);
-}
+static Vec3 point_of(const Fit *fit, int i) { return vec3((double)fit->points.given[0][i], (double)fit->points.given[1][i], (double)fit->points.given[2][i]); }
 
 // Eq. (9): the blob whose own surface is nearest to the point by Taubin's distance.
 static int select_blob(const Fit *fit, Vec3 p)

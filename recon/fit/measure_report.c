@@ -4,9 +4,9 @@ static void print_jumps(FILE *out, const char *what, const JumpRow *row)
 {
     for (int place = 0; place < PLACES; place++)
         if (row[place].count > 0)
-            fprintf(out, "%-8s %-12s %7d %9.4f %8.4f %8.4f %9.4f %8.4f %8.4f   %d, %d\n", what, model_place_name[place], row[place].count, row[place].gap_median,
-                   row[place].gap_p99, row[place].gap_most, row[place].normal_median, row[place].normal_p99, row[place].normal_most,
-                   row[place].worst_node, row[place].worst_other);
+            fprintf(out, "%-8s %-12s %7d %9.4f %8.4f %8.4f %9.4f %8.4f %8.4f   %d, %d\n", what, model_place_name[place], row[place].count,
+                    row[place].gap_median, row[place].gap_p99, row[place].gap_most, row[place].normal_median, row[place].normal_p99, row[place].normal_most,
+                    row[place].worst_node, row[place].worst_other);
 }
 
 void model_measure_print(FILE *out, const ModelMeasure *m)

@@ -165,7 +165,9 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
         f->join_capacity = capacity;
     }
     double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across), anew = aside * vec3_dot(vec3_add(before.normal, fresh.normal), across);
-    f->join[f->joins++] = (Join){place_of(job, node, other), node, other,
+    f->join[f->joins++] = (Join){place_of(job, node, other),
+                                 node,
+                                 other,
                                  {fabs(p.distance - q.distance), fabs(behind.gap - before.gap - moved), fabs(fresh.gap - before.gap - anew)},
                                  {vec3_angle(p.normal, q.normal), vec3_angle(before.normal, behind.normal), vec3_angle(before.normal, fresh.normal)}};
 }
@@ -199,8 +201,8 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
             continue;
         double beyond = (power_distance(p, tree->center[other], tree->radius[other]) - own) / (2 * apart);
         Vec3 across = vec3_scale(e, 1 / apart), x = vec3_add_scaled(p, beyond, across);
-        if (beyond < 0.1 * tree->radius[node] && slide_to_wall(&model, across, 0.01 * tree->radius[node], &x) &&
-            lim_is_in_cell(tree, node, other, x) && lim_is_in_cell(tree, other, node, x))
+        if (beyond < 0.1 * tree->radius[node] && slide_to_wall(&model, across, 0.01 * tree->radius[node], &x) && lim_is_in_cell(tree, node, other, x) &&
+            lim_is_in_cell(tree, other, node, x))
             add_join(job, node, other, x, across, f);
     }
     if (job->truth) {

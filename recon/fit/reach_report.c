@@ -24,7 +24,8 @@ static void print_stop(FILE *out, const VesselTree *tree, const Reach *reach, co
 static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
 {
     double tool = reach->options.tool_radius;
-    fprintf(out, "from the inlet a point gets to %.1f %% of %.0f mm of centreline, a tool of %.2f mm radius on the line to %.1f %%, up to %.2g r aside to %.1f %%\n",
+    fprintf(out,
+            "from the inlet a point gets to %.1f %% of %.0f mm of centreline, a tool of %.2f mm radius on the line to %.1f %%, up to %.2g r aside to %.1f %%\n",
             percent(reach, reach->reached[REACH_POINT]), reach->length, tool, percent(reach, reach->reached[REACH_TOOL]), reach->options.aside,
             percent(reach, reach->reached[REACH_ASIDE]));
     fprintf(out, "junctions      %d: %d capped, %d with less than %.2f mm free", reach->junction_count, reach->capped, reach->narrow, tool);
@@ -32,8 +33,8 @@ static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
         fprintf(out, "; %d of these and %d of these over links longer than their radii", reach->capped_apart, reach->narrow_apart);
     fprintf(out, "\n");
     if (reach->apart_links > 0)
-        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel, %d of them open; behind them %.1f mm\n", reach->apart_links,
-                reach->apart_open, reach->apart_length);
+        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel, %d of them open; behind them %.1f mm\n",
+                reach->apart_links, reach->apart_open, reach->apart_length);
     if (reach->sac_nodes > 0)
         fprintf(out, "aneurysm nodes %d of %d are reached by a point\n", reach->sac_nodes_reached, reach->sac_nodes);
     if (reach->stop_count > 0)

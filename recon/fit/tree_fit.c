@@ -33,13 +33,14 @@ static int describe_fit(const TreeFitOptions *options, char *text, size_t room)
                         fit_preset_name[options->preset], options->edge_blur, f.target_mm, f.voxel_mm, f.tolerance_voxels, f.tolerance, f.tolerance_unknown,
                         f.least_reach_voxels, f.significance, f.levels);
     }
-    return snprintf(text, room,
-                    "fit:\n  preset: %s\n  edge_blur_mm: %g\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
-                    "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
-                    "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
-                    fit_preset_name[options->preset], options->edge_blur, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm,
-                    o->topological_distance, o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits,
-                    o->extend_inlet, o->guard_shape, o->agree, o->max_points);
+    return snprintf(
+        text, room,
+        "fit:\n  preset: %s\n  edge_blur_mm: %g\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
+        "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
+        "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
+        fit_preset_name[options->preset], options->edge_blur, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm,
+        o->topological_distance, o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits, o->extend_inlet,
+        o->guard_shape, o->agree, o->max_points);
 }
 
 char *tree_fit_parameters(const TreeFitOptions *options, const TreeFileInfo *tree)

@@ -21,7 +21,7 @@ static bool build_capsule(Shape *shape, const ShapeOptions *o, bool open)
     double knot[5][4];
     for (int i = 0; i < 5; i++)
         memcpy(knot[i], (double[4]){o->length_mm * i / 4, 0, 0, o->radius_mm}, sizeof knot[i]);
-    return shape_add(shape, (const double (*)[4])knot, 5, open, open, -1, NODE_VESSEL, NULL);
+    return shape_add(shape, (const double(*)[4])knot, 5, open, open, -1, NODE_VESSEL, NULL);
 }
 
 static bool build_arc(Shape *shape, const ShapeOptions *o)
@@ -33,7 +33,7 @@ static bool build_arc(Shape *shape, const ShapeOptions *o)
         memcpy(knot[i], (double[4]){o->bend_radius_mm * same_sin(angle), o->bend_radius_mm * (1 - same_cos(angle)), 0, o->radius_mm}, sizeof knot[i]);
     }
     const double tangent[2][4] = {{1, 0, 0, 0}, {-1, 0, 0, 0}};
-    return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, tangent);
+    return shape_add(shape, (const double(*)[4])knot, N, true, true, -1, NODE_VESSEL, tangent);
 }
 
 // Two quarter arcs that start in the same direction and diverge to both sides.
@@ -47,7 +47,7 @@ static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
             memcpy(knot[i], (double[4]){o->bend_radius_mm * same_sin(angle), side ? -across : across, 0, o->radius_mm}, sizeof knot[i]);
         }
         const double tangent[2][4] = {{1, 0, 0, 0}, {0, side ? -1 : 1, 0, 0}};
-        if (!shape_add(shape, (const double (*)[4])knot, N, true, true, side - 1, NODE_VESSEL, tangent))
+        if (!shape_add(shape, (const double(*)[4])knot, N, true, true, side - 1, NODE_VESSEL, tangent))
             return false;
     }
     return true;
@@ -70,30 +70,29 @@ static bool build_spiral(Shape *shape, const ShapeOptions *o)
         double x = -polar / theta * same_cos(theta) - polar * same_sin(theta), y = -polar / theta * same_sin(theta) + polar * same_cos(theta);
         memcpy(tangent[end], (double[4]){x / along, y / along, z / along, (0.15 - 0.5) / (3 * PI) / along}, sizeof tangent[end]);
     }
-    return shape_add(shape, (const double (*)[4])knot, N, true, false, -1, NODE_VESSEL, (const double (*)[4])tangent);
+    return shape_add(shape, (const double(*)[4])knot, N, true, false, -1, NODE_VESSEL, (const double(*)[4])tangent);
 }
 
 // An internal carotid with its siphon, continuing as the middle cerebral artery; anterior cerebral artery; two branches each, of which the anterior
 // ones kiss; a saccular aneurysm on the outer side of the siphon's anterior knee. x lateral, y anterior, z up [mm].
 static bool build_phantom(Shape *shape)
 {
-    static const double carotid[][4] = {{0, 0, 0, 2.5},       {0, 0, 8, 2.45},      {0.4, 1.2, 15, 2.4},   {1.4, 6.2, 20.4, 2.3},
-                                        {2.4, 12.6, 22.2, 2.3}, {3, 17.8, 25.4, 2.25}, {3.2, 18.6, 31, 2.2}, {3.8, 14.4, 35.2, 2.1},
-                                        {5, 8.9, 36.6, 2.05}, {7, 5.9, 40.4, 1.9},  {10.4, 5.6, 44.6, 1.75}, {15.4, 6.6, 46.6, 1.5},
-                                        {21, 7.6, 46.4, 1.4}, {26.6, 7, 48.2, 1.3}, {31.4, 5, 52, 1.15}};
-    static const double anterior[][4] = {{9.3, 5.6, 43.4, 1.2}, {6.6, 6.4, 47.2, 1.2}, {3.2, 9.2, 50.4, 1.1}, {0.6, 12.2, 54, 1},
-                                         {-0.8, 12.4, 59.4, 0.9}, {-0.6, 10, 64.4, 0.8}};
+    static const double carotid[][4] = {{0, 0, 0, 2.5},          {0, 0, 8, 2.45},        {0.4, 1.2, 15, 2.4},    {1.4, 6.2, 20.4, 2.3}, {2.4, 12.6, 22.2, 2.3},
+                                        {3, 17.8, 25.4, 2.25},   {3.2, 18.6, 31, 2.2},   {3.8, 14.4, 35.2, 2.1}, {5, 8.9, 36.6, 2.05},  {7, 5.9, 40.4, 1.9},
+                                        {10.4, 5.6, 44.6, 1.75}, {15.4, 6.6, 46.6, 1.5}, {21, 7.6, 46.4, 1.4},   {26.6, 7, 48.2, 1.3},  {31.4, 5, 52, 1.15}};
+    static const double anterior[][4] = {{9.3, 5.6, 43.4, 1.2}, {6.6, 6.4, 47.2, 1.2},   {3.2, 9.2, 50.4, 1.1},
+                                         {0.6, 12.2, 54, 1},    {-0.8, 12.4, 59.4, 0.9}, {-0.6, 10, 64.4, 0.8}};
     static const double middle_1[][4] = {{21, 7.6, 46.4, 0.9}, {21.8, 9.4, 49.6, 0.85}, {21.6, 10.2, 54, 0.8}};
     static const double middle_2[][4] = {{26.6, 7, 48.2, 0.85}, {29.4, 8.2, 45.8, 0.8}, {33, 9, 45, 0.75}};
-    static const double anterior_1[][4] = {{3.2, 9.2, 50.4, 0.8}, {4.9, 12, 52.2, 0.75}, {4.2, 15.6, 54.8, 0.75}, {1.5, 17.4, 57.8, 0.7}, {-0.4, 18.2, 60.2, 0.65}};
-    static const double anterior_2[][4] = {{0.6, 12.2, 54, 0.72}, {-0.6, 14.6, 54.8, 0.69}, {-0.9, 16.4, 57.2, 0.66}, {0.6, 16.2, 60.6, 0.63},
-                                           {1.6, 14.2, 63.8, 0.6}};
-    static const double sac[][4] = {{3.1, 18.6, 28.2, 1.85}, {3.2, 20.6, 27.9, 1.9}, {3.3, 22.4, 27.7, 2.6}, {3.4, 24.2, 27.5, 3.35},
-                                    {3.45, 25.2, 27.4, 3.5}};
+    static const double anterior_1[][4] = {
+        {3.2, 9.2, 50.4, 0.8}, {4.9, 12, 52.2, 0.75}, {4.2, 15.6, 54.8, 0.75}, {1.5, 17.4, 57.8, 0.7}, {-0.4, 18.2, 60.2, 0.65}};
+    static const double anterior_2[][4] = {
+        {0.6, 12.2, 54, 0.72}, {-0.6, 14.6, 54.8, 0.69}, {-0.9, 16.4, 57.2, 0.66}, {0.6, 16.2, 60.6, 0.63}, {1.6, 14.2, 63.8, 0.6}};
+    static const double sac[][4] = {{3.1, 18.6, 28.2, 1.85}, {3.2, 20.6, 27.9, 1.9}, {3.3, 22.4, 27.7, 2.6}, {3.4, 24.2, 27.5, 3.35}, {3.45, 25.2, 27.4, 3.5}};
 #define PART(knots, open, parent, kind) shape_add(shape, knots, (int)(sizeof knots / sizeof knots[0]), open, false, parent, kind, NULL)
     return PART(carotid, true, -1, NODE_VESSEL) && PART(anterior, false, 0, NODE_VESSEL) && PART(middle_1, false, 0, NODE_VESSEL) &&
-           PART(middle_2, false, 0, NODE_VESSEL) && PART(anterior_1, false, 1, NODE_VESSEL) &&
-           PART(anterior_2, false, 1, NODE_VESSEL) && PART(sac, false, 0, NODE_ANEURYSM);
+           PART(middle_2, false, 0, NODE_VESSEL) && PART(anterior_1, false, 1, NODE_VESSEL) && PART(anterior_2, false, 1, NODE_VESSEL) &&
+           PART(sac, false, 0, NODE_ANEURYSM);
 #undef PART
 }
 
@@ -103,12 +102,15 @@ static bool build_helix(Shape *shape, const ShapeOptions *o)
     double knot[N][4], tangent[2][4], turn = 2 * PI * o->turns, along = sqrt(same_square(turn * o->bend_radius_mm) + o->rise_mm * o->rise_mm);
     for (int i = 0; i < N; i++) {
         double u = (double)i / (N - 1);
-        memcpy(knot[i], (double[4]){o->bend_radius_mm * same_cos(turn * u), o->bend_radius_mm * same_sin(turn * u), o->rise_mm * u, o->radius_mm}, sizeof knot[i]);
+        memcpy(knot[i], (double[4]){o->bend_radius_mm * same_cos(turn * u), o->bend_radius_mm * same_sin(turn * u), o->rise_mm * u, o->radius_mm},
+               sizeof knot[i]);
     }
     for (int end = 0; end < 2; end++)
-        memcpy(tangent[end], (double[4]){-o->bend_radius_mm * turn * same_sin(end * turn) / along, o->bend_radius_mm * turn * same_cos(end * turn) / along,
-                                         o->rise_mm / along, 0}, sizeof tangent[end]);
-    return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, (const double (*)[4])tangent);
+        memcpy(tangent[end],
+               (double[4]){-o->bend_radius_mm * turn * same_sin(end * turn) / along, o->bend_radius_mm * turn * same_cos(end * turn) / along,
+                           o->rise_mm / along, 0},
+               sizeof tangent[end]);
+    return shape_add(shape, (const double(*)[4])knot, N, true, true, -1, NODE_VESSEL, (const double(*)[4])tangent);
 }
 
 // Symmetric: trunk and left daughter are one part, the right daughter is another that starts as wide as the trunk; each bends by the angle on an arc of
@@ -116,7 +118,8 @@ static bool build_helix(Shape *shape, const ShapeOptions *o)
 static bool build_y(Shape *shape, const ShapeOptions *o)
 {
     enum { TRUNK = 17, ARM = 33 };
-    double r = o->radius_mm, small = r / same_cbrt(2), angle = o->angle_deg * PI / 180, bend = 3 * small, arc = bend * angle, length = fmax(o->length_mm, 4 * r);
+    double r = o->radius_mm, small = r / same_cbrt(2), angle = o->angle_deg * PI / 180, bend = 3 * small, arc = bend * angle,
+           length = fmax(o->length_mm, 4 * r);
     for (int side = 0; side < 2; side++) {
         double knot[TRUNK + ARM][4];
         int n = 0;
@@ -128,7 +131,7 @@ static bool build_y(Shape *shape, const ShapeOptions *o)
             memcpy(knot[n++], (double[4]){x, side ? -y : y, 0, r + (small - r) * u * u * (3 - 2 * u)}, sizeof knot[0]);
         }
         const double tangent[2][4] = {{1, 0, 0, 0}, {same_cos(angle), side ? -same_sin(angle) : same_sin(angle), 0, 0}};
-        if (!shape_add(shape, (const double (*)[4])knot, n, side == 0, true, side - 1, NODE_VESSEL, tangent))
+        if (!shape_add(shape, (const double(*)[4])knot, n, side == 0, true, side - 1, NODE_VESSEL, tangent))
             return false;
     }
     return true;
@@ -145,7 +148,7 @@ static bool add_wave(Shape *shape, const ShapeOptions *o, double half_length)
         double x = half_length * (2.0 * i / (N - 1) - 1);
         memcpy(knot[i], (double[4]){x, 0, wave(o, x), o->radius_mm}, sizeof knot[i]);
     }
-    return shape_add(shape, (const double (*)[4])knot, N, true, false, -1, NODE_VESSEL, NULL);
+    return shape_add(shape, (const double(*)[4])knot, N, true, false, -1, NODE_VESSEL, NULL);
 }
 
 // The neighbour runs beside the vessel for twelve radii at `gap_mm` from wall to wall, and bends away from it at both ends.
@@ -161,7 +164,7 @@ static bool build_kissing(Shape *shape, const ShapeOptions *o)
         double y = 2 * r + o->gap_mm + r * 0.06 * same_square(far) * fmin(1, far / 3);
         memcpy(knot[i], (double[4]){x * same_cos(turn) - z * same_sin(turn), y, x * same_sin(turn) + z * same_cos(turn), r}, sizeof knot[i]);
     }
-    return shape_add(shape->neighbour, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, NULL);
+    return shape_add(shape->neighbour, (const double(*)[4])knot, N, true, true, -1, NODE_VESSEL, NULL);
 }
 
 static bool build_bone(Shape *shape, const ShapeOptions *o)
@@ -189,11 +192,12 @@ static bool build_twig(Shape *shape, const ShapeOptions *o)
         memcpy(knot[i], (double[4]){length * u, 0, 0, r}, sizeof knot[i]);
         memcpy(branch[i], (double[4]){0.5 * length + 0.2 * u * u * length, 0.6 * length * u, 0, twig}, sizeof branch[i]);
     }
-    return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, NULL) &&
-           shape_add(shape, (const double (*)[4])branch, N, false, false, 0, NODE_VESSEL, NULL);
+    return shape_add(shape, (const double(*)[4])knot, N, true, true, -1, NODE_VESSEL, NULL) &&
+           shape_add(shape, (const double(*)[4])branch, N, false, false, 0, NODE_VESSEL, NULL);
 }
 
-static const char *const names[] = {"capsule", "open-capsule", "arc", "bifurcation", "spiral", "phantom", "helix", "y", "kissing", "bone", "twig", "tree", "aorta"};
+static const char *const names[] = {"capsule", "open-capsule", "arc",  "bifurcation", "spiral", "phantom", "helix",
+                                    "y",       "kissing",      "bone", "twig",        "tree",   "aorta"};
 
 const char *shape_names(void) { return "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta"; }
 
@@ -202,13 +206,25 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
     const struct {
         const char *key;
         double *value, least, most;
-    } known[] = {{"points", &out->points, 8, 100000},         {"sac_points", &out->sac_points, 8, 100000}, {"noise_mm", &out->noise_mm, 0, 10},
-                 {"seed", &out->seed, 0, 9007199254740992.0}, {"spacing", &out->spacing, 0.05, 4},          {"blend_mm", &out->blend_mm, 0, 3},
-                 {"length_mm", &out->length_mm, 0.1, 1000},   {"radius_mm", &out->radius_mm, 0.05, 50},
-                 {"bend_radius_mm", &out->bend_radius_mm, 0.1, 1000}, {"rise_mm", &out->rise_mm, 0, 100}, {"scale", &out->scale, 0.01, 100},
-                 {"turns", &out->turns, 0.1, 10},             {"angle_deg", &out->angle_deg, 5, 85},         {"branches", &out->branches, 1, 200},
-                 {"sacs", &out->sacs, 0, 50},                 {"blocks", &out->blocks, 0, 100},              {"gap_mm", &out->gap_mm, 0, 100},
-                 {"crossing_deg", &out->crossing_deg, 0, 90}, {"twig_radius_mm", &out->twig_radius_mm, 0.02, 50}};
+    } known[] = {{"points", &out->points, 8, 100000},
+                 {"sac_points", &out->sac_points, 8, 100000},
+                 {"noise_mm", &out->noise_mm, 0, 10},
+                 {"seed", &out->seed, 0, 9007199254740992.0},
+                 {"spacing", &out->spacing, 0.05, 4},
+                 {"blend_mm", &out->blend_mm, 0, 3},
+                 {"length_mm", &out->length_mm, 0.1, 1000},
+                 {"radius_mm", &out->radius_mm, 0.05, 50},
+                 {"bend_radius_mm", &out->bend_radius_mm, 0.1, 1000},
+                 {"rise_mm", &out->rise_mm, 0, 100},
+                 {"scale", &out->scale, 0.01, 100},
+                 {"turns", &out->turns, 0.1, 10},
+                 {"angle_deg", &out->angle_deg, 5, 85},
+                 {"branches", &out->branches, 1, 200},
+                 {"sacs", &out->sacs, 0, 50},
+                 {"blocks", &out->blocks, 0, 100},
+                 {"gap_mm", &out->gap_mm, 0, 100},
+                 {"crossing_deg", &out->crossing_deg, 0, 90},
+                 {"twig_radius_mm", &out->twig_radius_mm, 0.02, 50}};
     int before = faults->count;
     for (int i = 0; i < count; i++) {
         size_t k = 0, n = sizeof known / sizeof known[0];
@@ -236,8 +252,8 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
 
 static bool build_tree(Shape *shape, const ShapeOptions *o, const char *file, Faults *faults)
 {
-    RandomTreeOptions tree = {.branches = (int)o->branches, .radius_mm = o->radius_mm, .seed = shape->seed, .sacs = (int)o->sacs,
-                              .blocks = (int)o->blocks, .gap_mm = o->gap_mm};
+    RandomTreeOptions tree = {
+        .branches = (int)o->branches, .radius_mm = o->radius_mm, .seed = shape->seed, .sacs = (int)o->sacs, .blocks = (int)o->blocks, .gap_mm = o->gap_mm};
     return random_tree_grow(shape, &tree, file, faults);
 }
 
@@ -256,8 +272,18 @@ static bool scale_shape(Shape *shape, double scale)
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults)
 {
     enum { HELIX = 6, Y, KISSING, BONE, TWIG, TREE, AORTA, SHAPES };
-    ShapeOptions o = {.points = 108, .sac_points = 1500, .seed = 1, .spacing = 0.5, .length_mm = 4, .radius_mm = 1, .bend_radius_mm = 4, .scale = 1,
-                      .turns = 2, .angle_deg = 37.5, .branches = 51, .twig_radius_mm = 0.2};
+    ShapeOptions o = {.points = 108,
+                      .sac_points = 1500,
+                      .seed = 1,
+                      .spacing = 0.5,
+                      .length_mm = 4,
+                      .radius_mm = 1,
+                      .bend_radius_mm = 4,
+                      .scale = 1,
+                      .turns = 2,
+                      .angle_deg = 37.5,
+                      .branches = 51,
+                      .twig_radius_mm = 0.2};
     int which = 0, before = faults->count;
     while (which < SHAPES && strcmp(name, names[which]))
         which++;
@@ -344,4 +370,3 @@ void shape_free(Shape *shape)
     free(shape->cell_part);
     free(shape);
 }
-

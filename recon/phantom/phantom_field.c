@@ -68,8 +68,7 @@ Station part_at(const Part *part, double t)
 // --- Parts ---
 
 // Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False if out of memory.
-static bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
-                       const double (*end_slope)[4])
+static bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4])
 {
     *part = (Part){.knot_count = count, .open_start = open_start, .open_end = open_end, .parent = parent, .kind = kind};
     double least = HUGE_VAL;
@@ -96,7 +95,8 @@ static bool part_build(Part *part, const double (*knot)[4], int count, bool open
     part->block_sample = calloc(b, sizeof(int));
     part->block_radius = calloc(b, sizeof(double));
     part->block_at = calloc(b, sizeof(double));
-    if (!part->block_sample || !part->block_radius || !part->block_at || !part->sample || !part->sample_radius || !part->sample_at || !part->block_center || !part->block_reach)
+    if (!part->block_sample || !part->block_radius || !part->block_at || !part->sample || !part->sample_radius || !part->sample_at || !part->block_center ||
+        !part->block_reach)
         return false;
     for (int i = 0; i < part->sample_count; i++) {
         double t = part->low + (part->high - part->low) * i / (part->sample_count - 1);
@@ -142,7 +142,8 @@ static double climb(const Part *part, Vec3 x, double t, double *value, Vec3 *awa
 
 double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradient, double *at)
 {
-    double lowest = cut ? 0 : part->low, highest = cut ? part->at[part->knot_count - 1] : part->high, best = -HUGE_VAL, step = part->sample_count > 1 ? part->sample_at[1] - part->sample_at[0] : 1;
+    double lowest = cut ? 0 : part->low, highest = cut ? part->at[part->knot_count - 1] : part->high, best = -HUGE_VAL,
+           step = part->sample_count > 1 ? part->sample_at[1] - part->sample_at[0] : 1;
     int nearest = 0;
     // the blocks' middle samples give a first best that rules out most blocks
     for (int k = 0; k < part->block_count; k++) {
@@ -198,10 +199,7 @@ double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradi
 
 // --- The field ---
 
-static double joint_width(const Shape *shape, int child)
-{
-    return shape->blend > 0 ? shape->blend : 0.6 * shape->part[child].coordinate[3].value[0];
-}
+static double joint_width(const Shape *shape, int child) { return shape->blend > 0 ? shape->blend : 0.6 * shape->part[child].coordinate[3].value[0]; }
 
 // The octree's cell, or all parts where there is none. Parts stand in their order.
 static int parts_near(const Shape *shape, Vec3 x, const int **list)
@@ -387,7 +385,7 @@ bool part_scale(Part *part, double scale)
         spline_at(&old.coordinate[k], old.at, old.knot_count, old.knot_count - 2, old.at[old.knot_count - 1], &tangent[1][k]);
     }
     part_free(&old);
-    return part_build(part, (const double (*)[4])knot, old.knot_count, old.open_start, old.open_end, old.parent, old.kind, (const double (*)[4])tangent);
+    return part_build(part, (const double(*)[4])knot, old.knot_count, old.open_start, old.open_end, old.parent, old.kind, (const double(*)[4])tangent);
 }
 
 // Of `list` the parts that can be within a joint's width of the largest anywhere in the ball around c; returns how many, `kept` in order.

@@ -140,7 +140,7 @@ enum { NODES_PER_PART = 4000 };
 
 VesselTree *shape_sample(const Shape *shape, Faults *faults)
 {
-    double (*at)[NODES_PER_PART] = calloc((size_t)shape->part_count, sizeof *at);
+    double(*at)[NODES_PER_PART] = calloc((size_t)shape->part_count, sizeof *at);
     int *count = calloc((size_t)shape->part_count, sizeof *count), *first = calloc((size_t)shape->part_count, sizeof *first), nodes = 0;
     bool room = at && count && first;
     for (int p = 0; room && p < shape->part_count; p++) {
@@ -197,4 +197,3 @@ VesselTree *shape_tree(const char *name, int option_count, const char (*option)[
     shape_free(shape);
     return tree;
 }
-

@@ -114,8 +114,8 @@ static int edge_vertex(Mesher *m, const int in[3], const int out[3])
     m->key[slot] = key;
     m->value[slot] = mesh->vertex_count;
     m->used++;
-    mesh->vertex[mesh->vertex_count] = crossing(m, lattice_point(m, from), m->field[in[2]][in[1]][in[0]], lattice_point(m, to),
-                                                m->field[out[2]][out[1]][out[0]]);
+    mesh->vertex[mesh->vertex_count] =
+        crossing(m, lattice_point(m, from), m->field[in[2]][in[1]][in[0]], lattice_point(m, to), m->field[out[2]][out[1]][out[0]]);
     return mesh->vertex_count++;
 }
 

@@ -82,7 +82,9 @@ static double voxel_value(const Painter *p, Vec3 x, const double *known)
                 field_of(p, which, x, &n, NULL, NULL);
             else   // the blocks' faces, to the second order of a voxel
                 for (int k = 0; k < 3; k++)
-                    *(k == 0 ? &n.x : k == 1 ? &n.y : &n.z) =
+                    *(k == 0   ? &n.x
+                      : k == 1 ? &n.y
+                               : &n.z) =
                         (field_of(p, which, vec3_add(x, vec3(k == 0 ? 1e-6 : 0, k == 1 ? 1e-6 : 0, k == 2 ? 1e-6 : 0)), NULL, NULL, NULL) - f) / 1e-6;
             n = vec3_unit_or(n, vec3(1, 0, 0));
             for (int k = 0; k < 3; k++)
@@ -271,7 +273,14 @@ static void finish_slice(void *context, long index)
 
 VolumeOptions volume_default_options(void)
 {
-    return (VolumeOptions){.voxel_mm = {0.2, 0.2, 0.2}, .psf_mm = 0.2, .noise = 0.05, .seed = 2, .clip = -HUGE_VAL, .saturate = HUGE_VAL, .bone = 1.2, .band_mm = 4,
+    return (VolumeOptions){.voxel_mm = {0.2, 0.2, 0.2},
+                           .psf_mm = 0.2,
+                           .noise = 0.05,
+                           .seed = 2,
+                           .clip = -HUGE_VAL,
+                           .saturate = HUGE_VAL,
+                           .bone = 1.2,
+                           .band_mm = 4,
                            .background_grey = 60};
 }
 
@@ -282,8 +291,9 @@ static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *fau
     double turn = o->rotate_deg * PI / 180, total = 1, grow = 0;
     for (int k = 0; k < 3; k++) {
         Vec3 e = vec3(k == 0, k == 1, k == 2);
-        unit[k] = turn == 0 ? e : vec3_add(vec3_add(vec3_scale(e, same_cos(turn)), vec3_scale(vec3_cross(about, e), same_sin(turn))),
-                                           vec3_scale(about, (1 - same_cos(turn)) * vec3_dot(about, e)));
+        unit[k] = turn == 0 ? e
+                            : vec3_add(vec3_add(vec3_scale(e, same_cos(turn)), vec3_scale(vec3_cross(about, e), same_sin(turn))),
+                                       vec3_scale(about, (1 - same_cos(turn)) * vec3_dot(about, e)));
     }
     for (int p = 0; (shape->neighbour || shape->block_count > 0) && p < shape->part_count; p++)
         grow = fmax(grow, 4 * shape->part[p].coordinate[3].value[0]);

@@ -35,8 +35,8 @@ static bool save_tree(const PhantomFiles *files, const Shape *shape, const Vesse
         print_blocks(out, shape);
     }
     bool good = out && fclose(out) == 0;
-    TreeFileInfo info = {.source = (char *)(size_t)files->name, .parameters = parameters,
-                         .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " synth"};
+    TreeFileInfo info = {
+        .source = (char *)(size_t)files->name, .parameters = parameters, .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " synth"};
     if (!good)
         faults_add(faults, path, 0, 0, "not enough memory");
     good = good && tree_file_save(tree, &info, path, faults);
@@ -80,8 +80,8 @@ static bool write_ply(const TriangleMesh *mesh, const char *path, Faults *faults
                 "property float nz\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
                 mesh->vertex_count, mesh->triangle_count);
         for (int i = 0; i < mesh->vertex_count; i++)
-            fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x,
-                    mesh->normal[i].y, mesh->normal[i].z);
+            fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
+                    mesh->normal[i].z);
         for (int t = 0; t < mesh->triangle_count; t++)
             fprintf(out, "3 %d %d %d\n", mesh->triangle[t][0], mesh->triangle[t][1], mesh->triangle[t][2]);
     }

@@ -120,8 +120,14 @@ static bool take(Growth *g, const Draft *draft, int way, int parent)
     }
     Way *w = &g->way[way];
     Segment *s = &g->segment[g->segment_count];
-    *s = (Segment){.way = way, .first = w->count, .parent = parent, .sister = -1, .radius = draft->radius, .length = draft->length,
-                   .direction = draft->direction, .is_tip = true};
+    *s = (Segment){.way = way,
+                   .first = w->count,
+                   .parent = parent,
+                   .sister = -1,
+                   .radius = draft->radius,
+                   .length = draft->length,
+                   .direction = draft->direction,
+                   .is_tip = true};
     memcpy(w->knot + w->count, draft->knot, (size_t)draft->count * sizeof draft->knot[0]);
     w->count += draft->count;
     s->last = w->count - 1;
@@ -208,7 +214,7 @@ static bool add_sac(Growth *g, Shape *shape)
         }
         int way = s->way;
         g->bead[g->bead_count++] = ball;   // arc 0: no seat for another sac
-        return shape_add(shape, (const double (*)[4])knot, 5, false, false, way, NODE_ANEURYSM, NULL);
+        return shape_add(shape, (const double(*)[4])knot, 5, false, false, way, NODE_ANEURYSM, NULL);
     }
     return true;
 }
@@ -240,7 +246,8 @@ bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, Ran
 bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file, Faults *faults)
 {
     int most = o->branches + 2, before = faults->count;
-    Growth g = {.way = calloc((size_t)most, sizeof(Way)), .segment = calloc((size_t)most, sizeof(Segment)), .clearance = 0.5 * o->radius_mm, .random = {o->seed}};
+    Growth g = {
+        .way = calloc((size_t)most, sizeof(Way)), .segment = calloc((size_t)most, sizeof(Segment)), .clearance = 0.5 * o->radius_mm, .random = {o->seed}};
     bool failed = !g.way || !g.segment;
     const double root[4] = {0, 0, 0, o->radius_mm};
     if (!failed) {
@@ -263,7 +270,7 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
     for (int w = 0; w < g.way_count && !failed; w++) {
         const Way *way = &g.way[w];
         const double slope[2][4] = {{way->start.x, way->start.y, way->start.z, 0}, {(double)NAN, (double)NAN, (double)NAN, (double)NAN}};
-        failed = !shape_add(shape, (const double (*)[4])way->knot, way->count, w == 0, false, way->parent, NODE_VESSEL, slope);
+        failed = !shape_add(shape, (const double(*)[4])way->knot, way->count, w == 0, false, way->parent, NODE_VESSEL, slope);
     }
     for (int i = 0; i < o->sacs && !failed; i++)
         failed = !add_sac(&g, shape);

@@ -146,7 +146,8 @@ static void parse_markup(const cJSON *markup, int index, const char *name, Curve
     if (count && good)
         cJSON_ArrayForEach(entry, cJSON_GetObjectItemCaseSensitive(markup, "measurements"))
         {
-            const cJSON *title = cJSON_GetObjectItemCaseSensitive(entry, "name"), *values = cJSON_GetObjectItemCaseSensitive(entry, "controlPointValues"), *value;
+            const cJSON *title = cJSON_GetObjectItemCaseSensitive(entry, "name"), *values = cJSON_GetObjectItemCaseSensitive(entry, "controlPointValues"),
+                        *value;
             if (!cJSON_IsString(title) || strcasecmp(title->valuestring, "radius") || !cJSON_IsArray(values))
                 continue;
             if (cJSON_GetArraySize(values) != count) {
@@ -380,10 +381,11 @@ static bool name_ends(const char *name, const char *end)
 
 static void write_vtp(FILE *out, const CurveSet *set)
 {
-    fprintf(out, "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\">\n<PolyData>\n"
-                 "<Piece NumberOfPoints=\"%d\" NumberOfVerts=\"0\" NumberOfLines=\"%d\" NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n"
-                 "<PointData Scalars=\"MaximumInscribedSphereRadius\">\n"
-                 "<DataArray type=\"Float64\" Name=\"MaximumInscribedSphereRadius\" format=\"ascii\">\n",
+    fprintf(out,
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\">\n<PolyData>\n"
+            "<Piece NumberOfPoints=\"%d\" NumberOfVerts=\"0\" NumberOfLines=\"%d\" NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n"
+            "<PointData Scalars=\"MaximumInscribedSphereRadius\">\n"
+            "<DataArray type=\"Float64\" Name=\"MaximumInscribedSphereRadius\" format=\"ascii\">\n",
             set->point_count, set->curve_count);
     for (int i = 0; i < set->point_count; i++)
         fprintf(out, "%.9g\n", set->radius[i]);
@@ -432,10 +434,10 @@ static void write_swc(FILE *out, const CurveSet *set)
 
 char *centreline_text(const CurveSet *set, const char *name, size_t *length, Faults *faults)
 {
-    void (*write)(FILE *, const CurveSet *) = name_ends(name, ".vtp")         ? write_vtp
+    void (*write)(FILE *, const CurveSet *) = name_ends(name, ".vtp")        ? write_vtp
                                               : name_ends(name, ".mrk.json") ? write_markups
                                               : name_ends(name, ".swc")      ? write_swc
-                                                                              : NULL;
+                                                                             : NULL;
     if (!write) {
         faults_add(faults, name, 0, 0, "has no known centreline extension; expected .vtp, .mrk.json or .swc");
         return NULL;

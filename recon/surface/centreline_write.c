@@ -94,8 +94,8 @@ static bool centreline_print_swc(FILE *out, const VesselTree *tree)
 {
     fprintf(out, "# seldinger " SELDINGER_VERSION ", mm: id type x y z radius parent; type 0: vessel, 5: aneurysm\n");
     for (int i = 0; i < tree->node_count; i++)
-        fprintf(out, "%d %d %.9g %.9g %.9g %.9g %d\n", i + 1, tree->kind[i] == NODE_ANEURYSM ? 5 : 0, tree->center[i].x, tree->center[i].y,
-                tree->center[i].z, tree->radius[i], tree->parent[i] < 0 ? -1 : tree->parent[i] + 1);
+        fprintf(out, "%d %d %.9g %.9g %.9g %.9g %d\n", i + 1, tree->kind[i] == NODE_ANEURYSM ? 5 : 0, tree->center[i].x, tree->center[i].y, tree->center[i].z,
+                tree->radius[i], tree->parent[i] < 0 ? -1 : tree->parent[i] + 1);
     return true;
 }
 

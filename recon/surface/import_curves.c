@@ -54,7 +54,8 @@ bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, I
     report->curves_flipped = frame[best][0] < 0;
     report->curves_scaled = frame[best][1];
     if (most < 0.5) {
-        faults_add(faults, name, 0, 0, "only %.0f %% of the centrelines' points lie inside the surface, with x and y negated or not: they are of another frame or vessel",
+        faults_add(faults, name, 0, 0,
+                   "only %.0f %% of the centrelines' points lie inside the surface, with x and y negated or not: they are of another frame or vessel",
                    100 * most);
         return false;
     }

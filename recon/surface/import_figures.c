@@ -7,7 +7,7 @@ static void print_junctions(FILE *out, const ImportReport *r)
     if (r->junction_count == 0)
         return;
     fprintf(out, "junctions      %d: %d supported by the surface, %d doubtful, %d refused", r->junction_count, r->junctions_with[IMPORT_SUPPORTED],
-           r->junctions_with[IMPORT_DOUBTFUL], r->junctions_with[IMPORT_REFUSED]);
+            r->junctions_with[IMPORT_DOUBTFUL], r->junctions_with[IMPORT_REFUSED]);
     if (r->junctions_moved)
         fprintf(out, "; %d hung on another node", r->junctions_moved);
     if (r->refused_nodes)
@@ -36,7 +36,8 @@ static void print_curves(FILE *out, const ImportFigures *f)
     if (!f->computed && r->inside_percent < 99.5)
         fprintf(out, "centrelines: %.0f %% of their points lie inside the surface\n", r->inside_percent);
     if (!f->computed && r->moved_samples)
-        fprintf(out, "centrelines: %.1f %% of their points graze the wall or lie beside the lumen: moved to its middle\n", 100.0 * r->moved_samples / r->samples);
+        fprintf(out, "centrelines: %.1f %% of their points graze the wall or lie beside the lumen: moved to its middle\n",
+                100.0 * r->moved_samples / r->samples);
     if (!f->computed && r->cut_samples)
         fprintf(out, "centrelines: %.1f %% of their points lie over a vessel's end or in no vessel: cut off\n", 100.0 * r->cut_samples / r->samples);
     if (r->root_is_cut)
@@ -53,14 +54,16 @@ void import_figures_print(FILE *out, const char *surface, const ImportFigures *f
     if (r->unused_components)
         fprintf(out, "%s: %d components have no centreline: left out\n", surface, r->unused_components);
     print_curves(out, f);
-    fprintf(out, "surface        %d triangles, %.4g mm^2, lumen %.4g mm^3; %d lids taken off\n", f->check.triangle_count, f->check.area, f->check.volume, r->lid_count);
-    fprintf(out, "centrelines    %d curves %s, %d branches, %.1f mm, radius %.3g to %.3g mm\n", f->curve_count, f->computed ? "computed" : "read", r->branch_count,
-           r->length, r->radius_min, r->radius_max);
+    fprintf(out, "surface        %d triangles, %.4g mm^2, lumen %.4g mm^3; %d lids taken off\n", f->check.triangle_count, f->check.area, f->check.volume,
+            r->lid_count);
+    fprintf(out, "centrelines    %d curves %s, %d branches, %.1f mm, radius %.3g to %.3g mm\n", f->curve_count, f->computed ? "computed" : "read",
+            r->branch_count, r->length, r->radius_min, r->radius_max);
     fprintf(out, "ends           %d, %d of them open\n", r->end_count, r->open_end_count);
-    fprintf(out, "root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z, r->root_is_open ? "open" : "closed: no tool can enter there; --root X,Y,Z opens an end");
+    fprintf(out, "root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z,
+            r->root_is_open ? "open" : "closed: no tool can enter there; --root X,Y,Z opens an end");
     print_junctions(out, r);
-    fprintf(out, "nodes          %d, %ld points; %ld of them out of every node's sight; %ld more belong to no node, %ld lie where a tool passes\n", f->nodes, f->points,
-           r->unseen_points, r->left_points, r->inner_points);
+    fprintf(out, "nodes          %d, %ld points; %ld of them out of every node's sight; %ld more belong to no node, %ld lie where a tool passes\n", f->nodes,
+            f->points, r->unseen_points, r->left_points, r->inner_points);
     fprintf(out, "seconds        %.2f\n", f->seconds);
 }
 
@@ -95,19 +98,50 @@ void import_figures_add(cJSON *root, const ImportFigures *f)
     const MeshCheck *c = &f->check;
     const ImportReport *r = &f->report;
     cJSON *mesh = cJSON_AddObjectToObject(root, "surface");
-    const struct { const char *name; double value; } surface[] = {
-        {"vertices", c->vertex_count}, {"triangles", c->triangle_count}, {"area_mm2", c->area}, {"volume_mm3", c->volume}, {"components", c->component_count},
-        {"openings", c->opening_count}, {"inside_out_components", c->inside_out_count}, {"duplicate_vertices", c->duplicate_vertices.count},
-        {"unreferenced_vertices", c->unreferenced_vertices.count}, {"degenerate_triangles", c->degenerate_triangles.count},
-        {"duplicate_triangles", c->duplicate_triangles.count}, {"flipped_triangles", c->flipped_triangles.count}, {"open_edges", c->open_edges.count},
-        {"nonmanifold_edges", c->nonmanifold_edges.count}, {"one_sided_edges", c->one_sided_edges.count}};
-    const struct { const char *name; double value; } tree[] = {
-        {"curves", f->curve_count}, {"nodes", f->nodes}, {"points", (double)f->points}, {"branches", r->branch_count}, {"ends", r->end_count},
-        {"open_ends", r->open_end_count}, {"lids", r->lid_count}, {"loops_cut", r->loop_count}, {"curves_lost", r->lost_curves},
-        {"components_unused", r->unused_components}, {"unseen_points", (double)r->unseen_points}, {"left_points", (double)r->left_points}, {"inner_points", (double)r->inner_points}, {"dropped_nodes", r->dropped_nodes},
-        {"length_mm", r->length}, {"radius_min_mm", r->radius_min}, {"radius_max_mm", r->radius_max}, {"inside_percent", r->inside_percent},
-        {"moved_percent", r->samples ? 100.0 * r->moved_samples / r->samples : 0},
-        {"cut_percent", r->samples ? 100.0 * r->cut_samples / r->samples : 0}, {"root_cut_mm", r->root_cut}, {"curves_scaled", r->curves_scaled}, {"seconds", f->seconds}};
+    const struct {
+        const char *name;
+        double value;
+    } surface[] = {{"vertices", c->vertex_count},
+                   {"triangles", c->triangle_count},
+                   {"area_mm2", c->area},
+                   {"volume_mm3", c->volume},
+                   {"components", c->component_count},
+                   {"openings", c->opening_count},
+                   {"inside_out_components", c->inside_out_count},
+                   {"duplicate_vertices", c->duplicate_vertices.count},
+                   {"unreferenced_vertices", c->unreferenced_vertices.count},
+                   {"degenerate_triangles", c->degenerate_triangles.count},
+                   {"duplicate_triangles", c->duplicate_triangles.count},
+                   {"flipped_triangles", c->flipped_triangles.count},
+                   {"open_edges", c->open_edges.count},
+                   {"nonmanifold_edges", c->nonmanifold_edges.count},
+                   {"one_sided_edges", c->one_sided_edges.count}};
+    const struct {
+        const char *name;
+        double value;
+    } tree[] = {{"curves", f->curve_count},
+                {"nodes", f->nodes},
+                {"points", (double)f->points},
+                {"branches", r->branch_count},
+                {"ends", r->end_count},
+                {"open_ends", r->open_end_count},
+                {"lids", r->lid_count},
+                {"loops_cut", r->loop_count},
+                {"curves_lost", r->lost_curves},
+                {"components_unused", r->unused_components},
+                {"unseen_points", (double)r->unseen_points},
+                {"left_points", (double)r->left_points},
+                {"inner_points", (double)r->inner_points},
+                {"dropped_nodes", r->dropped_nodes},
+                {"length_mm", r->length},
+                {"radius_min_mm", r->radius_min},
+                {"radius_max_mm", r->radius_max},
+                {"inside_percent", r->inside_percent},
+                {"moved_percent", r->samples ? 100.0 * r->moved_samples / r->samples : 0},
+                {"cut_percent", r->samples ? 100.0 * r->cut_samples / r->samples : 0},
+                {"root_cut_mm", r->root_cut},
+                {"curves_scaled", r->curves_scaled},
+                {"seconds", f->seconds}};
     for (size_t i = 0; i < sizeof surface / sizeof surface[0]; i++)
         cJSON_AddNumberToObject(mesh, surface[i].name, surface[i].value);
     for (size_t i = 0; i < sizeof tree / sizeof tree[0]; i++)

@@ -13,7 +13,7 @@
 
 enum { ROOT_NODES = 5, STATIONS_MOST = 2000 };
 static const double SPACING = 0.5, INSIDE = 1.5,   // in radii of the branch
-                    DOUBTFUL = 0.25;               // narrower than this share of the branch's radius
+    DOUBTFUL = 0.25;                             // narrower than this share of the branch's radius
 
 typedef struct Link {
     int node, parent;
@@ -28,8 +28,14 @@ typedef struct Link {
 
 bool nodes_create(Nodes *nodes, size_t room)
 {
-    *nodes = (Nodes){0, calloc(room, sizeof(Vec3)), calloc(room, sizeof(Vec3)), calloc(room, sizeof(double)), calloc(room, sizeof(int)), calloc(room, sizeof(int)),
-                     calloc(room, sizeof(bool)), calloc(room, sizeof(bool))};
+    *nodes = (Nodes){0,
+                     calloc(room, sizeof(Vec3)),
+                     calloc(room, sizeof(Vec3)),
+                     calloc(room, sizeof(double)),
+                     calloc(room, sizeof(int)),
+                     calloc(room, sizeof(int)),
+                     calloc(room, sizeof(bool)),
+                     calloc(room, sizeof(bool))};
     return nodes->center && nodes->direction && nodes->radius && nodes->parent && nodes->sample && nodes->is_end && nodes->is_link;
 }
 
@@ -142,7 +148,8 @@ static bool find_path(const Nodes *n, const Skeleton *s, const Wall *wall, Link 
         inside = inside && stays_inside(&room, link->path.point[i - 1], link->path.point[i]);
     if (!inside) {
         free(link->path.point);
-        if (!link_lattice_path(n->center[link->parent], n->center[link->node], link->radius, 0.2 * link->radius, &(LinkGround){room_at, stays_inside, &room}, &link->path))
+        if (!link_lattice_path(n->center[link->parent], n->center[link->node], link->radius, 0.2 * link->radius, &(LinkGround){room_at, stays_inside, &room},
+                               &link->path))
             return false;
     }
     for (int i = 0; i < link->path.count; i++)
@@ -255,7 +262,8 @@ static void report_link(const Nodes *n, const Link *link, ImportReport *report)
     if (support == IMPORT_SUPPORTED)
         return;
     if (report->named_count < IMPORT_NAMED_MOST)
-        report->named[report->named_count++] = (ImportJunction){link->is_refused ? n->center[link->node] : link->place, link->length, link->is_refused ? 0 : link->path.share, support};
+        report->named[report->named_count++] =
+            (ImportJunction){link->is_refused ? n->center[link->node] : link->place, link->length, link->is_refused ? 0 : link->path.share, support};
 }
 
 // --- the new nodes ---

@@ -125,10 +125,7 @@ static End end_at(const Fine *fine, const Wall *wall, int curve, bool last)
     return end;
 }
 
-static bool are_close(const Fine *fine, int i, int k)
-{
-    return vec3_distance(fine->point[i], fine->point[k]) < SAME * fmin(fine->radius[i], fine->radius[k]);
-}
+static bool are_close(const Fine *fine, int i, int k) { return vec3_distance(fine->point[i], fine->point[k]) < SAME * fmin(fine->radius[i], fine->radius[k]); }
 
 // Whether another curve passes by or ends at this curve's end. One that ends there too and comes the same way overlaps: it leaves the end free.
 static bool end_is_joined(const Fine *fine, int curve, int sample)
@@ -158,8 +155,7 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
             if (end_is_joined(fine, c, end.sample))
                 continue;
             Vec3 place = end.opening >= 0 ? wall->opening[end.opening].center : fine->point[end.sample];
-            double value = options->has_root ? -vec3_distance(place, options->root)
-                                             : (end.opening >= 0 ? 1e6 + wall->opening[end.opening].radius : end.radius);
+            double value = options->has_root ? -vec3_distance(place, options->root) : (end.opening >= 0 ? 1e6 + wall->opening[end.opening].radius : end.radius);
             if (value > best) {
                 best = value;
                 *root = end;
@@ -210,10 +206,7 @@ static void look_again(Fine *fine, const Skeleton *s, int first)
     }
 }
 
-static bool touches(const Fine *fine, const Skeleton *s, int i)
-{
-    return fine->distance[i] < SAME * fmin(fine->radius[i], s->radius[fine->nearest[i]]);
-}
+static bool touches(const Fine *fine, const Skeleton *s, int i) { return fine->distance[i] < SAME * fmin(fine->radius[i], s->radius[fine->nearest[i]]); }
 
 // The samples from `at` on, towards `end` (exclusive), while they lie apart from the tree; returns whether anything was added.
 static bool grow_run(Growing *g, Fine *fine, int at, int step, int end, ImportReport *report)
@@ -265,7 +258,8 @@ static void grow_all(Growing *g, Fine *fine, ImportReport *report)
                 best = i;
         if (best < 0)   // a curve that begins within a vessel but off its centreline
             for (int i = 0; i < fine->count; i++)
-                if (!fine->done[i] && fine->distance[i] < g->s->radius[fine->nearest[i]] + fine->radius[i] && (best < 0 || fine->distance[i] < fine->distance[best]))
+                if (!fine->done[i] && fine->distance[i] < g->s->radius[fine->nearest[i]] + fine->radius[i] &&
+                    (best < 0 || fine->distance[i] < fine->distance[best]))
                     best = i;
         if (best < 0)
             return;
@@ -334,7 +328,7 @@ static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, d
 static void blunt_end(const Growing *g, int end, bool *kept)
 {
     const Skeleton *s = g->s;
-    for (int from = end, to; ; from = to) {
+    for (int from = end, to;; from = to) {
         double widest = s->radius[from], arc = 0;
         for (int i = from; s->parent[i] > 0 && g->children[s->parent[i]] < 2 && arc < 15 * widest; i = s->parent[i]) {
             arc += vec3_distance(s->point[i], s->point[s->parent[i]]);

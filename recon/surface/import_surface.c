@@ -16,7 +16,7 @@
 
 enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
 static const double POINTS_MAX = 4e6, SEEN_REACH = 2.5, REACH = 2, ASIDE = 1.3,   // reaches in radii
-                    AGREES = 0.05, NEARLY = 0.1, PULLED = 1.6, STEEP = 0.5, SHARP_COSINE = 0.5;
+    AGREES = 0.05, NEARLY = 0.1, PULLED = 1.6, STEEP = 0.5, SHARP_COSINE = 0.5;
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
@@ -411,7 +411,8 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
         total += s->weight[t];
     }
     if (total > POINTS_MAX) {
-        faults_add(faults, name, 0, 0, "would take %.0f points: the centrelines leave wide parts of the surface out; expected a centreline in every vessel", total);
+        faults_add(faults, name, 0, 0, "would take %.0f points: the centrelines leave wide parts of the surface out; expected a centreline in every vessel",
+                   total);
         return false;
     }
     s->point = calloc((size_t)total + 2, sizeof *s->point);
@@ -526,7 +527,8 @@ static bool open_ostia(Nodes *nodes, const Skeleton *skeleton, Sampling *s, int 
     return true;
 }
 
-static VesselTree *build(Nodes *nodes, const Skeleton *skeleton, Sampling *s, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults)
+static VesselTree *build(Nodes *nodes, const Skeleton *skeleton, Sampling *s, const ImportOptions *options, ImportReport *report, const char *name,
+                         Faults *faults)
 {
     long *points = calloc((size_t)nodes->count + 1, sizeof *points);
     int *place = calloc((size_t)nodes->count + 1, sizeof *place);
@@ -585,8 +587,8 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const
     report->lid_count = wall.lid_count;
     Skeleton *skeleton = skeleton_join(set, &wall, options, report, name, faults);
     if (skeleton && choose_nodes(skeleton, &wall, options->spacing, &nodes)) {
-        Sampling sampling = {.nodes = &nodes, .wall = &wall, .points_per_node = options->points_per_node, .spacing = options->spacing,
-                             .root_is_cut = report->root_is_cut};
+        Sampling sampling = {
+            .nodes = &nodes, .wall = &wall, .points_per_node = options->points_per_node, .spacing = options->spacing, .root_is_cut = report->root_is_cut};
         tree = build(&nodes, skeleton, &sampling, options, report, name, faults);
         free(sampling.weight);
         free(sampling.component);

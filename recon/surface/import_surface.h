@@ -15,7 +15,6 @@
 ImportOptions import_default_options(void);
 
 // NULL with faults. `name` is used in messages.
-VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name,
-                           Faults *faults);
+VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults);
 
 #endif

@@ -11,7 +11,7 @@
 #include <string.h>
 
 static const double LID_COSINE = 0.94, SQUARE_COSINE = 0.7, EDGE_COSINE = 0.82,   // 20 degrees, 45 degrees, 35 degrees
-                    ROUND = 0.5;   // area against the disc around it: triangles have 0.41 at most, squares 0.64
+    ROUND = 0.5;                                                                // area against the disc around it: triangles have 0.41 at most, squares 0.64
 
 static bool link_sides(const SurfaceMesh *mesh, int (*across)[3])
 {

@@ -18,7 +18,7 @@
 enum { VOXELS_MAX = 2000000, CENTRING_PASSES = 12, RAY_PAIRS = 8, CURVES_MAX = 4096, BESIDE = 2, LID_RAYS = 200 };
 static const double LID_REACH = 3, LID_COSINE = 0.94, LID_SHARE = 0.15;   // a round tip has 0.06 of the half sphere within 20 degrees
 static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6,   // LEAST: voxels
-                    PINCHED = 0.25;   // of the narrower side
+    PINCHED = 0.25;                                                                                                                  // of the narrower side
 
 typedef struct Finding {
     const Lumen *lumen;
@@ -603,8 +603,15 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
     if (l) {
         size_t n = (size_t)l->count + 1;
         int *component = malloc(n * sizeof *component), start = -1;
-        Finding f = {.lumen = l, .tree = tree, .mesh = &closed, .component = component, .cost = malloc(n * sizeof(float)), .length = malloc(n * sizeof(float)),
-                     .from = malloc(n * sizeof(int)), .owner = malloc(n * sizeof(int)), .depth = malloc(n * sizeof(float))};
+        Finding f = {.lumen = l,
+                     .tree = tree,
+                     .mesh = &closed,
+                     .component = component,
+                     .cost = malloc(n * sizeof(float)),
+                     .length = malloc(n * sizeof(float)),
+                     .from = malloc(n * sizeof(int)),
+                     .owner = malloc(n * sizeof(int)),
+                     .depth = malloc(n * sizeof(float))};
         good = component && f.cost && f.length && f.from && f.owner && f.depth;
         f.wanted = good ? label(l, options, component, &start) : -1;
         // once from any end to find the ends, then from the root

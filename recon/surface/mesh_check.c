@@ -356,8 +356,9 @@ bool mesh_repair(SurfaceMesh *mesh, MeshCheck *check)
 {
     size_t v = (size_t)mesh->vertex_count + 1, t = (size_t)mesh->triangle_count + 1;
     *check = (MeshCheck){.vertex_count = mesh->vertex_count, .triangle_count = mesh->triangle_count, .low = mesh->vertex[0], .high = mesh->vertex[0]};
-    MeshFinding *findings[] = {&check->duplicate_vertices, &check->unreferenced_vertices, &check->degenerate_triangles, &check->duplicate_triangles,
-                               &check->flipped_triangles, &check->open_edges, &check->nonmanifold_edges, &check->one_sided_edges};
+    MeshFinding *findings[] = {&check->duplicate_vertices,  &check->unreferenced_vertices, &check->degenerate_triangles,
+                               &check->duplicate_triangles, &check->flipped_triangles,     &check->open_edges,
+                               &check->nonmanifold_edges,   &check->one_sided_edges};
     for (size_t i = 0; i < sizeof findings / sizeof findings[0]; i++)
         findings[i]->first = -1;
     for (int i = 0; i < mesh->vertex_count; i++) {
@@ -368,11 +369,19 @@ bool mesh_repair(SurfaceMesh *mesh, MeshCheck *check)
     Vec3 extent = vec3_sub(check->high, check->low);
     double most = fmax(extent.x, fmax(extent.y, extent.z));
     check->unit_is_doubtful = most < SMALL || most > LARGE;
-    Work work = {.same = calloc(v, sizeof(int)),      .parent = calloc(v, sizeof(int)),  .number = calloc(v, sizeof(int)),  .source = calloc(t, sizeof(int)),
-                 .component = calloc(t, sizeof(int)), .queue = calloc(t, sizeof(int)),   .turned = calloc(t, sizeof(bool)), .seen = calloc(t, sizeof(bool)),
-                 .used = calloc(v, sizeof(bool)),     .edge = calloc(3 * t, sizeof(MeshEdge)), .across = calloc(t, sizeof(int[3]))};
-    bool good = work.same && work.parent && work.number && work.source && work.component && work.queue && work.turned && work.seen && work.used &&
-                work.edge && work.across && repair(mesh, check, &work);
+    Work work = {.same = calloc(v, sizeof(int)),
+                 .parent = calloc(v, sizeof(int)),
+                 .number = calloc(v, sizeof(int)),
+                 .source = calloc(t, sizeof(int)),
+                 .component = calloc(t, sizeof(int)),
+                 .queue = calloc(t, sizeof(int)),
+                 .turned = calloc(t, sizeof(bool)),
+                 .seen = calloc(t, sizeof(bool)),
+                 .used = calloc(v, sizeof(bool)),
+                 .edge = calloc(3 * t, sizeof(MeshEdge)),
+                 .across = calloc(t, sizeof(int[3]))};
+    bool good = work.same && work.parent && work.number && work.source && work.component && work.queue && work.turned && work.seen && work.used && work.edge &&
+                work.across && repair(mesh, check, &work);
     free(work.same);
     free(work.parent);
     free(work.number);
@@ -413,8 +422,10 @@ SurfaceMesh *mesh_load_repaired(const char *path, double scale, const char *opti
         faults_add(faults, path, 0, 0, "not enough memory");
     else if (check->unit_is_doubtful && !(scale > 0)) {
         Vec3 e = vec3_sub(check->high, check->low);
-        faults_add(faults, path, 0, 0, "is %g x %g x %g across, which cannot be the size of a vessel in mm; %s1000 takes metres, %s0.001 micrometres, %s1 takes it "
-                   "as it is", e.x, e.y, e.z, option, option, option);
+        faults_add(faults, path, 0, 0,
+                   "is %g x %g x %g across, which cannot be the size of a vessel in mm; %s1000 takes metres, %s0.001 micrometres, %s1 takes it "
+                   "as it is",
+                   e.x, e.y, e.z, option, option, option);
     } else if (check->one_sided_edges.count)
         faults_add(faults, path, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be distinguished", check->one_sided_edges.first);
     else if (mesh->triangle_count == 0 || !(check->area > 0))

@@ -277,10 +277,7 @@ static int neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], fl
     return count;
 }
 
-int lumen_neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS])
-{
-    return neighbours(l, voxel, other, step, NULL);
-}
+int lumen_neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS]) { return neighbours(l, voxel, other, step, NULL); }
 
 // --- distances ---
 

@@ -10,9 +10,9 @@ static void print_census(FILE *out, const SurfaceCensus *c, double cell_mm, int 
 {
     fprintf(out, "surface        %d vertices, %d triangles, cells of %.3g mm\n", c->vertices, c->triangles, cell_mm);
     fprintf(out, "parts          %d, Euler characteristic %" PRId64 "%s\n", c->parts, c->euler,
-           bubbles ? "; bubbles inside the lumen and specks beside it were dropped" : "");
+            bubbles ? "; bubbles inside the lumen and specks beside it were dropped" : "");
     fprintf(out, "edges          %" PRId64 " open, %" PRId64 " non-manifold, %" PRId64 " between triangles turned against each other\n", c->open_edges,
-           c->non_manifold_edges, c->turned_edges);
+            c->non_manifold_edges, c->turned_edges);
     fprintf(out, "area, volume   %.6g mm2, %.6g mm3\n", c->area, c->volume);
 }
 
@@ -29,7 +29,9 @@ static void print_dropped(FILE *out, const char *file, const SurfaceParts *parts
     }
     if (count[PART_SHUT] + count[PART_GHOST] == 0)
         return;
-    fprintf(out, "%s: %d part%s of the surface dropped, %.3g mm3: %d with nodes of the tree that are shut off from the inlet, %d that hold%s none (--keep-floating keeps them)\n",
+    fprintf(out,
+            "%s: %d part%s of the surface dropped, %.3g mm3: %d with nodes of the tree that are shut off from the inlet, %d that hold%s none (--keep-floating "
+            "keeps them)\n",
             file, count[PART_SHUT] + count[PART_GHOST], count[PART_SHUT] + count[PART_GHOST] == 1 ? "" : "s", volume, count[PART_SHUT], count[PART_GHOST],
             count[PART_GHOST] == 1 ? "s" : "");
     for (int p = 0; p < parts->count && shown < SHOWN; p++) {

@@ -134,10 +134,7 @@ static bool take_number(Cursor *c, double *value)
     return true;
 }
 
-static bool take_point(Cursor *c, Vec3 *p)
-{
-    return take_number(c, &p->x) && take_number(c, &p->y) && take_number(c, &p->z) && good_point(*p);
-}
+static bool take_point(Cursor *c, Vec3 *p) { return take_number(c, &p->x) && take_number(c, &p->y) && take_number(c, &p->z) && good_point(*p); }
 
 // --- STL ---
 
@@ -187,7 +184,10 @@ static float float_at(const unsigned char *bytes, bool big)
     return value;
 }
 
-static uint32_t stl_count(const unsigned char *bytes) { return (uint32_t)bytes[80] | (uint32_t)bytes[81] << 8 | (uint32_t)bytes[82] << 16 | (uint32_t)bytes[83] << 24; }
+static uint32_t stl_count(const unsigned char *bytes)
+{
+    return (uint32_t)bytes[80] | (uint32_t)bytes[81] << 8 | (uint32_t)bytes[82] << 16 | (uint32_t)bytes[83] << 24;
+}
 
 static void parse_stl_binary(Growing *g, const unsigned char *bytes, size_t length)
 {
@@ -244,7 +244,8 @@ static void parse_obj(Growing *g, const char *text)
             for (skip_blanks(&c); *c.at && *c.at != '\n' && *c.at != '#' && !g->bad; skip_blanks(&c)) {
                 int at = take_obj_index(&c, g->mesh.vertex_count);
                 if (at < 0 || (*c.at && !strchr(" \t\r\n", *c.at)))
-                    fault_line(g, c.line, "a face refers to a vertex that does not exist; expected indices from 1, or from -1 backwards, of the vertices above");
+                    fault_line(g, c.line,
+                               "a face refers to a vertex that does not exist; expected indices from 1, or from -1 backwards, of the vertices above");
                 else if (++corners >= 3)
                     add_triangle(g, first, before, at);
                 first = corners == 1 ? at : first;
@@ -281,11 +282,14 @@ typedef struct PlyBody {     // binary or text, read in order
 
 static bool ply_type(Cursor *c, int *size, bool *is_float, bool *is_signed)
 {
-    static const struct { const char *name; int size; bool is_float, is_signed; } types[] = {
-        {"char", 1, false, true},   {"int8", 1, false, true},   {"uchar", 1, false, false}, {"uint8", 1, false, false},  {"short", 2, false, true},
-        {"int16", 2, false, true},  {"ushort", 2, false, false}, {"uint16", 2, false, false}, {"int", 4, false, true},    {"int32", 4, false, true},
-        {"uint", 4, false, false},  {"uint32", 4, false, false}, {"float", 4, true, true},    {"float32", 4, true, true}, {"double", 8, true, true},
-        {"float64", 8, true, true}};
+    static const struct {
+        const char *name;
+        int size;
+        bool is_float, is_signed;
+    } types[] = {{"char", 1, false, true},  {"int8", 1, false, true},   {"uchar", 1, false, false},  {"uint8", 1, false, false},
+                 {"short", 2, false, true}, {"int16", 2, false, true},  {"ushort", 2, false, false}, {"uint16", 2, false, false},
+                 {"int", 4, false, true},   {"int32", 4, false, true},  {"uint", 4, false, false},   {"uint32", 4, false, false},
+                 {"float", 4, true, true},  {"float32", 4, true, true}, {"double", 8, true, true},   {"float64", 8, true, true}};
     skip_blanks(c);
     for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
         if (take_word(c, types[i].name)) {

@@ -64,9 +64,12 @@ static const char *attribute(const char **list, const char *key)
 
 static bool number_type(const char *text, Number *out)
 {
-    static const struct { const char *name; Number number; } types[] = {
-        {"Float64", {8, true, true}}, {"Float32", {4, true, true}},   {"Int64", {8, false, true}},   {"UInt64", {8, false, false}}, {"Int32", {4, false, true}},
-        {"UInt32", {4, false, false}}, {"Int16", {2, false, true}},   {"UInt16", {2, false, false}}, {"Int8", {1, false, true}},    {"UInt8", {1, false, false}}};
+    static const struct {
+        const char *name;
+        Number number;
+    } types[] = {{"Float64", {8, true, true}}, {"Float32", {4, true, true}},  {"Int64", {8, false, true}}, {"UInt64", {8, false, false}},
+                 {"Int32", {4, false, true}},  {"UInt32", {4, false, false}}, {"Int16", {2, false, true}}, {"UInt16", {2, false, false}},
+                 {"Int8", {1, false, true}},   {"UInt8", {1, false, false}}};
     for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
         if (!strcmp(types[i].name, text)) {
             *out = types[i].number;
@@ -177,7 +180,8 @@ static void end_element(void *context, const char *element)
     reader->depth--;
     if (!strcmp(element, "DataArray"))
         reader->open_array = -1;
-    else if (!strcmp(element, "Points") || !strcmp(element, "PointData") || !strcmp(element, "Lines") || !strcmp(element, "Polys") || !strcmp(element, "Strips"))
+    else if (!strcmp(element, "Points") || !strcmp(element, "PointData") || !strcmp(element, "Lines") || !strcmp(element, "Polys") ||
+             !strcmp(element, "Strips"))
         reader->section = SECTION_NONE;
 }
 

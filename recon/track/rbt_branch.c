@@ -70,8 +70,13 @@ static double contrast_of(const Tracker *t, const Cylinder *c)
 static double search_axes(Tracker *t, const Cylinder *predicted, int candidates, double threshold, Cylinder *out)
 {
     const RbtParameters *p = t->parameters;
-    RansacOptions options = {.threshold = threshold, .radius_min = predicted->radius / 2, .radius_max = 1.5 * predicted->radius,
-                             .offset_max = 1.5 * predicted->radius, .inlier_rate = p->p_inl, .trials_min = (int)p->n_min, .trials_max = (int)p->n_max};
+    RansacOptions options = {.threshold = threshold,
+                             .radius_min = predicted->radius / 2,
+                             .radius_max = 1.5 * predicted->radius,
+                             .offset_max = 1.5 * predicted->radius,
+                             .inlier_rate = p->p_inl,
+                             .trials_min = (int)p->n_min,
+                             .trials_max = (int)p->n_max};
     Vec3 z = predicted->axis, x = vec3_normal_to(z), y = vec3_cross(z, x);
     double best = 0;
     for (int i = 0; i < t->axis_count && best <= p->p_inl; i++) {
@@ -211,8 +216,8 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * tracker_usual_radius(branch) || next->contrast > 1.8 * contrast))
         return false;
     t->why = "no vessel beyond";
-    if (is_retry && (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius ||
-                     next->contrast < p->retry_contrast * contrast))
+    if (is_retry &&
+        (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius || next->contrast < p->retry_contrast * contrast))
         return false;
     t->why = "runs into another branch";
     return may_overlap || tracker_node_around(t, next->cylinder.center, p->overlap) < 0;

@@ -54,9 +54,9 @@ static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 dir
     const TrackNode *n = &t->estimate.node;
     const TrackNode *parent = &t->tree.node[limb->contact];
     return vec3_dot(n->cylinder.axis, direction) > 0.5 && vec3_distance(n->cylinder.center, place) < 1.5 * fmax(n->cylinder.radius, t->voxel) &&
-           n->contrast > 0.7 * share * parent->contrast && tracker_is_inside(t->volume, n->cylinder.center) &&
-           !tracker_is_forbidden(t, n->cylinder.center) && tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) &&
-           tracker_brightness(t, n->cylinder.center) <= limb->ceiling && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
+           n->contrast > 0.7 * share * parent->contrast && tracker_is_inside(t->volume, n->cylinder.center) && !tracker_is_forbidden(t, n->cylinder.center) &&
+           tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) && tracker_brightness(t, n->cylinder.center) <= limb->ceiling &&
+           tracker_node_around(t, n->cylinder.center, 0.8) < 0;
 }
 
 // Where the vessel comes from, behind the first start.
@@ -397,8 +397,8 @@ static double noise_of(const Tracker *t)
     double value[SAMPLES];
     int n = 0;
     for (size_t i = 0; i < voxels && n < SAMPLES; i += stride)
-        value[n++] = (double)bspline_sample(t->volume, vec3((double)(i % (size_t)size[0]), (double)(i / (size_t)size[0] % (size_t)size[1]),
-                                                            (double)(i / ((size_t)size[0] * (size_t)size[1]))));
+        value[n++] = (double)bspline_sample(
+            t->volume, vec3((double)(i % (size_t)size[0]), (double)(i / (size_t)size[0] % (size_t)size[1]), (double)(i / ((size_t)size[0] * (size_t)size[1]))));
     sort_doubles(value, (size_t)n);
     double middle = value[n / 2];
     for (int i = 0; i < n; i++)

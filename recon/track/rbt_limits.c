@@ -20,7 +20,8 @@ static bool vessel_at(Tracker *t, const RbtRegion *region, const char *what, con
     *seed = (RbtSeed){.start = point_of(t, region), .line = region->line, .column = region->column};
     Vec3 x = seed->start;
     if (!tracker_is_inside(t->volume, x)) {
-        faults_add(faults, path, region->line, region->column, "the point of `%s` (%g, %g, %g) mm lies outside the volume; expected a point inside a vessel", what, x.x, x.y, x.z);
+        faults_add(faults, path, region->line, region->column, "the point of `%s` (%g, %g, %g) mm lies outside the volume; expected a point inside a vessel",
+                   what, x.x, x.y, x.z);
         return false;
     }
     Cylinder tube[RBT_SCANS];
@@ -30,7 +31,8 @@ static bool vessel_at(Tracker *t, const RbtRegion *region, const char *what, con
         *out = tube[0];
     }
     if (!found && !t->out_of_memory)
-        faults_add(faults, path, region->line, region->column, "the point of `%s` (%g, %g, %g) mm lies in no vessel; expected a point well inside one", what, x.x, x.y, x.z);
+        faults_add(faults, path, region->line, region->column, "the point of `%s` (%g, %g, %g) mm lies in no vessel; expected a point well inside one", what,
+                   x.x, x.y, x.z);
     return found;
 }
 
@@ -53,8 +55,9 @@ bool rbt_place_stops(Tracker *t, Vec3 start, const char *path, Faults *faults)
         // across the vessel at the point itself, not at the best-fitting cylinder
         *stop = (RbtStop){vec3_add_scaled(c.center, vec3_dot(q, c.axis), c.axis), c.axis, 1.5 * c.radius + t->voxel, fmax(0.5 * c.radius, t->voxel)};
         if (vec3_distance(start, stop->center) < 2 * stop->half) {
-            faults_add(faults, path, seed.line, seed.column, "the point of `until` (%g, %g, %g) mm lies at the first start; expected a point further along the vessel",
-                       seed.start.x, seed.start.y, seed.start.z);
+            faults_add(faults, path, seed.line, seed.column,
+                       "the point of `until` (%g, %g, %g) mm lies at the first start; expected a point further along the vessel", seed.start.x, seed.start.y,
+                       seed.start.z);
             good = false;
         }
         stop++;
@@ -83,7 +86,8 @@ static int narrowest_between(const TrackNode *node, int from, int to)
     double least = HUGE_VAL;
     for (int i = low; i <= high; i++) {
         double r = node[i].cylinder.radius;
-        bool is_free = vec3_distance(node[i].cylinder.center, node[low].cylinder.center) > 2 * r && vec3_distance(node[i].cylinder.center, node[high].cylinder.center) > 2 * r;
+        bool is_free = vec3_distance(node[i].cylinder.center, node[low].cylinder.center) > 2 * r &&
+                       vec3_distance(node[i].cylinder.center, node[high].cylinder.center) > 2 * r;
         if (is_free && r < least) {
             least = r;
             best = i;
@@ -157,8 +161,9 @@ bool rbt_add_rival(Tracker *t, const RbtRegion *point, Vec3 start, int number, c
     if (!vessel_at(t, point, "not", path, faults, &seed, &c))
         return false;
     if (vec3_distance(start, seed.start) < 2 * c.radius) {
-        faults_add(faults, path, point->line, point->column, "the point of `not` (%g, %g, %g) mm lies %.2f mm from the first start; expected at least %.2f mm, two radii", seed.start.x,
-                   seed.start.y, seed.start.z, vec3_distance(start, seed.start), 2 * c.radius);
+        faults_add(faults, path, point->line, point->column,
+                   "the point of `not` (%g, %g, %g) mm lies %.2f mm from the first start; expected at least %.2f mm, two radii", seed.start.x, seed.start.y,
+                   seed.start.z, vec3_distance(start, seed.start), 2 * c.radius);
         return false;
     }
     t->random = random_from_seed((uint64_t)t->parameters->seed, (uint64_t)(RIVAL_STREAM + number));
@@ -169,8 +174,9 @@ bool rbt_add_rival(Tracker *t, const RbtRegion *point, Vec3 start, int number, c
     t->tree = wanted;
     memcpy(t->start, said, sizeof said);
     if (!found && !t->out_of_memory)
-        faults_add(faults, path, point->line, point->column, "nothing could be tracked from the point of `not` (%g, %g, %g) mm; expected a point well inside a vessel", seed.start.x,
-                   seed.start.y, seed.start.z);
+        faults_add(faults, path, point->line, point->column,
+                   "nothing could be tracked from the point of `not` (%g, %g, %g) mm; expected a point well inside a vessel", seed.start.x, seed.start.y,
+                   seed.start.z);
     // only the first branch is divided: earlier rivals follow it
     int first = 0;
     while (first < t->tree.count && t->tree.node[first].branch == 0)

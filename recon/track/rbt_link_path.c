@@ -34,7 +34,10 @@ static double rbt_link_lit(const LinkLight *light, double value)
     return range > 0 ? fmax(0, fmin(1, (value - light->outside) / range)) : value >= light->inside;
 }
 
-static double lit_at(const Tracker *t, const LinkLight *light, Vec3 x) { return tracker_is_forbidden(t, x) ? 0 : rbt_link_lit(light, tracker_brightness(t, x)); }
+static double lit_at(const Tracker *t, const LinkLight *light, Vec3 x)
+{
+    return tracker_is_forbidden(t, x) ? 0 : rbt_link_lit(light, tracker_brightness(t, x));
+}
 
 typedef struct Grid {
     int size[3];

@@ -164,8 +164,8 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
 }
 
 // Nodes along the path from the parent's centre to the child's: each as far along as it is in line of sight of the one before, at most half a radius.
-static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number,
-                         int parent_index, const Light *light)
+static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number, int parent_index,
+                         const Light *light)
 {
     Vec3 last = parent->cylinder.center;
     double radius = child->kind == NODE_ANEURYSM ? fmin(parent->cylinder.radius, child->cylinder.radius) : child->cylinder.radius,
@@ -221,8 +221,8 @@ bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joine
             }
             if (good && way_count > 0) {
                 int before = new.count;
-                good = insert_nodes(t, &new, &tree->node[parent], &node, way, way_count, node.branch,
-                                    parent >= first ? first + place[parent - first] : parent, &light);
+                good = insert_nodes(t, &new, &tree->node[parent], &node, way, way_count, node.branch, parent >= first ? first + place[parent - first] : parent,
+                                    &light);
                 for (int k = before; k < new.count; k++)
                     if (new.node[k].parent == -2)
                         new.node[k].parent = first + k - 1;

@@ -19,9 +19,9 @@
 
 enum { ROOT_NODES = 8, NEAR_MOST = 64, STATIONS_MOST = 2000 };
 static const double SPACING = 0.5,        // of the nodes, in radii of the child
-                    INSIDE = 1.5,         // that far inside the parent's wall they begin, in radii of the child
-                    NEAR_REACH = 3,       // of the parent's nodes about a mouth, in its radii
-                    IN_PARENT = 0.1;      // depth in the parent up to which a point may be wall, in its radii
+    INSIDE = 1.5,                  // that far inside the parent's wall they begin, in radii of the child
+    NEAR_REACH = 3,                // of the parent's nodes about a mouth, in its radii
+    IN_PARENT = 0.1;               // depth in the parent up to which a point may be wall, in its radii
 
 typedef struct Link {
     int node, parent;        // node of t->tree: as tracked, or the present parent
@@ -49,7 +49,8 @@ static int nodes_about(const Track *tree, int node, int *list)
         list[count++] = tree->node[i].parent;
     }
     length = 0;
-    for (int i = node + 1; i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[node].branch && length < reach && count < NEAR_MOST; i++) {
+    for (int i = node + 1;
+         i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[node].branch && length < reach && count < NEAR_MOST; i++) {
         length += vec3_distance(tree->node[i].cylinder.center, tree->node[i - 1].cylinder.center);
         list[count++] = i;
     }
@@ -136,8 +137,14 @@ static bool append_station(const Tracker *t, Link *link, Vec3 x, Vec3 axis, doub
         if (is_own && (link->is_inner || depth_in(&t->tree, list, near, wall) < IN_PARENT * t->tree.node[link->parent].cylinder.radius))
             point[count++] = wall;
     }
-    TrackNode node = {.cylinder = {x, r, axis, 2 * spacing}, .inlier_rate = (double)count / RING, .contrast = link->light.inside - link->light.outside,
-                      .kind = NODE_VESSEL, .branch = child->branch, .is_junction = true, .is_link = true, .point_count = count};
+    TrackNode node = {.cylinder = {x, r, axis, 2 * spacing},
+                      .inlier_rate = (double)count / RING,
+                      .contrast = link->light.inside - link->light.outside,
+                      .kind = NODE_VESSEL,
+                      .branch = child->branch,
+                      .is_junction = true,
+                      .is_link = true,
+                      .point_count = count};
     return track_append(&link->nodes, &node, point);
 }
 
@@ -196,8 +203,9 @@ static void measure_link(const Tracker *t, Link *link)
     const TrackNode *child = &t->tree.node[link->node], *parent = &t->tree.node[link->parent];
     bool is_sac = child->kind == NODE_ANEURYSM;
     link->length = vec3_distance(child->cylinder.center, parent->cylinder.center);
-    link->radius = is_sac ? fmin(parent->cylinder.radius, child->cylinder.radius) : link->is_inner ? fmin(parent->cylinder.radius, child->cylinder.radius)
-                                                                                                    : root_radius(&t->tree, link->node);
+    link->radius = is_sac           ? fmin(parent->cylinder.radius, child->cylinder.radius)
+                   : link->is_inner ? fmin(parent->cylinder.radius, child->cylinder.radius)
+                                    : root_radius(&t->tree, link->node);
     link->light = rbt_link_light(&t->tree, t, link->node);
     link->scale = is_sac ? 1 : rbt_ring_scale(t, link->node, &link->light);
     link->failed = !rbt_link_path(t, parent->cylinder.center, child->cylinder.center, fmax(link->radius, t->voxel), &link->light, &link->path);
@@ -236,7 +244,8 @@ static Link *collect_links(const Track *tree, const bool *is_named, int *count)
     for (int i = 1; link && i < tree->count; i++) {
         const TrackNode *n = &tree->node[i], *p = &tree->node[n->parent];
         bool is_inner = n->branch == p->branch;
-        if (is_inner && (n->kind == NODE_ANEURYSM || p->kind == NODE_ANEURYSM || vec3_distance(n->cylinder.center, p->cylinder.center) <= n->cylinder.radius + p->cylinder.radius))
+        if (is_inner && (n->kind == NODE_ANEURYSM || p->kind == NODE_ANEURYSM ||
+                         vec3_distance(n->cylinder.center, p->cylinder.center) <= n->cylinder.radius + p->cylinder.radius))
             continue;
         link[(*count)++] = (Link){.node = i, .parent = n->parent, .is_inner = is_inner, .is_named = is_named[n->branch]};
     }
@@ -421,8 +430,14 @@ static void decide(const Track *tree, Link *link, int link_count, const bool *is
 
 static void report_link(const Track *tree, const Link *link, const bool *keep, RbtJunction *out)
 {
-    *out = (RbtJunction){.branch = tree->node[link->node].branch, .parent = tree->node[link->parent].branch, .place = link->place, .length = link->length,
-                         .share = link->share, .support = link->support, .is_moved = link->is_moved, .is_inner = link->is_inner,
+    *out = (RbtJunction){.branch = tree->node[link->node].branch,
+                         .parent = tree->node[link->parent].branch,
+                         .place = link->place,
+                         .length = link->length,
+                         .share = link->share,
+                         .support = link->support,
+                         .is_moved = link->is_moved,
+                         .is_inner = link->is_inner,
                          .node_count = keep[link->node] ? link->nodes.count : 0};
     for (int k = 0; k < link->nodes.count && keep[link->node]; k++)
         out->point_count += link->nodes.node[k].point_count;

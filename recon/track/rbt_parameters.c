@@ -11,10 +11,27 @@
 RbtParameters rbt_paper_parameters(void)
 {
     return (RbtParameters){
-        .p_inl = 0.7, .r_t = 0.1, .n_r = 162, .n_d = 81, .n_p = 128, .n_min = 220, .n_max = 500, .s = 0.5, .ray_length = 3, .height_share = 0.75,
-        .back_step = 0.1, .relaxed = 0.5, .powell = 1, .turn_deg = 180,
-        .overlap = 0.5, .max_length_mm = 1000, .aneurysm_rays = 162, .aneurysm_reach_mm = 15, .seed = 1,
-        .find_aneurysms = 1, .residue = 0.17,
+        .p_inl = 0.7,
+        .r_t = 0.1,
+        .n_r = 162,
+        .n_d = 81,
+        .n_p = 128,
+        .n_min = 220,
+        .n_max = 500,
+        .s = 0.5,
+        .ray_length = 3,
+        .height_share = 0.75,
+        .back_step = 0.1,
+        .relaxed = 0.5,
+        .powell = 1,
+        .turn_deg = 180,
+        .overlap = 0.5,
+        .max_length_mm = 1000,
+        .aneurysm_rays = 162,
+        .aneurysm_reach_mm = 15,
+        .seed = 1,
+        .find_aneurysms = 1,
+        .residue = 0.17,
     };
 }
 

@@ -47,7 +47,7 @@ typedef struct RbtParameters {
     double overlap;          // a branch ends where its centre is closer than this many radii to the centre of another branch's node
     double max_length_mm;    // of a branch
     double aneurysm_rays;    // from each centre of an aneurysm: 162, 642 or 2562
-    double aneurysm_reach_mm;// their length
+    double aneurysm_reach_mm;    // their length
     double seed;             // of the random numbers
     // the whole tree from the first start
     double automatic;        // 1: also search for branches and aneurysms without a seed

@@ -146,8 +146,8 @@ bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track 
     chosen[used++] = (Lobe){center, met > 0 ? sorted[met / 10] : 0};
     for (int i = 0; i < RAYS * STEPS; i++) {
         Lobe l = {.center = vec3_add_scaled(center, (0.8 - 0.2 * (i % STEPS)) * far[i / STEPS], coarse[i / STEPS])};
-        if (!(far[i / STEPS] > 0 && far[i / STEPS] < 2 * median) || tracker_node_around(t, l.center, 1) >= 0 ||
-            tracker_is_forbidden(t, l.center) || !is_lumen(t, limb, l.center))
+        if (!(far[i / STEPS] > 0 && far[i / STEPS] < 2 * median) || tracker_node_around(t, l.center, 1) >= 0 || tracker_is_forbidden(t, l.center) ||
+            !is_lumen(t, limb, l.center))
             continue;
         met = see_walls(t, l.center, coarse, RAYS, reach, distance, sorted);
         if (met >= least_closed * RAYS && sorted[met / 10] >= fmax(least_lobe * chosen[0].inscribed, 2.5 * t->voxel)) {

@@ -60,7 +60,8 @@ static bool crop_near(RbtLevels *levels, Vec3 x)
     for (int k = 0; k < size[2]; k++)
         for (int j = 0; j < size[1]; j++)
             memcpy(near->value + ((size_t)k * (size_t)size[1] + (size_t)j) * (size_t)size[0],
-                   v->value + ((size_t)(low[2] + k) * (size_t)v->size[1] + (size_t)(low[1] + j)) * (size_t)v->size[0] + low[0], (size_t)size[0] * sizeof *near->value);
+                   v->value + ((size_t)(low[2] + k) * (size_t)v->size[1] + (size_t)(low[1] + j)) * (size_t)v->size[0] + low[0],
+                   (size_t)size[0] * sizeof *near->value);
     near->minimum = v->minimum;
     near->maximum = v->maximum;
     levels->near[0] = near;
@@ -109,7 +110,8 @@ static int sector_of(double u, double v) { return (int)fmin(SECTORS - 1, floor((
 
 RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
 {
-    double voxel = volume_voxel_size(volume), r = tube->radius, half = fmax(r, 2 * voxel), within = 0.85 * r, from = 1.25 * r + 0.5 * voxel, to = 1.8 * r + voxel;
+    double voxel = volume_voxel_size(volume), r = tube->radius, half = fmax(r, 2 * voxel), within = 0.85 * r, from = 1.25 * r + 0.5 * voxel,
+           to = 1.8 * r + voxel;
     double sum = 0, ring[SECTORS] = {0}, reach = sqrt(to * to + half * half);
     Vec3 e1 = vec3_normal_to(tube->axis), e2 = vec3_cross(tube->axis, e1), c = volume_voxel_of(volume, tube->center);
     double at[3] = {c.x, c.y, c.z};
@@ -198,8 +200,7 @@ static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, do
         }
         for (int k = 0; k < OUTER; k++) {
             double a = 2 * PI * (k + 0.5) / OUTER, rho = (k % 2 ? 1.35 : 1.7) * r + 0.5 * voxel;
-            ring[k * SECTORS / OUTER] +=
-                smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * same_cos(a), e1), rho * same_sin(a), e2));
+            ring[k * SECTORS / OUTER] += smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * same_cos(a), e1), rho * same_sin(a), e2));
         }
     }
     sort_falling(ring);

@@ -112,8 +112,7 @@ static Vec3 longest_of(const Tracker *t, const Chords *c)
 }
 
 // The cylinder of the highest inlier rate about the middle x, or somewhat further along. False if there is none.
-static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, double radius, bool is_known, double level, Cylinder *out,
-                          double *inlier_rate)
+static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, double radius, bool is_known, double level, Cylinder *out, double *inlier_rate)
 {
     static const double along[] = {0, 1.5, -1.5, 3, -3}, size[] = {1, 0.75, 1.35};
     const RbtParameters *p = t->parameters;

@@ -64,19 +64,23 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
     v.check.certainty = sight.certainty;
     v.check.smoothing_mm = t->check.smoothing_mm;
     if (v.check.drift > 2 * c->radius + t->voxel)
-        snprintf(v.refusal, sizeof v.refusal, "the vessel found there lies %.2f mm from the click and has a radius of %.2f mm; expected a click within one radius of its axis",
+        snprintf(v.refusal, sizeof v.refusal,
+                 "the vessel found there lies %.2f mm from the click and has a radius of %.2f mm; expected a click within one radius of its axis",
                  v.check.drift, c->radius);
     else if (2 * c->radius > extent)
-        snprintf(v.refusal, sizeof v.refusal, "the radius found there, %.2f mm, is more than half of the volume's smallest extent of %.1f mm; click in a vessel, or give its radius_mm",
+        snprintf(v.refusal, sizeof v.refusal,
+                 "the radius found there, %.2f mm, is more than half of the volume's smallest extent of %.1f mm; click in a vessel, or give its radius_mm",
                  c->radius, extent);
     else if (v.check.noise > 0 && v.check.certainty < least_certainty)
-        snprintf(v.refusal, sizeof v.refusal,
-                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than its surroundings at a noise of %.3g, %.1f standard "
-                 "errors; expected a place with at least %g, or a less noisy volume",
-                 c->radius, sight.contrast, v.check.noise, v.check.certainty, least_certainty);
+        snprintf(
+            v.refusal, sizeof v.refusal,
+            "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than its surroundings at a noise of %.3g, %.1f standard "
+            "errors; expected a place with at least %g, or a less noisy volume",
+            c->radius, sight.contrast, v.check.noise, v.check.certainty, least_certainty);
     else if (t->is_noisy && sight.contrast < least_contrast * level_noise(t, levels))
         snprintf(v.refusal, sizeof v.refusal,
-                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than its surroundings, but the smoothed copy that suits it has a noise "
+                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than its surroundings, but the smoothed copy that "
+                 "suits it has a noise "
                  "of %.3g; expected a contrast %g times that, or a less noisy volume",
                  c->radius, sight.contrast, level_noise(t, levels), least_contrast);
     if (v.check.drift > c->radius + 0.5 * t->voxel) {
@@ -84,16 +88,20 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
         doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, text);
     }
     if (inlier_rate < least_inliers) {
-        snprintf(text, sizeof text, "%.0f %% of the edge points at the start lie on its cylinder; expected %.0f %% or more for a vessel", 100 * inlier_rate, 100 * least_inliers);
+        snprintf(text, sizeof text, "%.0f %% of the edge points at the start lie on its cylinder; expected %.0f %% or more for a vessel", 100 * inlier_rate,
+                 100 * least_inliers);
         doubt(&v.check, RBT_INLIERS, inlier_rate, least_inliers, text);
     }
     if (4 * c->radius > extent && 2 * c->radius <= extent) {
-        snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's smallest extent of %.1f mm", c->radius, extent);
+        snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's smallest extent of %.1f mm", c->radius,
+                 extent);
         doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
     }
     if (sight.evenness < least_evenness) {
-        snprintf(text, sizeof text, "what was found at the start is bright on both sides too (its wall shows %.0f %% of its contrast there): a band or a sheet, or vessels that touch",
-                 100 * fmax(0, sight.evenness));
+        snprintf(
+            text, sizeof text,
+            "what was found at the start is bright on both sides too (its wall shows %.0f %% of its contrast there): a band or a sheet, or vessels that touch",
+            100 * fmax(0, sight.evenness));
         doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness, text);
     }
     return v;
@@ -165,7 +173,8 @@ bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
     RbtSight sight = rbt_sight_of(levels->volume, noise, &tube);
     double beside = tracker_brightness(t, tube.center) - sight.contrast;
     bool is_inside = tracker_brightness(t, seed->start) > beside + 0.4 * sight.contrast;
-    return sight.certainty >= least_certainty && (t->is_noisy || (is_inside && sight.contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)));
+    return sight.certainty >= least_certainty &&
+           (t->is_noisy || (is_inside && sight.contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)));
 }
 
 // Noise alone is no reason to refuse a doubtful start, but deserves a warning.
@@ -175,7 +184,8 @@ static void say_noise(Tracker *t)
     RbtStartCheck *check = &t->check;
     if (!t->is_noisy || !(check->noise > 0))
         return;
-    snprintf(text, sizeof text, "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked, "
+    snprintf(text, sizeof text,
+             "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked, "
              "thin branches may be missing",
              check->contrast, check->noise, check->certainty, check->smoothing_mm);
     doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
@@ -199,7 +209,8 @@ static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtSt
         double share = is_thin && check->drift > 0.6 * check->cylinder.radius ? 0.2 : is_thin ? 0.5 : 1.5;
         if (sight.certainty < certain_contrast || sight.evenness * sight.contrast < share * own.evenness * own.contrast)
             continue;
-        snprintf(text, sizeof text, "a tube of radius %.2f mm stands out at the click, which is not the one of %.2f mm that was found (%.3g and %.3g grey values)",
+        snprintf(text, sizeof text,
+                 "a tube of radius %.2f mm stands out at the click, which is not the one of %.2f mm that was found (%.3g and %.3g grey values)",
                  t->scan[i].radius, check->cylinder.radius, sight.evenness * sight.contrast, own.evenness * own.contrast);
         doubt(check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius, text);
         return true;
@@ -277,7 +288,9 @@ static void judge_background(Tracker *t, int count)
     double low = beside[n / 10], high = beside[n - 1 - n / 10];
     if (high - low <= contrast[n / 2])
         return;
-    snprintf(text, sizeof text, "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early there, and branches may be missing",
+    snprintf(text, sizeof text,
+             "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early "
+             "there, and branches may be missing",
              low, high, contrast[n / 2]);
     doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
 }
@@ -297,7 +310,9 @@ static void judge_ends(Tracker *t, int count)
         }
         if (brighter <= 1.5 * before->contrast + 4 * level_noise(t, t->levels))
             continue;
-        snprintf(text, sizeof text, "the first branch ends at (%.1f, %.1f, %.1f) mm next to something %.3g grey values brighter than itself, at a contrast of %.3g (a bright band?): it may continue there",
+        snprintf(text, sizeof text,
+                 "the first branch ends at (%.1f, %.1f, %.1f) mm next to something %.3g grey values brighter than itself, at a contrast of %.3g (a bright "
+                 "band?): it may continue there",
                  c.x, c.y, c.z, brighter, before->contrast);
         doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast, text);
     }
@@ -320,22 +335,25 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
     if (count == 0)
         return;
     if (sum < least_inliers * count) {
-        snprintf(text, sizeof text, "over the first branch %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel", 100 * sum / count, 100 * least_inliers);
+        snprintf(text, sizeof text, "over the first branch %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel",
+                 100 * sum / count, 100 * least_inliers);
         doubt(&t->check, RBT_INLIERS, sum / count, least_inliers, text);
     } else if (root < least_inliers * (count < ROOT ? count : ROOT)) {
-        snprintf(text, sizeof text, "at the root %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel", 100 * root / (count < ROOT ? count : ROOT),
-                 100 * least_inliers);
+        snprintf(text, sizeof text, "at the root %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel",
+                 100 * root / (count < ROOT ? count : ROOT), 100 * least_inliers);
         doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
     }
     judge_background(t, count);
     judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {
-        snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; expected %g or more for a vessel", length, length / radius, least_length);
+        snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; expected %g or more for a vessel", length, length / radius,
+                 least_length);
         doubt(&t->check, RBT_LENGTH, length / radius, least_length, text);
     }
     if (faint > 0.2 * count) {
-        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, RBT_NODE_CERTAINTY);
+        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count,
+                 RBT_NODE_CERTAINTY);
         doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, text);
     }
 }

@@ -169,8 +169,8 @@ static bool check_point(Tracker *t, Vec3 x, const RbtSeed *seed, const char *wha
     const int *size = t->volume->size;
     if (!tracker_is_inside(t->volume, x)) {
         faults_add(faults, path, line, column,
-                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; expected voxel (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y, x.z,
-                   v.x, v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
+                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; expected voxel (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y, x.z, v.x,
+                   v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
@@ -260,7 +260,8 @@ static bool out_of_memory_at(const Job *job, int number)
 
 static bool start_is_refused(const Tracker *t, const RbtSeed *seed, int number, const char *path, Faults *faults)
 {
-    faults_add(faults, path, seed->line, seed->column, "the start of branch %d (%g, %g, %g) mm: %s", number + 1, seed->start.x, seed->start.y, seed->start.z, t->refusal);
+    faults_add(faults, path, seed->line, seed->column, "the start of branch %d (%g, %g, %g) mm: %s", number + 1, seed->start.x, seed->start.y, seed->start.z,
+               t->refusal);
     return false;
 }
 
@@ -474,8 +475,8 @@ static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
         if (has_nodes || ends->seed[b] < 0)
             continue;
         const RbtSeed *seed = &job->seed[ends->seed[b]];
-        faults_add(job->faults, job->path, seed->line, seed->column, "branch %d is attached to a vessel excluded by `not`; expected a start on the tree's own side, or another `not`",
-                   ends->seed[b] + 1);
+        faults_add(job->faults, job->path, seed->line, seed->column,
+                   "branch %d is attached to a vessel excluded by `not`; expected a start on the tree's own side, or another `not`", ends->seed[b] + 1);
         return false;
     }
     return true;
@@ -579,13 +580,19 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     if (!good)
         faults_add(faults, path, 0, 0, "out of memory");
     if (good && parameters->powell > 0 && !cylinder_refine_has_powell())
-        faults_add(faults, path, 0, 0, "powell: 1 (as with `parameters: paper`) needs NLopt, and this program was built without it; install libnlopt-dev and build again, or "
-                                       "set powell: 0, which reaches the same minimum");
+        faults_add(faults, path, 0, 0,
+                   "powell: 1 (as with `parameters: paper`) needs NLopt, and this program was built without it; install libnlopt-dev and build again, or "
+                   "set powell: 0, which reaches the same minimum");
     if (good && seed_count < 1)
         faults_add(faults, path, 0, 0, "there is no branch to track; expected `branches` with at least one start");
     if (good) {
-        *t = (Tracker){.volume = volume, .parameters = parameters, .voxel = volume_voxel_size(volume), .ray_count = (int)parameters->n_r,
-                       .axis_count = (int)parameters->n_d, .longest = HUGE_VAL, .scan_count = -1};
+        *t = (Tracker){.volume = volume,
+                       .parameters = parameters,
+                       .voxel = volume_voxel_size(volume),
+                       .ray_count = (int)parameters->n_r,
+                       .axis_count = (int)parameters->n_d,
+                       .longest = HUGE_VAL,
+                       .scan_count = -1};
         double low, high;
         brightness_range(volume, &low, &high);
         t->background = low;

@@ -63,7 +63,7 @@ typedef struct Tracker {
     bool out_of_memory;
     const char *why;         // the last estimate was refused
     char start[256];         // description of the estimate at the first start; may be empty
-    struct RbtLevels *levels;// the volume and its smoothed copies, for the first start
+    struct RbtLevels *levels; // the volume and its smoothed copies, for the first start
     bool is_noisy;           // single voxels are noisier than the first vessel is bright
     int scan_count;          // tubes around the first start that stand out, best first; -1: not looked for
     Cylinder scan[12];

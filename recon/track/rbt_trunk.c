@@ -58,8 +58,8 @@ void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, c
         snprintf(radius, sizeof radius, ", radius %.2f mm", start->radius);
     if (!seed->has_toward)
         snprintf(direction, sizeof direction, ", direction (%.2f, %.2f, %.2f)", start->axis.x, start->axis.y, start->axis.z);
-    snprintf(t->start, sizeof t->start, "first start estimated: middle (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x,
-             start->center.y, start->center.z, vec3_distance(start->center, seed->start), radius, direction, root);
+    snprintf(t->start, sizeof t->start, "first start estimated: middle (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x, start->center.y,
+             start->center.z, vec3_distance(start->center, seed->start), radius, direction, root);
 }
 
 // Number of nodes of `way` before it meets `other`, which starts at the same place: a loop of vessels closes there.

@@ -28,7 +28,7 @@ static void print_junctions(FILE *out, const RbtReport *report)
     if (report->junction_count == 0)
         return;
     fprintf(out, "%d junctions: %d supported by the image, %d doubtful, %d refused", report->junction_count - inner, junctions_with(report, RBT_SUPPORTED),
-           junctions_with(report, RBT_DOUBTFUL), junctions_with(report, RBT_REFUSED) + junctions_with(report, RBT_KEPT));
+            junctions_with(report, RBT_DOUBTFUL), junctions_with(report, RBT_REFUSED) + junctions_with(report, RBT_KEPT));
     if (moved)
         fprintf(out, "; %d hung on another parent", moved);
     if (inner)
@@ -38,8 +38,8 @@ static void print_junctions(FILE *out, const RbtReport *report)
         const RbtJunction *j = &report->junction[i];
         if ((j->support == RBT_SUPPORTED && !j->is_moved) || (j->is_inner && j->support == RBT_DOUBTFUL))
             continue;
-        fprintf(out, "  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support], j->is_inner ? "gap" : "junction",
-               j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
+        fprintf(out, "  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support],
+                j->is_inner ? "gap" : "junction", j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
         if (j->support == RBT_REFUSED)
             fprintf(out, ": %d nodes, %.1f mm dropped", j->dropped_nodes, j->dropped_mm);
         else
@@ -51,16 +51,20 @@ static void print_junctions(FILE *out, const RbtReport *report)
 void segment_report_print(FILE *out, const VesselTree *tree, const RbtReport *report, double load_s, double track_s)
 {
     double length = 0;
-    fprintf(out, "%-4s %-16s %6s %5s %6s %6s %10s %10s %8s %6s  %s\n", "#", "branch", "parent", "order", "nodes", "points", "length_mm", "radius_mm", "inliers", "least", "ends because");
+    fprintf(out, "%-4s %-16s %6s %5s %6s %6s %10s %10s %8s %6s  %s\n", "#", "branch", "parent", "order", "nodes", "points", "length_mm", "radius_mm", "inliers",
+            "least", "ends because");
     for (int i = 0; i < report->branch_count; i++) {
         const RbtBranchReport *b = &report->branch[i];
         char parent[16] = "-";
         if (b->parent >= 0)
             snprintf(parent, sizeof parent, "%d", b->parent + 1);
         fprintf(out, "%-4d %-16s %6s %5d %6d %6ld %10.1f %10.2f %7.0f%% %5.0f%%  ", i + 1,
-               b->name[0] ? b->name : b->is_aneurysm ? "(aneurysm)" : b->is_found ? "(found)" : "(branch)", parent, b->order, b->node_count,
-               (long)(tree->point_offset[b->first_node + b->node_count] - tree->point_offset[b->first_node]), b->length, b->radius, 100 * b->inlier_rate,
-               100 * b->inlier_rate_min);
+                b->name[0]       ? b->name
+                : b->is_aneurysm ? "(aneurysm)"
+                : b->is_found    ? "(found)"
+                                 : "(branch)",
+                parent, b->order, b->node_count, (long)(tree->point_offset[b->first_node + b->node_count] - tree->point_offset[b->first_node]), b->length,
+                b->radius, 100 * b->inlier_rate, 100 * b->inlier_rate_min);
         if (b->is_aneurysm)
             fprintf(out, "aneurysm about (%.1f, %.1f, %.1f) mm\n", b->center.x, b->center.y, b->center.z);
         else
@@ -72,12 +76,13 @@ void segment_report_print(FILE *out, const VesselTree *tree, const RbtReport *re
     print_junctions(out, report);
     for (int i = 0; i < report->loop_count; i++) {
         const RbtLoop *l = &report->loop[i];
-        fprintf(out, "loop: the end of branch %d meets branch %d at (%.2f, %.2f, %.2f) mm, %.1f mm around\n", l->branch + 1, l->meets + 1, l->place.x, l->place.y, l->place.z, l->length);
+        fprintf(out, "loop: the end of branch %d meets branch %d at (%.2f, %.2f, %.2f) mm, %.1f mm around\n", l->branch + 1, l->meets + 1, l->place.x,
+                l->place.y, l->place.z, l->length);
     }
     if (report->left_out_count > 0)
         fprintf(out, "left out, as `not` says: %d branches, %.0f mm\n", report->left_out_count, report->left_out_length);
-    fprintf(out, "%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count, (long)tree->point_count,
-           load_s, track_s);
+    fprintf(out, "%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count,
+            (long)tree->point_count, load_s, track_s);
 }
 
 static void add_junctions(cJSON *root, const RbtReport *report)

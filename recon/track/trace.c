@@ -301,7 +301,8 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         return;
     }
     FAULT(w, value,
-          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, parameters (default or paper), or a parameter that `segment --help` lists",
+          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, parameters (default or paper), or a parameter that `segment "
+          "--help` lists",
           key);
 }
 
@@ -367,8 +368,8 @@ void trace_free(Trace *trace)
 
 static void yaml_fault(const yaml_parser_t *parser, const char *path, Faults *faults)
 {
-    faults_add(faults, path, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1, "is not YAML: %s; expected a map such as `branches: [...]`",
-               parser->problem ? parser->problem : "unreadable");
+    faults_add(faults, path, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1,
+               "is not YAML: %s; expected a map such as `branches: [...]`", parser->problem ? parser->problem : "unreadable");
 }
 
 static void point_to_places(Trace *trace)

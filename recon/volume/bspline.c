@@ -74,8 +74,8 @@ static float sample(const Volume *volume, double x, double y, double z)
     const float *first = volume->value + (size_t)base[2] * slice + (size_t)base[1] * row + (size_t)base[0];
     Row sum = {0, 0, 0, 0};
     for (int k = 0; k < 4; k++, first += slice)
-        sum += w[2][k] * (((w[1][0] * load_row(first) + w[1][1] * load_row(first + row)) + w[1][2] * load_row(first + 2 * row)) +
-                          w[1][3] * load_row(first + 3 * row));
+        sum += w[2][k] *
+               (((w[1][0] * load_row(first) + w[1][1] * load_row(first + row)) + w[1][2] * load_row(first + 2 * row)) + w[1][3] * load_row(first + 3 * row));
     return (sum[0] * w[0][0] + sum[1] * w[0][1]) + (sum[2] * w[0][2] + sum[3] * w[0][3]);
 }
 
@@ -122,7 +122,4 @@ INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start,
 #include "base/each_simd.inc"
 static void (*const sample_line_on[SIMD_COUNT])(const Volume *, Vec3, Vec3, int, float *) = SIMD_FORMS(sample_line);
 
-void bspline_sample_line(const Volume *volume, Vec3 start, Vec3 step, int count, float *out)
-{
-    sample_line_on[simd_level()](volume, start, step, count, out);
-}
+void bspline_sample_line(const Volume *volume, Vec3 start, Vec3 step, int count, float *out) { sample_line_on[simd_level()](volume, start, step, count, out); }

@@ -30,12 +30,30 @@ enum { PREAMBLE = 128, UID_ROOM = 68, MAX_DEPTH = 24 };
 #define TAG(GROUP, ELEMENT) ((uint32_t)(GROUP) << 16 | (ELEMENT))
 
 enum Tag {
-    T_TRANSFER_SYNTAX = TAG(0x0002, 0x0010), T_SOP = TAG(0x0008, 0x0018), T_MODALITY = TAG(0x0008, 0x0060), T_DESCRIPTION = TAG(0x0008, 0x103e),
-    T_SERIES = TAG(0x0020, 0x000e), T_POSITION = TAG(0x0020, 0x0032), T_ORIENTATION = TAG(0x0020, 0x0037), T_PLANE_POSITION = TAG(0x0020, 0x9113),
-    T_PLANE_ORIENTATION = TAG(0x0020, 0x9116), T_SAMPLES = TAG(0x0028, 0x0002), T_PHOTOMETRIC = TAG(0x0028, 0x0004), T_FRAMES = TAG(0x0028, 0x0008),
-    T_ROWS = TAG(0x0028, 0x0010), T_COLUMNS = TAG(0x0028, 0x0011), T_SPACING = TAG(0x0028, 0x0030), T_ALLOCATED = TAG(0x0028, 0x0100),
-    T_STORED = TAG(0x0028, 0x0101), T_HIGH_BIT = TAG(0x0028, 0x0102), T_SIGNED = TAG(0x0028, 0x0103), T_INTERCEPT = TAG(0x0028, 0x1052),
-    T_SLOPE = TAG(0x0028, 0x1053), T_MEASURES = TAG(0x0028, 0x9110), T_TRANSFORMATION = TAG(0x0028, 0x9145), T_SHARED = TAG(0x5200, 0x9229)
+    T_TRANSFER_SYNTAX = TAG(0x0002, 0x0010),
+    T_SOP = TAG(0x0008, 0x0018),
+    T_MODALITY = TAG(0x0008, 0x0060),
+    T_DESCRIPTION = TAG(0x0008, 0x103e),
+    T_SERIES = TAG(0x0020, 0x000e),
+    T_POSITION = TAG(0x0020, 0x0032),
+    T_ORIENTATION = TAG(0x0020, 0x0037),
+    T_PLANE_POSITION = TAG(0x0020, 0x9113),
+    T_PLANE_ORIENTATION = TAG(0x0020, 0x9116),
+    T_SAMPLES = TAG(0x0028, 0x0002),
+    T_PHOTOMETRIC = TAG(0x0028, 0x0004),
+    T_FRAMES = TAG(0x0028, 0x0008),
+    T_ROWS = TAG(0x0028, 0x0010),
+    T_COLUMNS = TAG(0x0028, 0x0011),
+    T_SPACING = TAG(0x0028, 0x0030),
+    T_ALLOCATED = TAG(0x0028, 0x0100),
+    T_STORED = TAG(0x0028, 0x0101),
+    T_HIGH_BIT = TAG(0x0028, 0x0102),
+    T_SIGNED = TAG(0x0028, 0x0103),
+    T_INTERCEPT = TAG(0x0028, 0x1052),
+    T_SLOPE = TAG(0x0028, 0x1053),
+    T_MEASURES = TAG(0x0028, 0x9110),
+    T_TRANSFORMATION = TAG(0x0028, 0x9145),
+    T_SHARED = TAG(0x5200, 0x9229)
 };
 // beyond the range of int, which an enumerator must keep within
 #define T_PER_FRAME TAG(0x5200u, 0x9230)
@@ -131,8 +149,9 @@ static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
         }
     }
     if (e->length != UNDEFINED_LENGTH && e->length > end - c->at && !may_be_cut) {
-        faults_add_at_byte(c->faults, c->path, c->offset + e->place, "the element (%04x,%04x) has a length of %u bytes, but %zu are left; expected the whole file", e->tag >> 16,
-                           e->tag & 0xffff, e->length, end - c->at);
+        faults_add_at_byte(c->faults, c->path, c->offset + e->place,
+                           "the element (%04x,%04x) has a length of %u bytes, but %zu are left; expected the whole file", e->tag >> 16, e->tag & 0xffff,
+                           e->length, end - c->at);
         return false;
     }
     return true;
@@ -372,13 +391,15 @@ static bool check_image(const Cursor *c, const DicomImage *m)
     if (m->samples != 1)
         faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld samples per pixel (colour); expected one", m->samples);
     else if (strcmp(m->photometric, "MONOCHROME2") && strcmp(m->photometric, "MONOCHROME1"))
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the photometric interpretation '%s' is not supported; expected MONOCHROME1 or MONOCHROME2",
-                           m->photometric);
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place,
+                           "the photometric interpretation '%s' is not supported; expected MONOCHROME1 or MONOCHROME2", m->photometric);
     if ((m->allocated != 8 && m->allocated != 16) || m->stored < 1 || m->stored > m->allocated || m->high_bit + 1 < m->stored || m->high_bit >= m->allocated ||
         m->is_signed > 1)
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld bits allocated, %ld stored, high bit %ld, representation %ld are not supported; expected "
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place,
+                           "%ld bits allocated, %ld stored, high bit %ld, representation %ld are not supported; expected "
                            "8 or 16 bits "
-                           "allocated, the stored ones within, representation 0 or 1", m->allocated, m->stored, m->high_bit, m->is_signed);
+                           "allocated, the stored ones within, representation 0 or 1",
+                           m->allocated, m->stored, m->high_bit, m->is_signed);
     if (faults->count > before)
         return false;
     // rows and columns have 16 bits, frames 31: no overflow
@@ -386,7 +407,8 @@ static bool check_image(const Cursor *c, const DicomImage *m)
     if (there > m->pixel_length)
         there = m->pixel_length;
     if (needed > there && !m->is_encapsulated) {
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place + there, "the pixels end after %zu of %zu bytes (%ld x %ld, %ld frames, %ld "
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place + there,
+                           "the pixels end after %zu of %zu bytes (%ld x %ld, %ld frames, %ld "
                            "bits); expected the whole file",
                            there, needed, m->columns, m->rows, m->frames, m->allocated);
         return false;
@@ -493,7 +515,9 @@ static Plane plane_of(const DicomImage *m, int frame)
     Plane p = {.slope = 1};
     for (int i = 2; i >= 0; i--) {
         const Plane *s = said[i];
-#define TAKE(HAS, FIELD) if (s->HAS) p.HAS = true, memcpy(&p.FIELD, &s->FIELD, sizeof p.FIELD)
+#define TAKE(HAS, FIELD)                                                                                                                                       \
+    if (s->HAS)                                                                                                                                                \
+    p.HAS = true, memcpy(&p.FIELD, &s->FIELD, sizeof p.FIELD)
         TAKE(has_position, position);
         TAKE(has_orientation, orientation);
         TAKE(has_spacing, spacing);
@@ -522,30 +546,37 @@ static bool check_slice(const Slice *s, const Slice *first, Faults *faults)
     const char *path = s->file->path;
     const DicomImage *m = &s->file->image, *n = &first->file->image;
     if (!p->has_position || !p->has_orientation || !p->has_spacing) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d has no %s: not a slice of a volume (a projection, a cine run, a secondary "
+        faults_add_at_byte(faults, path, m->pixel_place,
+                           "frame %d has no %s: not a slice of a volume (a projection, a cine run, a secondary "
                            "capture); expected images with "
-                           "ImagePositionPatient, ImageOrientationPatient and PixelSpacing", s->frame + 1,
-                           !p->has_position ? "position" : !p->has_orientation ? "orientation" : "pixel spacing");
+                           "ImagePositionPatient, ImageOrientationPatient and PixelSpacing",
+                           s->frame + 1,
+                           !p->has_position      ? "position"
+                           : !p->has_orientation ? "orientation"
+                                                 : "pixel spacing");
         return false;
     }
     if (m->rows != n->rows || m->columns != n->columns) {
         faults_add_at_byte(faults, path, m->pixel_place, "has %ld x %ld pixels, %s %ld x %ld; expected one size for the series: move the odd file away",
-                           m->columns, m->rows,
-                           first->file->path, n->columns, n->rows);
+                           m->columns, m->rows, first->file->path, n->columns, n->rows);
         return false;
     }
     Vec3 u = vec3_of(p->orientation), v = vec3_of(p->orientation + 3);
     if (!(p->spacing[0] > 0 && p->spacing[1] > 0) || !(fabs(vec3_norm(u) - 1) < 0.01 && fabs(vec3_norm(v) - 1) < 0.01 && fabs(vec3_dot(u, v)) < 0.01)) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d: pixel spacing %g, %g or orientation (%g,%g,%g) (%g,%g,%g) is not valid; expected spacings "
+        faults_add_at_byte(faults, path, m->pixel_place,
+                           "frame %d: pixel spacing %g, %g or orientation (%g,%g,%g) (%g,%g,%g) is not valid; expected spacings "
                            "above 0, two unit "
-                           "vectors at right angles", s->frame + 1, p->spacing[0], p->spacing[1], u.x, u.y, u.z, v.x, v.y, v.z);
+                           "vectors at right angles",
+                           s->frame + 1, p->spacing[0], p->spacing[1], u.x, u.y, u.z, v.x, v.y, v.z);
         return false;
     }
     double turn = vec3_distance(u, vec3_of(q->orientation)) + vec3_distance(v, vec3_of(q->orientation + 3));
     if (turn > 2e-3 || fabs(p->spacing[0] / q->spacing[0] - 1) > 1e-3 || fabs(p->spacing[1] / q->spacing[1] - 1) > 1e-3) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d has another orientation or spacing than the first of %s; expected parallel slices of one "
+        faults_add_at_byte(faults, path, m->pixel_place,
+                           "frame %d has another orientation or spacing than the first of %s; expected parallel slices of one "
                            "spacing: move the odd file "
-                           "(a localizer?) away", s->frame + 1, first->file->path);
+                           "(a localizer?) away",
+                           s->frame + 1, first->file->path);
         return false;
     }
     return true;
@@ -572,9 +603,11 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
     for (int i = 1; i < kept; i++) {
         double d = slice[i].along - slice[i - 1].along;
         if (!(d > 1e-4)) {
-            faults_add_at_byte(faults, slice[i].file->path, slice[i].file->image.pixel_place, "frame %d has the same position as frame %d of %s (several times "
+            faults_add_at_byte(faults, slice[i].file->path, slice[i].file->image.pixel_place,
+                               "frame %d has the same position as frame %d of %s (several times "
                                "or echoes in one "
-                               "series?); expected one slice at each place", slice[i].frame + 1, slice[i - 1].frame + 1, slice[i - 1].file->path);
+                               "series?); expected one slice at each place",
+                               slice[i].frame + 1, slice[i - 1].frame + 1, slice[i - 1].file->path);
             return false;
         }
         steps[0] = fmin(steps[0], d);
@@ -587,8 +620,8 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
         if (vec3_distance(place, vec3_of(slice[i].plane.position)) > 0.05 * mean) {
             faults_add_at_byte(faults, slice[widest].file->path, slice[widest].file->image.pixel_place,
                                "frame %d lies %.4g mm behind frame %d of %s, others lie %.4g mm "
-                               "apart: slices are missing or unevenly spaced; expected all slices, evenly spaced", slice[widest].frame + 1, steps[1],
-                               slice[widest - 1].frame + 1, slice[widest - 1].file->path, steps[0]);
+                               "apart: slices are missing or unevenly spaced; expected all slices, evenly spaced",
+                               slice[widest].frame + 1, steps[1], slice[widest - 1].frame + 1, slice[widest - 1].file->path, steps[0]);
             return false;
         }
     }
@@ -652,7 +685,8 @@ static bool unpack(OpenFile *open, Faults *faults)
     open->image.is_words = plain.is_words;
     if (!plain.is_encapsulated && plain.rows == m->rows && plain.columns == m->columns && plain.frames == m->frames && plain.allocated == m->allocated)
         return true;
-    faults_add_at_byte(faults, open->file->path, m->pixel_place, "the compressed pixels decode to an image of another size than the header says; expected an intact file");
+    faults_add_at_byte(faults, open->file->path, m->pixel_place,
+                       "the compressed pixels decode to an image of another size than the header says; expected an intact file");
     return false;
 }
 
@@ -846,9 +880,8 @@ Volume *volume_load_dicom_folder(const char *path, Faults *faults)
                 if (is_same_series(f, &series.file[k]))
                     files++, earlier += k < i;
             if (!earlier)
-                faults_add(faults, f->path, 0, 0, "a series of %d file%s, %ld x %ld pixels%s, %s '%s'", files, files > 1 ? "s" : "",
-                           f->image.columns, f->image.rows,
-                           f->image.frames > 1 ? ", multi-frame" : "", f->image.modality, f->image.description);
+                faults_add(faults, f->path, 0, 0, "a series of %d file%s, %ld x %ld pixels%s, %s '%s'", files, files > 1 ? "s" : "", f->image.columns,
+                           f->image.rows, f->image.frames > 1 ? ", multi-frame" : "", f->image.modality, f->image.description);
         }
         good = false;
     }

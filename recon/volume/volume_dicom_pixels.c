@@ -86,8 +86,10 @@ bool dicom_unpack(const char *path, size_t place, const char *syntax, size_t mos
     const char *why;
     *out = (FileBytes){.path = path};
     if (!process_beside("seldinger-dicom", program, sizeof program) || access(program, X_OK) != 0) {
-        faults_add_at_byte(faults, path, place, "the pixels are compressed (transfer syntax %s), and seldinger-dicom, which decodes them, is not installed next to "
-                           "this program; decompress the file with `gdcmconv --raw IN.dcm OUT.dcm`", syntax);
+        faults_add_at_byte(faults, path, place,
+                           "the pixels are compressed (transfer syntax %s), and seldinger-dicom, which decodes them, is not installed next to "
+                           "this program; decompress the file with `gdcmconv --raw IN.dcm OUT.dcm`",
+                           syntax);
         return false;
     }
     int file = regular_file_open(path, &status, &why);
@@ -98,7 +100,7 @@ bool dicom_unpack(const char *path, size_t place, const char *syntax, size_t mos
     bool good = run(program, file, most, out);
     close(file);
     if (!good)
-        faults_add_at_byte(faults, path, place, "cannot decode the compressed pixels (transfer syntax %s); expected an intact file in JPEG, JPEG-LS, JPEG 2000 or RLE",
-                           syntax);
+        faults_add_at_byte(faults, path, place,
+                           "cannot decode the compressed pixels (transfer syntax %s); expected an intact file in JPEG, JPEG-LS, JPEG 2000 or RLE", syntax);
     return good;
 }

@@ -90,7 +90,8 @@ static void call_header(const FileBytes *file, FileCall *call, void *context)
     while (line_cursor_next(&cursor, &text, &length) && length > 0) {
         const char *sign = memchr(text, is_nrrd ? ':' : '=', length);
         size_t named = sign ? (size_t)(sign - text) : 0;
-        bool is_key = is_nrrd ? header_text_is(text, named, "data file") || header_text_is(text, named, "datafile") : header_text_is(text, named, "ElementDataFile");
+        bool is_key =
+            is_nrrd ? header_text_is(text, named, "data file") || header_text_is(text, named, "datafile") : header_text_is(text, named, "ElementDataFile");
         if (sign && is_key) {
             call_named(file->path, sign + 1, length - named - 1, cursor, call, context);
             return;
@@ -148,7 +149,8 @@ static Volume *parse(const FileBytes *file, Faults *faults)
         return volume_parse_metaimage(file, faults);
     if (volume_is_dicom(file))
         return volume_parse_dicom(file, faults);
-    faults_add_at_byte(faults, file->path, 0, "is not a supported volume format; expected NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
+    faults_add_at_byte(faults, file->path, 0,
+                       "is not a supported volume format; expected NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
     return NULL;
 }
 

@@ -146,8 +146,8 @@ static bool is_not_too_long(const VolumeHeader *header, const FileBytes *file, F
     return false;
 }
 
-bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t length, const VolumeHeader *header, FileBytes *out,
-                            char path[4096], Faults *faults)
+bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t length, const VolumeHeader *header, FileBytes *out, char path[4096],
+                            Faults *faults)
 {
     while (length > 0 && isspace((unsigned char)*name))
         name++, length--;
@@ -199,8 +199,10 @@ bool volume_header_check(const VolumeHeader *header, const char *path, int line,
     Vec3 a = header->axis[0], b = header->axis[1], c = header->axis[2];
     double volume = fabs(vec3_dot(a, vec3_cross(b, c))), box = vec3_norm(a) * vec3_norm(b) * vec3_norm(c);
     if (!vec3_is_finite(header->origin) || !isfinite(volume) || !isfinite(box) || !(volume > 1e-6 * box) || !(box > 1e-24) || !(box < 1e24)) {
-        faults_add(faults, path, line, 0, "the axes (%g,%g,%g) (%g,%g,%g) (%g,%g,%g) span no grid; expected three independent directions, finite and not 0, and a "
-                   "finite origin", a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z);
+        faults_add(faults, path, line, 0,
+                   "the axes (%g,%g,%g) (%g,%g,%g) (%g,%g,%g) span no grid; expected three independent directions, finite and not 0, and a "
+                   "finite origin",
+                   a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z);
         return false;
     }
     if (!isfinite(header->slope) || !isfinite(header->intercept)) {
@@ -256,16 +258,18 @@ static void say_short(const Inflater *inflater, size_t made, size_t wanted, Faul
     if (inflater->state == Z_DATA_ERROR || inflater->state == Z_NEED_DICT)
         faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the compressed data is damaged; expected an intact gzip or zlib stream");
     else
-        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the data ends after %zu of %zu bytes; expected the whole file, or a header with the true sizes",
-                           made, wanted);
+        faults_add_at_byte(faults, data->path, data->offset + inflater->in,
+                           "the data ends after %zu of %zu bytes; expected the whole file, or a header with the true sizes", made, wanted);
 }
 
 static bool can_hold(const FileBytes *data, size_t wanted, Faults *faults)
 {
     if (wanted / DEFLATE_GROWTH <= data->length)
         return true;
-    faults_add_at_byte(faults, data->path, data->offset, "%zu compressed bytes cannot hold the %zu bytes that the header promises; expected a header and data "
-                       "that belong together", data->length, wanted);
+    faults_add_at_byte(faults, data->path, data->offset,
+                       "%zu compressed bytes cannot hold the %zu bytes that the header promises; expected a header and data "
+                       "that belong together",
+                       data->length, wanted);
     return false;
 }
 
@@ -293,13 +297,13 @@ static uint64_t load_bits(const uint8_t *p, size_t size, bool big_endian)
     return bits;
 }
 
-#define CONVERT(TYPE, BITS)                                                            \
-    for (size_t i = 0; i < count; i++) {                                               \
-        BITS bits = (BITS)load_bits(sample + i * sizeof(TYPE), sizeof(TYPE), big);     \
-        TYPE x;                                                                        \
-        memcpy(&x, &bits, sizeof x);                                                   \
-        value[i] = (float)(scaled ? header->slope * (double)x + header->intercept : (double)x); \
-    }                                                                                  \
+#define CONVERT(TYPE, BITS)                                                                                                                                    \
+    for (size_t i = 0; i < count; i++) {                                                                                                                       \
+        BITS bits = (BITS)load_bits(sample + i * sizeof(TYPE), sizeof(TYPE), big);                                                                             \
+        TYPE x;                                                                                                                                                \
+        memcpy(&x, &bits, sizeof x);                                                                                                                           \
+        value[i] = (float)(scaled ? header->slope * (double)x + header->intercept : (double)x);                                                                \
+    }                                                                                                                                                          \
     break
 
 static void convert(const VolumeHeader *header, const uint8_t *sample, size_t count, float *value)
@@ -336,8 +340,10 @@ bool volume_finish_values(Volume *volume, const FileBytes *data, size_t start, s
     if (bad == 0)
         return true;
     size_t nx = (size_t)volume->size[0], ny = (size_t)volume->size[1];
-    faults_add_at_byte(faults, data->path, start + first * sample_size, "%zu voxels are not finite numbers (NaN or too large), the first at (%zu, %zu, %zu); "
-                       "finite values: set the unknown ones to the background's", bad, first % nx, first / nx % ny, first / (nx * ny));
+    faults_add_at_byte(faults, data->path, start + first * sample_size,
+                       "%zu voxels are not finite numbers (NaN or too large), the first at (%zu, %zu, %zu); "
+                       "finite values: set the unknown ones to the background's",
+                       bad, first % nx, first / nx % ny, first / (nx * ny));
     return false;
 }
 
@@ -356,7 +362,8 @@ Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *f
 static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, size_t count, Faults *faults)
 {
     if (count / 2 > data->length) {
-        faults_add_at_byte(faults, data->path, data->offset, "%zu bytes of text cannot hold %zu numbers; expected all numbers, or the true sizes", data->length, count);
+        faults_add_at_byte(faults, data->path, data->offset, "%zu bytes of text cannot hold %zu numbers; expected all numbers, or the true sizes", data->length,
+                           count);
         return NULL;
     }
     Volume *volume = volume_of_header(header, data->path, faults);
@@ -365,8 +372,8 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
     for (size_t i = 0; volume && i < count; i++) {
         double x;
         if (!take_number(&text, &left, &x)) {
-            faults_add_at_byte(faults, data->path, data->offset + data->length - left, "value %zu of %zu is missing or not a number; expected numbers separated by blanks",
-                               i + 1, count);
+            faults_add_at_byte(faults, data->path, data->offset + data->length - left,
+                               "value %zu of %zu is missing or not a number; expected numbers separated by blanks", i + 1, count);
             volume_free(volume);
             return NULL;
         }
@@ -405,8 +412,10 @@ static bool inflate_values(const VolumeHeader *header, const FileBytes *data, si
     if (!good) {
         say_short(&inflater, made + got, wanted, faults);
     } else if (inflater_read(&inflater, &excess, 1) > 0) {
-        faults_add_at_byte(faults, data->path, data->offset, "the compressed data holds more than the %zu bytes that the header promises; expected a header and data "
-                           "that belong together", wanted);
+        faults_add_at_byte(faults, data->path, data->offset,
+                           "the compressed data holds more than the %zu bytes that the header promises; expected a header and data "
+                           "that belong together",
+                           wanted);
         good = false;
     }
     inflateEnd(&inflater.stream);
@@ -448,8 +457,8 @@ static bool skip_lines(FileBytes *data, long lines, Faults *faults)
             return false;
         }
     }
-    *data = (FileBytes){.byte = data->byte + cursor.position, .length = data->length - cursor.position, .offset = data->offset + cursor.position,
-                        .path = data->path};
+    *data = (FileBytes){
+        .byte = data->byte + cursor.position, .length = data->length - cursor.position, .offset = data->offset + cursor.position, .path = data->path};
     return true;
 }
 
@@ -477,9 +486,11 @@ Volume *volume_decode(const VolumeHeader *header, const FileBytes *file, Faults 
     if (header->encoding == ENCODING_TEXT)
         return decode_text(header, &data, count, faults);
     if (data.length < bytes) {
-        faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); expected the "
+        faults_add_at_byte(faults, data.path, data.offset + data.length,
+                           "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); expected the "
                            "whole file, "
-                           "or a header with the true sizes", data.length, bytes, header->size[0], header->size[1], header->size[2], sample);
+                           "or a header with the true sizes",
+                           data.length, bytes, header->size[0], header->size[1], header->size[2], sample);
         return NULL;
     }
     Volume *volume = volume_of_header(header, data.path, faults);
@@ -585,8 +596,7 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
         files++;
     if (files == 0 || files > (size_t)header->size[2] || (size_t)header->size[2] % files != 0) {
         faults_add(faults, header_path, line, 0, "%zu%s data files for %d slices; expected as many, or a divisor of that number", files,
-                   files > (size_t)header->size[2] ? " or more" : "",
-                   header->size[2]);
+                   files > (size_t)header->size[2] ? " or more" : "", header->size[2]);
         return NULL;
     }
     size_t share = bytes / files;

@@ -8,28 +8,61 @@
 #include <string.h>
 
 enum Key {
-    OBJECT_TYPE, NDIMS, DIM_SIZE, ELEMENT_TYPE, SPACING, ELEMENT_SIZE, OFFSET, MATRIX, BINARY, BIG_ENDIAN_KEY, COMPRESSED, COMPRESSED_SIZE, CHANNELS, HEADER_SIZE,
-    SLOPE, INTERCEPT, DATA_FILE, KEY_COUNT
+    OBJECT_TYPE,
+    NDIMS,
+    DIM_SIZE,
+    ELEMENT_TYPE,
+    SPACING,
+    ELEMENT_SIZE,
+    OFFSET,
+    MATRIX,
+    BINARY,
+    BIG_ENDIAN_KEY,
+    COMPRESSED,
+    COMPRESSED_SIZE,
+    CHANNELS,
+    HEADER_SIZE,
+    SLOPE,
+    INTERCEPT,
+    DATA_FILE,
+    KEY_COUNT
 };
 
 static const struct KeyName {
     const char *name;
     enum Key key;
 } key_names[] = {
-    {"ObjectType", OBJECT_TYPE}, {"NDims", NDIMS}, {"DimSize", DIM_SIZE}, {"ElementType", ELEMENT_TYPE}, {"ElementSpacing", SPACING},
-    {"ElementSize", ELEMENT_SIZE}, {"Offset", OFFSET}, {"Origin", OFFSET}, {"Position", OFFSET}, {"TransformMatrix", MATRIX}, {"Rotation", MATRIX},
-    {"Orientation", MATRIX}, {"BinaryData", BINARY}, {"BinaryDataByteOrderMSB", BIG_ENDIAN_KEY}, {"ElementByteOrderMSB", BIG_ENDIAN_KEY},
-    {"CompressedData", COMPRESSED}, {"CompressedDataSize", COMPRESSED_SIZE}, {"ElementNumberOfChannels", CHANNELS}, {"HeaderSize", HEADER_SIZE},
-    {"ElementToIntensityFunctionSlope", SLOPE}, {"ElementToIntensityFunctionOffset", INTERCEPT}, {"ElementDataFile", DATA_FILE},
+    {"ObjectType", OBJECT_TYPE},
+    {"NDims", NDIMS},
+    {"DimSize", DIM_SIZE},
+    {"ElementType", ELEMENT_TYPE},
+    {"ElementSpacing", SPACING},
+    {"ElementSize", ELEMENT_SIZE},
+    {"Offset", OFFSET},
+    {"Origin", OFFSET},
+    {"Position", OFFSET},
+    {"TransformMatrix", MATRIX},
+    {"Rotation", MATRIX},
+    {"Orientation", MATRIX},
+    {"BinaryData", BINARY},
+    {"BinaryDataByteOrderMSB", BIG_ENDIAN_KEY},
+    {"ElementByteOrderMSB", BIG_ENDIAN_KEY},
+    {"CompressedData", COMPRESSED},
+    {"CompressedDataSize", COMPRESSED_SIZE},
+    {"ElementNumberOfChannels", CHANNELS},
+    {"HeaderSize", HEADER_SIZE},
+    {"ElementToIntensityFunctionSlope", SLOPE},
+    {"ElementToIntensityFunctionOffset", INTERCEPT},
+    {"ElementDataFile", DATA_FILE},
 };
 
 static const struct {
     const char *name;
     VoxelType type;
 } type_names[] = {
-    {"MET_CHAR", VOXEL_INT8}, {"MET_ASCII_CHAR", VOXEL_INT8}, {"MET_UCHAR", VOXEL_UINT8}, {"MET_SHORT", VOXEL_INT16}, {"MET_USHORT", VOXEL_UINT16},
-    {"MET_INT", VOXEL_INT32}, {"MET_UINT", VOXEL_UINT32}, {"MET_LONG", VOXEL_INT32}, {"MET_ULONG", VOXEL_UINT32}, {"MET_LONG_LONG", VOXEL_INT64},
-    {"MET_ULONG_LONG", VOXEL_UINT64}, {"MET_FLOAT", VOXEL_FLOAT}, {"MET_DOUBLE", VOXEL_DOUBLE},
+    {"MET_CHAR", VOXEL_INT8},         {"MET_ASCII_CHAR", VOXEL_INT8}, {"MET_UCHAR", VOXEL_UINT8},   {"MET_SHORT", VOXEL_INT16},  {"MET_USHORT", VOXEL_UINT16},
+    {"MET_INT", VOXEL_INT32},         {"MET_UINT", VOXEL_UINT32},     {"MET_LONG", VOXEL_INT32},    {"MET_ULONG", VOXEL_UINT32}, {"MET_LONG_LONG", VOXEL_INT64},
+    {"MET_ULONG_LONG", VOXEL_UINT64}, {"MET_FLOAT", VOXEL_FLOAT},     {"MET_DOUBLE", VOXEL_DOUBLE},
 };
 #define COUNT(TABLE) (sizeof(TABLE) / sizeof(TABLE)[0])
 
@@ -62,7 +95,8 @@ static bool gather(const FileBytes *file, KeyValue value[KEY_COUNT], size_t *end
     int before = faults->count;
     while (!value[DATA_FILE].line) {
         if (!line_cursor_next(&cursor, &text, &length)) {
-            faults_add_at_byte(faults, file->path, file->length, "the header ends without ElementDataFile; expected `ElementDataFile = LOCAL` or a file name as its last "
+            faults_add_at_byte(faults, file->path, file->length,
+                               "the header ends without ElementDataFile; expected `ElementDataFile = LOCAL` or a file name as its last "
                                "line");
             return false;
         }
@@ -125,7 +159,8 @@ static bool read_grid(const KeyValue *value, const char *path, VolumeHeader *out
         return false;
     for (int i = 0; i < d; i++)
         if (!(size[i] >= 1 && size[i] <= INT32_MAX) || floor(size[i]) != size[i] || (i == 3 && size[i] > 1)) {
-            faults_add(faults, path, value[DIM_SIZE].line, 0, "size %g of axis %d is not valid; expected a whole number from 1 (1 for a fourth axis)", size[i], i);
+            faults_add(faults, path, value[DIM_SIZE].line, 0, "size %g of axis %d is not valid; expected a whole number from 1 (1 for a fourth axis)", size[i],
+                       i);
             return false;
         }
     for (int i = 0; i < 3; i++) {
@@ -176,14 +211,19 @@ Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults)
         return NULL;
     const KeyValue *name = &value[DATA_FILE];
     if (header_text_is(name->text, name->length, "LOCAL")) {
-        FileBytes data = {.byte = file->byte + end, .length = file->length - end, .offset = end, .path = file->path,
-                          .whole = file->whole > file->length ? file->whole - end : 0, .needed = file->needed};
+        FileBytes data = {.byte = file->byte + end,
+                          .length = file->length - end,
+                          .offset = end,
+                          .path = file->path,
+                          .whole = file->whole > file->length ? file->whole - end : 0,
+                          .needed = file->needed};
         return volume_decode(&header, &data, faults);
     }
     if (file->needed)
         return NULL;
     if (data_names_several(name->text, name->length))
-        return volume_decode_several(&header, file->path, name->line, name->text, name->length, (LineCursor){file->byte, file->length, end, name->line}, faults);
+        return volume_decode_several(&header, file->path, name->line, name->text, name->length, (LineCursor){file->byte, file->length, end, name->line},
+                                     faults);
     char path[4096];
     FileBytes data;
     if (!file_bytes_read_beside(file->path, name->line, name->text, name->length, &header, &data, path, faults))

@@ -9,15 +9,30 @@
 #include <string.h>
 
 enum {
-    AT_DIM = 40, AT_DATATYPE = 70, AT_BITPIX = 72, AT_PIXDIM = 76, AT_VOX_OFFSET = 108, AT_SLOPE = 112, AT_INTERCEPT = 116, AT_UNITS = 123, AT_QFORM = 252,
-    AT_SFORM = 254, AT_QUATERN = 256, AT_QOFFSET = 268, AT_SROW = 280, AT_MAGIC = 344, HEADER_BYTES = 348, DATA_START = 352, NIFTI2_BYTES = 540
+    AT_DIM = 40,
+    AT_DATATYPE = 70,
+    AT_BITPIX = 72,
+    AT_PIXDIM = 76,
+    AT_VOX_OFFSET = 108,
+    AT_SLOPE = 112,
+    AT_INTERCEPT = 116,
+    AT_UNITS = 123,
+    AT_QFORM = 252,
+    AT_SFORM = 254,
+    AT_QUATERN = 256,
+    AT_QOFFSET = 268,
+    AT_SROW = 280,
+    AT_MAGIC = 344,
+    HEADER_BYTES = 348,
+    DATA_START = 352,
+    NIFTI2_BYTES = 540
 };
 
 static const struct {
     int code;
     VoxelType type;
-} data_types[] = {{2, VOXEL_UINT8}, {4, VOXEL_INT16}, {8, VOXEL_INT32}, {16, VOXEL_FLOAT}, {64, VOXEL_DOUBLE}, {256, VOXEL_INT8},
-                  {512, VOXEL_UINT16}, {768, VOXEL_UINT32}, {1024, VOXEL_INT64}, {1280, VOXEL_UINT64}};
+} data_types[] = {{2, VOXEL_UINT8},  {4, VOXEL_INT16},    {8, VOXEL_INT32},    {16, VOXEL_FLOAT},   {64, VOXEL_DOUBLE},
+                  {256, VOXEL_INT8}, {512, VOXEL_UINT16}, {768, VOXEL_UINT32}, {1024, VOXEL_INT64}, {1280, VOXEL_UINT64}};
 
 typedef struct NiftiBytes {
     const uint8_t *byte;
@@ -65,7 +80,8 @@ static bool read_grid(const NiftiBytes *h, const char *path, VolumeHeader *out, 
     for (int i = 1; i <= dimension; i++) {
         int size = short_at(h, AT_DIM + 2 * i);
         if (size < 1 || (i > 3 && size > 1)) {
-            faults_add_at_byte(faults, path, (size_t)(AT_DIM + 2 * i), "size %d of axis %d is not valid; expected 1 or more (1 beyond the third axis: one value per voxel)", size, i - 1);
+            faults_add_at_byte(faults, path, (size_t)(AT_DIM + 2 * i),
+                               "size %d of axis %d is not valid; expected 1 or more (1 beyond the third axis: one value per voxel)", size, i - 1);
             return false;
         }
         if (i <= 3)
@@ -109,7 +125,8 @@ static bool read_grid(const NiftiBytes *h, const char *path, VolumeHeader *out, 
     faults_clear(&inner);
     if (volume_header_check(out, path, 0, &inner))
         return true;
-    faults_add_at_byte(faults, path, place, "the grid is not valid; expected independent axes that are finite and not 0, finite origin and scale, at most 2^31 voxels");
+    faults_add_at_byte(faults, path, place,
+                       "the grid is not valid; expected independent axes that are finite and not 0, finite origin and scale, at most 2^31 voxels");
     return false;
 }
 
@@ -145,7 +162,8 @@ static bool read_header(const FileBytes *file, NiftiBytes *h, VolumeHeader *out,
         return false;
     }
     if (bits != 8 * (int)voxel_type_size(out->type)) {
-        faults_add_at_byte(faults, path, AT_BITPIX, "%d bits per voxel do not match data type %d; expected %d", bits, code, 8 * (int)voxel_type_size(out->type));
+        faults_add_at_byte(faults, path, AT_BITPIX, "%d bits per voxel do not match data type %d; expected %d", bits, code,
+                           8 * (int)voxel_type_size(out->type));
         return false;
     }
     double offset = float_at(h, AT_VOX_OFFSET), least = *is_pair ? 0 : DATA_START;

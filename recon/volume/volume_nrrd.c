@@ -9,47 +9,127 @@
 #include <string.h>
 
 enum Field {
-    TYPE, DIMENSION, SIZES, ENCODING, ENDIAN, DATA_FILE, LINE_SKIP, BYTE_SKIP, SPACE, SPACE_DIMENSION, SPACE_ORIGIN, SPACE_DIRECTIONS, SPACE_UNITS, SPACINGS,
-    AXIS_MINS, AXIS_MAXS, CENTERS, UNITS, IGNORED, FIELD_COUNT
+    TYPE,
+    DIMENSION,
+    SIZES,
+    ENCODING,
+    ENDIAN,
+    DATA_FILE,
+    LINE_SKIP,
+    BYTE_SKIP,
+    SPACE,
+    SPACE_DIMENSION,
+    SPACE_ORIGIN,
+    SPACE_DIRECTIONS,
+    SPACE_UNITS,
+    SPACINGS,
+    AXIS_MINS,
+    AXIS_MAXS,
+    CENTERS,
+    UNITS,
+    IGNORED,
+    FIELD_COUNT
 };
 
 static const struct FieldName {
     const char *name;
     enum Field field;
 } field_names[] = {
-    {"type", TYPE}, {"dimension", DIMENSION}, {"sizes", SIZES}, {"encoding", ENCODING}, {"endian", ENDIAN}, {"data file", DATA_FILE}, {"datafile", DATA_FILE},
-    {"line skip", LINE_SKIP}, {"lineskip", LINE_SKIP}, {"byte skip", BYTE_SKIP}, {"byteskip", BYTE_SKIP}, {"space", SPACE},
-    {"space dimension", SPACE_DIMENSION}, {"space origin", SPACE_ORIGIN}, {"space directions", SPACE_DIRECTIONS}, {"space units", SPACE_UNITS},
-    {"spacings", SPACINGS}, {"axis mins", AXIS_MINS}, {"axismins", AXIS_MINS}, {"axis maxs", AXIS_MAXS}, {"axismaxs", AXIS_MAXS}, {"centers", CENTERS},
-    {"centerings", CENTERS}, {"units", UNITS},
+    {"type", TYPE},
+    {"dimension", DIMENSION},
+    {"sizes", SIZES},
+    {"encoding", ENCODING},
+    {"endian", ENDIAN},
+    {"data file", DATA_FILE},
+    {"datafile", DATA_FILE},
+    {"line skip", LINE_SKIP},
+    {"lineskip", LINE_SKIP},
+    {"byte skip", BYTE_SKIP},
+    {"byteskip", BYTE_SKIP},
+    {"space", SPACE},
+    {"space dimension", SPACE_DIMENSION},
+    {"space origin", SPACE_ORIGIN},
+    {"space directions", SPACE_DIRECTIONS},
+    {"space units", SPACE_UNITS},
+    {"spacings", SPACINGS},
+    {"axis mins", AXIS_MINS},
+    {"axismins", AXIS_MINS},
+    {"axis maxs", AXIS_MAXS},
+    {"axismaxs", AXIS_MAXS},
+    {"centers", CENTERS},
+    {"centerings", CENTERS},
+    {"units", UNITS},
     // without meaning for the grid
-    {"content", IGNORED}, {"kinds", IGNORED}, {"labels", IGNORED}, {"thicknesses", IGNORED}, {"number", IGNORED}, {"min", IGNORED}, {"max", IGNORED},
-    {"old min", IGNORED}, {"oldmin", IGNORED}, {"old max", IGNORED}, {"oldmax", IGNORED}, {"block size", IGNORED}, {"blocksize", IGNORED},
-    {"sample units", IGNORED}, {"sampleunits", IGNORED}, {"measurement frame", IGNORED},
+    {"content", IGNORED},
+    {"kinds", IGNORED},
+    {"labels", IGNORED},
+    {"thicknesses", IGNORED},
+    {"number", IGNORED},
+    {"min", IGNORED},
+    {"max", IGNORED},
+    {"old min", IGNORED},
+    {"oldmin", IGNORED},
+    {"old max", IGNORED},
+    {"oldmax", IGNORED},
+    {"block size", IGNORED},
+    {"blocksize", IGNORED},
+    {"sample units", IGNORED},
+    {"sampleunits", IGNORED},
+    {"measurement frame", IGNORED},
 };
 
 static const struct TypeName {
     const char *name;
     VoxelType type;
 } type_names[] = {
-    {"signed char", VOXEL_INT8}, {"int8", VOXEL_INT8}, {"int8_t", VOXEL_INT8},
-    {"uchar", VOXEL_UINT8}, {"unsigned char", VOXEL_UINT8}, {"uint8", VOXEL_UINT8}, {"uint8_t", VOXEL_UINT8},
-    {"short", VOXEL_INT16}, {"short int", VOXEL_INT16}, {"signed short", VOXEL_INT16}, {"signed short int", VOXEL_INT16}, {"int16", VOXEL_INT16},
+    {"signed char", VOXEL_INT8},
+    {"int8", VOXEL_INT8},
+    {"int8_t", VOXEL_INT8},
+    {"uchar", VOXEL_UINT8},
+    {"unsigned char", VOXEL_UINT8},
+    {"uint8", VOXEL_UINT8},
+    {"uint8_t", VOXEL_UINT8},
+    {"short", VOXEL_INT16},
+    {"short int", VOXEL_INT16},
+    {"signed short", VOXEL_INT16},
+    {"signed short int", VOXEL_INT16},
+    {"int16", VOXEL_INT16},
     {"int16_t", VOXEL_INT16},
-    {"ushort", VOXEL_UINT16}, {"unsigned short", VOXEL_UINT16}, {"unsigned short int", VOXEL_UINT16}, {"uint16", VOXEL_UINT16}, {"uint16_t", VOXEL_UINT16},
-    {"int", VOXEL_INT32}, {"signed int", VOXEL_INT32}, {"int32", VOXEL_INT32}, {"int32_t", VOXEL_INT32},
-    {"uint", VOXEL_UINT32}, {"unsigned int", VOXEL_UINT32}, {"uint32", VOXEL_UINT32}, {"uint32_t", VOXEL_UINT32},
-    {"longlong", VOXEL_INT64}, {"long long", VOXEL_INT64}, {"long long int", VOXEL_INT64}, {"signed long long", VOXEL_INT64},
-    {"signed long long int", VOXEL_INT64}, {"int64", VOXEL_INT64}, {"int64_t", VOXEL_INT64},
-    {"ulonglong", VOXEL_UINT64}, {"unsigned long long", VOXEL_UINT64}, {"unsigned long long int", VOXEL_UINT64}, {"uint64", VOXEL_UINT64},
-    {"uint64_t", VOXEL_UINT64}, {"float", VOXEL_FLOAT}, {"double", VOXEL_DOUBLE},
+    {"ushort", VOXEL_UINT16},
+    {"unsigned short", VOXEL_UINT16},
+    {"unsigned short int", VOXEL_UINT16},
+    {"uint16", VOXEL_UINT16},
+    {"uint16_t", VOXEL_UINT16},
+    {"int", VOXEL_INT32},
+    {"signed int", VOXEL_INT32},
+    {"int32", VOXEL_INT32},
+    {"int32_t", VOXEL_INT32},
+    {"uint", VOXEL_UINT32},
+    {"unsigned int", VOXEL_UINT32},
+    {"uint32", VOXEL_UINT32},
+    {"uint32_t", VOXEL_UINT32},
+    {"longlong", VOXEL_INT64},
+    {"long long", VOXEL_INT64},
+    {"long long int", VOXEL_INT64},
+    {"signed long long", VOXEL_INT64},
+    {"signed long long int", VOXEL_INT64},
+    {"int64", VOXEL_INT64},
+    {"int64_t", VOXEL_INT64},
+    {"ulonglong", VOXEL_UINT64},
+    {"unsigned long long", VOXEL_UINT64},
+    {"unsigned long long int", VOXEL_UINT64},
+    {"uint64", VOXEL_UINT64},
+    {"uint64_t", VOXEL_UINT64},
+    {"float", VOXEL_FLOAT},
+    {"double", VOXEL_DOUBLE},
 };
 
 static const struct SpaceName {
     const char *name, *frame;
 } space_names[] = {
-    {"right-anterior-superior", "RAS"}, {"RAS", "RAS"}, {"left-anterior-superior", "LAS"}, {"LAS", "LAS"}, {"left-posterior-superior", "LPS"}, {"LPS", "LPS"},
-    {"scanner-xyz", "scanner-xyz"}, {"3D-right-handed", "3D-right-handed"}, {"3D-left-handed", "3D-left-handed"},
+    {"right-anterior-superior", "RAS"},   {"RAS", "RAS"}, {"left-anterior-superior", "LAS"}, {"LAS", "LAS"},
+    {"left-posterior-superior", "LPS"},   {"LPS", "LPS"}, {"scanner-xyz", "scanner-xyz"},    {"3D-right-handed", "3D-right-handed"},
+    {"3D-left-handed", "3D-left-handed"},
 };
 
 enum { MAX_DIMENSION = 16 };
@@ -83,7 +163,8 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
         if (text[0] == '#')
             continue;
         if (!colon || (size_t)(colon - text) + 1 >= length || (colon[1] != ' ' && colon[1] != '=')) {
-            faults_add(faults, file->path, cursor.line, 1, "neither a field, a key nor a comment; expected `field: value`, `key:=value`, or an empty line before the data");
+            faults_add(faults, file->path, cursor.line, 1,
+                       "neither a field, a key nor a comment; expected `field: value`, `key:=value`, or an empty line before the data");
             return false;   // most likely the data: continuing would only repeat this
         }
         if (colon[1] == '=')
@@ -144,8 +225,8 @@ static double unit_scale(const FieldValue *value, const char *path, Faults *faul
     static const struct {
         const char *name;
         double mm;
-    } units[] = {{"mm", 1}, {"millimeter", 1}, {"millimeters", 1}, {"millimetre", 1}, {"cm", 10}, {"m", 1000}, {"meter", 1000}, {"um", 1e-3},
-                 {"micrometer", 1e-3}, {"micron", 1e-3}, {"nm", 1e-6}, {"", 1}, {"???", 1}, {"none", 1}};
+    } units[] = {{"mm", 1},    {"millimeter", 1},    {"millimeters", 1}, {"millimetre", 1}, {"cm", 10}, {"m", 1000}, {"meter", 1000},
+                 {"um", 1e-3}, {"micrometer", 1e-3}, {"micron", 1e-3},   {"nm", 1e-6},      {"", 1},    {"???", 1},  {"none", 1}};
     double scale = 0;
     const char *text = value->text, *end = text + value->length;
     for (const char *open; text < end && (open = memchr(text, '"', (size_t)(end - text)));) {
@@ -175,8 +256,10 @@ static bool choose_axes(const NrrdHeader *h, int dimension, const double *size, 
     for (int i = 0; i < dimension; i++) {
         bool drop = has_directions ? is_none[i] : spare > 0 && size[i] < 2;   // sizes are whole numbers >= 1 here
         if (drop && size[i] >= 2) {
-            faults_add(faults, path, h->field[SIZES].line, 0, "axis %d has no direction in space but %.0f samples: %.0f values per voxel; expected one value per voxel, axes of "
-                       "space only", i, size[i], size[i]);
+            faults_add(faults, path, h->field[SIZES].line, 0,
+                       "axis %d has no direction in space but %.0f samples: %.0f values per voxel; expected one value per voxel, axes of "
+                       "space only",
+                       i, size[i], size[i]);
             return false;
         }
         if (drop)
@@ -216,7 +299,8 @@ static bool read_grid(const NrrdHeader *h, const char *path, VolumeHeader *out, 
         FieldValue list = f[SPACE_DIRECTIONS];
         for (int i = 0; i < n; i++)
             if (!take_vector(&list, direction[i], &is_none[i])) {
-                faults_add(faults, path, list.line, 0, "direction %d of %d is missing or not valid; expected `(x,y,z)` for each spatial axis, `none` for others", i + 1, n);
+                faults_add(faults, path, list.line, 0,
+                           "direction %d of %d is missing or not valid; expected `(x,y,z)` for each spatial axis, `none` for others", i + 1, n);
                 return false;
             }
     }
@@ -275,8 +359,10 @@ static bool read_space(const NrrdHeader *h, const char *path, VolumeHeader *out,
             snprintf(out->frame, sizeof out->frame, "%s", space_names[i].frame);
             return true;
         }
-    faults_add(faults, path, space->line, 0, "the space '%.*s' is unknown; expected right-anterior-superior, left-posterior-superior, left-anterior-superior, scanner-xyz or "
-               "3D-right-handed", space->length < 60 ? (int)space->length : 60, space->text);
+    faults_add(faults, path, space->line, 0,
+               "the space '%.*s' is unknown; expected right-anterior-superior, left-posterior-superior, left-anterior-superior, scanner-xyz or "
+               "3D-right-handed",
+               space->length < 60 ? (int)space->length : 60, space->text);
     return false;
 }
 
@@ -288,7 +374,8 @@ static bool read_encoding(const NrrdHeader *h, const char *path, VolumeHeader *o
         if (header_text_is(type->text, type->length, type_names[i].name))
             out->type = type_names[i].type;
     if (out->type == VOXEL_NONE)
-        faults_add(faults, path, type->line, 0, "the type '%.*s' is not valid; expected int8 to uint64, float or double", type->length < 60 ? (int)type->length : 60, type->text);
+        faults_add(faults, path, type->line, 0, "the type '%.*s' is not valid; expected int8 to uint64, float or double",
+                   type->length < 60 ? (int)type->length : 60, type->text);
     if (header_text_is(encoding->text, encoding->length, "raw"))
         out->encoding = ENCODING_RAW;
     else if (header_text_is(encoding->text, encoding->length, "gzip") || header_text_is(encoding->text, encoding->length, "gz"))
@@ -297,12 +384,14 @@ static bool read_encoding(const NrrdHeader *h, const char *path, VolumeHeader *o
              header_text_is(encoding->text, encoding->length, "ascii"))
         out->encoding = ENCODING_TEXT;
     else
-        faults_add(faults, path, encoding->line, 0, "the encoding '%.*s' is not supported; expected raw, gzip or text (convert with `unu save -f nrrd -e gzip`)",
+        faults_add(faults, path, encoding->line, 0,
+                   "the encoding '%.*s' is not supported; expected raw, gzip or text (convert with `unu save -f nrrd -e gzip`)",
                    encoding->length < 60 ? (int)encoding->length : 60, encoding->text);
     if (endian->line) {
         out->big_endian = header_text_is(endian->text, endian->length, "big");
         if (!out->big_endian && !header_text_is(endian->text, endian->length, "little"))
-            faults_add(faults, path, endian->line, 0, "the endian '%.*s' is not valid; expected little or big", endian->length < 60 ? (int)endian->length : 60, endian->text);
+            faults_add(faults, path, endian->line, 0, "the endian '%.*s' is not valid; expected little or big", endian->length < 60 ? (int)endian->length : 60,
+                       endian->text);
     } else if (voxel_type_size(out->type) > 1 && out->encoding != ENCODING_TEXT) {
         faults_add(faults, path, type->line, 0, "samples of several bytes have no byte order; expected a line `endian: little` or `endian: big`");
     }
@@ -339,11 +428,16 @@ Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults)
     const FieldValue *detached = &h.field[DATA_FILE];
     if (!detached->line) {
         if (!h.has_end) {
-            faults_add_at_byte(faults, file->path, file->length, "the file ends within the header; expected an empty line and the data after it, or `data file: NAME`");
+            faults_add_at_byte(faults, file->path, file->length,
+                               "the file ends within the header; expected an empty line and the data after it, or `data file: NAME`");
             return NULL;
         }
-        FileBytes data = {.byte = file->byte + h.end, .length = file->length - h.end, .offset = h.end, .path = file->path,
-                          .whole = file->whole > file->length ? file->whole - h.end : 0, .needed = file->needed};
+        FileBytes data = {.byte = file->byte + h.end,
+                          .length = file->length - h.end,
+                          .offset = h.end,
+                          .path = file->path,
+                          .whole = file->whole > file->length ? file->whole - h.end : 0,
+                          .needed = file->needed};
         return volume_decode(&header, &data, faults);
     }
     if (file->needed)

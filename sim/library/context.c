@@ -10,7 +10,8 @@
 
 #define TEXT(number) #number
 #define NUMBER(number) TEXT(number)
-_Static_assert(sizeof SELDINGER_VERSION == sizeof NUMBER(SEL_VERSION_MAJOR) "." NUMBER(SEL_VERSION_MINOR) "." NUMBER(SEL_VERSION_PATCH), "include/seldinger/base.h has another version");
+_Static_assert(sizeof SELDINGER_VERSION == sizeof NUMBER(SEL_VERSION_MAJOR) "." NUMBER(SEL_VERSION_MINOR) "." NUMBER(SEL_VERSION_PATCH),
+               "include/seldinger/base.h has another version");
 
 const char *sel_version(void) { return SELDINGER_VERSION; }
 
@@ -171,10 +172,7 @@ static void tell_progress(void *argument, long done, long total)
     context->options.progress(context->options.user, done, total);
 }
 
-Progress context_progress(SelContext *context)
-{
-    return context->options.progress ? (Progress){.call = tell_progress, .context = context} : (Progress){0};
-}
+Progress context_progress(SelContext *context) { return context->options.progress ? (Progress){.call = tell_progress, .context = context} : (Progress){0}; }
 
 void context_say(SelContext *context, SelMessageLevel level, const char *path, const char *text)
 {
@@ -211,8 +209,10 @@ SelHand hand_of(const ToolCommands *commands)
 {
     SelHand hand = {.contrast_ml_s = commands->contrast_ml_s, .contrast_tool = commands->contrast_tool};
     for (int k = 0; k < SEL_TOOLS_MOST; k++)
-        hand.tool[k] = (SelCommand){.push_mm_s = commands->tool[k].push_mm_s, .twist_deg_s = commands->tool[k].twist_deg_s,
-                                    .released = commands->released >> k & 1, .device = commands->fitted[k]};
+        hand.tool[k] = (SelCommand){.push_mm_s = commands->tool[k].push_mm_s,
+                                    .twist_deg_s = commands->tool[k].twist_deg_s,
+                                    .released = commands->released >> k & 1,
+                                    .device = commands->fitted[k]};
     return hand;
 }
 

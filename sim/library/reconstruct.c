@@ -151,7 +151,8 @@ static TreeFitOptions how_of(const Fitting *fitting)
 
 static TreeFileInfo model_info(const SelTree *tree, const TreeFitOptions *how)
 {
-    return (TreeFileInfo){.source = HEAP_TEXT(tree->info.source ? tree->info.source : ""), .parameters = tree_fit_parameters(how, &tree->info),
+    return (TreeFileInfo){.source = HEAP_TEXT(tree->info.source ? tree->info.source : ""),
+                          .parameters = tree_fit_parameters(how, &tree->info),
                           .created_by = HEAP_TEXT("seldinger " SELDINGER_VERSION " fit")};
 }
 

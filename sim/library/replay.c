@@ -147,6 +147,7 @@ SelStatus sel_recording_verify(SelContext *context, const SelRecording *recordin
     if (status != SEL_OK)
         return status;
     if (verdict)
-        *verdict = (SelVerdict){.steps = v.verdict.steps, .first_different = v.verdict.first_different, .recorded = v.verdict.recorded, .simulated = v.verdict.simulated};
+        *verdict = (SelVerdict){
+            .steps = v.verdict.steps, .first_different = v.verdict.first_different, .recorded = v.verdict.recorded, .simulated = v.verdict.simulated};
     return v.verdict.first_different < 0 ? SEL_OK : SEL_DIFFERENT;
 }

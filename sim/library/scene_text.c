@@ -23,8 +23,14 @@ void sel_vessel_options_init(SelVesselOptions *options, size_t size)
 
 void sel_tool_options_init(SelToolOptions *options, size_t size)
 {
-    SelToolOptions own = {.length_mm = -1, .inserted_mm = -1, .elements = -1, .damping_mass_1_s = -1, .damping_stiffness_s = -1, .hand_limit_n = -1,
-                          .valve_n = -1, .friction_inside = -1};
+    SelToolOptions own = {.length_mm = -1,
+                          .inserted_mm = -1,
+                          .elements = -1,
+                          .damping_mass_1_s = -1,
+                          .damping_stiffness_s = -1,
+                          .hand_limit_n = -1,
+                          .valve_n = -1,
+                          .friction_inside = -1};
     result_give(options, size, &own, sizeof own);
 }
 

@@ -168,10 +168,18 @@ SelStatus sel_simulator_report(const SelSimulator *s, SelReport *report, size_t 
         return SEL_ERROR_ARGUMENT;
     const StepReport *last = simulator_last(s->simulator);
     const RunTotals *totals = simulator_totals(s->simulator);
-    SelReport own = {.flags = last->flags, .flags_ever = totals->flags, .contacts = last->active, .self_contacts = last->self_contacts,
-                     .iterations = last->iterations, .residual = last->residual, .penetration_mm = last->penetration,
-                     .wall_force_max_n = last->wall_force_max, .wall_force_sum_n = last->wall_force_sum,
-                     .step_us = (double)simulator_step_ns(s->simulator) / 1000, .push_least_n = totals->push_least, .push_most_n = totals->push_most};
+    SelReport own = {.flags = last->flags,
+                     .flags_ever = totals->flags,
+                     .contacts = last->active,
+                     .self_contacts = last->self_contacts,
+                     .iterations = last->iterations,
+                     .residual = last->residual,
+                     .penetration_mm = last->penetration,
+                     .wall_force_max_n = last->wall_force_max,
+                     .wall_force_sum_n = last->wall_force_sum,
+                     .step_us = (double)simulator_step_ns(s->simulator) / 1000,
+                     .push_least_n = totals->push_least,
+                     .push_most_n = totals->push_most};
     report_tools(s->simulator, &own);
     result_give(report, size, &own, sizeof own);
     return SEL_OK;
@@ -257,9 +265,19 @@ SelStatus sel_simulator_score(const SelSimulator *s, SelScore *score, size_t siz
     if (!s->lesson)
         return context_refuse(s->context, SEL_ERROR_STATE, __func__, "the simulator was created without a score");
     const ScoreFigures f = score_figures(lesson_score(s->lesson));
-    SelScore own = {.state = (SelScoreState)f.state, .points = f.points, .time_s = f.time_s, .path_mm = f.path_mm, .way_mm = f.way_mm,
-                    .remaining_mm = f.remaining_mm, .inserted_mm = f.inserted_mm, .withdrawn_mm = f.withdrawn_mm, .wall_force_peak_n = f.wall_force_peak_n,
-                    .wall_impulse_n_s = f.wall_impulse_n_s, .tip_force_peak_n = f.tip_force_peak_n, .contrast_ml = f.contrast_ml, .errors = f.error_total};
+    SelScore own = {.state = (SelScoreState)f.state,
+                    .points = f.points,
+                    .time_s = f.time_s,
+                    .path_mm = f.path_mm,
+                    .way_mm = f.way_mm,
+                    .remaining_mm = f.remaining_mm,
+                    .inserted_mm = f.inserted_mm,
+                    .withdrawn_mm = f.withdrawn_mm,
+                    .wall_force_peak_n = f.wall_force_peak_n,
+                    .wall_impulse_n_s = f.wall_impulse_n_s,
+                    .tip_force_peak_n = f.tip_force_peak_n,
+                    .contrast_ml = f.contrast_ml,
+                    .errors = f.error_total};
     result_give(score, size, &own, sizeof own);
     return SEL_OK;
 }

@@ -79,7 +79,10 @@ SelStatus sel_tree_node(const SelTree *tree, int index, SelTreeNode *node)
         return SEL_ERROR_ARGUMENT;
     const VesselTree *t = tree->tree;
     Vec3 c = t->center[index], d = t->direction[index];
-    *node = (SelTreeNode){.center_mm = {c.x, c.y, c.z}, .direction = {d.x, d.y, d.z}, .radius_mm = t->radius[index], .parent = t->parent[index],
+    *node = (SelTreeNode){.center_mm = {c.x, c.y, c.z},
+                          .direction = {d.x, d.y, d.z},
+                          .radius_mm = t->radius[index],
+                          .parent = t->parent[index],
                           .is_aneurysm = t->kind[index] == NODE_ANEURYSM};
     return SEL_OK;
 }

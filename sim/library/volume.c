@@ -118,11 +118,13 @@ static bool count_voxels(const int size[3], size_t *count)
     return true;
 }
 
-SelStatus sel_volume_create(SelContext *context, const int size[3], const double origin_mm[3], const double axis_mm[3][3], const float *value, SelVolume **volume)
+SelStatus sel_volume_create(SelContext *context, const int size[3], const double origin_mm[3], const double axis_mm[3][3], const float *value,
+                            SelVolume **volume)
 {
     if (!context || !size || !origin_mm || !axis_mm || !value || !volume)
         return context_refuse(context, SEL_ERROR_ARGUMENT, __func__, "a pointer is NULL");
-    Filling filling = {.size = size, .origin = vector_of(origin_mm), .axis = {vector_of(axis_mm[0]), vector_of(axis_mm[1]), vector_of(axis_mm[2])}, .value = value};
+    Filling filling = {
+        .size = size, .origin = vector_of(origin_mm), .axis = {vector_of(axis_mm[0]), vector_of(axis_mm[1]), vector_of(axis_mm[2])}, .value = value};
     if (!count_voxels(size, &filling.count) || !is_a_frame(&filling))
         return context_refuse(context, SEL_ERROR_ARGUMENT, __func__, "sizes are not 1 to 2^31 voxels in all, or the axes do not span space");
     SelStatus status = context_call(context, fill, &filling, SEL_ERROR_ARGUMENT);

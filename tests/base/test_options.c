@@ -37,7 +37,8 @@ static const Option options[] = {
     {"output", "F.h5", OPTION_FILE, OPTION_AT(Values, output), "what is written", .letter = 'o'},
     {"quiet", NULL, OPTION_FLAG, OPTION_AT(Values, quiet), "no summary", .letter = 'q'},
     {"no-drawing", NULL, OPTION_CLEARED, OPTION_AT(Values, draws), "no picture"},
-    {"voxel-mm", "X", OPTION_NUMBER, OPTION_AT(Values, voxel_mm), "edge of a voxel", .least = 0.01, .most = 10, .unit = "mm", .given = offsetof(Values, has_voxel)},
+    {"voxel-mm", "X", OPTION_NUMBER, OPTION_AT(Values, voxel_mm), "edge of a voxel", .least = 0.01, .most = 10, .unit = "mm",
+     .given = offsetof(Values, has_voxel)},
     {"seed", "N", OPTION_WHOLE, OPTION_AT(Values, seed), "of the noise", .most = 9007199254740991.0, .otherwise = "the trace's"},
     {"threads", "N", OPTION_INT, OPTION_AT(Values, threads), "threads; 0: all cores", .most = 256, .group = "machine"},
     {"start", "X,Y,Z", OPTION_POINT, OPTION_AT(Values, point), "one point in a vessel", .unit = "mm"},
@@ -52,10 +53,20 @@ static void set_defaults(void *structure) { *(Values *)structure = (Values){.dra
 
 static const char *check(void *structure) { return ((Values *)structure)->width == 7 ? "a width of 7 needs --quiet" : NULL; }
 
-static const OptionTable table = {.program = "seldinger try", .does = "tries - what is written", .usage = "SCENE [options]\nSCENE --quiet", .intro = "One paragraph.\n  as it is",
-                                  .exits = "0 done; 2 wrong usage", .option = options, .option_count = sizeof options / sizeof *options, .size = sizeof(Values),
-                                  .set_defaults = set_defaults, .check = check, .takes_argument = true, .argument = offsetof(Values, scene),
-                                  .missing = "missing the scene", .too_many = "one scene at a time, not also "};
+static const OptionTable table = {.program = "seldinger try",
+                                  .does = "tries - what is written",
+                                  .usage = "SCENE [options]\nSCENE --quiet",
+                                  .intro = "One paragraph.\n  as it is",
+                                  .exits = "0 done; 2 wrong usage",
+                                  .option = options,
+                                  .option_count = sizeof options / sizeof *options,
+                                  .size = sizeof(Values),
+                                  .set_defaults = set_defaults,
+                                  .check = check,
+                                  .takes_argument = true,
+                                  .argument = offsetof(Values, scene),
+                                  .missing = "missing the scene",
+                                  .too_many = "one scene at a time, not also "};
 
 static char said[4096];
 
@@ -87,7 +98,8 @@ static void values_of_each_type_are_stored(void **state)
     assert_int_equal(parse(&table, "a.yaml", &v), -1);
     assert_string_equal(v.scene, "a.yaml");
     assert_true(v.draws && !v.quiet && !v.has_voxel && v.voxel_mm == 0.2 && v.threads == 3 && v.kind == 1);
-    assert_int_equal(parse(&table, "--voxel-mm 0.5 --seed=9007199254740991 -q --no-drawing b.yaml --threads 256 --start 1,-2.5,3e1 --kind grid -oout.h5", &v), -1);
+    assert_int_equal(parse(&table, "--voxel-mm 0.5 --seed=9007199254740991 -q --no-drawing b.yaml --threads 256 --start 1,-2.5,3e1 --kind grid -oout.h5", &v),
+                     -1);
     assert_string_equal(v.scene, "b.yaml");
     assert_string_equal(v.output, "out.h5");
     assert_true(v.voxel_mm == 0.5 && v.has_voxel && v.seed == 9007199254740991.0 && v.quiet && !v.draws && v.threads == 256 && v.kind == 2);
@@ -151,8 +163,17 @@ static void any_number_of_arguments(void **state)
         int count;
     } Paths;
     static const Option quiet[] = {{"quiet", NULL, OPTION_FLAG, OPTION_AT(Paths, quiet), "no summary"}};
-    OptionTable many = {.program = "seldinger many", .does = "many", .usage = "PATH...", .exits = "0", .option = quiet, .option_count = 1, .size = sizeof(Paths),
-                        .takes_argument = true, .argument = offsetof(Paths, path), .argument_count = offsetof(Paths, count), .missing = "missing a path"};
+    OptionTable many = {.program = "seldinger many",
+                        .does = "many",
+                        .usage = "PATH...",
+                        .exits = "0",
+                        .option = quiet,
+                        .option_count = 1,
+                        .size = sizeof(Paths),
+                        .takes_argument = true,
+                        .argument = offsetof(Paths, path),
+                        .argument_count = offsetof(Paths, count),
+                        .missing = "missing a path"};
     Paths p;
     assert_int_equal(parse(&many, "a --quiet b c", &p), -1);
     assert_true(p.quiet && p.count == 3);

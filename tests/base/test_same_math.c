@@ -43,15 +43,24 @@ typedef struct Function {
 } Function;
 
 static const Function function[] = {
-    {"sin", same_sin, sinl, between, -10, 10, 0.8},        {"sin", same_sin, sinl, of_any_size, -1000, 1023, 0.8},
-    {"cos", same_cos, cosl, between, -10, 10, 0.8},        {"cos", same_cos, cosl, of_any_size, -1000, 1023, 0.8},
-    {"atan", same_atan, atanl, between, -3, 3, 0.6},       {"atan", same_atan, atanl, of_any_size, -1000, 1000, 0.6},
-    {"asin", same_asin, asinl, between, -1, 1, 2},         {"asin", same_asin, asinl, of_any_size, -1000, -1, 2},
-    {"acos", same_acos, acosl, between, -1, 1, 1.4},       {"exp", same_exp, expl, between, -700, 709, 0.8},
-    {"exp", same_exp, expl, of_any_size, -60, 1, 0.8},     {"expm1", same_expm1, expm1l, between, -50, 700, 1.2},
-    {"expm1", same_expm1, expm1l, of_any_size, -1000, 1, 1.2}, {"log", same_log, logl, between, 0, 3, 0.9},
-    {"log", same_log, logl, of_any_size, -1050, 1023, 0.9}, {"cbrt", same_cbrt, cbrtl, of_any_size, -1070, 1023, 0.6},
-    {"erf", same_erf, erfl, between, -7, 7, 12},           {"erf", same_erf, erfl, of_any_size, -1000, 1, 12},
+    {"sin", same_sin, sinl, between, -10, 10, 0.8},
+    {"sin", same_sin, sinl, of_any_size, -1000, 1023, 0.8},
+    {"cos", same_cos, cosl, between, -10, 10, 0.8},
+    {"cos", same_cos, cosl, of_any_size, -1000, 1023, 0.8},
+    {"atan", same_atan, atanl, between, -3, 3, 0.6},
+    {"atan", same_atan, atanl, of_any_size, -1000, 1000, 0.6},
+    {"asin", same_asin, asinl, between, -1, 1, 2},
+    {"asin", same_asin, asinl, of_any_size, -1000, -1, 2},
+    {"acos", same_acos, acosl, between, -1, 1, 1.4},
+    {"exp", same_exp, expl, between, -700, 709, 0.8},
+    {"exp", same_exp, expl, of_any_size, -60, 1, 0.8},
+    {"expm1", same_expm1, expm1l, between, -50, 700, 1.2},
+    {"expm1", same_expm1, expm1l, of_any_size, -1000, 1, 1.2},
+    {"log", same_log, logl, between, 0, 3, 0.9},
+    {"log", same_log, logl, of_any_size, -1050, 1023, 0.9},
+    {"cbrt", same_cbrt, cbrtl, of_any_size, -1070, 1023, 0.6},
+    {"erf", same_erf, erfl, between, -7, 7, 12},
+    {"erf", same_erf, erfl, of_any_size, -1000, 1, 12},
 };
 enum { FUNCTIONS = sizeof function / sizeof *function };
 
@@ -208,8 +217,11 @@ static void what_they_cost(void **state)
     NEED_WHOLE_RUNS();
     enum { CALLS = 200000 };
     static double argument[CALLS];
-    static const struct { const char *name; double (*own)(double), (*library)(double); } pair[] = {
-        {"sin", same_sin, sin}, {"cos", same_cos, cos}, {"atan", same_atan, atan}, {"exp", same_exp, exp}, {"log", same_log, log}, {"cbrt", same_cbrt, cbrt}};
+    static const struct {
+        const char *name;
+        double (*own)(double), (*library)(double);
+    } pair[] = {{"sin", same_sin, sin}, {"cos", same_cos, cos}, {"atan", same_atan, atan},
+                {"exp", same_exp, exp}, {"log", same_log, log}, {"cbrt", same_cbrt, cbrt}};
     seed = 5;
     for (int k = 0; k < CALLS; k++)
         argument[k] = uniform(0, 3);
@@ -230,8 +242,12 @@ static void what_they_cost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(errors_are_as_stated), cmocka_unit_test(errors_of_two_arguments_are_as_stated), cmocka_unit_test(zeros_of_sine_and_cosine),
-        cmocka_unit_test(special_values),       cmocka_unit_test(laws),                                  cmocka_unit_test(every_machine_gives_these_bits),
+        cmocka_unit_test(errors_are_as_stated),
+        cmocka_unit_test(errors_of_two_arguments_are_as_stated),
+        cmocka_unit_test(zeros_of_sine_and_cosine),
+        cmocka_unit_test(special_values),
+        cmocka_unit_test(laws),
+        cmocka_unit_test(every_machine_gives_these_bits),
         cmocka_unit_test(what_they_cost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

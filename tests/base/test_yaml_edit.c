@@ -21,9 +21,12 @@ static void becomes(const char *text, const char *path, const char *value, const
 static void values_are_replaced_where_they_stand(void **state)
 {
     (void)state;
-    becomes("# a\nvessel: {model: a.h5, friction: 0.1}   # b\n", "vessel.model", "../x \"y\".h5", "# a\nvessel: {model: \"../x \\\"y\\\".h5\", friction: 0.1}   # b\n");
-    becomes("vessel:\n  model: a.h5  # c\n  friction: 0\nscript: s.csv\n", "script", "hand.csv", "vessel:\n  model: a.h5  # c\n  friction: 0\nscript: \"hand.csv\"\n");
-    becomes("tools:\n  - {device: a.yaml}\n  - {name: x, device: b.yaml}  # c\n", "tools.1.device", "d", "tools:\n  - {device: a.yaml}\n  - {name: x, device: \"d\"}  # c\n");
+    becomes("# a\nvessel: {model: a.h5, friction: 0.1}   # b\n", "vessel.model", "../x \"y\".h5",
+            "# a\nvessel: {model: \"../x \\\"y\\\".h5\", friction: 0.1}   # b\n");
+    becomes("vessel:\n  model: a.h5  # c\n  friction: 0\nscript: s.csv\n", "script", "hand.csv",
+            "vessel:\n  model: a.h5  # c\n  friction: 0\nscript: \"hand.csv\"\n");
+    becomes("tools:\n  - {device: a.yaml}\n  - {name: x, device: b.yaml}  # c\n", "tools.1.device", "d",
+            "tools:\n  - {device: a.yaml}\n  - {name: x, device: \"d\"}  # c\n");
     becomes("script: [[0, 1, 2],\n  [3, 4, 5]]\nwire: 1\n", "script", "h", "script: \"h\"\nwire: 1\n");
     becomes("script:\n  - {t_s: 0}\n  - {t_s: 1}\nwire: 1\n", "script", "h", "script:\n  \"h\"\nwire: 1\n");
     becomes("a:\nb: 1\n", "a", "2", "a: \"2\"\nb: 1\n");
@@ -84,7 +87,7 @@ static void what_cannot_be_edited_is_told(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(keys_are_added), cmocka_unit_test(items_are_appended),
-                                       cmocka_unit_test(what_cannot_be_edited_is_told)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(keys_are_added),
+                                       cmocka_unit_test(items_are_appended), cmocka_unit_test(what_cannot_be_edited_is_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -60,7 +60,8 @@ static void tools_table(void **state)
     cJSON *rows = cJSON_GetObjectItem(root, "tools");
     int count = 0;
     assert_true(cJSON_GetArraySize(rows) >= 16 && cJSON_GetArraySize(rows) % 16 == 0);       // arch and angiogram are there or not
-    cJSON_ArrayForEach(at, rows) {
+    cJSON_ArrayForEach(at, rows)
+    {
         const cJSON *step = cJSON_GetObjectItem(at, "step_us");
         assert_true(number(at, "tools") == 1 + count / 4 % 4 && number(at, "steps") == 200);
         assert_true(number(step, "median") > 0 && number(step, "median") <= number(step, "p999"));
@@ -81,7 +82,8 @@ static void step_tables(void **state)
     cJSON *scenes = cJSON_GetObjectItem(root, "scenes");
     assert_true(cJSON_GetArraySize(scenes) >= 2);   // the aneurism is there or not
     double samples = 0;
-    cJSON_ArrayForEach(at, scenes) {
+    cJSON_ArrayForEach(at, scenes)
+    {
         const cJSON *step = cJSON_GetObjectItem(at, "step_us"), *error = cJSON_GetObjectItem(at, "force_error");
         assert_true(number(step, "median") > 0 && number(step, "median") <= number(step, "p99"));
         assert_true(number(step, "p99") <= number(step, "p999") && number(step, "p999") <= number(step, "max"));
@@ -92,7 +94,8 @@ static void step_tables(void **state)
     cJSON *growth = cJSON_GetObjectItem(root, "growth");
     assert_int_equal(cJSON_GetArraySize(growth), 5);
     double elements = 25;
-    cJSON_ArrayForEach(at, growth) {
+    cJSON_ArrayForEach(at, growth)
+    {
         assert_true(number(at, "elements") == 2 * elements);
         assert_true(number(at, "steps") == 200 && number(cJSON_GetObjectItem(at, "contacts"), "max") > 0);
         elements *= 2;
@@ -111,10 +114,10 @@ static void peer_scenes_stay_inside(void **state)
     cJSON *root = load("/tmp/seldinger-bench-peer.json"), *rows = cJSON_GetObjectItem(root, "rows"), *at;
     unlink("/tmp/seldinger-bench-peer.txt");
     int surfaces = 2;    // the exact tube, local models, and with Embree a mesh
-    cJSON_ArrayForEach(at, rows)
-        surfaces = strcmp(cJSON_GetObjectItem(at, "contact")->valuestring, "mesh") == 0 ? 3 : surfaces;
+    cJSON_ArrayForEach(at, rows) surfaces = strcmp(cJSON_GetObjectItem(at, "contact")->valuestring, "mesh") == 0 ? 3 : surfaces;
     assert_int_equal(cJSON_GetArraySize(rows), (tubes ? 6 : 2) * surfaces);
-    cJSON_ArrayForEach(at, rows) {
+    cJSON_ArrayForEach(at, rows)
+    {
         print_message("%s on %s: %g steps, deepest %.1f um, %g contacts at most\n", cJSON_GetObjectItem(at, "scene")->valuestring,
                       cJSON_GetObjectItem(at, "contact")->valuestring, number(at, "steps"), number(at, "deepest_um"), number(at, "contacts_max"));
         assert_true(cJSON_IsTrue(cJSON_GetObjectItem(at, "contained")));
@@ -128,10 +131,7 @@ static void peer_scenes_stay_inside(void **state)
     }
 }
 
-static bool is_called(const cJSON *row, const char *representation)
-{
-    return !strcmp(cJSON_GetObjectItem(row, "representation")->valuestring, representation);
-}
+static bool is_called(const cJSON *row, const char *representation) { return !strcmp(cJSON_GetObjectItem(row, "representation")->valuestring, representation); }
 
 static void a_row_is_whole(const cJSON *row, double steps)
 {
@@ -173,7 +173,8 @@ static void collision_of_a_scene(void **state)
     bool embree = cJSON_IsTrue(cJSON_GetObjectItem(root, "embree"));
     assert_int_equal(cJSON_GetArraySize(rows), embree ? 11 : 6);
     double exact_push = 0;
-    cJSON_ArrayForEach(row, rows) {
+    cJSON_ArrayForEach(row, rows)
+    {
         a_row_is_whole(row, 200);
         const cJSON *loop = cJSON_GetObjectItem(row, "loop"), *gap = cJSON_GetObjectItem(cJSON_GetObjectItem(row, "motion"), "gap_error_um");
         const cJSON *smooth = cJSON_GetObjectItem(row, "frictionless");
@@ -202,9 +203,17 @@ static void collision_of_a_scene(void **state)
 static void tables_that_are_not_there(void **state)
 {
     (void)state;
-    static const char *const bad[] = {"bench", "bench collision --fast", "bench collision nowhere.yaml", "bench collision scenes/verify/cantilever.yaml",
-                                      "bench fit", "bench track --fast", "bench nothing", "bench step --fast", "bench step extra",
-                                      "bench peer --threads many", "bench step --json /nowhere/f.json"};
+    static const char *const bad[] = {"bench",
+                                      "bench collision --fast",
+                                      "bench collision nowhere.yaml",
+                                      "bench collision scenes/verify/cantilever.yaml",
+                                      "bench fit",
+                                      "bench track --fast",
+                                      "bench nothing",
+                                      "bench step --fast",
+                                      "bench step extra",
+                                      "bench peer --threads many",
+                                      "bench step --json /nowhere/f.json"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         char line[128];
         snprintf(line, sizeof line, "%s 2> /dev/null > /dev/null", bad[i]);
@@ -220,7 +229,8 @@ static void without_the_benchmarks(void **state)
     (void)state;
     char folder[] = "/tmp/seldinger-alone-XXXXXX", command[1024];
     assert_non_null(mkdtemp(folder));
-    snprintf(command, sizeof command, "cp %s %s/seldinger && { %s/seldinger bench step; test $? = 2; } 2>&1 | grep -q 'not installed: there is no %s/seldinger-bench'",
+    snprintf(command, sizeof command,
+             "cp %s %s/seldinger && { %s/seldinger bench step; test $? = 2; } 2>&1 | grep -q 'not installed: there is no %s/seldinger-bench'",
              SELDINGER_PROGRAM, folder, folder, folder);
     assert_int_equal(system(command), 0);
     snprintf(command, sizeof command, "rm -rf %s", folder);
@@ -250,7 +260,8 @@ static void a_chart_is_a_picture(void **state)
 static const cJSON *wall_line(const cJSON *lines, const char *row, const char *what)
 {
     const cJSON *at;
-    cJSON_ArrayForEach(at, lines) {
+    cJSON_ArrayForEach(at, lines)
+    {
         if (!strcmp(cJSON_GetObjectItem(at, "row")->valuestring, row) && !strcmp(cJSON_GetObjectItem(at, "what")->valuestring, what))
             return at;
     }
@@ -263,7 +274,8 @@ static void wall_table(void **state)
 {
     (void)state;
     assert_int_equal(run("synth y --quiet -o /tmp/seldinger-wall-y.h5"), 0);
-    int code = run("bench wall --rows jumps,points,blobs,fit,junctions,flood --quick --json /tmp/seldinger-wall.json /tmp/seldinger-wall-y.h5 > /tmp/seldinger-wall.txt 2>&1");
+    int code = run("bench wall --rows jumps,points,blobs,fit,junctions,flood --quick --json /tmp/seldinger-wall.json /tmp/seldinger-wall-y.h5 > "
+                   "/tmp/seldinger-wall.txt 2>&1");
     assert_true(code == 0 || code == 1);
     cJSON *root = load("/tmp/seldinger-wall.json");
     const cJSON *lines = cJSON_GetObjectItem(root, "lines");
@@ -321,7 +333,8 @@ static void random_runs_stay_inside(void **state)
     (void)state;
     char folder[] = "/tmp/seldinger-torture-XXXXXX", command[300];
     assert_non_null(mkdtemp(folder));
-    snprintf(command, sizeof command, "bench torture --runs %d --steps 200 --finer 4 --keep %s --json %s/t.json >/dev/null 2>&1", WHOLE_OR_SHORT(12, 3), folder, folder);
+    snprintf(command, sizeof command, "bench torture --runs %d --steps 200 --finer 4 --keep %s --json %s/t.json >/dev/null 2>&1", WHOLE_OR_SHORT(12, 3), folder,
+             folder);
     int code = run(command);
     snprintf(command, sizeof command, "%s/t.json", folder);
     cJSON *root = load(command), *rows = cJSON_GetObjectItem(root, "rows"), *all = cJSON_GetArrayItem(rows, cJSON_GetArraySize(rows) - 1);
@@ -338,8 +351,15 @@ static void random_runs_stay_inside(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(tools_table), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene),
-                                       cmocka_unit_test(tables_that_are_not_there), cmocka_unit_test(without_the_benchmarks),
-                                       cmocka_unit_test(a_chart_is_a_picture), cmocka_unit_test(wall_table), cmocka_unit_test(reach_reports), cmocka_unit_test(random_runs_stay_inside)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables),
+                                       cmocka_unit_test(tools_table),
+                                       cmocka_unit_test(peer_scenes_stay_inside),
+                                       cmocka_unit_test(collision_of_a_scene),
+                                       cmocka_unit_test(tables_that_are_not_there),
+                                       cmocka_unit_test(without_the_benchmarks),
+                                       cmocka_unit_test(a_chart_is_a_picture),
+                                       cmocka_unit_test(wall_table),
+                                       cmocka_unit_test(reach_reports),
+                                       cmocka_unit_test(random_runs_stay_inside)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

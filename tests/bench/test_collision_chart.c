@@ -186,12 +186,14 @@ static void check_ticks(const Panel *panel)
 
 static const char whole[] =
     "{\"rows\":["
-    "{\"surface\":\"capsule\",\"representation\":\"lim\",\"motion\":{\"us_per_80_points\":6.5,\"gap_error_um\":{\"rms\":2.5},\"normal_error_deg\":{\"rms\":0.1}},"
+    "{\"surface\":\"capsule\",\"representation\":\"lim\",\"motion\":{\"us_per_80_points\":6.5,\"gap_error_um\":{\"rms\":2.5},\"normal_error_deg\":{\"rms\":0.1}"
+    "},"
     "\"loop\":{\"survived\":true},\"frictionless\":{\"artificial_mu\":-0.00025,\"work_lost_n\":3e-5},\"paper\":{\"ms\":0.0232}},"
     "{\"surface\":\"capsule\",\"representation\":\"mesh\",\"motion\":{\"us_per_80_points\":31.25,\"gap_error_um\":{\"rms\":8}},\"loop\":{\"survived\":false},"
     "\"frictionless\":{\"artificial_mu\":0.125,\"work_lost_n\":0.004},\"paper\":{\"ms\":4.89}},"
     "{\"surface\":\"a & b <c>\",\"representation\":\"mesh\",\"motion\":{\"us_per_80_points\":2500}},"
-    "{\"surface\":\"capsule\",\"representation\":\"tube\",\"motion\":{\"us_per_80_points\":1.5,\"gap_error_um\":{\"rms\":0}},\"frictionless\":{\"artificial_mu\":0,"
+    "{\"surface\":\"capsule\",\"representation\":\"tube\",\"motion\":{\"us_per_80_points\":1.5,\"gap_error_um\":{\"rms\":0}},\"frictionless\":{\"artificial_"
+    "mu\":0,"
     "\"work_lost_n\":null}},"
     "{\"surface\":\"capsule\",\"representation\":\"grid\",\"frictionless\":{\"artificial_mu\":0.5,\"survived\":false},\"paper\":{\"ms\":4.89}}],"
     "\"growth\":[{\"surface\":\"phantom\",\"search\":\"full\",\"triangles\":1000,\"ns_per_query\":{\"wire\":400,\"spread\":500}},"
@@ -250,9 +252,10 @@ static void what_is_missing_has_no_mark(void **state)
 {
     (void)state;
     static Page page;
-    static const char *const poor[] = {"{}", "{\"rows\":[],\"growth\":[],\"sizes\":[]}", "{\"rows\":{\"a\":1},\"growth\":\"no\",\"sizes\":null}",
-                                       "{\"rows\":[1,null,{\"surface\":5},{\"surface\":\"s\",\"representation\":\"r\",\"motion\":[{\"us_per_80_points\":3}]}]}",
-                                       "{\"rows\":[{\"surface\":\"s\",\"representation\":\"r\",\"motion\":{\"us_per_80_points\":1e999,\"gap_error_um\":{\"rms\":-1}}}]}"};
+    static const char *const poor[] = {
+        "{}", "{\"rows\":[],\"growth\":[],\"sizes\":[]}", "{\"rows\":{\"a\":1},\"growth\":\"no\",\"sizes\":null}",
+        "{\"rows\":[1,null,{\"surface\":5},{\"surface\":\"s\",\"representation\":\"r\",\"motion\":[{\"us_per_80_points\":3}]}]}",
+        "{\"rows\":[{\"surface\":\"s\",\"representation\":\"r\",\"motion\":{\"us_per_80_points\":1e999,\"gap_error_um\":{\"rms\":-1}}}]}"};
     for (size_t i = 0; i < sizeof poor / sizeof poor[0]; i++) {
         draw(poor[i], &page);
         for (int k = 0; k < PANELS; k++) {

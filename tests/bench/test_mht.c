@@ -165,7 +165,8 @@ static void score_is_a_t_statistic(void **state)
         for (int i = 0; i < TRIALS; i++) {
             Vec3 direction = {random_unit(&random) - 0.5, random_unit(&random) - 0.5, random_unit(&random) - 0.5};
             MhtTemplate t = {.center = {5 + 10 * random_unit(&random), 5 + 10 * random_unit(&random), 5 + 10 * random_unit(&random)},
-                             .axis = vec3_unit(direction), .radius = radius[k]};
+                             .axis = vec3_unit(direction),
+                             .radius = radius[k]};
             assert_true(mht_window_open(window, v, &t, 4) > 100);
             mht_template_score(window, &t);
             sum += t.score;
@@ -202,7 +203,7 @@ static double best_radius(double blur, double size)
                 m[5] += w * f * f;
             }
             double det = m[0] * m[2] - m[1] * m[1], k = (m[0] * m[4] - m[1] * m[3]) / det, b = (m[2] * m[3] - m[1] * m[4]) / det,
-                cost = m[5] - k * m[4] - b * m[3];
+                   cost = m[5] - k * m[4] - b * m[3];
             if (cost < least) {
                 least = cost;
                 best = r;
@@ -234,8 +235,7 @@ static void straight_cylinder(void **state)
                 nodes++;
             }
             print_message("cylinder, %s, noise %g: radius %.4f (best template %.4f), centre %.4f mm, to z = %.2f of 11.8, %d nodes\n", kind_name[kind],
-                          noisy ? 0.05 : 0.0,
-                          radius / nodes, expected, center / nodes, reached, tree->node_count);
+                          noisy ? 0.05 : 0.0, radius / nodes, expected, center / nodes, reached, tree->node_count);
             assert_true(nodes >= 4);
             assert_true(fabs(radius / nodes - expected) < (noisy ? 0.01 : 0.005));
             assert_true(center / nodes < (noisy ? 0.02 : 0.006));
@@ -291,8 +291,7 @@ static void helix_to_its_end(void **state)
             nodes++;
         }
         print_message("helix, %s: %.1f mm of %.1f, centre %.4f mm, worst %.3f, %d nodes, %s\n", kind_name[kind], report.branch[0].length, length,
-                      center / nodes, worst,
-                      tree->node_count, report.branch[0].end);
+                      center / nodes, worst, tree->node_count, report.branch[0].end);
         assert_true(furthest > 8.0);
         // not beyond the end either; Kerrien's values do continue into the background (their table 2 has 8.9 % of such), and lag in the curve
         assert_true(kind == 2 || report.branch[0].length < length + 0.5);
@@ -331,9 +330,8 @@ static void bifurcation_by_two_seeds(void **state)
             tree = track(v, &p, seed, 2, &report);
             const RbtBranchReport *second = &report.branch[1];
             Vec3 tip = tree->center[second->first_node + second->node_count - 1], foot = tree->center[tree->parent[second->first_node]];
-            print_message("fork, %s%s: tip (%.1f, %.1f, %.1f), %s; joined %.2f mm from the fork\n", kind_name[kind], has_toward ? ", toward" : "", tip.x,
-                          tip.y, tip.z, second->end,
-                          vec3_distance(foot, fork));
+            print_message("fork, %s%s: tip (%.1f, %.1f, %.1f), %s; joined %.2f mm from the fork\n", kind_name[kind], has_toward ? ", toward" : "", tip.x, tip.y,
+                          tip.z, second->end, vec3_distance(foot, fork));
             assert_true(tip.z > 18 && (tip.x < 11) != went_left);
             assert_true(vec3_distance(foot, fork) < 3.5);
             for (int i = 1; i < tree->node_count; i++)
@@ -482,7 +480,7 @@ static void unfit_seeds_and_parameters(void **state)
     struct {
         RbtSeed seed;
         const char *words;
-    } cases[] = {{good, "outside the volume"}, {good, "same point"}, {good, "no radius"}, {good, "no direction"}, {good, "larger than the volume"},
+    } cases[] = {{good, "outside the volume"},      {good, "same point"}, {good, "no radius"}, {good, "no direction"}, {good, "larger than the volume"},
                  {good, "nothing could be tracked"}};
     cases[0].seed.start = vec3(6, 6, -1);
     cases[1].seed.toward = good.start;
@@ -519,11 +517,12 @@ static void unfit_seeds_and_parameters(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gradient_by_differences), cmocka_unit_test(fit_of_its_own_template), cmocka_unit_test(score_is_a_t_statistic),
-        cmocka_unit_test(straight_cylinder), cmocka_unit_test(helix_to_its_end), cmocka_unit_test(bifurcation_by_two_seeds),
-        cmocka_unit_test(ends_where_the_vessel_ends), cmocka_unit_test(parallel_neighbour), cmocka_unit_test(joined_where_it_passes),
-        cmocka_unit_test(turned_volume_gives_the_turned_tree),
-        cmocka_unit_test(the_same_every_time), cmocka_unit_test(unfit_seeds_and_parameters),
+        cmocka_unit_test(gradient_by_differences),    cmocka_unit_test(fit_of_its_own_template),
+        cmocka_unit_test(score_is_a_t_statistic),     cmocka_unit_test(straight_cylinder),
+        cmocka_unit_test(helix_to_its_end),           cmocka_unit_test(bifurcation_by_two_seeds),
+        cmocka_unit_test(ends_where_the_vessel_ends), cmocka_unit_test(parallel_neighbour),
+        cmocka_unit_test(joined_where_it_passes),     cmocka_unit_test(turned_volume_gives_the_turned_tree),
+        cmocka_unit_test(the_same_every_time),        cmocka_unit_test(unfit_seeds_and_parameters),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

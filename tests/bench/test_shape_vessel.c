@@ -44,7 +44,7 @@ static void capsule_and_arc_are_exact(void **state)
             double scale = scales[k];
             memcpy(text, option, sizeof text);
             snprintf(text[0][1], sizeof text[0][1], "%g", scale);
-            Shape *shape = make(which ? "arc" : "capsule", 1, (const char (*)[2][64])text);
+            Shape *shape = make(which ? "arc" : "capsule", 1, (const char(*)[2][64])text);
             Vessel *truth = shape_vessel_create(shape);
             TubePiece piece = which ? (TubePiece){0, 4 * scale, PI, 0} : (TubePiece){4 * scale, 0, 0, 0};
             TubeOptions o = {.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = scale, .piece_count = 1, .piece = &piece, .closed_ends = !which};
@@ -299,8 +299,12 @@ static void models_as_triangles(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(capsule_and_arc_are_exact), cmocka_unit_test(feet_are_nearest), cmocka_unit_test(clearance_is_no_more_than_the_wall),
-        cmocka_unit_test(flat_fields), cmocka_unit_test(open_ends), cmocka_unit_test(shapes_as_triangles),
+        cmocka_unit_test(capsule_and_arc_are_exact),
+        cmocka_unit_test(feet_are_nearest),
+        cmocka_unit_test(clearance_is_no_more_than_the_wall),
+        cmocka_unit_test(flat_fields),
+        cmocka_unit_test(open_ends),
+        cmocka_unit_test(shapes_as_triangles),
         cmocka_unit_test(models_as_triangles),
     };
     return cmocka_run_group_tests_name("shape_vessel", tests, NULL, NULL);

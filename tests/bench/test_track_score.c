@@ -303,8 +303,13 @@ int main(void)
 {
 #define BOTH(f) cmocka_unit_test(f), cmocka_unit_test_setup_teardown(f, another_frame, same_frame)
     const struct CMUnitTest tests[] = {
-        BOTH(truth_is_successful), BOTH(stopping_early_and_never_starting), BOTH(lost_into_what_touches), BOTH(turning_back),
-        BOTH(leaks_off_a_followed_branch_are_counted), BOTH(hanging_on_the_wrong_vessel), BOTH(errors_are_those_put_in),
+        BOTH(truth_is_successful),
+        BOTH(stopping_early_and_never_starting),
+        BOTH(lost_into_what_touches),
+        BOTH(turning_back),
+        BOTH(leaks_off_a_followed_branch_are_counted),
+        BOTH(hanging_on_the_wrong_vessel),
+        BOTH(errors_are_those_put_in),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

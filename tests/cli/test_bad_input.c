@@ -73,11 +73,20 @@ static void volumes_cut_off_or_lying(void **state)
     put("lie.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 10 -10 10\nendian: little\nencoding: raw\n\nabc");
     put("head.nrrd", "NRRD0004\ntype: short\ndimension: 3\n");
     put("trace.yaml", "branches: [{start_mm: [1, 1, 1], toward_mm: [2, 2, 2], radius_mm: 1}]\n");
-    static const char *const files[][2] = {
-        {"short.nii", "short.nii:byte "}, {"cut.nii", "cut.nii:byte 200"}, {"lie.nii", "lie.nii:byte 42"}, {"two.nii", "two.nii:byte 0: is NIfTI-2"},
-        {"analyze.hdr", "analyze.hdr:byte 344: "}, {"beside.mhd", "beside.mhd:5: the data file 'a?[2Jb.raw' does not exist"}, {"short.mha", "short.mha:byte "},
-        {"lie.mha", "lie.mha:3"},         {"short.nrrd", "short.nrrd:byte "}, {"lie.nrrd", "lie.nrrd:4"}, {"head.nrrd", "head.nrrd:"},
-        {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"}, {".", "the folder has no DICOM images"}, {"tree.h5", "tree.h5:byte 0"}};
+    static const char *const files[][2] = {{"short.nii", "short.nii:byte "},
+                                           {"cut.nii", "cut.nii:byte 200"},
+                                           {"lie.nii", "lie.nii:byte 42"},
+                                           {"two.nii", "two.nii:byte 0: is NIfTI-2"},
+                                           {"analyze.hdr", "analyze.hdr:byte 344: "},
+                                           {"beside.mhd", "beside.mhd:5: the data file 'a?[2Jb.raw' does not exist"},
+                                           {"short.mha", "short.mha:byte "},
+                                           {"lie.mha", "lie.mha:3"},
+                                           {"short.nrrd", "short.nrrd:byte "},
+                                           {"lie.nrrd", "lie.nrrd:4"},
+                                           {"head.nrrd", "head.nrrd:"},
+                                           {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"},
+                                           {".", "the folder has no DICOM images"},
+                                           {"tree.h5", "tree.h5:byte 0"}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         char arguments[200];
         snprintf(arguments, sizeof arguments, "segment %s --trace trace.yaml -o out.h5 --json out.json", files[i][0]);
@@ -183,15 +192,19 @@ static void words_of_the_command_line(void **state)
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         refused(lines[i][0], lines[i][1]);
     // what is read is never written over, under whatever name
-    static const char *const same[] = {"query model.h5 --points ok.csv -o ok.csv", "query model.h5 --points ok.csv -o ./model.h5", "export model.h5 -o alias.stl",
-                                       "info model.h5 --report model.h5", "segment capsule.nrrd --trace trace.yaml -o capsule.nrrd",
-                                       "segment capsule.nrrd --trace trace.yaml -o out.h5 --json trace.yaml", "import --surface tube.stl -o tube.stl"};
+    static const char *const same[] = {"query model.h5 --points ok.csv -o ok.csv",
+                                       "query model.h5 --points ok.csv -o ./model.h5",
+                                       "export model.h5 -o alias.stl",
+                                       "info model.h5 --report model.h5",
+                                       "segment capsule.nrrd --trace trace.yaml -o capsule.nrrd",
+                                       "segment capsule.nrrd --trace trace.yaml -o out.h5 --json trace.yaml",
+                                       "import --surface tube.stl -o tube.stl"};
     assert_int_equal(run_in("ln -s model.h5 alias.stl &&", "synth open-capsule -o tube.stl --quiet"), 0);
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
         refused(same[i], " would overwrite ");
-    static const char *const nowhere[] = {"fit tree.h5 -o nowhere/x", "synth capsule -o nowhere/x.h5", "synth capsule -o nowhere/x.nrrd",
-                                          "query model.h5 --points ok.csv -o nowhere/x.csv", "export model.h5 -o nowhere/x.stl",
-                                          "segment capsule.nrrd --trace trace.yaml -o nowhere/x.h5"};
+    static const char *const nowhere[] = {"fit tree.h5 -o nowhere/x",         "synth capsule -o nowhere/x.h5",
+                                          "synth capsule -o nowhere/x.nrrd",  "query model.h5 --points ok.csv -o nowhere/x.csv",
+                                          "export model.h5 -o nowhere/x.stl", "segment capsule.nrrd --trace trace.yaml -o nowhere/x.h5"};
     for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++)
         refused(nowhere[i], "cannot be written: No such file or directory");
 }
@@ -206,7 +219,8 @@ static void verbs_of_the_trainer(void **state)
     put("noise.bin", "no file of any kind");
     put("open.yaml", "x: [1\n");
     put("empty.json", "{\"seldinger_session\": 1}");
-    put("guide.yaml", "seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 9}\ntwist: {source: X, deg_s: 9, optional: true, tool: guide}\n");
+    put("guide.yaml",
+        "seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 9}\ntwist: {source: X, deg_s: 9, optional: true, tool: guide}\n");
     assert_int_equal(run_in("", "run free.yaml --record free.h5 --quiet"), 0);
     static const char *const lines[][2] = {
         {"replay free.h5 --verify --banana", "see `seldinger replay --help`"},
@@ -242,7 +256,8 @@ static void verbs_of_the_trainer(void **state)
         {"nav free.yaml --threads 1.5", "--threads: '1.5' is not valid"},
         {"nav free.yaml --no-record --device nowhere.yaml", "nowhere.yaml: cannot be opened"},
         {"nav free.yaml --no-record --device open.yaml", "open.yaml:2:1: is not YAML"},
-        {"nav free.yaml --no-record --device guide.yaml", "guide.yaml:4:52: 'tool' is 'guide', but the scene has no such tool; write wire, outermost, innermost"},
+        {"nav free.yaml --no-record --device guide.yaml",
+         "guide.yaml:4:52: 'tool' is 'guide', but the scene has no such tool; write wire, outermost, innermost"},
         {"nav free.yaml --no-record --figures nowhere/out.json", "nowhere/out.json: cannot be written"},
         {"nav free.yaml --no-record --resume nowhere.h5", "nowhere.h5: cannot be opened"},
         {"nav free.yaml --no-record --resume tree.h5", "tree.h5: has no dataset"},
@@ -259,9 +274,14 @@ static void verbs_of_the_trainer(void **state)
 static void a_full_disk(void **state)
 {
     (void)state;
-    static const char *const lines[] = {"synth phantom -o out.h5 --quiet", "synth capsule -o out.nrrd --quiet", "synth capsule -o out.stl --quiet",
-                                        "fit tree.h5 -o out.h5 --quiet",   "export model.h5 -o out.stl",        "query model.h5 --points many.csv -o out.csv",
-                                        "segment capsule.nrrd --trace one.yaml -o out.h5 --quiet", "import --surface capsule.stl -o out.h5 --quiet"};
+    static const char *const lines[] = {"synth phantom -o out.h5 --quiet",
+                                        "synth capsule -o out.nrrd --quiet",
+                                        "synth capsule -o out.stl --quiet",
+                                        "fit tree.h5 -o out.h5 --quiet",
+                                        "export model.h5 -o out.stl",
+                                        "query model.h5 --points many.csv -o out.csv",
+                                        "segment capsule.nrrd --trace one.yaml -o out.h5 --quiet",
+                                        "import --surface capsule.stl -o out.h5 --quiet"};
     char many[60000] = "x_mm,y_mm,z_mm\n";
     size_t length = strlen(many);
     for (int i = 0; i < 200; i++)
@@ -355,7 +375,8 @@ static void pipes_and_devices_stay_what_they_are(void **state)
                                         "fit tree.h5 -o out.h5 --picture pipe.nrrd"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         refused(lines[i], "pipe.nrrd: is not a regular file");
-    assert_int_equal(run_in("{ timeout 10 cat pipe.nrrd > heard.csv & } ;", "query model.h5 --points ok.csv -o pipe.nrrd --quiet; wait; grep -q '^0,0,2,' heard.csv"), 0);
+    assert_int_equal(
+        run_in("{ timeout 10 cat pipe.nrrd > heard.csv & } ;", "query model.h5 --points ok.csv -o pipe.nrrd --quiet; wait; grep -q '^0,0,2,' heard.csv"), 0);
     struct stat status;
     assert_true(stat(path, &status) == 0 && S_ISFIFO(status.st_mode));
 }

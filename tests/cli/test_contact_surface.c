@@ -208,7 +208,8 @@ static void all_surfaces_of_a_tube_hold_the_same_wire(void **state)
     static const char *const kinds[] = {"lim", "mesh", "smooth_mesh", "flat_mesh", "grid"};
     double tip[3], other[3];
     scene_write("tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 0, 1], radius_mm: 1, "
-                "path: [{line_mm: 8}, {arc: {radius_mm: 12, angle_deg: 90}}, {line_mm: 12}]}", "[0.5, 0, 0]");
+                "path: [{line_mm: 8}, {arc: {radius_mm: 12, angle_deg: 90}}, {line_mm: 12}]}",
+                "[0.5, 0, 0]");
     told("", tip);
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
         char arguments[100];

@@ -57,7 +57,8 @@ static void is_solved(const char *name, const char *model, LeftToMend left)
     cJSON_Delete(score);
     cJSON *summary = json_of("summary.json");
     const cJSON *flag, *energy = cJSON_GetObjectItem(summary, "energy_mj"), *solver = cJSON_GetObjectItem(summary, "solver");
-    cJSON_ArrayForEach(flag, cJSON_GetObjectItem(summary, "flags")) {
+    cJSON_ArrayForEach(flag, cJSON_GetObjectItem(summary, "flags"))
+    {
         const char *text = flag->valuestring;
         bool is_known = (left.unconverged && !strcmp(text, "not_converged")) || (left.gained > 0 && !strcmp(text, "gains_energy")) ||
                         (left.limited && !strcmp(text, "limited")) || (left.is_drawn_out && !strcmp(text, "fully_withdrawn"));
@@ -69,10 +70,7 @@ static void is_solved(const char *name, const char *model, LeftToMend left)
     cJSON_Delete(summary);
 }
 
-static double errors_of(const cJSON *score, const char *kind)
-{
-    return number(cJSON_GetObjectItem(cJSON_GetObjectItem(score, "errors"), kind), "count");
-}
+static double errors_of(const cJSON *score, const char *kind) { return number(cJSON_GetObjectItem(cJSON_GetObjectItem(score, "errors"), kind), "count"); }
 
 // `kind`: an error that it makes besides going the wrong way; NULL: none in particular.
 static void errs(const char *name, const char *model, const char *kind)

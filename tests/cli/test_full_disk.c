@@ -65,12 +65,18 @@ static int run_full(const char *arguments)
 static void standard_output_that_is_full(void **state)
 {
     (void)state;
-    static const char *const arguments[] = {"--help",           "-h",
-                                            "help",             "--version",
-                                            "run --help",       "fit --help",
-                                            "segment --help",   "check --help",
-                                            "info model.h5",    "info model.h5 --json",
-                                            "run tube.yaml --duration-s 0.01", "run tube.yaml --duration-s 0.01 --summary - --quiet",
+    static const char *const arguments[] = {"--help",
+                                            "-h",
+                                            "help",
+                                            "--version",
+                                            "run --help",
+                                            "fit --help",
+                                            "segment --help",
+                                            "check --help",
+                                            "info model.h5",
+                                            "info model.h5 --json",
+                                            "run tube.yaml --duration-s 0.01",
+                                            "run tube.yaml --duration-s 0.01 --summary - --quiet",
                                             "query model.h5 --points points.csv -o -"};
     for (size_t i = 0; i < sizeof arguments / sizeof *arguments; i++) {
         int code = run_full(arguments[i]);

@@ -46,7 +46,8 @@ static cJSON *run(const char *scene)
 static cJSON *holds(HardCase c)
 {
     cJSON *s = run(c.scene);
-    double push = fmax(number(s, "proximal", "force_most_n"), -number(s, "proximal", "force_least_n")), gained = number(s, "energy_mj", "gained_most_in_a_step");
+    double push = fmax(number(s, "proximal", "force_most_n"), -number(s, "proximal", "force_least_n")),
+           gained = number(s, "energy_mj", "gained_most_in_a_step");
     int cut = (int)number(s, "solver", "limited_steps"), failed = (int)number(s, "solver", "not_converged_steps");
     bool rests = cJSON_IsTrue(cJSON_GetObjectItem(s, "settled"));
     print_message("%-20s push %.4f N, gained %.2g mJ in a step, %d steps cut, %d not converged, %s\n", c.scene, push, gained, cut, failed,
@@ -162,7 +163,8 @@ static void quick_steps_gain_no_energy(void **state)
     const struct {
         const char *name;
         double share;        // of the work of hands and loads that all steps together may gain
-    } scene[] = {{"stiff-wire-turned", 1e-3}, {"wire-in-soft-guide", 5e-3}, {"tips-nearly-flush", 5e-3}, {"twist-at-mouth", 1e-4}, {"whole-turns-inside", 2e-4}};
+    } scene[] = {
+        {"stiff-wire-turned", 1e-3}, {"wire-in-soft-guide", 5e-3}, {"tips-nearly-flush", 5e-3}, {"twist-at-mouth", 1e-4}, {"whole-turns-inside", 2e-4}};
     for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
         cJSON *s = run(scene[i].name);
         double gained = number(s, "energy_mj", "gained"), work = number(s, "energy_mj", "work");
@@ -187,11 +189,17 @@ static void an_inner_tip_stays_within_the_wall(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(curved_tools_leave_the_mouth), cmocka_unit_test(what_is_let_go_is_not_cut_for_ever), cmocka_unit_test(a_tool_rests_with_the_hand),
-        cmocka_unit_test(a_hand_slips_above_its_limit), cmocka_unit_test(an_inner_hand_pushes_a_stiff_bend_out),
-        cmocka_unit_test(twist_passes_a_clearance_of_5_um), cmocka_unit_test(a_curved_tip_is_drawn_into_the_sheath),
-        cmocka_unit_test(a_hand_that_slips_makes_no_energy), cmocka_unit_test(a_guide_is_drawn_back_over_a_turned_wire),
-        cmocka_unit_test(a_curl_is_drawn_into_the_sheath), cmocka_unit_test(an_inner_tip_stays_within_the_wall),
+        cmocka_unit_test(curved_tools_leave_the_mouth),
+        cmocka_unit_test(what_is_let_go_is_not_cut_for_ever),
+        cmocka_unit_test(a_tool_rests_with_the_hand),
+        cmocka_unit_test(a_hand_slips_above_its_limit),
+        cmocka_unit_test(an_inner_hand_pushes_a_stiff_bend_out),
+        cmocka_unit_test(twist_passes_a_clearance_of_5_um),
+        cmocka_unit_test(a_curved_tip_is_drawn_into_the_sheath),
+        cmocka_unit_test(a_hand_that_slips_makes_no_energy),
+        cmocka_unit_test(a_guide_is_drawn_back_over_a_turned_wire),
+        cmocka_unit_test(a_curl_is_drawn_into_the_sheath),
+        cmocka_unit_test(an_inner_tip_stays_within_the_wall),
         cmocka_unit_test(quick_steps_gain_no_energy),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

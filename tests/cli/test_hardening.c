@@ -92,7 +92,8 @@ static void its_stacks_are_guarded(void **state)
     assert_int_equal(of_program("readelf -W --dyn-syms"), 0);
     expect("__stack_chk_fail");
     // large frames touch each page on their way: or $0,(%rsp)
-    assert_int_equal(of_program("probed() { objdump -d --no-show-raw-insn -j .text \"$1\" | grep -E 'or[lq]? +[$]0x0,[(]%[re]?sp[)]' | head -n 1; }; probed"), 0);
+    assert_int_equal(of_program("probed() { objdump -d --no-show-raw-insn -j .text \"$1\" | grep -E 'or[lq]? +[$]0x0,[(]%[re]?sp[)]' | head -n 1; }; probed"),
+                     0);
     expect("(%rsp)");
 }
 

@@ -69,12 +69,24 @@ static void what_is_no_file_is_refused(void **state)
 {
     (void)state;
     static const char *const what[] = {"pipe", "device", "socket", "sub"};
-    static const char *const verbs[] = {"fit %s -o out.h5", "fit tree.h5 -o out.h5 --junctions j.png --volume %s", "import --surface %s -o out.h5",
-                                        "import --surface surface.stl --centreline %s -o out.h5", "query %s --points points.csv -o out.csv",
-                                        "query model.h5 --points %s -o out.csv", "segment %s --trace trace.yaml -o out.h5",
-                                        "segment %s --start 1,1,1 -o out.h5", "segment model.h5 --trace %s -o out.h5", "export %s -o out.vtp", "info %s",
-                                        "run %s --duration-s 0.01", "run tube.yaml --script %s", "run tube.yaml --duration-s 0.01 --device %s", "check %s",
-                                        "synth arc --measure %s", "report %s --html out.html", "devices --map %s"};
+    static const char *const verbs[] = {"fit %s -o out.h5",
+                                        "fit tree.h5 -o out.h5 --junctions j.png --volume %s",
+                                        "import --surface %s -o out.h5",
+                                        "import --surface surface.stl --centreline %s -o out.h5",
+                                        "query %s --points points.csv -o out.csv",
+                                        "query model.h5 --points %s -o out.csv",
+                                        "segment %s --trace trace.yaml -o out.h5",
+                                        "segment %s --start 1,1,1 -o out.h5",
+                                        "segment model.h5 --trace %s -o out.h5",
+                                        "export %s -o out.vtp",
+                                        "info %s",
+                                        "run %s --duration-s 0.01",
+                                        "run tube.yaml --script %s",
+                                        "run tube.yaml --duration-s 0.01 --device %s",
+                                        "check %s",
+                                        "synth arc --measure %s",
+                                        "report %s --html out.html",
+                                        "devices --map %s"};
     for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++)
         for (size_t k = 0; k < sizeof what / sizeof *what; k++) {
             char arguments[200];
@@ -196,11 +208,12 @@ static void long_files_are_not_read_whole(void **state)
     ends_in_little_memory("run long.yaml", 2, "expected at most 67108864");
 }
 
-static const char vtp_head[] = "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n"
-                               "<PolyData><Piece NumberOfPoints=\"%s\" NumberOfPolys=\"1\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" "
-                               "offset=\"0\"/></Points><Polys><DataArray type=\"Int8\" Name=\"connectivity\" format=\"appended\" offset=\"0\"/>"
-                               "<DataArray type=\"Int8\" Name=\"offsets\" format=\"appended\" offset=\"0\"/></Polys></Piece></PolyData>"
-                               "<AppendedData encoding=\"raw\">_";
+static const char vtp_head[] =
+    "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n"
+    "<PolyData><Piece NumberOfPoints=\"%s\" NumberOfPolys=\"1\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" "
+    "offset=\"0\"/></Points><Polys><DataArray type=\"Int8\" Name=\"connectivity\" format=\"appended\" offset=\"0\"/>"
+    "<DataArray type=\"Int8\" Name=\"offsets\" format=\"appended\" offset=\"0\"/></Polys></Piece></PolyData>"
+    "<AppendedData encoding=\"raw\">_";
 
 // An array of 512 MB of zeros in half a megabyte.
 static void put_vtp(const char *name, const char *points)

@@ -29,14 +29,15 @@ static const char scene[] = "seldinger: 1\n"
                             "targets: [{name: bend, point_mm: [30, 7, 0], radius_mm: 3}]\n"
                             "exercise: {title: To the bend, target: bend, hold_s: 1}\n";
 
-static const char coaxial[] = "seldinger: 1\n"
-                              "vessel: {tube: {radius_mm: 1.2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 30}]}, "
-                              "contact: tube, friction: 0.05}\n"
-                              "tools:\n"
-                              "  - {name: tube, kind: microcatheter, elements: 20, sections: [{length_mm: 80, diameter_mm: 0.8, inner_diameter_mm: 0.5, "
-                              "young_modulus_gpa: 1}]}\n"
-                              "  - {name: thread, kind: wire, elements: 25, sections: [{length_mm: 110, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
-                              "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n";
+static const char coaxial[] =
+    "seldinger: 1\n"
+    "vessel: {tube: {radius_mm: 1.2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 30}]}, "
+    "contact: tube, friction: 0.05}\n"
+    "tools:\n"
+    "  - {name: tube, kind: microcatheter, elements: 20, sections: [{length_mm: 80, diameter_mm: 0.8, inner_diameter_mm: 0.5, "
+    "young_modulus_gpa: 1}]}\n"
+    "  - {name: thread, kind: wire, elements: 25, sections: [{length_mm: 110, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n";
 
 static pid_t server;
 
@@ -110,12 +111,12 @@ static int run(const char *format, ...)
 }
 
 // The same; prints the output if it does not end with `code`.
-#define RUNS(code, ...)                                                                                                                            \
-    do {                                                                                                                                           \
-        int ended = run(__VA_ARGS__);                                                                                                              \
-        if (ended != (code) && access(in_folder("out.txt"), R_OK) == 0)                                                                            \
-            print_message("%s", text_of(in_folder("out.txt")));                                                                                    \
-        assert_int_equal(ended, code);                                                                                                             \
+#define RUNS(code, ...)                                                                                                                                        \
+    do {                                                                                                                                                       \
+        int ended = run(__VA_ARGS__);                                                                                                                          \
+        if (ended != (code) && access(in_folder("out.txt"), R_OK) == 0)                                                                                        \
+            print_message("%s", text_of(in_folder("out.txt")));                                                                                                \
+        assert_int_equal(ended, code);                                                                                                                         \
     } while (0)
 
 static bool ends_with(const char *text, const char *end) { return strlen(text) >= strlen(end) && !strcmp(text + strlen(text) - strlen(end), end); }
@@ -157,8 +158,8 @@ static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
 {
     (void)state;
     need_display();
-    RUNS(0, "(%s) & exec %s nav scene.yaml --sessions sessions --trainee Ada --duration-s 60 --size 800x600 --figures figures.json >out.txt 2>&1",
-                         hand, SELDINGER_PROGRAM);
+    RUNS(0, "(%s) & exec %s nav scene.yaml --sessions sessions --trainee Ada --duration-s 60 --size 800x600 --figures figures.json >out.txt 2>&1", hand,
+         SELDINGER_PROGRAM);
     char path[700], json[700];
     snprintf(path, sizeof path, "%s", newest_recording());
     RecordedRun *recorded = load(path);
@@ -207,19 +208,20 @@ static void a_session_goes_on_from_a_moment_of_another(void **state)
     recorded_run_free(second);
     RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
     // not in another scene
-    RUNS(2, "sed 's/friction: 0.05/friction: 0.06/' scene.yaml > other.yaml; %s nav other.yaml --resume '%s' --duration-s 1 >out.txt 2>&1",
-                         SELDINGER_PROGRAM, path);
+    RUNS(2, "sed 's/friction: 0.05/friction: 0.06/' scene.yaml > other.yaml; %s nav other.yaml --resume '%s' --duration-s 1 >out.txt 2>&1", SELDINGER_PROGRAM,
+         path);
     char *said = text_of(in_folder("out.txt"));
     assert_non_null(strstr(said, "is a recording of another scene"));
     free(said);
 }
 
 // The thread by the arrows, then both at once by two hands, then locked, then let go; the window drawn all the while.
-static const char two_hands[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
-                                "xdotool key 2; sleep 0.2; xdotool keydown Up; sleep 2; xdotool keydown u; sleep 1.5; xdotool keyup u; xdotool keyup Up; sleep 0.2; "
-                                "xdotool key l; sleep 0.2; xdotool keydown Right; sleep 1.5; xdotool keyup Right; sleep 0.2; "
-                                "xdotool key g; sleep 0.3; xdotool key 6; sleep 0.3; xdotool key 7; sleep 0.3; "
-                                "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+static const char two_hands[] =
+    "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "xdotool key 2; sleep 0.2; xdotool keydown Up; sleep 2; xdotool keydown u; sleep 1.5; xdotool keyup u; xdotool keyup Up; sleep 0.2; "
+    "xdotool key l; sleep 0.2; xdotool keydown Right; sleep 1.5; xdotool keyup Right; sleep 0.2; "
+    "xdotool key g; sleep 0.3; xdotool key 6; sleep 0.3; xdotool key 7; sleep 0.3; "
+    "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
 static void two_tools_are_moved_by_keys(void **state)
 {
@@ -243,7 +245,8 @@ static void two_tools_are_moved_by_keys(void **state)
     recorded_run_free(recorded);
     RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
     RUNS(0, "exec %s replay '%s' --duration-s 2 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
-    RUNS(0, "exec %s nav coaxial.yaml --sessions sessions --resume '%s' --at 1.5 --duration-s 2 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
+    RUNS(0, "exec %s nav coaxial.yaml --sessions sessions --resume '%s' --at 1.5 --duration-s 2 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM,
+         newest_recording());
     RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
 }
 
@@ -251,7 +254,8 @@ static void two_tools_are_moved_by_keys(void **state)
 static const char exchanging_hands[] =
     "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
     "xdotool key 2; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.3; xdotool key Return; sleep 0.5; xdotool key x; sleep 0.3; "
-    "xdotool keydown shift; xdotool keydown Down; sleep 4; xdotool keyup Down; xdotool keyup shift; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.2; xdotool key Right; sleep 0.3; "
+    "xdotool keydown shift; xdotool keydown Down; sleep 4; xdotool keyup Down; xdotool keyup shift; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep "
+    "0.2; xdotool key Right; sleep 0.3; "
     "xdotool key Return; sleep 3; xdotool keydown shift; xdotool keydown Up; sleep 4; xdotool keyup Up; xdotool keyup shift; sleep 0.3; "
     "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
@@ -283,17 +287,20 @@ static void a_recording_is_shown_in_the_window(void **state)
 }
 
 // Killed while a key is held; the next start asks, and Enter has it scored.
-static const char killing_hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
-                                   "xdotool key e; xdotool keydown Up; sleep 3; kill -9 $(xdotool getwindowpid $W); xdotool keyup Up";
-static const char recovering_hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 1; "
-                                      "xdotool key Return; while ! ls killed/*.json >/dev/null 2>&1; do sleep 0.2; done; sleep 1; "
-                                      "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+static const char killing_hand[] =
+    "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "xdotool key e; xdotool keydown Up; sleep 3; kill -9 $(xdotool getwindowpid $W); xdotool keyup Up";
+static const char recovering_hand[] =
+    "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 1; "
+    "xdotool key Return; while ! ls killed/*.json >/dev/null 2>&1; do sleep 0.2; done; sleep 1; "
+    "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
 static void a_session_that_was_cut_off_is_recovered(void **state)
 {
     (void)state;
     need_display();
-    RUNS(137, "(%s) & %s nav scene.yaml --sessions killed --trainee Eve --duration-s 60 --size 800x600 >out.txt 2>&1; exit $?", killing_hand, SELDINGER_PROGRAM);
+    RUNS(137, "(%s) & %s nav scene.yaml --sessions killed --trainee Eve --duration-s 60 --size 800x600 >out.txt 2>&1; exit $?", killing_hand,
+         SELDINGER_PROGRAM);
     RUNS(0, "while xdotool search --name Seldinger: >/dev/null 2>&1; do sleep 0.1; done");   // a busy X server shows a dead program's window a little longer
     RUNS(0, "test $(ls killed/*.h5 | wc -l) = 1 && ! ls killed/*.json 2>/dev/null && cp killed/*.h5 cut-off.h5");
     RUNS(0, "(%s) & exec %s nav scene.yaml --sessions killed --duration-s 60 --size 800x600 >out.txt 2>&1", recovering_hand, SELDINGER_PROGRAM);
@@ -320,8 +327,11 @@ static void without_a_display_it_says_so(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
-                                       cmocka_unit_test(a_session_goes_on_from_a_moment_of_another), cmocka_unit_test(a_recording_is_shown_in_the_window),
-                                       cmocka_unit_test(two_tools_are_moved_by_keys), cmocka_unit_test(a_tip_is_shaped_and_put_in_from_the_tray),
-                                       cmocka_unit_test(a_session_that_was_cut_off_is_recovered), cmocka_unit_test(without_a_display_it_says_so)};
+                                       cmocka_unit_test(a_session_goes_on_from_a_moment_of_another),
+                                       cmocka_unit_test(a_recording_is_shown_in_the_window),
+                                       cmocka_unit_test(two_tools_are_moved_by_keys),
+                                       cmocka_unit_test(a_tip_is_shaped_and_put_in_from_the_tray),
+                                       cmocka_unit_test(a_session_that_was_cut_off_is_recovered),
+                                       cmocka_unit_test(without_a_display_it_says_so)};
     return cmocka_run_group_tests(tests, open_display, close_display);
 }

@@ -49,8 +49,8 @@ static int make_files(void **state)
     put("slice01.raw", "abcd");
     put("slice02.raw", "abcd");
     char path[200];
-    return symlink("tree.h5", in_folder("link.h5")) || link(strcpy(path, in_folder("tree.h5")), in_folder("hard.h5")) || symlink("later.h5", in_folder("dangling.h5")) ||
-           mkdir(in_folder("sub"), 0755);
+    return symlink("tree.h5", in_folder("link.h5")) || link(strcpy(path, in_folder("tree.h5")), in_folder("hard.h5")) ||
+           symlink("later.h5", in_folder("dangling.h5")) || mkdir(in_folder("sub"), 0755);
 }
 
 // Exit code 2, the words, and every file as it was.
@@ -176,12 +176,9 @@ static void what_loses_nothing_is_allowed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_loses_nothing_is_allowed),
-        cmocka_unit_test(runs_keep_their_scene),
-        cmocka_unit_test(trees_and_models_are_kept),
-        cmocka_unit_test(volumes_and_their_samples_are_kept),
-        cmocka_unit_test(sessions_and_tables_are_kept),
-        cmocka_unit_test(a_recording_and_its_scene_are_kept),
+        cmocka_unit_test(what_loses_nothing_is_allowed), cmocka_unit_test(runs_keep_their_scene),
+        cmocka_unit_test(trees_and_models_are_kept),     cmocka_unit_test(volumes_and_their_samples_are_kept),
+        cmocka_unit_test(sessions_and_tables_are_kept),  cmocka_unit_test(a_recording_and_its_scene_are_kept),
     };
     return cmocka_run_group_tests(tests, make_files, remove_folder);
 }

@@ -294,7 +294,8 @@ int main(void)
         cmocka_unit_test(what_is_no_recording_is_refused),
         cmocka_unit_test(wrong_options_are_refused),
 #ifdef SELDINGER_RENDER
-        cmocka_unit_test(pictures_are_of_the_moment_and_size_asked_for), cmocka_unit_test(a_film_has_its_frames),
+        cmocka_unit_test(pictures_are_of_the_moment_and_size_asked_for),
+        cmocka_unit_test(a_film_has_its_frames),
 #endif
     };
     return cmocka_run_group_tests(tests, set_up, remove_folder);

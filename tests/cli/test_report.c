@@ -29,8 +29,9 @@ static int make_model(void)
 {
     static Faults faults;
     char command[1000];
-    snprintf(command, sizeof command, "%s synth phantom --points 50 --sac-points 400 --quiet -o '%s' && %s fit '%s' -o '%s' --target-mm 0.2 --voxel-mm 0.4 --quiet",
-             SELDINGER_PROGRAM, in_folder("tree.h5"), SELDINGER_PROGRAM, in_folder("tree.h5"), in_folder("plain.h5"));
+    snprintf(command, sizeof command,
+             "%s synth phantom --points 50 --sac-points 400 --quiet -o '%s' && %s fit '%s' -o '%s' --target-mm 0.2 --voxel-mm 0.4 --quiet", SELDINGER_PROGRAM,
+             in_folder("tree.h5"), SELDINGER_PROGRAM, in_folder("tree.h5"), in_folder("plain.h5"));
     if (system(command) != 0)
         return -1;
     VesselTree *tree = tree_file_load(in_folder("plain.h5"), NULL, &faults);
@@ -186,7 +187,8 @@ static void hostile_texts_stay_text(void **state)
     tree->direction[0] = vec3(1, 0, 0);
     tree->parent[0] = -1;
     TreeFileInfo texts = {.source = (char[]){"<script>boo()</script> & \"q\" \xff\xc3 \xed\xa0\x80 \x01 \xc3\xa9"},
-                          .parameters = (char[]){"</pre><img src=http://x.invalid/>"}, .created_by = (char[]){"]]>"}};
+                          .parameters = (char[]){"</pre><img src=http://x.invalid/>"},
+                          .created_by = (char[]){"]]>"}};
     assert_true(tree_file_save(tree, &texts, in_folder("<b>&.h5"), &faults));
     char arguments[500];
     snprintf(arguments, sizeof arguments, "'%s' --report '%s'", in_folder("<b>&.h5"), in_folder("tree.html"));
@@ -221,7 +223,8 @@ static Shown show(const char *page, bool dark, const char *png)
 {
     char command[2000];
     snprintf(command, sizeof command,
-             "timeout 100 %s --headless --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run --disable-background-networking --disable-component-update "
+             "timeout 100 %s --headless --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run --disable-background-networking "
+             "--disable-component-update "
              "--disable-default-apps --disable-sync --disable-extensions --host-resolver-rules='MAP * ~NOTFOUND' --user-data-dir='%s' --enable-logging=stderr "
              "--window-size=1200,3600 %s --log-net-log='%s' --screenshot='%s' --dump-dom 'file://%s' >'%s' 2>'%s'",
              browser, in_folder("profile"), dark ? "--blink-settings=preferredColorScheme=0" : "", in_folder("net.json"), png, page, in_folder("dom.html"),
@@ -244,7 +247,8 @@ static int requests(const char *net)
     for (const char *at = net; (at = strstr(at, "\"url\":\"http")); at++) {
         const char *host = strstr(at, "//") + 2;
         size_t length = strcspn(host, "/\"?:");
-        bool makers = (length >= 11 && !strncmp(host + length - 11, ".google.com", 11)) || (length >= 15 && !strncmp(host + length - 15, ".googleapis.com", 15));
+        bool makers =
+            (length >= 11 && !strncmp(host + length - 11, ".google.com", 11)) || (length >= 15 && !strncmp(host + length - 15, ".googleapis.com", 15));
         count += !makers;
     }
     return count;

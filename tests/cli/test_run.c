@@ -23,17 +23,17 @@ static char folder[] = "/tmp/seldinger-run-XXXXXX";
 
 // A tube with a bend, a wire that is pushed through it: contact, friction, a script. 0.4 s.
 #define SCENE(modulus, radius, elements, vessel_more, script) SCENE_MU("0.1", modulus, radius, elements, vessel_more, script)
-#define SCENE_MU(friction, modulus, radius, elements, vessel_more, script)                                                                                      \
-    "seldinger: 1\n"                                                                                                                               \
-    "vessel:\n"                                                                                                                                    \
-    "  tube: {radius_mm: " radius ", normal: [0, 1, 0], path: [{line_mm: 5}, {arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 30}]}\n"             \
-    "  friction: " friction "\n" vessel_more "wire:\n"                                                                                             \
-    "  elements: " elements "\n"                                                                                                                   \
-    "  sections:\n"                                                                                                                               \
-    "    - {length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: " modulus "}\n"                                                                  \
-    "    - {length_mm: 10, diameter_mm: 0.36, young_modulus_gpa: 5, rest_curvature_1_mm: 0.1}\n"                                                  \
-    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n"                                                                       \
-    "script: " script "\n"                                                                                                                         \
+#define SCENE_MU(friction, modulus, radius, elements, vessel_more, script)                                                                                     \
+    "seldinger: 1\n"                                                                                                                                           \
+    "vessel:\n"                                                                                                                                                \
+    "  tube: {radius_mm: " radius ", normal: [0, 1, 0], path: [{line_mm: 5}, {arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 30}]}\n"                         \
+    "  friction: " friction "\n" vessel_more "wire:\n"                                                                                                         \
+    "  elements: " elements "\n"                                                                                                                               \
+    "  sections:\n"                                                                                                                                            \
+    "    - {length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: " modulus "}\n"                                                                               \
+    "    - {length_mm: 10, diameter_mm: 0.36, young_modulus_gpa: 5, rest_curvature_1_mm: 0.1}\n"                                                               \
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n"                                                                                    \
+    "script: " script "\n"                                                                                                                                     \
     "targets: [{name: start, point_mm: [2, 0, 0], radius_mm: 3}]\n"
 #define SCRIPT "[[0, 60, 30], [0.4, 0, 0]]"
 #define GOOD SCENE("80", "0.68", "40", "", SCRIPT)
@@ -104,8 +104,9 @@ static void bad_input_ends_with_2_and_says_where(void **state)
                  models[i]);
         expect_bad(scene, "run bad.yaml --duration-s 1", models[i]);
     }
-    expect_bad("seldinger: 1\nvessel: {shape: {name: banana}}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nsheath: {inlet: root}\n",
-               "run bad.yaml --duration-s 1", "banana");
+    expect_bad(
+        "seldinger: 1\nvessel: {shape: {name: banana}}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nsheath: {inlet: root}\n",
+        "run bad.yaml --duration-s 1", "banana");
 }
 
 static void outputs_that_cannot_be_written_are_found_before_the_run(void **state)
@@ -140,12 +141,36 @@ static void a_tool_that_touches_itself_is_told_of(void **state)
 static void a_run_leaves_its_files_and_repeats_bit_for_bit(void **state)
 {
     (void)state;
-    static const char *const numbers[][2] = {{NULL, "steps"}, {NULL, "simulated_s"}, {NULL, "wall_s"}, {NULL, "real_time_factor"},
-        {"step_us", "median"}, {"step_us", "p99"}, {"step_us", "p999"}, {"step_us", "max"}, {"stage_us", "assemble"}, {"stage_us", "factor"},
-        {"stage_us", "detect"}, {"stage_us", "contact"}, {"stage_us", "correct"}, {NULL, "deadline_misses"}, {"contacts", "max"}, {"contacts", "final"}, {"self_contacts", "max"}, {"self_contacts", "final"},
-        {"penetration_mm", "max"}, {"penetration_mm", "final"}, {"solver", "iterations_median"}, {"solver", "iterations_max"},
-        {"solver", "not_converged_steps"}, {"solver", "residual_max"}, {"proximal", "force_n"}, {"proximal", "torque_n_mm"}, {"wall_force_n", "max"},
-        {"wall_force_n", "sum_final"}, {NULL, "inserted_mm"}, {NULL, "elastic_energy_mj"}};
+    static const char *const numbers[][2] = {{NULL, "steps"},
+                                             {NULL, "simulated_s"},
+                                             {NULL, "wall_s"},
+                                             {NULL, "real_time_factor"},
+                                             {"step_us", "median"},
+                                             {"step_us", "p99"},
+                                             {"step_us", "p999"},
+                                             {"step_us", "max"},
+                                             {"stage_us", "assemble"},
+                                             {"stage_us", "factor"},
+                                             {"stage_us", "detect"},
+                                             {"stage_us", "contact"},
+                                             {"stage_us", "correct"},
+                                             {NULL, "deadline_misses"},
+                                             {"contacts", "max"},
+                                             {"contacts", "final"},
+                                             {"self_contacts", "max"},
+                                             {"self_contacts", "final"},
+                                             {"penetration_mm", "max"},
+                                             {"penetration_mm", "final"},
+                                             {"solver", "iterations_median"},
+                                             {"solver", "iterations_max"},
+                                             {"solver", "not_converged_steps"},
+                                             {"solver", "residual_max"},
+                                             {"proximal", "force_n"},
+                                             {"proximal", "torque_n_mm"},
+                                             {"wall_force_n", "max"},
+                                             {"wall_force_n", "sum_final"},
+                                             {NULL, "inserted_mm"},
+                                             {NULL, "elastic_energy_mj"}};
     put("good.yaml", GOOD);
     assert_int_equal(run("run good.yaml --summary a.json --final a.csv --record a.h5"), 0);
     assert_int_equal(run("run good.yaml --json b.json --final b.csv --quiet --threads 2"), 0);

@@ -35,8 +35,9 @@ static void need(const char *tool)
 // Whether the C library rounds this function as it likes: base/same_math.h has its place.
 static bool is_rounded_freely(const char *name)
 {
-    static const char *const inexact[] = {"sin", "cos", "tan", "sincos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "exp", "exp2",
-                                          "exp10", "expm1", "log", "log2", "log10", "log1p", "pow", "cbrt", "hypot", "erf", "erfc", "lgamma", "tgamma", "j0", "j1", "y0", "y1"};
+    static const char *const inexact[] = {"sin",   "cos",   "tan",   "sincos", "asin", "acos",   "atan",   "atan2", "sinh", "cosh",  "tanh",
+                                          "asinh", "acosh", "atanh", "exp",    "exp2", "exp10",  "expm1",  "log",   "log2", "log10", "log1p",
+                                          "pow",   "cbrt",  "hypot", "erf",    "erfc", "lgamma", "tgamma", "j0",    "j1",   "y0",    "y1"};
     for (size_t i = 0; i < sizeof inexact / sizeof *inexact; i++) {
         size_t length = strlen(inexact[i]);
         if (!strncmp(name, inexact[i], length) && (!name[length] || ((name[length] == 'f' || name[length] == 'l') && !name[length + 1])))
@@ -269,16 +270,17 @@ static void the_program_does_not_tell_where_it_was_built(void **state)
 static void no_source_asks_for_the_date(void **state)
 {
     (void)state;
-    assert_int_not_equal(system("grep -rnE '__(DATE|TIME|TIMESTAMP)__' base geom solver input recon sim render cli --include=*.c --include=*.h --include=*.cpp --include=*.inc"), 0);
+    assert_int_not_equal(
+        system("grep -rnE '__(DATE|TIME|TIMESTAMP)__' base geom solver input recon sim render cli --include=*.c --include=*.h --include=*.cpp --include=*.inc"),
+        0);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_calls_what_c_libraries_round_differently), cmocka_unit_test(no_product_is_fused_with_a_sum),
-        cmocka_unit_test(instruction_sets_and_c_libraries_give_the_same_bits),
-        cmocka_unit_test(the_bill_of_materials_is_whole),                   cmocka_unit_test(the_program_does_not_tell_where_it_was_built),
-        cmocka_unit_test(no_source_asks_for_the_date),
+        cmocka_unit_test(nothing_calls_what_c_libraries_round_differently),    cmocka_unit_test(no_product_is_fused_with_a_sum),
+        cmocka_unit_test(instruction_sets_and_c_libraries_give_the_same_bits), cmocka_unit_test(the_bill_of_materials_is_whole),
+        cmocka_unit_test(the_program_does_not_tell_where_it_was_built),        cmocka_unit_test(no_source_asks_for_the_date),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

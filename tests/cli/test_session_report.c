@@ -253,8 +253,9 @@ static void a_stopped_report_leaves_no_page(void **state)
     snprintf(at_path, sizeof at_path, "%s", in_folder("at.txt"));
     snprintf(pdf, sizeof pdf, "%s", in_folder("stopped.pdf"));
     snprintf(session, sizeof session, "%s", in_folder("second.json"));
-    snprintf(script, sizeof script, "#!/bin/sh\nfor a; do case \"$a\" in file://*) echo \"${a#file://}\" >'%s.tmp'; mv '%s.tmp' '%s';; esac; done\nsleep 300 & wait\n",
-             at_path, at_path, at_path);
+    snprintf(script, sizeof script,
+             "#!/bin/sh\nfor a; do case \"$a\" in file://*) echo \"${a#file://}\" >'%s.tmp'; mv '%s.tmp' '%s';; esac; done\nsleep 300 & wait\n", at_path,
+             at_path, at_path);
     mkdir(in_folder("bin"), 0755);
     put("bin/chromium", script);
     chmod(in_folder("bin/chromium"), 0755);

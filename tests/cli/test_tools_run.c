@@ -31,7 +31,8 @@ static int run(const char *arguments)
 static cJSON *summary(const char *scene, const char *more)
 {
     char arguments[800];
-    snprintf(arguments, sizeof arguments, "run scenes/coaxial/%s --summary '%s' --final '%s' %s", scene, in_folder("summary.json"), in_folder("final.csv"), more);
+    snprintf(arguments, sizeof arguments, "run scenes/coaxial/%s --summary '%s' --final '%s' %s", scene, in_folder("summary.json"), in_folder("final.csv"),
+             more);
     assert_int_equal(run(arguments), 0);
     return json_of("summary.json");
 }
@@ -101,10 +102,13 @@ static void ends(int code, const char *words, const char *arguments)
 // Three tools that go in and out of each other in a bend: nodes come and go.
 static const char three_tools[] =
     "seldinger: 1\n"
-    "vessel: {tube: {radius_mm: 2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 20}]}, contact: tube, friction: 0.05}\n"
+    "vessel: {tube: {radius_mm: 2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 20}]}, contact: tube, friction: "
+    "0.05}\n"
     "tools:\n"
-    "  - {name: guide, kind: guide_catheter, elements: 20, inserted_mm: 5, sections: [{length_mm: 60, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 0.1}]}\n"
-    "  - {name: micro, kind: microcatheter, elements: 25, inserted_mm: 4, sections: [{length_mm: 75, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 0.5}]}\n"
+    "  - {name: guide, kind: guide_catheter, elements: 20, inserted_mm: 5, sections: [{length_mm: 60, diameter_mm: 2, inner_diameter_mm: 1.8, "
+    "young_modulus_gpa: 0.1}]}\n"
+    "  - {name: micro, kind: microcatheter, elements: 25, inserted_mm: 4, sections: [{length_mm: 75, diameter_mm: 0.8, inner_diameter_mm: 0.5, "
+    "young_modulus_gpa: 0.5}]}\n"
     "  - {name: wire, kind: wire, elements: 30, inserted_mm: 6, sections: [{length_mm: 95, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n"
     "script:\n"
@@ -227,17 +231,20 @@ static void a_script_exchanges_tools(void **state)
     put("early.csv", "t_s,microcatheter.exchange,wire.exchange\n0,0,0\n0.1,1,0\n0.2,1,1\n0.3,1,3\n0.4,1,3\n");
     ends(0, "3 exchanges were refused, the last because the scene has no such tool", "run scenes/coaxial/exchange.yaml --script $D/early.csv");
     put("wrong.csv", "t_s,wire.exchange\n0,0.5\n1,0\n");
-    ends(2, "wrong.csv:2:1: exchange is 0.5; expected 0 (the scene's tool) or 1 to 4 (those under its 'exchange:')", "run scenes/coaxial/exchange.yaml --script $D/wrong.csv");
-    put("wide.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
-                     "  - {name: tube, kind: catheter, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
-                     "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
-                     "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.6, young_modulus_gpa: 20}]}]}\n"
-                     "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
+    ends(2, "wrong.csv:2:1: exchange is 0.5; expected 0 (the scene's tool) or 1 to 4 (those under its 'exchange:')",
+         "run scenes/coaxial/exchange.yaml --script $D/wrong.csv");
+    put("wide.yaml",
+        "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
+        "  - {name: tube, kind: catheter, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
+        "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+        "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.6, young_modulus_gpa: 20}]}]}\n"
+        "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
     ends(2, "wide.yaml:6:17: 'wire' is up to 0.6 mm thick, but the lumen of 'tube' around it is only 0.5 mm wide", "run $D/wide.yaml --duration-s 0.1");
-    put("single.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
-                       "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
-                       "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.3, young_modulus_gpa: 20}]}]}\n"
-                       "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
+    put("single.yaml",
+        "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
+        "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+        "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.3, young_modulus_gpa: 20}]}]}\n"
+        "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
     ends(2, "single.yaml:5:17: the scene has one tool", "run $D/single.yaml --duration-s 0.1");
 }
 
@@ -247,11 +254,12 @@ static void the_chain_follows_exchanges(void **state)
 {
     (void)state;
     put("device.yaml", "seldinger: 1\nkind: wire\nelements: 12\nsections: [{length_mm: 90, diameter_mm: 0.4, young_modulus_gpa: 100}]\n");
-    put("swap.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
-                     "  - {name: tube, kind: catheter, elements: 10, sections: [{length_mm: 30, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
-                     "  - name: wire\n    kind: wire\n    elements: 20\n    sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]\n    exchange:\n"
-                     "      - device: device.yaml\n"
-                     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 8}\nscript: swap.csv\n");
+    put("swap.yaml",
+        "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
+        "  - {name: tube, kind: catheter, elements: 10, sections: [{length_mm: 30, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
+        "  - name: wire\n    kind: wire\n    elements: 20\n    sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]\n    exchange:\n"
+        "      - device: device.yaml\n"
+        "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 8}\nscript: swap.csv\n");
     put("swap.csv", "t_s,wire.push_mm_s,wire.twist_deg_s,wire.exchange\n0,-100,0,0\n0.4,0,0,1\n0.41,100,0,1\n0.7,0,0,1\n");
     ends(0, "1 tools were exchanged", "run $D/swap.yaml --record $D/swap.h5 --summary $D/swap.json --score $D/score.json --final $D/final.csv --settle-s 0.3");
     char *text = text_of(in_folder("swap.json"));
@@ -373,11 +381,17 @@ static void a_score_has_each_tool(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_reference_from_a_scene), cmocka_unit_test(two_tools_in_a_model_repeat),
-        cmocka_unit_test(a_run_of_three_tools_is_recorded_and_simulated_again), cmocka_unit_test(each_format_has_all_tools),
+        cmocka_unit_test(a_reference_from_a_scene),
+        cmocka_unit_test(two_tools_in_a_model_repeat),
+        cmocka_unit_test(a_run_of_three_tools_is_recorded_and_simulated_again),
+        cmocka_unit_test(each_format_has_all_tools),
         cmocka_unit_test(a_tool_that_is_let_go_stays_so_in_a_replay),
-        cmocka_unit_test(a_bench_experiment_is_met), cmocka_unit_test(two_devices_reach_a_vertebral_artery),
-        cmocka_unit_test(a_script_exchanges_tools), cmocka_unit_test(the_chain_follows_exchanges), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
+        cmocka_unit_test(a_bench_experiment_is_met),
+        cmocka_unit_test(two_devices_reach_a_vertebral_artery),
+        cmocka_unit_test(a_script_exchanges_tools),
+        cmocka_unit_test(the_chain_follows_exchanges),
+        cmocka_unit_test(golden_paths_of_the_scenes_hold),
+        cmocka_unit_test(a_map_names_a_tool_of_the_scene),
         cmocka_unit_test(two_devices_reach_it_in_a_vessel_of_our_own),
         cmocka_unit_test(a_score_has_each_tool),
     };

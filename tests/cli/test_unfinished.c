@@ -90,7 +90,8 @@ static int end_of(pid_t child)
 static void a_run_without_its_device_leaves_no_recording(void **state)
 {
     (void)state;
-    int code = run_in("timeout 100", "run tube.yaml --device absent.yaml --duration-s 1 --record run.h5 --summary run.json --score run-score.json --final run.csv --quiet");
+    int code = run_in("timeout 100",
+                      "run tube.yaml --device absent.yaml --duration-s 1 --record run.h5 --summary run.json --score run-score.json --final run.csv --quiet");
     if (code != 2 || !strstr(output, "no device that fits came"))
         fail_msg("ended with %d: %s", code, output);
     assert_false(is_there("run.*") || is_there("run-*") || is_there("*.part*"));
@@ -142,15 +143,11 @@ static void rights_of_outputs_stay(void **state)
 {
     (void)state;
     static const char *const made[][2] = {
-        {"run tube.yaml --duration-s 0.01 --summary kept --quiet", "kept"},
-        {"run tube.yaml --duration-s 0.01 --final kept --quiet", "kept"},
-        {"run tube.yaml --duration-s 0.01 --record kept --quiet", "kept"},
-        {"fit tree.h5 -o kept --preset local --quiet", "kept"},
-        {"synth arc --voxel-mm 0.5 -o kept.nrrd --quiet", "kept.nrrd"},
-        {"synth capsule -o kept.stl --quiet", "kept.stl"},
+        {"run tube.yaml --duration-s 0.01 --summary kept --quiet", "kept"}, {"run tube.yaml --duration-s 0.01 --final kept --quiet", "kept"},
+        {"run tube.yaml --duration-s 0.01 --record kept --quiet", "kept"},  {"fit tree.h5 -o kept --preset local --quiet", "kept"},
+        {"synth arc --voxel-mm 0.5 -o kept.nrrd --quiet", "kept.nrrd"},     {"synth capsule -o kept.stl --quiet", "kept.stl"},
 #ifdef SELDINGER_RENDER
-        {"run tube.yaml --duration-s 0.01 --picture kept --quiet", "kept"},
-        {"run tube.yaml --duration-s 0.01 --chart kept --quiet", "kept"},
+        {"run tube.yaml --duration-s 0.01 --picture kept --quiet", "kept"}, {"run tube.yaml --duration-s 0.01 --chart kept --quiet", "kept"},
 #endif
     };
     for (size_t i = 0; i < sizeof made / sizeof *made; i++) {

@@ -31,7 +31,8 @@ static void write_scene(const char *name, const char *plan)
     assert_non_null(file);
     fprintf(file,
             "seldinger: 1\nwire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]\n  damping: {mass_1_s: 50}\n"
-            "rig: {fix: [{s_mm: 0, dof: all}], loads: [{s_mm: end, force_n: [0, 0, 0.03297918], ramp_s: 0.2}]}\n%s", plan);
+            "rig: {fix: [{s_mm: 0, dof: all}], loads: [{s_mm: end, force_n: [0, 0, 0.03297918], ramp_s: 0.2}]}\n%s",
+            plan);
     fclose(file);
 }
 
@@ -102,7 +103,8 @@ static void write_two_tools(const char *cases)
             "seldinger: 1\ntools:\n"
             "  - {name: tube, kind: catheter, elements: 10, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 2}]}\n"
             "  - {name: core, kind: wire, elements: 20, inserted_mm: 5, sections: [{length_mm: 120, diameter_mm: 0.5, young_modulus_gpa: 13}]}\n"
-            "rig: {fix: [{s_mm: 0, dof: all}]}\nverify: {duration_s: 0.01, cases: [%s]}\n", cases);
+            "rig: {fix: [{s_mm: 0, dof: all}]}\nverify: {duration_s: 0.01, cases: [%s]}\n",
+            cases);
     fclose(file);
 }
 
@@ -121,7 +123,8 @@ static void a_case_names_its_tool(void **state)
     write_two_tools("{name: x, tool: tube, quantity: position_mm, s_mm: 61, reference: 5, tolerance: 1}");
     assert_int_equal(check("two.yaml"), 2);
     assert_non_null(strstr(output, "at most 60"));
-    write_two_tools("{name: x, quantity: wall_force_n, s_mm: 3, reference: 5, tolerance: 1}, {name: y, tool: core, quantity: wall_force_n, reference: 5, tolerance: 1}");
+    write_two_tools(
+        "{name: x, quantity: wall_force_n, s_mm: 3, reference: 5, tolerance: 1}, {name: y, tool: core, quantity: wall_force_n, reference: 5, tolerance: 1}");
     assert_int_equal(check("two.yaml"), 2);
     assert_non_null(strstr(output, "'wall_force_n' of several tools is that of all of them"));
     assert_non_null(strstr(output, "'tool' has no effect here"));

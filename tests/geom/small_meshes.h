@@ -11,7 +11,8 @@
 // Grown without bounds' checks: room for what the tests make.
 static inline TriangleMesh mesh_room(int vertices, int triangles)
 {
-    TriangleMesh m = {.vertex = calloc((size_t)vertices, sizeof(Vec3)), .normal = calloc((size_t)vertices, sizeof(Vec3)),
+    TriangleMesh m = {.vertex = calloc((size_t)vertices, sizeof(Vec3)),
+                      .normal = calloc((size_t)vertices, sizeof(Vec3)),
                       .triangle = calloc((size_t)triangles, sizeof *m.triangle)};
     return m;
 }

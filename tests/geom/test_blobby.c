@@ -336,10 +336,18 @@ static void closest_near_the_surface(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(radius_table),          cmocka_unit_test(split_table),     cmocka_unit_test(derivatives_of_second_order),
-        cmocka_unit_test(curvature_of_a_sphere), cmocka_unit_test(sphere_is_exact), cmocka_unit_test(centre_and_far_away),
-        cmocka_unit_test(tube_axis),             cmocka_unit_test(tapered_row),       cmocka_unit_test(closest_against_sampling), cmocka_unit_test(closest_near_the_surface),
-        cmocka_unit_test(own_side_from_any_start), cmocka_unit_test(nearest_from_a_top_of_the_field),
+        cmocka_unit_test(radius_table),
+        cmocka_unit_test(split_table),
+        cmocka_unit_test(derivatives_of_second_order),
+        cmocka_unit_test(curvature_of_a_sphere),
+        cmocka_unit_test(sphere_is_exact),
+        cmocka_unit_test(centre_and_far_away),
+        cmocka_unit_test(tube_axis),
+        cmocka_unit_test(tapered_row),
+        cmocka_unit_test(closest_against_sampling),
+        cmocka_unit_test(closest_near_the_surface),
+        cmocka_unit_test(own_side_from_any_start),
+        cmocka_unit_test(nearest_from_a_top_of_the_field),
     };
     return cmocka_run_group_tests_name("blobby", tests, NULL, NULL);
 }

@@ -358,7 +358,8 @@ static void no_jump_between_cells(void **state)
             double s = 5 + 0.003 * k, angle = 1.57 * way;
             int i = (int)s;
             Vec3 c = vec3_mix(t->center[i], t->center[i + 1], s - i), d = vec3_unit(vec3_sub(t->center[i + 1], t->center[i]));
-            Vec3 e1 = vec3_normal_to(vec3(0, 0, 1)), e2 = vec3_unit(vec3_cross(d, e1)), out = vec3_add(vec3_scale(vec3_cross(e2, d), cos(angle)), vec3_scale(e2, sin(angle)));
+            Vec3 e1 = vec3_normal_to(vec3(0, 0, 1)), e2 = vec3_unit(vec3_cross(d, e1)),
+                 out = vec3_add(vec3_scale(vec3_cross(e2, d), cos(angle)), vec3_scale(e2, sin(angle)));
             Vec3 x = vec3_add_scaled(c, 0.85, out);
             VesselHit hit;
             vessel_query(v, 1, &x, 5, &memory, &hit);
@@ -391,8 +392,9 @@ static void kissing_vessels_keep_apart(void **state)
     for (int i = 0; i < ALL + 2 * OVER; i++) {
         int k = i - OVER;
         double angle = PI * (k - ARM) / BEND;
-        line[i] = k < ARM ? vec3(spacing * (k - ARM), 0, 0)
-                  : k < ARM + BEND ? vec3(r * sin(angle), r - r * cos(angle), 0) : vec3(-spacing * (k - ARM - BEND), 2 * r, 0);
+        line[i] = k < ARM          ? vec3(spacing * (k - ARM), 0, 0)
+                  : k < ARM + BEND ? vec3(r * sin(angle), r - r * cos(angle), 0)
+                                   : vec3(-spacing * (k - ARM - BEND), 2 * r, 0);
     }
     VesselTree *t = field_tree_along(line, ALL, OVER, 2, 0, 1);
     Vessel *v = make(t, 0);
@@ -936,12 +938,25 @@ static void no_wall_is_nearer(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_blob_is_a_sphere), cmocka_unit_test(row_becomes_a_tube), cmocka_unit_test(walks_against_twin),
-        cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(alone_as_in_company), cmocka_unit_test(derivatives_of_the_gap),
-        cmocka_unit_test(no_jump_between_cells), cmocka_unit_test(kissing_vessels_keep_apart), cmocka_unit_test(inlet_is_open),
-        cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(nowhere_is_survived), cmocka_unit_test(far_is_far),
-        cmocka_unit_test(copies_repeat_and_heap_rests), cmocka_unit_test(crowded_places), cmocka_unit_test(rough_walls_are_met), cmocka_unit_test(no_wall_where_a_field_ends), cmocka_unit_test(contradiction_is_told),
-        cmocka_unit_test(cleft_behind_the_wall), cmocka_unit_test(no_wall_is_nearer),
+        cmocka_unit_test(one_blob_is_a_sphere),
+        cmocka_unit_test(row_becomes_a_tube),
+        cmocka_unit_test(walks_against_twin),
+        cmocka_unit_test(same_bits_on_every_isa),
+        cmocka_unit_test(alone_as_in_company),
+        cmocka_unit_test(derivatives_of_the_gap),
+        cmocka_unit_test(no_jump_between_cells),
+        cmocka_unit_test(kissing_vessels_keep_apart),
+        cmocka_unit_test(inlet_is_open),
+        cmocka_unit_test(moved_and_mirrored_scenes),
+        cmocka_unit_test(nowhere_is_survived),
+        cmocka_unit_test(far_is_far),
+        cmocka_unit_test(copies_repeat_and_heap_rests),
+        cmocka_unit_test(crowded_places),
+        cmocka_unit_test(rough_walls_are_met),
+        cmocka_unit_test(no_wall_where_a_field_ends),
+        cmocka_unit_test(contradiction_is_told),
+        cmocka_unit_test(cleft_behind_the_wall),
+        cmocka_unit_test(no_wall_is_nearer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -328,8 +328,14 @@ static void cost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(converges), cmocka_unit_test(turned_and_scaled), cmocka_unit_test(sides_are_right), cmocka_unit_test(open_ends),
-        cmocka_unit_test(memory_changes_nothing), cmocka_unit_test(kissing_legs), cmocka_unit_test(bad_options), cmocka_unit_test(cost),
+        cmocka_unit_test(converges),
+        cmocka_unit_test(turned_and_scaled),
+        cmocka_unit_test(sides_are_right),
+        cmocka_unit_test(open_ends),
+        cmocka_unit_test(memory_changes_nothing),
+        cmocka_unit_test(kissing_legs),
+        cmocka_unit_test(bad_options),
+        cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("grid_vessel", tests, NULL, NULL);
 }

@@ -250,8 +250,12 @@ static void cost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(table), cmocka_unit_test(sphere_converges), cmocka_unit_test(random_models_are_closed),
-        cmocka_unit_test(tree_joins_without_gap), cmocka_unit_test(what_cannot_be_meshed), cmocka_unit_test(cost),
+        cmocka_unit_test(table),
+        cmocka_unit_test(sphere_converges),
+        cmocka_unit_test(random_models_are_closed),
+        cmocka_unit_test(tree_joins_without_gap),
+        cmocka_unit_test(what_cannot_be_meshed),
+        cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("isosurface", tests, NULL, NULL);
 }

@@ -89,8 +89,7 @@ static void lanes_against_twin(void **state)
                 c = a;
                 kernels->hessian(&a, &lane, 1, 0.1);
                 kernels->gradient(&c, &lane, 1, 0.1);
-                double sum[10] = {a.f[lane], a.gx[lane], a.gy[lane], a.gz[lane], a.hxx[lane], a.hxy[lane], a.hxz[lane], a.hyy[lane], a.hyz[lane],
-                                  a.hzz[lane]};
+                double sum[10] = {a.f[lane], a.gx[lane], a.gy[lane], a.gz[lane], a.hxx[lane], a.hxy[lane], a.hxz[lane], a.hyy[lane], a.hyz[lane], a.hzz[lane]};
                 double twin[10] = {f, g.x, g.y, g.z, h.xx, h.xy, h.xz, h.yy, h.yz, h.zz};
                 assert_true(c.f[lane] == sum[0] && c.gx[lane] == sum[1] && c.gy[lane] == sum[2] && c.gz[lane] == sum[3]);
                 for (int e = 0; e < 10; e++)   // sums in another order: rounding of some tens of terms
@@ -713,8 +712,8 @@ static void near_the_axis(void **state)
         VesselTree *t = rough_tree(rough ? 0.02 : 0);
         int bad_axis, bad_wall;
         double axis = swing(t, 0, &bad_axis), wall = swing(t, 0.7, &bad_wall);
-        print_message("roughness %g: 40 points about the axis %.1f us, beside the wall %.1f us; bad answers %d and %d of 1200\n", rough ? 0.02 : 0, axis, wall, bad_axis,
-                      bad_wall);
+        print_message("roughness %g: 40 points about the axis %.1f us, beside the wall %.1f us; bad answers %d and %d of 1200\n", rough ? 0.02 : 0, axis, wall,
+                      bad_axis, bad_wall);
         assert_true(axis < 6 * wall);
         assert_int_equal(bad_axis, 0);
         assert_int_equal(bad_wall, 0);
@@ -803,12 +802,25 @@ static void cost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lanes_against_twin), cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(kernels_follow_the_level), cmocka_unit_test(one_blob_is_a_sphere),
-        cmocka_unit_test(gaps_against_slow_projection), cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(back_from_outside),
-        cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
-        cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer), cmocka_unit_test(clearance_holds_about_its_place),
-        cmocka_unit_test(far_is_far_in_a_taper), cmocka_unit_test(nearest_through_boxes), cmocka_unit_test(planes_against_walk),
-        cmocka_unit_test(near_the_axis), cmocka_unit_test(on_the_axis), cmocka_unit_test(cost),
+        cmocka_unit_test(lanes_against_twin),
+        cmocka_unit_test(same_bits_on_every_isa),
+        cmocka_unit_test(kernels_follow_the_level),
+        cmocka_unit_test(one_blob_is_a_sphere),
+        cmocka_unit_test(gaps_against_slow_projection),
+        cmocka_unit_test(derivatives_of_the_gap),
+        cmocka_unit_test(back_from_outside),
+        cmocka_unit_test(inlet_is_open),
+        cmocka_unit_test(moved_and_mirrored_scenes),
+        cmocka_unit_test(blend_has_no_jump),
+        cmocka_unit_test(nodes_without_blobs),
+        cmocka_unit_test(another_wall_comes_closer),
+        cmocka_unit_test(clearance_holds_about_its_place),
+        cmocka_unit_test(far_is_far_in_a_taper),
+        cmocka_unit_test(nearest_through_boxes),
+        cmocka_unit_test(planes_against_walk),
+        cmocka_unit_test(near_the_axis),
+        cmocka_unit_test(on_the_axis),
+        cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("lim_vessel", tests, NULL, NULL);
 }

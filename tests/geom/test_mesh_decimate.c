@@ -65,8 +65,9 @@ static void rims_get_lids(void **state)
     double section = 48 * sin(PI / 48) * cos(PI / 48) * radius * radius;
     assert_near(closure.volume / (section * (length + 10 * 0.5 + 5)), 1, 1e-3);
     for (int k = 0; k < 2; k++)
-        assert_near(fmin(vec3_norm(lids.middle[k]), vec3_distance(lids.middle[k], vec3_add_scaled(vec3(length + 10 * sin(0.5), 10 - 10 * cos(0.5), 0), 5,
-                                                                                                 vec3(cos(0.5), sin(0.5), 0)))), 0, 1e-9);
+        assert_near(fmin(vec3_norm(lids.middle[k]),
+                         vec3_distance(lids.middle[k], vec3_add_scaled(vec3(length + 10 * sin(0.5), 10 - 10 * cos(0.5), 0), 5, vec3(cos(0.5), sin(0.5), 0)))),
+                    0, 1e-9);
     mesh_lids_free(&lids);
     // a triangle that faces the other way is no rim
     int swapped = tube.triangle[100][1];
@@ -274,7 +275,7 @@ static void nothing_folds_flat(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(closed_surfaces_are_known), cmocka_unit_test(rims_get_lids),      cmocka_unit_test(spheres_keep_their_volume),
+        cmocka_unit_test(closed_surfaces_are_known),  cmocka_unit_test(rims_get_lids),      cmocka_unit_test(spheres_keep_their_volume),
         cmocka_unit_test(genus_parts_and_nodes_stay), cmocka_unit_test(thin_branches_stay), cmocka_unit_test(rims_and_limits_hold),
         cmocka_unit_test(nothing_folds_flat),
     };

@@ -111,8 +111,9 @@ static double true_gap(const TriangleMesh *m, Vec3 x)
 }
 
 enum { SHAPES = 8 };
-static const char *const shape_name[SHAPES] = {"sphere", "crumpled sphere", "torus", "thin triangles", "two spheres that nearly touch",
-                                               "crumpled, far from the origin", "two of 0.05 mm, 1000 mm apart", "slivers"};
+static const char *const shape_name[SHAPES] = {
+    "sphere", "crumpled sphere", "torus", "thin triangles", "two spheres that nearly touch", "crumpled, far from the origin", "two of 0.05 mm, 1000 mm apart",
+    "slivers"};
 
 static TriangleMesh shape_mesh(int shape)
 {
@@ -396,8 +397,9 @@ static Vec3 random_inside(int kind, uint64_t *seed)
 
 static Errors mean_errors(int kind, int fineness)
 {
-    TriangleMesh m = kind == 0 ? sphere_mesh(fineness) : kind == 1 ? torus_mesh(2, 0.5, 4 * fineness, fineness) :
-                     bent_tube_mesh(0.5, 0, 4, 1, 0, 0, 3.0 / fineness, fineness);
+    TriangleMesh m = kind == 0   ? sphere_mesh(fineness)
+                     : kind == 1 ? torus_mesh(2, 0.5, 4 * fineness, fineness)
+                                 : bent_tube_mesh(0.5, 0, 4, 1, 0, 0, 3.0 / fineness, fineness);
     Vessel *facets = vessel_of(&m, MESH_SEARCH_CACHED, MESH_FACES), *smooth = vessel_of(&m, MESH_SEARCH_CACHED, MESH_SMOOTH);
     Errors e = {0};
     uint64_t seed = 11;
@@ -766,14 +768,21 @@ static void without_embree_the_fault_says_so(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(agrees_with_brute_force), cmocka_unit_test(memory_changes_nothing),
-                                       cmocka_unit_test(far_points_are_bounded), cmocka_unit_test(sign_is_right_at_edges_and_corners),
-                                       cmocka_unit_test(derivatives_are_the_gaps), cmocka_unit_test(converges_to_exact_shapes),
-                                       cmocka_unit_test(moves_with_the_mesh), cmocka_unit_test(beyond_a_rim_there_is_no_wall),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(agrees_with_brute_force),
+                                       cmocka_unit_test(memory_changes_nothing),
+                                       cmocka_unit_test(far_points_are_bounded),
+                                       cmocka_unit_test(sign_is_right_at_edges_and_corners),
+                                       cmocka_unit_test(derivatives_are_the_gaps),
+                                       cmocka_unit_test(converges_to_exact_shapes),
+                                       cmocka_unit_test(moves_with_the_mesh),
+                                       cmocka_unit_test(beyond_a_rim_there_is_no_wall),
                                        cmocka_unit_test(a_funnel_is_no_inside_out),
-                                       cmocka_unit_test(points_that_are_none), cmocka_unit_test(points_on_the_mesh),
-                                       cmocka_unit_test(says_what_it_holds), cmocka_unit_test(every_instruction_set_gives_the_same_bits),
-                                       cmocka_unit_test(threads_do_not_disturb_each_other), cmocka_unit_test(bad_meshes_are_refused),
+                                       cmocka_unit_test(points_that_are_none),
+                                       cmocka_unit_test(points_on_the_mesh),
+                                       cmocka_unit_test(says_what_it_holds),
+                                       cmocka_unit_test(every_instruction_set_gives_the_same_bits),
+                                       cmocka_unit_test(threads_do_not_disturb_each_other),
+                                       cmocka_unit_test(bad_meshes_are_refused),
                                        cmocka_unit_test(without_embree_the_fault_says_so)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

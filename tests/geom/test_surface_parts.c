@@ -15,7 +15,8 @@
 #include "near.h"
 
 static FieldTree tree_room;
-static const Mat3 TURNS[] = {{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}}, {{{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}}}};
+static const Mat3 TURNS[] = {
+    {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}}, {{{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}}}};
 enum { TURN_COUNT = sizeof TURNS / sizeof TURNS[0] };
 
 static FieldTree *fresh(void)

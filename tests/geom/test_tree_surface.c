@@ -102,7 +102,8 @@ static void an_open_tube_is_no_speck(void **state)
     enum { BALLS = 80 };
     Faults faults = {0};
     TubePiece line = {40, 0, 0, 0};
-    Vessel *tube = tube_vessel_create(&(TubeOptions){.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 1, .piece_count = 1, .piece = &line}, "test", &faults);
+    Vessel *tube =
+        tube_vessel_create(&(TubeOptions){.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 1, .piece_count = 1, .piece = &line}, "test", &faults);
     Vec3 center[BALLS];
     double reach[BALLS];
     assert_non_null(tube);
@@ -292,8 +293,12 @@ static void vertices_know_their_data(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(edges_are_counted),  cmocka_unit_test(specks_are_dropped), cmocka_unit_test(an_open_tube_is_no_speck), cmocka_unit_test(the_inlet_opens),
-        cmocka_unit_test(what_is_not_an_inlet_stays_closed), cmocka_unit_test(vertices_know_their_data),
+        cmocka_unit_test(edges_are_counted),
+        cmocka_unit_test(specks_are_dropped),
+        cmocka_unit_test(an_open_tube_is_no_speck),
+        cmocka_unit_test(the_inlet_opens),
+        cmocka_unit_test(what_is_not_an_inlet_stays_closed),
+        cmocka_unit_test(vertices_know_their_data),
     };
     return cmocka_run_group_tests_name("tree_surface", tests, NULL, NULL);
 }

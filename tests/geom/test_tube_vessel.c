@@ -88,10 +88,7 @@ static void distance_to_the_centreline(void **state)
 }
 
 // The curvature jumps where line and arc meet and where a corner's sphere begins; a difference across such a plane says nothing.
-static bool same_kind(const VesselHit *a, const VesselHit *b)
-{
-    return a->node == b->node && fabs(sym3_trace(&a->hessian) - sym3_trace(&b->hessian)) < 1e-2;
-}
+static bool same_kind(const VesselHit *a, const VesselHit *b) { return a->node == b->node && fabs(sym3_trace(&a->hessian) - sym3_trace(&b->hessian)) < 1e-2; }
 
 static int skipped;
 static void check_derivatives(const Vessel *v, Vec3 x)
@@ -412,9 +409,15 @@ static void bad_tubes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distance_to_the_centreline), cmocka_unit_test(derivatives), cmocka_unit_test(curvatures),
-        cmocka_unit_test(ends), cmocka_unit_test(ends_are_smooth), cmocka_unit_test(rigid_motion_and_mirror), cmocka_unit_test(coils_that_coincide),
-        cmocka_unit_test(turns_that_nearly_touch), cmocka_unit_test(strange_tubes),
+        cmocka_unit_test(distance_to_the_centreline),
+        cmocka_unit_test(derivatives),
+        cmocka_unit_test(curvatures),
+        cmocka_unit_test(ends),
+        cmocka_unit_test(ends_are_smooth),
+        cmocka_unit_test(rigid_motion_and_mirror),
+        cmocka_unit_test(coils_that_coincide),
+        cmocka_unit_test(turns_that_nearly_touch),
+        cmocka_unit_test(strange_tubes),
         cmocka_unit_test(bad_tubes),
     };
     return cmocka_run_group_tests_name("tube_vessel", tests, NULL, NULL);

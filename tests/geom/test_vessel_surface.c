@@ -86,8 +86,13 @@ static TriangleMesh *mesh_of(const Tube *tube, double cell)
 static TubeOptions hook(TubePiece piece[3], Vec3 direction, Vec3 normal, bool closed, double scale)
 {
     memcpy(piece, (TubePiece[3]){{3 * scale, 0, 0, 0}, {0, 3 * scale, 2, 0}, {2 * scale, 0, 0, 0}}, 3 * sizeof *piece);
-    return (TubeOptions){.start = vec3_scale(vec3(0.11, -0.23, 0.37), scale), .direction = direction, .normal = normal, .radius = scale,
-                         .piece_count = 3, .piece = piece, .closed_ends = closed};
+    return (TubeOptions){.start = vec3_scale(vec3(0.11, -0.23, 0.37), scale),
+                         .direction = direction,
+                         .normal = normal,
+                         .radius = scale,
+                         .piece_count = 3,
+                         .piece = piece,
+                         .closed_ends = closed};
 }
 
 // --- What a mesh must be ---
@@ -448,8 +453,8 @@ static void thin_beside_wide_is_whole(void **state)
     (void)state;
     const int from[3] = {0, 1, 2};
     for (int swapped = 0; swapped < 2; swapped++) {
-        Balls balls = {.vessel = {.query = balls_query, .locate = balls_locate}, .count = 3, .center = {{0, 0, 0}, {0, 3.2, 0}, {0, 0, 20}},
-                       .radius = {2.5, 0.5, 1}};
+        Balls balls = {
+            .vessel = {.query = balls_query, .locate = balls_locate}, .count = 3, .center = {{0, 0, 0}, {0, 3.2, 0}, {0, 0, 20}}, .radius = {2.5, 0.5, 1}};
         if (swapped) {
             balls.center[0] = vec3(0, 3.2, 0), balls.radius[0] = 0.5;
             balls.center[1] = vec3(0, 0, 0), balls.radius[1] = 2.5;
@@ -505,8 +510,8 @@ static void kissing_legs_stay_apart(void **state)
 {
     (void)state;
     TubePiece piece[3] = {{4, 0, 0, 0}, {0, 1.1, PI, 0}, {4, 0, 0, 0}};
-    TubeOptions o = {.start = {0.1, 0.2, 0.3}, .direction = {0.3, 1, 0.2}, .normal = {1, 0, 0.4}, .radius = 1, .piece_count = 3, .piece = piece,
-                     .closed_ends = true};
+    TubeOptions o = {
+        .start = {0.1, 0.2, 0.3}, .direction = {0.3, 1, 0.2}, .normal = {1, 0, 0.4}, .radius = 1, .piece_count = 3, .piece = piece, .closed_ends = true};
     Tube *tube = make_tube(&o);
     TriangleMesh *mesh = mesh_of(tube, 0.1);
     check_closed(mesh, 1);
@@ -699,11 +704,20 @@ static void cost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tubes_converge), cmocka_unit_test(turned_tubes_are_the_same), cmocka_unit_test(scale_is_no_matter),
-        cmocka_unit_test(open_ends_have_rims), cmocka_unit_test(refinement_converges), cmocka_unit_test(fine_meshes_survive_floats),
-        cmocka_unit_test(thin_beside_wide_is_whole), cmocka_unit_test(thin_walls_stay_whole), cmocka_unit_test(kissing_legs_stay_apart),
-        cmocka_unit_test(model_has_one_rim), cmocka_unit_test(steps_are_closed), cmocka_unit_test(ragged_cover_has_clean_rims),
-        cmocka_unit_test(bad_input), cmocka_unit_test(cost),
+        cmocka_unit_test(tubes_converge),
+        cmocka_unit_test(turned_tubes_are_the_same),
+        cmocka_unit_test(scale_is_no_matter),
+        cmocka_unit_test(open_ends_have_rims),
+        cmocka_unit_test(refinement_converges),
+        cmocka_unit_test(fine_meshes_survive_floats),
+        cmocka_unit_test(thin_beside_wide_is_whole),
+        cmocka_unit_test(thin_walls_stay_whole),
+        cmocka_unit_test(kissing_legs_stay_apart),
+        cmocka_unit_test(model_has_one_rim),
+        cmocka_unit_test(steps_are_closed),
+        cmocka_unit_test(ragged_cover_has_clean_rims),
+        cmocka_unit_test(bad_input),
+        cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("vessel_surface", tests, NULL, NULL);
 }

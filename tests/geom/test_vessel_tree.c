@@ -107,12 +107,12 @@ static void rules(void **state)
     VesselTree *t = forked_tree();
     faults_clear(&faults);
     assert_true(vessel_tree_validate(t, "m.h5", &faults) && faults.count == 0);
-#define BREAK(place, value, words)                                                                                                          \
-    do {                                                                                                                                    \
-        __typeof__(place) kept = place;                                                                                                     \
-        place = value;                                                                                                                      \
-        expect_fault(t, words);                                                                                                             \
-        place = kept;                                                                                                                       \
+#define BREAK(place, value, words)                                                                                                                             \
+    do {                                                                                                                                                       \
+        __typeof__(place) kept = place;                                                                                                                        \
+        place = value;                                                                                                                                         \
+        expect_fault(t, words);                                                                                                                                \
+        place = kept;                                                                                                                                          \
     } while (0)
     BREAK(t->center[5].y, NAN, "nodes/center[5]");
     BREAK(t->radius[7], 0, "nodes/radius[7]");
@@ -308,8 +308,13 @@ static void near_is_complete_and_mutual(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(create_guards),    cmocka_unit_test(neighbours),       cmocka_unit_test(rules),
-        cmocka_unit_test(nearest_by_power), cmocka_unit_test(kissing_branches), cmocka_unit_test(wide_sac), cmocka_unit_test(near_is_complete_and_mutual),
+        cmocka_unit_test(create_guards),
+        cmocka_unit_test(neighbours),
+        cmocka_unit_test(rules),
+        cmocka_unit_test(nearest_by_power),
+        cmocka_unit_test(kissing_branches),
+        cmocka_unit_test(wide_sac),
+        cmocka_unit_test(near_is_complete_and_mutual),
         cmocka_unit_test(half_space),
     };
     return cmocka_run_group_tests_name("vessel_tree", tests, NULL, NULL);

@@ -173,8 +173,15 @@ static inline HidTransport fake_transport(FakeHid *hid)
     pthread_mutex_init(&hid->lock, NULL);
     pthread_cond_init(&hid->changed, &attributes);
     pthread_condattr_destroy(&attributes);
-    return (HidTransport){.context = hid, .list = fake_list, .open = fake_open, .descriptor = fake_descriptor, .read = fake_read, .write = fake_write,
-                          .send_feature = fake_send_feature, .get_feature = fake_get_feature, .close = fake_close};
+    return (HidTransport){.context = hid,
+                          .list = fake_list,
+                          .open = fake_open,
+                          .descriptor = fake_descriptor,
+                          .read = fake_read,
+                          .write = fake_write,
+                          .send_feature = fake_send_feature,
+                          .get_feature = fake_get_feature,
+                          .close = fake_close};
 }
 
 // Plugs device `index` in; its usages are taken from `usage` alone.

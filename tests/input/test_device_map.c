@@ -115,7 +115,8 @@ static void what_does_not_fit_together_is_said(void **state)
     expect_fault(HID "tool: [wire]\npush: {source: X, mm_s: 2}\n", "tool");
     expect_fault(HID "pedal: {source: button_1, tool: wire}\n", "tool");
     expect_fault(HID "push: [{source: X, mm_s: 2, tool: 1}, {source: Y, mm_s: 2, tool: 2}, {source: Z, mm_s: 2, tool: 3}, {source: Rx, mm_s: 2, tool: 4},"
-                     " {source: Ry, mm_s: 2, tool: wire}]\n", "one tool too many");
+                     " {source: Ry, mm_s: 2, tool: wire}]\n",
+                 "one tool too many");
 }
 
 static const ToolNames three = {.count = 3, .name = {"guide", "micro", "thread"}, .kind = {"catheter", "catheter", "wire"}};
@@ -127,9 +128,9 @@ static void tools_are_found_in_the_scene(void **state)
     static const struct {
         const char *tool;
         int drives;
-    } good[] = {{"chosen", DRIVES_CHOSEN},      {"outer", DRIVES_OUTER},           {"inner", DRIVES_INNER},  {"outermost", DRIVES_TOOL}, {"innermost", DRIVES_TOOL + 2},
-                {"1", DRIVES_TOOL},             {"3", DRIVES_TOOL + 2},            {"guide", DRIVES_TOOL},   {"micro", DRIVES_TOOL + 1}, {"thread", DRIVES_TOOL + 2},
-                {"wire", DRIVES_TOOL + 2}};
+    } good[] = {{"chosen", DRIVES_CHOSEN},      {"outer", DRIVES_OUTER},     {"inner", DRIVES_INNER},  {"outermost", DRIVES_TOOL},
+                {"innermost", DRIVES_TOOL + 2}, {"1", DRIVES_TOOL},          {"3", DRIVES_TOOL + 2},   {"guide", DRIVES_TOOL},
+                {"micro", DRIVES_TOOL + 1},     {"thread", DRIVES_TOOL + 2}, {"wire", DRIVES_TOOL + 2}};
     char text[300];
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
         snprintf(text, sizeof text, HID "tool: %s\npush: {source: X, mm_s: 2}\n", good[i].tool);
@@ -141,7 +142,9 @@ static void tools_are_found_in_the_scene(void **state)
     }
     static const struct {
         const char *tool, *said;
-    } bad[] = {{"4", "the scene has no such tool; write guide, micro, thread, outermost"}, {"microcatheter", "no such tool"}, {"catheter", "2 of that kind; choose one: guide, micro, thread"}};
+    } bad[] = {{"4", "the scene has no such tool; write guide, micro, thread, outermost"},
+               {"microcatheter", "no such tool"},
+               {"catheter", "2 of that kind; choose one: guide, micro, thread"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         snprintf(text, sizeof text, HID "twist: {source: X, deg_s: 2, tool: %s}\n", bad[i].tool);
         DeviceMap *map = must_parse(text);

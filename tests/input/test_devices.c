@@ -70,8 +70,8 @@ static void wrong_use_and_wrong_maps_are_told(void **state)
     assert_non_null(strstr(said, ":3:"));
     assert_null(strstr(said, "HID devices"));
     unlink(path);
-    static const char *const wrong[] = {"--nothing", "file.yaml", "--map", "--map /nowhere.yaml", "--duration-s 3", "--watch --duration-s -1",
-                                        "--json /nowhere/f.json"};
+    static const char *const wrong[] = {
+        "--nothing", "file.yaml", "--map", "--map /nowhere.yaml", "--duration-s 3", "--watch --duration-s -1", "--json /nowhere/f.json"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
         if (run(wrong[i], said, sizeof said) != 2 || !said[0])
             fail_msg("devices %s said '%s'", wrong[i], said);
@@ -90,8 +90,8 @@ static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **stat
     HidTransport transport = fake_transport(hid);
     size_t length = hid_bytes(sidewinder_2, bytes);
     fake_plug(hid, 0, 0x045e, 0x001b, "", HID_USAGE(1, 4), bytes, (int)length);
-    HidListing listing = {.info = hid->device[0].info, .descriptor = hid_descriptor_parse(bytes, length, "stick", &faults),
-                          .map = device_map_built_in(BUILT_IN_HID_HAPTIC)};
+    HidListing listing = {
+        .info = hid->device[0].info, .descriptor = hid_descriptor_parse(bytes, length, "stick", &faults), .map = device_map_built_in(BUILT_IN_HID_HAPTIC)};
     fake_report(hid, 0, (const uint8_t[]){1, 0, 0, 0xf0, 1, 0, 0, 0x8f, 0}, 9);      // Y at 496, hat released
     fake_report(hid, 0, (const uint8_t[]){1, 0, 0}, 3);                              // short
     fake_report(hid, 0, (const uint8_t[]){1, 0xff, 1, 0, 0xfe, 0, 0, 0x8f, 1}, 9);   // X at 511, Y at -512, button 1
@@ -108,8 +108,7 @@ static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **stat
     close(kept);
     unlink(path);
     assert_true(watched && !none);
-    static const char *const words[] = {"2 reports, 1 that the descriptor does not describe", "logical_min -512, logical_max 496 so far",
-                                        "twist 240.0 deg/s",
+    static const char *const words[] = {"2 reports, 1 that the descriptor does not describe", "logical_min -512, logical_max 496 so far", "twist 240.0 deg/s",
                                         "push 40.00 mm/s", ", pedal"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (!strstr(said, words[i]))

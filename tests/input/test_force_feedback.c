@@ -75,7 +75,16 @@ static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
     assert_false(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1}, 3));
     // index, constant, half a second, two intervals, gain, no trigger, axes and direction enable, directions, delay
     assert_true(pid_encode_effect(&layout, 7, 90, &message));
-    expect_bytes(&message, HID_OUTPUT, "010701" "f401" "0000" "0000" "ff" "ff" "04" "4000" "0000");
+    expect_bytes(&message, HID_OUTPUT,
+                 "010701"
+                 "f401"
+                 "0000"
+                 "0000"
+                 "ff"
+                 "ff"
+                 "04"
+                 "4000"
+                 "0000");
     assert_int_equal(pid_duration_ms(&layout), 500);
     assert_true(pid_encode_force(&layout, 7, -1, &message, &value));
     expect_bytes(&message, HID_OUTPUT, "050701ff");
@@ -93,8 +102,9 @@ static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
 static void what_has_no_constant_force_says_so(void **state)
 {
     (void)state;
-    static const struct { const char *hex, *words; } cases[] = {{xbox_one_s, "no constant force effect"}, {dualshock_4, "no force feedback"},
-                                                                 {boot_mouse, "no force feedback"}};
+    static const struct {
+        const char *hex, *words;
+    } cases[] = {{xbox_one_s, "no constant force effect"}, {dualshock_4, "no force feedback"}, {boot_mouse, "no force feedback"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         HidDescriptor *device = descriptor_of(cases[i].hex);
         PidLayout layout;
@@ -108,8 +118,11 @@ static void what_has_no_constant_force_says_so(void **state)
 static void the_reaction_comes_from_where_the_stick_goes(void **state)
 {
     (void)state;
-    static const struct { const char *push; double deg; } cases[] = {{"{source: X, mm_s: 1}", 90}, {"{source: X, mm_s: 1, invert: true}", 270},
-                                                                     {"{source: Y, mm_s: 1}", 180}, {"{source: Y, mm_s: 1, invert: true}", 0}};
+    static const struct {
+        const char *push;
+        double deg;
+    } cases[] = {
+        {"{source: X, mm_s: 1}", 90}, {"{source: X, mm_s: 1, invert: true}", 270}, {"{source: Y, mm_s: 1}", 180}, {"{source: Y, mm_s: 1, invert: true}", 0}};
     char text[200];
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         snprintf(text, sizeof text, "seldinger_device: 1\ndevice: {usage: joystick}\npush: %s\n", cases[i].push);
@@ -206,13 +219,13 @@ static void a_late_tick_does_not_jump(void **state)
 
 // --- with the threads and a device that is only there in fake_hid.h ---
 
-#define wait_for(condition) \
-    do { \
-        int64_t until_ = fake_now_us() + 10000000; \
-        while (!(condition) && fake_now_us() < until_) \
-            fake_sleep_us(200); \
-        if (!(condition)) \
-            fail_msg("never: %s", #condition); \
+#define wait_for(condition)                                                                                                                                    \
+    do {                                                                                                                                                       \
+        int64_t until_ = fake_now_us() + 10000000;                                                                                                             \
+        while (!(condition) && fake_now_us() < until_)                                                                                                         \
+            fake_sleep_us(200);                                                                                                                                \
+        if (!(condition))                                                                                                                                      \
+            fail_msg("never: %s", #condition);                                                                                                                 \
     } while (0)
 
 // The magnitude in the last Set Constant Force report; 0 if none was sent. *when: the time of it.
@@ -321,9 +334,12 @@ static void two_sticks_feel_a_tool_each(void **state)
     HandsOptions options = hands_default_options();
     static const char force[] = "force: {full_scale_n: 8, max_n: 4, stall_ms: 1000, quiet_ms: 10000}\n";
     char text[2][400];
-    snprintf(text[0], sizeof text[0], "seldinger_device: 1\ndevice: {usage: joystick, serial: A}\ntool: wire\npush: {source: Y, mm_s: 40, invert: true}\n%s", force);
-    snprintf(text[1], sizeof text[1], "seldinger_device: 1\ndevice: {usage: joystick, serial: B}\npush: {source: Y, mm_s: 40, invert: true, tool: guide}\n"
-             "twist: {source: X, deg_s: 90, tool: wire}\n%s", force);
+    snprintf(text[0], sizeof text[0], "seldinger_device: 1\ndevice: {usage: joystick, serial: A}\ntool: wire\npush: {source: Y, mm_s: 40, invert: true}\n%s",
+             force);
+    snprintf(text[1], sizeof text[1],
+             "seldinger_device: 1\ndevice: {usage: joystick, serial: B}\npush: {source: Y, mm_s: 40, invert: true, tool: guide}\n"
+             "twist: {source: X, deg_s: 90, tool: wire}\n%s",
+             force);
     DeviceMap *map[2] = {map_of(text[0]), map_of(text[1])};
     faults_clear(&faults);
     for (int i = 0; i < 2; i++)

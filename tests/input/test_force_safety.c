@@ -58,10 +58,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-static bool start(Bench *bench)
-{
-    return force_start(&bench->force, bench->map, bench->stick, &bench->transport, &bench->device, bench->device.now_us);
-}
+static bool start(Bench *bench) { return force_start(&bench->force, bench->map, bench->stick, &bench->transport, &bench->device, bench->device.now_us); }
 
 // One millisecond later the force is updated; the simulation advances by default.
 static void tick(Bench *bench, double force_n, bool steps)
@@ -286,10 +283,22 @@ static const char *with(const char *from, const char *to)
 static void an_effect_that_would_not_end_is_refused(void **state)
 {
     Bench *bench = *state;
-    static const struct { const char *what, *from, *to, *words; } cases[] = {
+    static const struct {
+        const char *what, *from, *to, *words;
+    } cases[] = {
         {"no duration", "0950095409511500", "0955095409511500", "no duration"},
-        {"ten seconds at least", "0950095409511500" "26ff7f350046ff7f57fdffffff", "0950095409511500" "26ff7f350046ff7f5701000000", "end by themselves"},
-        {"a millisecond at most", "0950095409511500" "26ff7f350046ff7f57fdffffff", "0950095409511500" "26ffff350046ff7f57f8ffffff", "end by themselves"},
+        {"ten seconds at least",
+         "0950095409511500"
+         "26ff7f350046ff7f57fdffffff",
+         "0950095409511500"
+         "26ff7f350046ff7f5701000000",
+         "end by themselves"},
+        {"a millisecond at most",
+         "0950095409511500"
+         "26ff7f350046ff7f57fdffffff",
+         "0950095409511500"
+         "26ffff350046ff7f57f8ffffff",
+         "end by themselves"},
         {"forces from 1 on", "09701601ff26ff00", "097016010026ff00", "no zero"},
         {"forces to 32767 in 8 bits", "09701601ff26ff0036f0d84610277510", "097016018026ff7f36f0d84610277508", "does not fit"},
     };
@@ -312,7 +321,10 @@ static void the_longest_duration_is_not_endless(void **state)
     Bench *bench = *state;
     int effects = 0;
     free(bench->stick);
-    bench->stick = descriptor_with(bench, with("0950095409511500" "26ff7f350046ff7f57fdffffff", "0950095409511500" "26ffff350046ff7f57faffffff"));
+    bench->stick = descriptor_with(bench, with("0950095409511500"
+                                               "26ff7f350046ff7f57fdffffff",
+                                               "0950095409511500"
+                                               "26ffff350046ff7f57faffffff"));
     assert_true(start(bench));
     for (int i = 0; i < bench->device.log_count; i++) {
         const uint8_t *bytes = bench->device.log[i].bytes;
@@ -329,15 +341,9 @@ int main(void)
 {
 #define EACH(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
     const struct CMUnitTest tests[] = {
-        EACH(a_force_is_held_as_long_as_it_is_wanted),
-        EACH(after_a_pause_no_stale_force_is_played),
-        EACH(after_a_pause_force_grows_from_zero),
-        EACH(a_paused_session_stops_the_effects),
-        EACH(a_failed_write_leaves_no_force),
-        EACH(a_device_that_fails_now_and_then_never_jumps),
-        EACH(a_device_that_is_given_up_is_stopped_first),
-        EACH(what_is_no_number_is_no_force),
-        EACH(an_effect_that_would_not_end_is_refused),
+        EACH(a_force_is_held_as_long_as_it_is_wanted),    EACH(after_a_pause_no_stale_force_is_played), EACH(after_a_pause_force_grows_from_zero),
+        EACH(a_paused_session_stops_the_effects),         EACH(a_failed_write_leaves_no_force),         EACH(a_device_that_fails_now_and_then_never_jumps),
+        EACH(a_device_that_is_given_up_is_stopped_first), EACH(what_is_no_number_is_no_force),          EACH(an_effect_that_would_not_end_is_refused),
         EACH(the_longest_duration_is_not_endless),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

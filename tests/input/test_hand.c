@@ -15,11 +15,11 @@
 #include <stdlib.h>
 
 // X and Y from 0 to 255, four buttons
-static const uint8_t stick[] = {0x05, 1, 0x09, 4, 0xa1, 1, 0x15, 0, 0x26, 0xff, 0, 0x75, 8, 0x95, 2, 0x09, 0x30, 0x09, 0x31, 0x81, 2,
-                                0x05, 9, 0x19, 1, 0x29, 4, 0x25, 1, 0x75, 1, 0x95, 4, 0x81, 2, 0x95, 4, 0x81, 1, 0xc0};
+static const uint8_t stick[] = {0x05, 1,    0x09, 4,    0xa1, 1,    0x15, 0,    0x26, 0xff, 0, 0x75, 8, 0x95, 2, 0x09, 0x30, 0x09, 0x31, 0x81,
+                                2,    0x05, 9,    0x19, 1,    0x29, 4,    0x25, 1,    0x75, 1, 0x95, 4, 0x81, 2, 0x95, 4,    0x81, 1,    0xc0};
 // relative X and Y of 16 bits and an absolute counter of 16 bits (dial)
-static const uint8_t roller[] = {0x05, 1, 0x09, 2, 0xa1, 1, 0x16, 0x01, 0x80, 0x26, 0xff, 0x7f, 0x75, 16, 0x95, 2, 0x09, 0x30, 0x09, 0x31, 0x81, 6,
-                                 0x15, 0, 0x27, 0xff, 0xff, 0, 0, 0x95, 1, 0x09, 0x37, 0x81, 2, 0xc0};
+static const uint8_t roller[] = {0x05, 1,    0x09, 2, 0xa1, 1, 0x16, 0x01, 0x80, 0x26, 0xff, 0x7f, 0x75, 16,   0x95, 2,    0x09, 0x30,
+                                 0x09, 0x31, 0x81, 6, 0x15, 0, 0x27, 0xff, 0xff, 0,    0,    0x95, 1,    0x09, 0x37, 0x81, 2,    0xc0};
 static const uint8_t lying[] = {0x05, 1, 0x09, 4, 0xa1, 1, 0x15, 10, 0x25, 5, 0x75, 8, 0x95, 2, 0x09, 0x30, 0x09, 0x31, 0x81, 2, 0xc0};
 
 typedef struct Session {
@@ -71,13 +71,13 @@ static bool heard(Session *session, const char *words)
 }
 
 // Waits until something is so, at most 10 s.
-#define wait_for(condition) \
-    do { \
-        int64_t until_ = fake_now_us() + 10000000; \
-        while (!(condition) && fake_now_us() < until_) \
-            fake_sleep_us(1000); \
-        if (!(condition)) \
-            fail_msg("never: %s", #condition); \
+#define wait_for(condition)                                                                                                                                    \
+    do {                                                                                                                                                       \
+        int64_t until_ = fake_now_us() + 10000000;                                                                                                             \
+        while (!(condition) && fake_now_us() < until_)                                                                                                         \
+            fake_sleep_us(1000);                                                                                                                               \
+        if (!(condition))                                                                                                                                      \
+            fail_msg("never: %s", #condition);                                                                                                                 \
     } while (0)
 
 static bool near(double a, double b) { return fabs(a - b) < 1e-9; }

@@ -114,7 +114,11 @@ static void globals_are_pushed_and_popped(void **state)
 {
     (void)state;
     // X of 8 bits; push; Y of 16 bits; pop; Z of 8 bits again
-    HidDescriptor *d = parse_hex("05010904a101150025647508950109308102" "a4" "26e803751009318102" "b4" "09328102c0");
+    HidDescriptor *d = parse_hex("05010904a101150025647508950109308102"
+                                 "a4"
+                                 "26e803751009318102"
+                                 "b4"
+                                 "09328102c0");
     assert_non_null(d);
     expect_field(d, "X", 0, 0, 0, 8, 0, 100);
     expect_field(d, "Y", 0, 0, 8, 16, 0, 1000);
@@ -126,7 +130,11 @@ static void usages_are_given_out_in_order_and_the_last_stays(void **state)
 {
     (void)state;
     // X, then the range Y to Rx, for 6 controls: X Y Z Rx Rx Rx; a full usage overrides the page
-    HidDescriptor *d = parse_hex("05010904a10115002501750895060930" "19312933" "81029501" "0b34000100" "8102c0");
+    HidDescriptor *d = parse_hex("05010904a10115002501750895060930"
+                                 "19312933"
+                                 "81029501"
+                                 "0b34000100"
+                                 "8102c0");
     assert_non_null(d);
     expect_field(d, "Z", 0, 0, 16, 8, 0, 1);
     expect_field(d, "Rx", 0, 0, 24, 8, 0, 1);
@@ -140,7 +148,12 @@ static void usages_are_given_out_in_order_and_the_last_stays(void **state)
 static void delimiters_long_items_and_padding_are_passed(void **state)
 {
     (void)state;
-    HidDescriptor *d = parse_hex("05010904a101" "fe02f0aabb" "1500257f75089501" "a9010930093ba900" "8102c0" "0000");
+    HidDescriptor *d = parse_hex("05010904a101"
+                                 "fe02f0aabb"
+                                 "1500257f75089501"
+                                 "a9010930093ba900"
+                                 "8102c0"
+                                 "0000");
     assert_non_null(d);
     expect_field(d, "X", 0, 0, 0, 8, 0, 127);    // the first of the set
     assert_int_equal(d->field_count, 1);
@@ -150,7 +163,9 @@ static void delimiters_long_items_and_padding_are_passed(void **state)
 static void ends_of_ranges_have_the_sign_of_the_minimum(void **state)
 {
     (void)state;
-    HidDescriptor *d = parse_hex("05010904a101150025ff750895010930810215802500093181021500" "27ffffffff7520" "09328102c0");
+    HidDescriptor *d = parse_hex("05010904a101150025ff750895010930810215802500093181021500"
+                                 "27ffffffff7520"
+                                 "09328102c0");
     assert_non_null(d);
     expect_field(d, "X", 0, 0, 0, 8, 0, 255);
     expect_field(d, "Y", 0, 0, 8, 8, -128, 0);
@@ -162,7 +177,9 @@ static void ends_of_ranges_have_the_sign_of_the_minimum(void **state)
 static void lies_are_refused_with_the_reason(void **state)
 {
     (void)state;
-    static const struct { const char *hex, *words; } cases[] = {
+    static const struct {
+        const char *hex, *words;
+    } cases[] = {
         {"", "0 bytes"},
         {"0501", "no field"},
         {"05010904a1", "truncated"},

@@ -157,7 +157,8 @@ static void one_injector_goes_through_one_tool(void **state)
 {
     (void)state;
     const ToolNames tools = {.count = 3, .name = {"guide", "micro", "wire"}};
-    static const char named[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,0\n1,0,0.5\n2,0,0\n3,1,0\n", both[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,1\n1,51,0\n2,-1,0\n";
+    static const char named[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,0\n1,0,0.5\n2,0,0\n3,1,0\n",
+                      both[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,1\n1,51,0\n2,-1,0\n";
     int cursor = 0;
     Script *script = script_parse_tools(named, strlen(named), "s.csv", &tools, &faults);
     assert_non_null(script);
@@ -179,9 +180,14 @@ static void one_injector_goes_through_one_tool(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_hold_until_the_next),    cmocka_unit_test(every_millisecond_finds_its_row), cmocka_unit_test(each_fault_has_its_place),
-        cmocka_unit_test(all_faults_come_in_one_pass), cmocka_unit_test(a_file_that_is_none_is_said),     cmocka_unit_test(numbers_are_decimal_and_finite),
-        cmocka_unit_test(a_hand_lets_go),              cmocka_unit_test(one_injector_goes_through_one_tool),
+        cmocka_unit_test(rows_hold_until_the_next),
+        cmocka_unit_test(every_millisecond_finds_its_row),
+        cmocka_unit_test(each_fault_has_its_place),
+        cmocka_unit_test(all_faults_come_in_one_pass),
+        cmocka_unit_test(a_file_that_is_none_is_said),
+        cmocka_unit_test(numbers_are_decimal_and_finite),
+        cmocka_unit_test(a_hand_lets_go),
+        cmocka_unit_test(one_injector_goes_through_one_tool),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

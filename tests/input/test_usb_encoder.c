@@ -19,8 +19,11 @@ static void baud_rates_are_coded_as_ftdi_says(void **state)
 {
     (void)state;
     // AN232B-05: divisors 10000, 5000, 2500, 1250, 625, 312.5, 156, 78, 52, 26, 13, 6.5 of 3 MHz, and the special cases 3 M, 2 M, 1 M
-    static const struct { int baud; uint32_t divisor; } cases[] = {{300, 10000}, {600, 5000}, {1200, 2500}, {2400, 1250}, {4800, 625}, {9600, 0x4138},
-                                                                   {115200, 26}, {230400, 13}, {460800, 0x4006}, {3000000, 0}, {2000000, 1}, {1000000, 3}};
+    static const struct {
+        int baud;
+        uint32_t divisor;
+    } cases[] = {{300, 10000}, {600, 5000},  {1200, 2500},     {2400, 1250}, {4800, 625},  {9600, 0x4138},
+                 {115200, 26}, {230400, 13}, {460800, 0x4006}, {3000000, 0}, {2000000, 1}, {1000000, 3}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         double actual;
         uint32_t divisor = ftdi_baud_divisor(cases[i].baud, &actual);
@@ -60,8 +63,8 @@ static bool line(const char *text, int64_t a, int64_t r)
 {
     EncoderLine out = {.count = {-1, -1}};
     bool good = encoder_parse_line(&serial, text, strlen(text), &out);
-    return good && (!out.fresh[0] || out.count[0] == a) && (!out.fresh[1] || out.count[1] == r) &&
-           out.fresh[0] == (a != INT64_MIN) && out.fresh[1] == (r != INT64_MIN);
+    return good && (!out.fresh[0] || out.count[0] == a) && (!out.fresh[1] || out.count[1] == r) && out.fresh[0] == (a != INT64_MIN) &&
+           out.fresh[1] == (r != INT64_MIN);
 }
 
 static void lines_are_counts_or_left_out(void **state)
@@ -149,8 +152,14 @@ static void noise_overlong_lines_and_errors_lose_only_themselves(void **state)
     // an overrun in the middle of a line: its rest is not a count
     FtdiStream stream = {0};
     taken = (Taken){0};
-    ftdi_stream_take(&stream, &serial, (const uint8_t *)"\x01\x60" "A12", 5, 64, take, &taken);
-    ftdi_stream_take(&stream, &serial, (const uint8_t *)"\x01\x62" "34\nA5\n", 8, 64, take, &taken);
+    ftdi_stream_take(&stream, &serial,
+                     (const uint8_t *)"\x01\x60"
+                                      "A12",
+                     5, 64, take, &taken);
+    ftdi_stream_take(&stream, &serial,
+                     (const uint8_t *)"\x01\x62"
+                                      "34\nA5\n",
+                     8, 64, take, &taken);
     assert_int_equal(taken.count, 1);
     assert_int_equal(taken.last[0], 5);
     assert_int_equal(stream.errors, 1);

@@ -15,14 +15,29 @@
 
 enum { LARGEST = 10000, AXIS = 32767 };   // of the joystick's descriptor
 
-typedef struct { double t; int value; } Entry;
-typedef struct { int count; Entry *entry; } Series;
-typedef struct { Series axis, force, sent; int faults; char first_fault[160]; double ended; } Log;   // times in s
+typedef struct {
+    double t;
+    int value;
+} Entry;
+typedef struct {
+    int count;
+    Entry *entry;
+} Series;
+typedef struct {
+    Series axis, force, sent;
+    int faults;
+    char first_fault[160];
+    double ended;
+} Log; // times in s
 
 static int wrong;
-#define CHECK(condition, ...)                                             \
-    do {                                                                  \
-        if (!(condition)) { printf("WRONG: " __VA_ARGS__); printf("\n"); wrong++; } \
+#define CHECK(condition, ...)                                                                                                                                  \
+    do {                                                                                                                                                       \
+        if (!(condition)) {                                                                                                                                    \
+            printf("WRONG: " __VA_ARGS__);                                                                                                                     \
+            printf("\n");                                                                                                                                      \
+            wrong++;                                                                                                                                           \
+        }                                                                                                                                                      \
     } while (0)
 
 static void append(Series *series, double t, int value)

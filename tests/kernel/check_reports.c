@@ -16,13 +16,23 @@
 
 enum { AXIS = 32767 };   // of the joystick's descriptor
 
-typedef struct { double t_ms; int axis; } Report;
-typedef struct { int64_t count, capacity, faults; Report *report; } Sent;
+typedef struct {
+    double t_ms;
+    int axis;
+} Report;
+typedef struct {
+    int64_t count, capacity, faults;
+    Report *report;
+} Sent;
 
 static int wrong;
-#define CHECK(condition, ...)                                             \
-    do {                                                                  \
-        if (!(condition)) { printf("WRONG: " __VA_ARGS__); printf("\n"); wrong++; } \
+#define CHECK(condition, ...)                                                                                                                                  \
+    do {                                                                                                                                                       \
+        if (!(condition)) {                                                                                                                                    \
+            printf("WRONG: " __VA_ARGS__);                                                                                                                     \
+            printf("\n");                                                                                                                                      \
+            wrong++;                                                                                                                                           \
+        }                                                                                                                                                      \
     } while (0)
 
 static bool read_log(const char *path, Sent *sent)
@@ -98,8 +108,9 @@ static void check(const RecordedRun *run, const Sent *sent, double mm_s, double 
     }
     for (int64_t k = 1; k < sent->count; k++)
         gap_ms = fmax(gap_ms, sent->report[k].t_ms - sent->report[k - 1].t_ms);
-    printf("reports: %" PRId64 " sent, %" PRId64 " received, %" PRId64 " lost; latest age %.1f ms in %" PRId64 " steps; longest gap %.1f ms as sent, %.0f ms as used, at most %"
-           PRId64 " in one step\n", sent->count, all, sent->count - all, latest_ms, aged, gap_ms, (double)(longest_still + 1) * run->step_ms, most_at_once);
+    printf("reports: %" PRId64 " sent, %" PRId64 " received, %" PRId64 " lost; latest age %.1f ms in %" PRId64
+           " steps; longest gap %.1f ms as sent, %.0f ms as used, at most %" PRId64 " in one step\n",
+           sent->count, all, sent->count - all, latest_ms, aged, gap_ms, (double)(longest_still + 1) * run->step_ms, most_at_once);
     CHECK(sent->count > 0 && all == sent->count, "%" PRId64 " reports were sent and %" PRId64 " taken", sent->count, all);
     CHECK(other == 0, "%" PRId64 " steps were told what no report says", other);
     CHECK(sent->faults == 0, "%" PRId64 " faults found by the device", sent->faults);

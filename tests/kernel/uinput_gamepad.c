@@ -10,14 +10,17 @@
 #include <unistd.h>
 
 static const int buttons[] = {BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_WEST, BTN_TL, BTN_TR, BTN_SELECT, BTN_START, BTN_MODE, BTN_THUMBL, BTN_THUMBR};
-static const struct { int code, least, most; } axes[] = {{ABS_X, -32768, 32767}, {ABS_Y, -32768, 32767}, {ABS_Z, 0, 255}, {ABS_RX, -32768, 32767},
-    {ABS_RY, -32768, 32767}, {ABS_RZ, 0, 255}, {ABS_HAT0X, -1, 1}, {ABS_HAT0Y, -1, 1}};
+static const struct {
+    int code, least, most;
+} axes[] = {{ABS_X, -32768, 32767},  {ABS_Y, -32768, 32767}, {ABS_Z, 0, 255},    {ABS_RX, -32768, 32767},
+            {ABS_RY, -32768, 32767}, {ABS_RZ, 0, 255},       {ABS_HAT0X, -1, 1}, {ABS_HAT0Y, -1, 1}};
 
 static bool plug(int fd)
 {
     struct uinput_setup setup = {.id = {.bustype = BUS_USB, .vendor = 0x045e, .product = 0x028e, .version = 0x0114}, .name = "Microsoft X-Box 360 pad"};
     bool good = ioctl(fd, UI_SET_EVBIT, EV_KEY) == 0 && ioctl(fd, UI_SET_EVBIT, EV_ABS) == 0;
-    for (size_t i = 0; i < sizeof buttons / sizeof buttons[0]; i++) good &= ioctl(fd, UI_SET_KEYBIT, buttons[i]) == 0;
+    for (size_t i = 0; i < sizeof buttons / sizeof buttons[0]; i++)
+        good &= ioctl(fd, UI_SET_KEYBIT, buttons[i]) == 0;
     for (size_t i = 0; i < sizeof axes / sizeof axes[0]; i++) {
         struct uinput_abs_setup axis = {.code = (__u16)axes[i].code, .absinfo = {.minimum = axes[i].least, .maximum = axes[i].most}};
         good &= ioctl(fd, UI_ABS_SETUP, &axis) == 0;

@@ -433,7 +433,8 @@ static void what_is_read_agrees(void **state)
     good(sel_simulator_contacts(simulator, NULL, 0, &few));
     assert_true(contacts == few && contacts <= ROOM);
     for (int i = 0; i < contacts; i++) {
-        double f = sqrt(contact[i].force_n[0] * contact[i].force_n[0] + contact[i].force_n[1] * contact[i].force_n[1] + contact[i].force_n[2] * contact[i].force_n[2]);
+        double f =
+            sqrt(contact[i].force_n[0] * contact[i].force_n[0] + contact[i].force_n[1] * contact[i].force_n[1] + contact[i].force_n[2] * contact[i].force_n[2]);
         sum += f;
         most = fmax(most, f);
     }

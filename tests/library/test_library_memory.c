@@ -96,11 +96,12 @@ static void *resize(void *user, void *memory, size_t bytes)
 
 // --- stories; each ends with all that it had destroyed, and returns its first error ---
 
-static const char tube[] = "seldinger: 1\n"
-                           "vessel: {tube: {radius_mm: 1, path: [{line_mm: 10}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: 0}}]}, contact: grid, friction: 0.1}\n"
-                           "wire: {elements: 30, sections: [{length_mm: 60, diameter_mm: 0.4, young_modulus_gpa: 5}]}\n"
-                           "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 8}\n"
-                           "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 90}, {t_s: 1, push_mm_s: 0, twist_deg_s: 0}]\n";
+static const char tube[] =
+    "seldinger: 1\n"
+    "vessel: {tube: {radius_mm: 1, path: [{line_mm: 10}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: 0}}]}, contact: grid, friction: 0.1}\n"
+    "wire: {elements: 30, sections: [{length_mm: 60, diameter_mm: 0.4, young_modulus_gpa: 5}]}\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 8}\n"
+    "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 90}, {t_s: 1, push_mm_s: 0, twist_deg_s: 0}]\n";
 
 static SelStatus run(SelSimulator *simulator, SelStatus status)
 {

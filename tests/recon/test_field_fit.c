@@ -46,8 +46,8 @@ static void exact_samples_give_the_wall(void **state)
     static const struct {
         const char *name;
         double tube, bifurcation, sac, worst;
-    } of[] = {{"arc", 0.002, 0, 0, 0}, {"y", 0.002, 0.003, 0, 0}, {"bifurcation", 0.002, 0.003, 0, 0}, {"kissing", 0.002, 0, 0, 0}, {"twig", 0.001, 0.003, 0, 0}, {"helix", 0.002, 0, 0, 0},
-              {"phantom", 0.003, 0.006, 0.007, 0.040}};
+    } of[] = {{"arc", 0.002, 0, 0, 0},      {"y", 0.002, 0.003, 0, 0}, {"bifurcation", 0.002, 0.003, 0, 0},    {"kissing", 0.002, 0, 0, 0},
+              {"twig", 0.001, 0.003, 0, 0}, {"helix", 0.002, 0, 0, 0}, {"phantom", 0.003, 0.006, 0.007, 0.040}};
     for (size_t i = 0; i < sizeof of / sizeof of[0] - (is_slow ? 5 : 0); i++) {
         Shape *shape = make(of[i].name, 0, NULL);
         VesselTree *model = shared_fit(shape, 0.05, 0);

@@ -24,10 +24,7 @@ static char folder[] = "/tmp/seldinger-hdf5-reader-XXXXXX";
 enum { ROWS = 50 };
 static const double numbers[ROWS] = {1, 2, 3};
 
-static hid_t new_file(void)
-{
-    return H5Fcreate(in_folder("a.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-}
+static hid_t new_file(void) { return H5Fcreate(in_folder("a.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT); }
 
 // A dataset of ROWS values, with the numbers unless `data` is NULL; takes `creation`.
 static void put_with(hid_t file, const char *name, hid_t type, hsize_t rows, hid_t creation, const void *data)
@@ -182,7 +179,8 @@ static void what_is_packed_is_read(void **state)
                 assert_true(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
                 double expected[165];        // as the library reads it
                 int32_t expected_counts[165];
-                assert_true(H5Dread(set, is_float ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, is_float ? (void *)expected : expected_counts) >= 0);
+                assert_true(H5Dread(set, is_float ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                                    is_float ? (void *)expected : expected_counts) >= 0);
                 H5Dclose(set);
                 H5Sclose(space);
                 H5Pclose(creation);
@@ -440,10 +438,16 @@ int main(void)
 {
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_plain_is_read),        cmocka_unit_test(links_out_are_not_followed), cmocka_unit_test(data_elsewhere_are_not_read),
-        cmocka_unit_test(what_is_packed_is_read),       cmocka_unit_test(other_packings_are_refused), cmocka_unit_test(damaged_chunks_are_refused),
-        cmocka_unit_test(bombs_are_refused),            cmocka_unit_test(what_is_not_there_is_refused),
-        cmocka_unit_test(what_is_no_number_is_refused), cmocka_unit_test(attributes_are_texts_or_numbers),
+        cmocka_unit_test(what_is_plain_is_read),
+        cmocka_unit_test(links_out_are_not_followed),
+        cmocka_unit_test(data_elsewhere_are_not_read),
+        cmocka_unit_test(what_is_packed_is_read),
+        cmocka_unit_test(other_packings_are_refused),
+        cmocka_unit_test(damaged_chunks_are_refused),
+        cmocka_unit_test(bombs_are_refused),
+        cmocka_unit_test(what_is_not_there_is_refused),
+        cmocka_unit_test(what_is_no_number_is_refused),
+        cmocka_unit_test(attributes_are_texts_or_numbers),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

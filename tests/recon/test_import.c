@@ -176,9 +176,8 @@ static void check_shape(const char *name)
         double most = wrong[c.tree->node_count * 9 / 10], from_wall = 0;
         for (int64_t i = 0; variant == PLAIN && i < c.tree->point_offset[c.tree->node_count]; i++)
             from_wall = fmax(from_wall, is_near_end(c.truth, c.tree->point[i]) ? 0 : fabs(shape_distance(c.shape, c.tree->point[i], NULL)));
-        print_message("%s %s: %d nodes, centres off by %.4f at most, radii by %.3f (p90), %ld left, %ld unseen, %d moved\n", name,
-                      variant_name[variant], c.tree->node_count, worst, most, c.report.left_points, c.report.unseen_points,
-                      c.report.moved_samples);
+        print_message("%s %s: %d nodes, centres off by %.4f at most, radii by %.3f (p90), %ld left, %ld unseen, %d moved\n", name, variant_name[variant],
+                      c.tree->node_count, worst, most, c.report.left_points, c.report.unseen_points, c.report.moved_samples);
         assert_true(worst < 0.05);
         assert_true(most < 0.1);
         if (variant == PLAIN)
@@ -371,8 +370,8 @@ static void test_other_vessel(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tubes), cmocka_unit_test(test_branches), cmocka_unit_test(test_threads),
-                                       cmocka_unit_test(test_coarse), cmocka_unit_test(test_curves_beside), cmocka_unit_test(test_wrong_radii),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tubes),         cmocka_unit_test(test_branches),      cmocka_unit_test(test_threads),
+                                       cmocka_unit_test(test_coarse),        cmocka_unit_test(test_curves_beside), cmocka_unit_test(test_wrong_radii),
                                        cmocka_unit_test(test_no_centreline), cmocka_unit_test(test_other_vessel)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

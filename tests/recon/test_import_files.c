@@ -14,7 +14,8 @@
 static Faults faults;
 
 static const double corner[8][3] = {{0, 0, 0}, {2, 0, 0}, {2, 3, 0}, {0, 3, 0}, {0, 0, 4}, {2, 0, 4}, {2, 3, 4}, {0, 3, 4}};
-static const int face[12][3] = {{0, 3, 2}, {0, 2, 1}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+static const int face[12][3] = {{0, 3, 2}, {0, 2, 1}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
+                                {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
 
 typedef struct Text {
     char byte[16384];
@@ -86,7 +87,8 @@ static void text_vtp(Text *t)
         add(t, "%g %g %g\n", corner[i][0], corner[i][1], corner[i][2]);
     add(t, "<InformationKey name=\"L2_NORM_RANGE\" location=\"vtkDataArray\" length=\"2\"><Value index=\"0\">\n0\n</Value><Value index=\"1\">\n1.7\n</Value>"
            "</InformationKey></DataArray></Points><Lines><DataArray type=\"Int64\" Name=\"connectivity\" format=\"binary\">\nAAAAAACAAAAAAAAA\n</DataArray>"
-           "<DataArray type=\"Int64\" Name=\"offsets\" format=\"binary\">\nAAAAAACAAAAAAAAA\n</DataArray></Lines><Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">\n");
+           "<DataArray type=\"Int64\" Name=\"offsets\" format=\"binary\">\nAAAAAACAAAAAAAAA\n</DataArray></Lines><Polys><DataArray type=\"Int32\" "
+           "Name=\"connectivity\" format=\"ascii\">\n");
     for (int i = 0; i < 12; i++)
         add(t, "%d %d %d\n", face[i][0], face[i][1], face[i][2]);
     add(t, "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">\n");
@@ -173,8 +175,10 @@ static void test_broken_surfaces(void **state)
     refused_surface("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "nan.obj:2");
     refused_surface("huge.obj", "v 0 0 0\nv 1e999 0 0\nv 0 1 0\nf 1 2 3\n", "huge.obj:2");
     refused_surface("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "points.obj");
-    refused_surface("word.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n", "word.stl:5");
-    refused_surface("many.ply", "ply\nformat ascii 1.0\nelement vertex 999999999999\nproperty float x\nproperty float y\nproperty float z\nend_header\n", "many.ply");
+    refused_surface("word.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n",
+                    "word.stl:5");
+    refused_surface("many.ply", "ply\nformat ascii 1.0\nelement vertex 999999999999\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+                    "many.ply");
     refused_surface("grid.vtp", "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\"></VTKFile>\n", "ImageData");
     refused_surface("open.vtp", "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\"><PolyData>\n", "open.vtp");
 }
@@ -262,7 +266,8 @@ static void test_broken_curves(void **state)
     refused_curves("none.mrk.json", "{\"markups\": []}", "markups");
     refused_curves("point.mrk.json", "{\"markups\": [{\"type\": \"Fiducial\", \"controlPoints\": []}]}", "Fiducial");
     refused_curves("short.mrk.json", "{\"markups\": [{\"type\": \"Curve\", \"controlPoints\": [{\"position\": [0, 0, 0]}]}]}", "1 control points");
-    refused_curves("word.mrk.json", "{\"markups\": [{\"type\": \"Curve\", \"controlPoints\": [{\"position\": [0, 0, 0]}, {\"position\": [1, \"a\", 0]}]}]}", "control point 1");
+    refused_curves("word.mrk.json", "{\"markups\": [{\"type\": \"Curve\", \"controlPoints\": [{\"position\": [0, 0, 0]}, {\"position\": [1, \"a\", 0]}]}]}",
+                   "control point 1");
     refused_curves("torn.mrk.json", "{\"markups\": [{\"type\": \"Curve\",\n", "torn.mrk.json");
 }
 

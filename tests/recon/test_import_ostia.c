@@ -75,10 +75,13 @@ static void check_tree(const char *name, const VesselTree *tree, const Shape *sh
     for (int64_t k = 0; k < tree->point_count; k += 7) {
         off = fmax(off, fabs(shape_field_cut(shape, tree->point[k])));
         for (int i = 1; i < tree->node_count; i++)
-            inner += segment_distance(tree->point[k], tree->center[i], tree->center[tree->parent[i]]) < 0.49 * fmin(tree->radius[i], tree->radius[tree->parent[i]]);
+            inner +=
+                segment_distance(tree->point[k], tree->center[i], tree->center[tree->parent[i]]) < 0.49 * fmin(tree->radius[i], tree->radius[tree->parent[i]]);
     }
-    print_message("%s: %d junctions, %d doubtful, %d refused, %d link nodes; longest link %.2f of both radii, shallowest %.2f r; points %.3f mm off at most, %ld inside\n", name,
-                  report->junction_count, report->junctions_with[IMPORT_DOUBTFUL], report->junctions_with[IMPORT_REFUSED], report->link_nodes, longest, shallow, off, inner);
+    print_message("%s: %d junctions, %d doubtful, %d refused, %d link nodes; longest link %.2f of both radii, shallowest %.2f r; points %.3f mm off at most, "
+                  "%ld inside\n",
+                  name, report->junction_count, report->junctions_with[IMPORT_DOUBTFUL], report->junctions_with[IMPORT_REFUSED], report->link_nodes, longest,
+                  shallow, off, inner);
     assert_true(longest <= 1 && shallow > 0 && off < near_wall);
     assert_int_equal(inner, 0);
 }
@@ -163,8 +166,8 @@ static void touching_vessels_stay_apart(void **state)
         for (int i = 0; i < faults.count; i++)
             print_message("%s\n", faults.text[i]);
         assert_non_null(tree);
-        print_message("gap %s mm: %d junctions, %d refused, %d nodes left out, %d curves apart\n", gap[g], report.junction_count, report.junctions_with[IMPORT_REFUSED],
-                      report.refused_nodes, report.lost_curves);
+        print_message("gap %s mm: %d junctions, %d refused, %d nodes left out, %d curves apart\n", gap[g], report.junction_count,
+                      report.junctions_with[IMPORT_REFUSED], report.refused_nodes, report.lost_curves);
         for (int i = 0; i < tree->node_count; i++)
             assert_true(shape_field(shape, tree->center[i], NULL) > 0);
         assert_true(report.junctions_with[IMPORT_REFUSED] + report.lost_curves > 0);

@@ -81,7 +81,10 @@ static void check_tube(const Tube *t, int variant, int *wrong)
     double off = tree ? vec3_distance(tree->center[0], options.root) / 2 : INFINITY;
     bool good = tree && report.root_is_open && off < 1.5 && report.open_end_count == 2;
     print_message("%-46s %d: %s, root %.2f radii off, radius %.2f mm, %d open ends, %d nodes%s\n", t->name, variant,
-                  !tree ? faults.text[0] : report.root_is_open ? "open" : "closed", off, tree ? tree->radius[0] : 0, report.open_end_count, tree ? tree->node_count : 0, good ? "" : "  <-- wrong");
+                  !tree                 ? faults.text[0]
+                  : report.root_is_open ? "open"
+                                        : "closed",
+                  off, tree ? tree->radius[0] : 0, report.open_end_count, tree ? tree->node_count : 0, good ? "" : "  <-- wrong");
     *wrong += !good;
     vessel_tree_free(tree);
     curve_set_free(set);

@@ -36,8 +36,7 @@ static void neighbours_agree(void **state)
             if (m.raw[place].count == 0)
                 continue;
             print_message("%-8s %-12s raw p99 %.4f mm %.3f rad, as met %.4f mm %.4f rad, wall bias %+.4f rms %.4f mm\n", names[s], model_place_name[place],
-                          m.raw[place].gap_p99, m.raw[place].normal_p99, m.met[place].gap_p99, m.met[place].normal_p99, m.wall[place].bias,
-                          m.wall[place].rms);
+                          m.raw[place].gap_p99, m.raw[place].normal_p99, m.met[place].gap_p99, m.met[place].normal_p99, m.wall[place].bias, m.wall[place].rms);
             assert_true(m.met[place].gap_p99 < (place == PLACE_TUBE ? 0.02 : 0.1));
             assert_true(place != PLACE_TUBE || (m.met[place].normal_p99 < 0.03 && fabs(m.wall[place].bias) < 0.01 && m.wall[place].rms < 0.02));
         }
@@ -101,11 +100,13 @@ static void mirrored_and_turned_trees_give_the_same_wall(void **state)
         int count = 0;
         for (int n = 0; n < tree->node_count; n++) {
             int64_t a = plain->blob_offset[n], b = model->blob_offset[n];
-            Blobby here = {.count = (int)(plain->blob_offset[n + 1] - a), .center = plain->blob_center + a, .width = plain->blob_width + a, .iso_level = plain->iso_level};
-            Blobby there = {.count = (int)(model->blob_offset[n + 1] - b), .center = model->blob_center + b, .width = model->blob_width + b, .iso_level = model->iso_level};
+            Blobby here = {
+                .count = (int)(plain->blob_offset[n + 1] - a), .center = plain->blob_center + a, .width = plain->blob_width + a, .iso_level = plain->iso_level};
+            Blobby there = {
+                .count = (int)(model->blob_offset[n + 1] - b), .center = model->blob_center + b, .width = model->blob_width + b, .iso_level = model->iso_level};
             for (int64_t i = tree->point_offset[n]; i < tree->point_offset[n + 1]; i += 5) {
-                double far = fabs(blobby_project(&here, tree->point[i], tree->point[i]).distance -
-                                  blobby_project(&there, other->point[i], other->point[i]).distance);
+                double far =
+                    fabs(blobby_project(&here, tree->point[i], tree->point[i]).distance - blobby_project(&there, other->point[i], other->point[i]).distance);
                 worst = fmax(worst, far);
                 sum2 += far * far;
                 count++;
@@ -147,7 +148,8 @@ static void without_a_voxel_the_fit_has_no_scale(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(neighbours_agree), cmocka_unit_test(mirrored_and_turned_trees_give_the_same_wall),
+        cmocka_unit_test(neighbours_agree),
+        cmocka_unit_test(mirrored_and_turned_trees_give_the_same_wall),
         cmocka_unit_test(few_blobs_are_not_too_wide),
         cmocka_unit_test(without_a_voxel_the_fit_has_no_scale),
     };

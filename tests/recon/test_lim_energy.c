@@ -362,9 +362,13 @@ static void adding_and_removing_cancels(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_fused_loop_equals_the_plain_one), cmocka_unit_test(slopes_equal_differences), cmocka_unit_test(columns_equal_differences),
-        cmocka_unit_test(feet_are_on_the_surface), cmocka_unit_test(every_instruction_set_gives_the_same_bits),
-        cmocka_unit_test(cohesion_equals_eq_7),                cmocka_unit_test(adding_and_removing_cancels),
+        cmocka_unit_test(the_fused_loop_equals_the_plain_one),
+        cmocka_unit_test(slopes_equal_differences),
+        cmocka_unit_test(columns_equal_differences),
+        cmocka_unit_test(feet_are_on_the_surface),
+        cmocka_unit_test(every_instruction_set_gives_the_same_bits),
+        cmocka_unit_test(cohesion_equals_eq_7),
+        cmocka_unit_test(adding_and_removing_cancels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

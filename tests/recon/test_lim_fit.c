@@ -52,8 +52,14 @@ static void spheres_are_found(void **state)
         options.target_mm = 0.02 * radius[k];
         double start_radius = 0.7 * radius[k];
         Vec3 off = vec3_add(start, vec3(0.1 * radius[k], 0, 0.05 * radius[k]));
-        LimFitTask task = {.point_count = N, .point = point, .center = start, .direction = {1, 0, 0}, .radius = radius[k], .start_count = 1,
-                           .start = &off, .start_radius = &start_radius};
+        LimFitTask task = {.point_count = N,
+                           .point = point,
+                           .center = start,
+                           .direction = {1, 0, 0},
+                           .radius = radius[k],
+                           .start_count = 1,
+                           .start = &off,
+                           .start_radius = &start_radius};
         int count = lim_fit_model(&task, &options, center, width);
         assert_int_equal(count, 1);
         assert_near(vec3_distance(center[0], start), 0, 0.02 * radius[k]);
@@ -312,10 +318,10 @@ static void poor_points_give_a_model(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(split_is_the_references), cmocka_unit_test(spheres_are_found),     cmocka_unit_test(shapes_are_fitted_within_the_target),
-        cmocka_unit_test(distance_follows_the_target), cmocka_unit_test(noise_is_averaged), cmocka_unit_test(capsule_of_table_3),
-        cmocka_unit_test(threads_do_not_matter),   cmocka_unit_test(inlet_is_tubular),      cmocka_unit_test(the_papers_preset_works),
-        cmocka_unit_test(bad_input_is_a_fault),    cmocka_unit_test(poor_points_give_a_model),
+        cmocka_unit_test(split_is_the_references),     cmocka_unit_test(spheres_are_found),        cmocka_unit_test(shapes_are_fitted_within_the_target),
+        cmocka_unit_test(distance_follows_the_target), cmocka_unit_test(noise_is_averaged),        cmocka_unit_test(capsule_of_table_3),
+        cmocka_unit_test(threads_do_not_matter),       cmocka_unit_test(inlet_is_tubular),         cmocka_unit_test(the_papers_preset_works),
+        cmocka_unit_test(bad_input_is_a_fault),        cmocka_unit_test(poor_points_give_a_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

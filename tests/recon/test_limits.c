@@ -131,8 +131,8 @@ static void what_is_not_wanted_is_left_out(void **state)
             double furthest = 0;
             for (int i = 0; i < tree->node_count; i++)
                 furthest = fmax(furthest, placed(tree->center[i], variant).x);
-            print_message("not: %d of %d nodes, furthest x %.2f (the vein's wall is at 12.5), %d branches, %.0f mm left out\n", tree->node_count, whole->node_count, furthest,
-                          report.left_out_count, report.left_out_length);
+            print_message("not: %d of %d nodes, furthest x %.2f (the vein's wall is at 12.5), %d branches, %.0f mm left out\n", tree->node_count,
+                          whole->node_count, furthest, report.left_out_count, report.left_out_length);
             assert_true(furthest < 12.7);
             assert_true(nearest_to(tree, placed(vec3(6, 10, 26), variant)) < 1 && nearest_to(tree, placed(vec3(6, 16.5, 11.7), variant)) < 1);
             assert_true(report.left_out_count >= 2 && report.left_out_length > 28);

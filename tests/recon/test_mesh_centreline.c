@@ -95,7 +95,7 @@ static void check_shape(const char *name, const char *key, const char *value, do
     snprintf(option[0][0], 64, "%s", key);
     snprintf(option[0][1], 64, "%s", value);
     faults_clear(&faults);
-    Shape *shape = shape_create(name, key[0] ? 1 : 0, (const char (*)[2][64])option, "test", &faults);
+    Shape *shape = shape_create(name, key[0] ? 1 : 0, (const char(*)[2][64])option, "test", &faults);
     VesselTree *truth = shape_sample(shape, &faults);
     assert_non_null(truth);
     for (int turn = 0; turn < WHOLE_OR_SHORT(2, 1); turn++) {

@@ -31,7 +31,8 @@ static MeshCheck mended(SurfaceMesh *mesh)
     assert_true(mesh_check(mesh, &second));
     // repairing once is enough
     assert_int_equal(second.flipped_triangles.count + second.inside_out_count + second.duplicate_triangles.count + second.duplicate_vertices.count +
-                         second.unreferenced_vertices.count, 0);
+                         second.unreferenced_vertices.count,
+                     0);
     surface_free(mesh);
     return first;
 }

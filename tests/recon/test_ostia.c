@@ -57,14 +57,15 @@ static Case make_case(const Kind *kind, int seed, double noise, bool track)
             snprintf(option[i][k], sizeof option[i][k], "%s", kind->option[i][k]);
     snprintf(option[3][0], sizeof option[3][0], "seed");
     snprintf(option[3][1], sizeof option[3][1], "%d", seed);
-    c.shape = shape_create(kind->name, 4, (const char (*)[2][64])option, "test", &faults);
+    c.shape = shape_create(kind->name, 4, (const char(*)[2][64])option, "test", &faults);
     c.truth = c.shape ? shape_sample(c.shape, &faults) : NULL;
     c.volume = c.shape ? shape_volume(c.shape, 0.25, 0.2, noise, (uint64_t)seed, &faults) : NULL;
     assert_true(c.truth && c.volume);
     RbtParameters p = rbt_default_parameters();
     p.automatic = 1;
     p.seed = seed;
-    RbtSeed start = {.start = c.truth->center[2], .toward = vec3_add(c.truth->center[2], c.truth->direction[2]), .has_toward = true, .radius = c.truth->radius[2]};
+    RbtSeed start = {
+        .start = c.truth->center[2], .toward = vec3_add(c.truth->center[2], c.truth->direction[2]), .has_toward = true, .radius = c.truth->radius[2]};
     if (track) {
         c.tree = rbt_track(c.volume, &p, &start, 1, NULL, 0, 0, NULL, &c.report, "t.yaml", &faults);
         assert_non_null(c.tree);
@@ -153,10 +154,10 @@ static void check_sum(const char *name, double noise, Sum *sum)
     double mean[2], rms[2], p99[2];
     summarise(&sum->link, &mean[0], &rms[0], &p99[0]);
     summarise(&sum->tube, &mean[1], &rms[1], &p99[1]);
-    print_message("%s, noise %.2f: %d junctions, %d doubtful, %d refused, darkest %.2f; %d wrong links; longest link %.2f of the sum of its radii\n", name, noise,
-                  sum->junctions, sum->doubtful, sum->refused, sum->darkest, sum->wrong, sum->longest);
-    print_message("  %d link nodes, %d outside the true lumen, shallowest %.2f r; %d points: mean %.3f, rms %.3f, p99 %.3f mm (all points %.3f, %.3f, %.3f)\n", sum->nodes,
-                  sum->outside, sum->shallow, sum->link.count, mean[0], rms[0], p99[0], mean[1], rms[1], p99[1]);
+    print_message("%s, noise %.2f: %d junctions, %d doubtful, %d refused, darkest %.2f; %d wrong links; longest link %.2f of the sum of its radii\n", name,
+                  noise, sum->junctions, sum->doubtful, sum->refused, sum->darkest, sum->wrong, sum->longest);
+    print_message("  %d link nodes, %d outside the true lumen, shallowest %.2f r; %d points: mean %.3f, rms %.3f, p99 %.3f mm (all points %.3f, %.3f, %.3f)\n",
+                  sum->nodes, sum->outside, sum->shallow, sum->link.count, mean[0], rms[0], p99[0], mean[1], rms[1], p99[1]);
     free(sum->link.error);
     free(sum->tube.error);
     assert_true(sum->junctions > 0 && sum->longest <= 1);
@@ -243,8 +244,8 @@ static void links_turned_aside_are_refused(void **state)
             case_free(&c);
         }
         sort_doubles(share, (size_t)count);
-        print_message("noise %.2f: true links %d of %d supported, darkest %.2f; turned aside: median %.2f, %d of %d supported, %d doubtful\n", 0.05 * n, own_pass, own, least,
-                      share[count / 2], pass, count, doubtful);
+        print_message("noise %.2f: true links %d of %d supported, darkest %.2f; turned aside: median %.2f, %d of %d supported, %d doubtful\n", 0.05 * n,
+                      own_pass, own, least, share[count / 2], pass, count, doubtful);
         assert_int_equal(own_pass, own);
         assert_true(share[count / 2] < 0.1 && pass <= 0.1 * count);
     }
@@ -305,7 +306,8 @@ static void cuts_leave_no_stub(void **state)
     (void)state;
     Kind kind = {"twig", {{"twig_radius_mm", "0.5"}, {"radius_mm", "2"}, {"points", "8"}}, 1};
     Case c = make_case(&kind, 1, 0.05, true);
-    RbtSeed start = {.start = c.truth->center[2], .toward = vec3_add(c.truth->center[2], c.truth->direction[2]), .has_toward = true, .radius = c.truth->radius[2]};
+    RbtSeed start = {
+        .start = c.truth->center[2], .toward = vec3_add(c.truth->center[2], c.truth->direction[2]), .has_toward = true, .radius = c.truth->radius[2]};
     int first = 0;
     for (int i = 1; i < c.truth->node_count; i++)
         first = c.truth->parent[i] != i - 1 ? i : first;
@@ -315,7 +317,10 @@ static void cuts_leave_no_stub(void **state)
     for (int place = 0; place < 5; place++) {
         RbtParameters p = rbt_default_parameters();
         RbtReport report = {0};
-        int node = twig->first_node + (place == 0 ? twig->link_count - 1 : place == 1 ? twig->link_count : place == 2 ? twig->link_count + 2 : twig->node_count / 2);
+        int node = twig->first_node + (place == 0   ? twig->link_count - 1
+                                       : place == 1 ? twig->link_count
+                                       : place == 2 ? twig->link_count + 2
+                                                    : twig->node_count / 2);
         RbtRegion region = {.center = c.tree->center[place == 4 ? twig->first_node + twig->link_count : node], .radius = 1, .line = 1, .column = 1};
         p.automatic = 1;
         *(place == 4 ? &p.forbid : &p.cut) = &region;
@@ -364,8 +369,12 @@ static void add_nodes(Track *tree, Vec3 a, Vec3 b, double radius, int branch, in
     double length = vec3_distance(a, b);
     int n = (int)(length / (0.5 * radius)) + 1;
     for (int i = 0; i < n; i++) {
-        TrackNode node = {.cylinder = {vec3_mix(a, b, (double)i / (n - 1)), radius, vec3_unit(vec3_sub(b, a)), radius}, .inlier_rate = 1, .contrast = 1,
-                          .parent = i > 0 ? tree->count - 1 : parent, .branch = branch, .kind = NODE_VESSEL};
+        TrackNode node = {.cylinder = {vec3_mix(a, b, (double)i / (n - 1)), radius, vec3_unit(vec3_sub(b, a)), radius},
+                          .inlier_rate = 1,
+                          .contrast = 1,
+                          .parent = i > 0 ? tree->count - 1 : parent,
+                          .branch = branch,
+                          .kind = NODE_VESSEL};
         assert_true(track_append(tree, &node, NULL));
     }
 }
@@ -410,8 +419,8 @@ static void refused_links(void **state)
     assert_true(rbt_open_ostia(t, is_named, 2, &found));
     assert_int_equal(found.count, 3);
     const RbtJunction *moved = &found.junction[0], *kept = &found.junction[1], *refused = &found.junction[2];
-    print_message("moved: share %.2f, %d nodes; kept: share %.2f; refused: share %.2f, %d nodes dropped\n", moved->share, moved->node_count, kept->share, refused->share,
-                  refused->dropped_nodes);
+    print_message("moved: share %.2f, %d nodes; kept: share %.2f; refused: share %.2f, %d nodes dropped\n", moved->share, moved->node_count, kept->share,
+                  refused->share, refused->dropped_nodes);
     assert_true(moved->branch == 1 && moved->is_moved && moved->support == RBT_SUPPORTED && moved->parent == 2 && moved->node_count > 0);
     assert_true(kept->branch == 2 && kept->support == RBT_KEPT && kept->share < 0.25 && kept->node_count == 0);
     assert_true(refused->branch == 3 && refused->support == RBT_REFUSED && refused->dropped_nodes > 20);
@@ -438,8 +447,11 @@ static void refused_links(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_ostium_is_described), cmocka_unit_test(links_turned_aside_are_refused), cmocka_unit_test(links_to_a_kissing_neighbour),
-        cmocka_unit_test(cuts_leave_no_stub), cmocka_unit_test(refused_links),
+        cmocka_unit_test(every_ostium_is_described),
+        cmocka_unit_test(links_turned_aside_are_refused),
+        cmocka_unit_test(links_to_a_kissing_neighbour),
+        cmocka_unit_test(cuts_leave_no_stub),
+        cmocka_unit_test(refused_links),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -284,10 +284,11 @@ static void bad_options_are_faults(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(capsule_is_a_capsule),        cmocka_unit_test(arc_is_a_torus),         cmocka_unit_test(field_and_distance_agree),
-        cmocka_unit_test(samples_lie_on_the_surface),  cmocka_unit_test(noise_has_its_size_and_seed), cmocka_unit_test(spiral_is_the_papers),
-        cmocka_unit_test(phantom_keeps_its_promises),  cmocka_unit_test(surface_is_closed_and_converges), cmocka_unit_test(volume_holds_the_shape),
-        cmocka_unit_test(bad_options_are_faults),
+        cmocka_unit_test(capsule_is_a_capsule),        cmocka_unit_test(arc_is_a_torus),
+        cmocka_unit_test(field_and_distance_agree),    cmocka_unit_test(samples_lie_on_the_surface),
+        cmocka_unit_test(noise_has_its_size_and_seed), cmocka_unit_test(spiral_is_the_papers),
+        cmocka_unit_test(phantom_keeps_its_promises),  cmocka_unit_test(surface_is_closed_and_converges),
+        cmocka_unit_test(volume_holds_the_shape),      cmocka_unit_test(bad_options_are_faults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

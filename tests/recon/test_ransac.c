@@ -173,8 +173,8 @@ static void exact_points_are_fitted_exactly(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(directions_are_even), cmocka_unit_test(random_numbers_repeat_and_differ),
-                                       cmocka_unit_test(finds_the_circle_among_outliers), cmocka_unit_test(nothing_is_found_in_nothing),
-                                       cmocka_unit_test(gauss_newton_equals_powell), cmocka_unit_test(exact_points_are_fitted_exactly)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(directions_are_even),         cmocka_unit_test(random_numbers_repeat_and_differ), cmocka_unit_test(finds_the_circle_among_outliers),
+        cmocka_unit_test(nothing_is_found_in_nothing), cmocka_unit_test(gauss_newton_equals_powell),       cmocka_unit_test(exact_points_are_fitted_exactly)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -153,7 +153,10 @@ static void straight_cylinder(void **state)
         bool paper;
         double tolerance;    // of the mean radius over nodes and seeds; its own scatter is about 0.002
         double center_mean;  // [mm] allowed
-    } cases[] = {{1, 0.2, 0, true, 0.003, 0.005}, {1, 0.2, 0.05, true, 0.006, 0.012}, {1, 0.2, 0.05, false, 0.006, 0.012}, {0.6, 0.1, 0.05, false, 0.008, 0.02},
+    } cases[] = {{1, 0.2, 0, true, 0.003, 0.005},
+                 {1, 0.2, 0.05, true, 0.006, 0.012},
+                 {1, 0.2, 0.05, false, 0.006, 0.012},
+                 {0.6, 0.1, 0.05, false, 0.008, 0.02},
                  {1, 0.2, 0.1, false, 0.008, 0.02}};
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         double r = cases[k].radius, error = 0, center = 0, tilt = 0, spline = 0.2 / sqrt(3.0), smoothing = cases[k].paper ? 0 : 0.2;
@@ -239,8 +242,8 @@ static void helix_to_its_end(void **state)
     }
     double spline = 0.2 / sqrt(3.0), bias = -(blur * blur + spline * spline + 0.04 / 12) / (2 * r);
     // a straight cylinder of height h in a curve of curvature k is off by k h^2 / 24; h is about 2 r, and some inliers lie further out
-    print_message("helix: %d of %d to the end, radius %+.4f (closed form %+.4f), centre %.4f mm (curve alone %.4f), worst %.3f\n", done, WHOLE_OR_SHORT(4, 1), error / nodes, bias,
-                  center / nodes, curvature * 4 * r * r / 24, worst);
+    print_message("helix: %d of %d to the end, radius %+.4f (closed form %+.4f), centre %.4f mm (curve alone %.4f), worst %.3f\n", done, WHOLE_OR_SHORT(4, 1),
+                  error / nodes, bias, center / nodes, curvature * 4 * r * r / 24, worst);
     assert_int_equal(done, WHOLE_OR_SHORT(4, 1));
     assert_true(fabs(error / nodes - bias) < 0.015);
     assert_true(center / nodes < 0.06 && worst < 0.25);
@@ -419,8 +422,8 @@ static void unfit_seeds(void **state)
     struct {
         RbtSeed seed;
         const char *words;
-    } cases[] = {{good, "outside the volume"}, {good, "lies on background"}, {good, "same point"}, {good, "larger than the volume"},
-                 {good, "nothing could be tracked"}};
+    } cases[] = {
+        {good, "outside the volume"}, {good, "lies on background"}, {good, "same point"}, {good, "larger than the volume"}, {good, "nothing could be tracked"}};
     cases[0].seed.start = vec3(5, 5, -1);
     cases[1].seed.start = vec3(1, 1, 2);
     cases[2].seed.toward = good.start;
@@ -577,10 +580,11 @@ static void past_the_giant_aneurysm(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(straight_cylinder), cmocka_unit_test(helix_to_its_end), cmocka_unit_test(oblique_grid), cmocka_unit_test(symmetric_bifurcation),
-        cmocka_unit_test(past_a_sac), cmocka_unit_test(the_same_for_any_number_of_threads), cmocka_unit_test(unfit_seeds),
-        cmocka_unit_test(nothing_beyond_the_end), cmocka_unit_test(a_click_is_enough),
-        cmocka_unit_test(past_the_giant_aneurysm),
+        cmocka_unit_test(straight_cylinder), cmocka_unit_test(helix_to_its_end),
+        cmocka_unit_test(oblique_grid),      cmocka_unit_test(symmetric_bifurcation),
+        cmocka_unit_test(past_a_sac),        cmocka_unit_test(the_same_for_any_number_of_threads),
+        cmocka_unit_test(unfit_seeds),       cmocka_unit_test(nothing_beyond_the_end),
+        cmocka_unit_test(a_click_is_enough), cmocka_unit_test(past_the_giant_aneurysm),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -102,7 +102,8 @@ static void noise_is_measured(void **state)
             before += (double)a.volume->value[k] / (double)voxels;
             after += (double)one->value[k] / (double)voxels;
         }
-        print_message("noise %.2f: found %.2f; smoothed by 2 voxels %.3f (white noise %.3f); mean %.3f and %.3f\n", exact, found, smooth, expected, before, after);
+        print_message("noise %.2f: found %.2f; smoothed by 2 voxels %.3f (white noise %.3f); mean %.3f and %.3f\n", exact, found, smooth, expected, before,
+                      after);
         assert_true(fabs(found / exact - 1) < 0.05);
         assert_true(band > 0 || (smooth > 0.9 * expected && smooth < 1.5 * expected));   // the vessels remain
         assert_true(fabs(after - before) < 0.2);
@@ -165,8 +166,9 @@ static void a_vessel_in_noise_is_found(void **state)
                     said = said || c->warning[i].kind == RBT_NOISE;
                 assert_true(said && c->smoothing_mm > 0 && fabs(c->noise / 16 - 1) < 0.1);
             }
-            print_message("seed %d, band %d: %s, start %.2f radii off the axis, radius %.2f of the true, first branch %.0f mm\n", seed, k, tree ? "tracked" : faults.text[0],
-                          off_axis(&a, report.check.cylinder.center) / radius, report.check.cylinder.radius / radius, length);
+            print_message("seed %d, band %d: %s, start %.2f radii off the axis, radius %.2f of the true, first branch %.0f mm\n", seed, k,
+                          tree ? "tracked" : faults.text[0], off_axis(&a, report.check.cylinder.center) / radius, report.check.cylinder.radius / radius,
+                          length);
             rbt_report_free(&report);
             vessel_tree_free(tree);
             release(&a);
@@ -188,8 +190,9 @@ static void hidden_vessels_are_refused(void **state)
             RbtReport report;
             VesselTree *tree = click(&a, x, &report);
             if (tree)
-                print_message("seed %d: found %.1f radii from any vessel, radius %.2f, certainty %.1f: %s\n", seed, off_axis(&a, report.check.cylinder.center) / radius,
-                              report.check.cylinder.radius, report.check.certainty, report.check.warning_count > 1 ? report.check.warning[0].text : "no word");
+                print_message("seed %d: found %.1f radii from any vessel, radius %.2f, certainty %.1f: %s\n", seed,
+                              off_axis(&a, report.check.cylinder.center) / radius, report.check.cylinder.radius, report.check.certainty,
+                              report.check.warning_count > 1 ? report.check.warning[0].text : "no word");
             assert_null(tree);
             print_message("%s\n", faults.text[0]);
             assert_int_equal(faults.count, 1);
@@ -216,7 +219,11 @@ static void a_slab_is_no_tube(void **state)
                 }
         Cylinder tube = {vec3(kind == 2 ? 35 : 30, 30, 30), 5, vec3(0, 0, 1), 10};
         RbtSight sight = rbt_sight_of(v, 5, &tube);
-        print_message("%s: contrast %.1f, evenness %.2f, %.0f standard errors\n", kind == 0 ? "tube" : kind == 1 ? "slab" : "step", sight.contrast, sight.evenness, sight.certainty);
+        print_message("%s: contrast %.1f, evenness %.2f, %.0f standard errors\n",
+                      kind == 0   ? "tube"
+                      : kind == 1 ? "slab"
+                                  : "step",
+                      sight.contrast, sight.evenness, sight.certainty);
         assert_int_equal(rbt_is_tube(&sight), kind == 0);
         assert_true(kind != 0 || (fabs(sight.contrast - 40) < 1 && sight.evenness > 0.95));
     }
@@ -225,7 +232,8 @@ static void a_slab_is_no_tube(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(noise_is_measured), cmocka_unit_test(a_slab_is_no_tube), cmocka_unit_test(clear_volumes_are_not_warned_of),
-                                       cmocka_unit_test(a_vessel_in_noise_is_found), cmocka_unit_test(hidden_vessels_are_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(noise_is_measured), cmocka_unit_test(a_slab_is_no_tube),
+                                       cmocka_unit_test(clear_volumes_are_not_warned_of), cmocka_unit_test(a_vessel_in_noise_is_found),
+                                       cmocka_unit_test(hidden_vessels_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

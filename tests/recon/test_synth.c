@@ -136,7 +136,8 @@ static double way_between(const VesselTree *tree, const double *arc, int a, int 
 static void random_tree_keeps_its_promises(void **state)
 {
     (void)state;
-    static const char *const seeds[] = {"branches 51 seed 1 points 8", "branches 51 seed 2 points 8", "branches 31 seed 9 points 8 sacs 3", "branches 200 seed 3 points 8"};
+    static const char *const seeds[] = {"branches 51 seed 1 points 8", "branches 51 seed 2 points 8", "branches 31 seed 9 points 8 sacs 3",
+                                        "branches 200 seed 3 points 8"};
     for (int s = 0; s < 4; s++) {
         Shape *shape = make("tree", seeds[s]);
         VesselTree *tree = shape_sample(shape, &faults);
@@ -161,7 +162,8 @@ static void random_tree_keeps_its_promises(void **state)
         for (int i = 0; i < n; i++)
             for (int k = 0; k < i; k++) {
                 double sum = tree->radius[i] + tree->radius[k];
-                if (tree->kind[i] == NODE_ANEURYSM || tree->kind[k] == NODE_ANEURYSM || vec3_norm2(vec3_sub(tree->center[i], tree->center[k])) > (sum + 0.5) * (sum + 0.5))
+                if (tree->kind[i] == NODE_ANEURYSM || tree->kind[k] == NODE_ANEURYSM ||
+                    vec3_norm2(vec3_sub(tree->center[i], tree->center[k])) > (sum + 0.5) * (sum + 0.5))
                     continue;
                 assert_true(way_between(tree, arc, i, k) < 8 * fmax(tree->radius[i], tree->radius[k]) + 2);
             }
@@ -281,7 +283,8 @@ static void voxels_hold_their_share(void **state)
             int in = 0;
             Vec3 at = volume_voxel_of(v, x);
             for (int m = 0; m < 512; m++)
-                in += shape_field(shape, volume_point_of(v, vec3_add(at, vec3((m % 8 + 0.5) / 8 - 0.5, (m / 8 % 8 + 0.5) / 8 - 0.5, (m / 64 + 0.5) / 8 - 0.5))), NULL) > 0;
+                in += shape_field(shape, volume_point_of(v, vec3_add(at, vec3((m % 8 + 0.5) / 8 - 0.5, (m / 8 % 8 + 0.5) / 8 - 0.5, (m / 64 + 0.5) / 8 - 0.5))),
+                                  NULL) > 0;
             double error = (double)v->value[i] - in / 512.0;
             sum += error;
             square += error * error;
@@ -514,11 +517,21 @@ static void grey_values_and_a_band(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(helix_is_a_helix),        cmocka_unit_test(y_is_symmetric_and_murrays), cmocka_unit_test(kissing_vessels_keep_their_gap),
-        cmocka_unit_test(bone_touches),            cmocka_unit_test(random_tree_keeps_its_promises), cmocka_unit_test(the_seed_makes_the_tree),
-        cmocka_unit_test(octree_changes_no_bit),   cmocka_unit_test(samples_lie_on_the_surface), cmocka_unit_test(voxels_hold_their_share),
-        cmocka_unit_test(blur_is_gaussian),        cmocka_unit_test(noise_is_white), cmocka_unit_test(grey_values_and_a_band),            cmocka_unit_test(threads_change_no_bit),
-        cmocka_unit_test(brightness_is_where_it_should_be), cmocka_unit_test(bad_options_are_faults),
+        cmocka_unit_test(helix_is_a_helix),
+        cmocka_unit_test(y_is_symmetric_and_murrays),
+        cmocka_unit_test(kissing_vessels_keep_their_gap),
+        cmocka_unit_test(bone_touches),
+        cmocka_unit_test(random_tree_keeps_its_promises),
+        cmocka_unit_test(the_seed_makes_the_tree),
+        cmocka_unit_test(octree_changes_no_bit),
+        cmocka_unit_test(samples_lie_on_the_surface),
+        cmocka_unit_test(voxels_hold_their_share),
+        cmocka_unit_test(blur_is_gaussian),
+        cmocka_unit_test(noise_is_white),
+        cmocka_unit_test(grey_values_and_a_band),
+        cmocka_unit_test(threads_change_no_bit),
+        cmocka_unit_test(brightness_is_where_it_should_be),
+        cmocka_unit_test(bad_options_are_faults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,7 +35,8 @@ static void full_file(void **state)
     assert_true(t->aneurysm[0].center_count == 2 && t->aneurysm[0].center[1].x == 3 && !t->aneurysm[0].is_voxel && t->aneurysm[1].is_voxel);
     // the set first, then single ones, wherever they stand
     RbtParameters p = rbt_paper_parameters();
-    assert_true(t->parameters.p_inl == 0.6 && t->parameters.seed == 7 && t->parameters.n_r == 642 && t->parameters.n_p == p.n_p && t->parameters.look_ahead == 0);
+    assert_true(t->parameters.p_inl == 0.6 && t->parameters.seed == 7 && t->parameters.n_r == 642 && t->parameters.n_p == p.n_p &&
+                t->parameters.look_ahead == 0);
     assert_true(t->parameters.retry_count == 2 && t->parameters.retry_steps[1] == 2);
     trace_free(t);
 }
@@ -66,7 +67,8 @@ static void automatic_and_corrections(void **state)
     t = parse(text);
     assert_true(t && t->parameters.automatic == 0);
     trace_free(t);
-    snprintf(text, sizeof text, "%sautomatic: 1\nforbid: [{center_voxel: [1, 2, 3], radius_mm: 4}, {center_mm: [5, 6, 7], radius_mm: 8}]\ncut: [{point_mm: [9, 10, 11]}]\n", two);
+    snprintf(text, sizeof text,
+             "%sautomatic: 1\nforbid: [{center_voxel: [1, 2, 3], radius_mm: 4}, {center_mm: [5, 6, 7], radius_mm: 8}]\ncut: [{point_mm: [9, 10, 11]}]\n", two);
     t = parse(text);
     assert_true(t && t->parameters.automatic == 1 && t->parameters.forbid_count == 2 && t->parameters.cut_count == 1);
     const RbtRegion *forbid = t->parameters.forbid, *cut = t->parameters.cut;
@@ -81,7 +83,8 @@ static void where_the_tree_ends(void **state)
     (void)state;
     Trace *t = parse("branches: [{start_mm: [1, 2, 3]}]\nuntil: [{point_mm: [4, 5, 6]}, {point_voxel: [7, 8, 9]}]\nnot: [{point_voxel: [10, 11, 12]}]\n");
     assert_true(t && t->parameters.until_count == 2 && t->parameters.rival_count == 1);
-    assert_true(!t->parameters.until[0].is_voxel && t->parameters.until[1].is_voxel && t->parameters.until[1].center.z == 9 && t->parameters.until[1].line == 2);
+    assert_true(!t->parameters.until[0].is_voxel && t->parameters.until[1].is_voxel && t->parameters.until[1].center.z == 9 &&
+                t->parameters.until[1].line == 2);
     assert_true(t->parameters.rival[0].is_voxel && t->parameters.rival[0].center.x == 10 && t->parameters.rival[0].line == 3);
     assert_true(trace_add_point(t, "until", vec3(1, 1, 1)) && trace_add_point(t, "not", vec3(2, 2, 2)) && trace_add_point(t, "not", vec3(3, 3, 3)));
     assert_true(t->parameters.until_count == 3 && t->parameters.until[2].center.x == 1 && t->parameters.until[0].center.x == 4);
@@ -97,7 +100,10 @@ static void every_parameter_by_name(void **state)
     (void)state;
     for (int i = 0; i < rbt_parameter_count; i++) {
         const RbtParameterName *p = &rbt_parameter_table[i];
-        double value = !strcmp(p->name, "N_r") || !strcmp(p->name, "aneurysm_rays") ? 642 : !strcmp(p->name, "N_d") ? 21 : !strcmp(p->name, "N_min") ? 100 : p->most;
+        double value = !strcmp(p->name, "N_r") || !strcmp(p->name, "aneurysm_rays") ? 642
+                       : !strcmp(p->name, "N_d")                                    ? 21
+                       : !strcmp(p->name, "N_min")                                  ? 100
+                                                                                    : p->most;
         char text[400];
         snprintf(text, sizeof text, "branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n%s: %.17g\n", p->name, value);
         Trace *t = parse(text);
@@ -112,7 +118,8 @@ static void every_parameter_by_name(void **state)
     RbtParameters d = rbt_default_parameters(), p = rbt_paper_parameters();
     for (int i = 0; i < rbt_parameter_count; i++) {
         double a = *(double *)(void *)((char *)&d + rbt_parameter_table[i].offset), b = *(double *)(void *)((char *)&p + rbt_parameter_table[i].offset);
-        assert_true(a >= rbt_parameter_table[i].least && a <= rbt_parameter_table[i].most && b >= rbt_parameter_table[i].least && b <= rbt_parameter_table[i].most);
+        assert_true(a >= rbt_parameter_table[i].least && a <= rbt_parameter_table[i].most && b >= rbt_parameter_table[i].least &&
+                    b <= rbt_parameter_table[i].most);
     }
 }
 
@@ -185,7 +192,8 @@ static void faults_with_their_place(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(a_start_is_enough), cmocka_unit_test(automatic_and_corrections), cmocka_unit_test(where_the_tree_ends),
-                                       cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(full_file),           cmocka_unit_test(a_start_is_enough),       cmocka_unit_test(automatic_and_corrections),
+        cmocka_unit_test(where_the_tree_ends), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

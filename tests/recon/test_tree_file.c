@@ -51,8 +51,8 @@ static VesselTree *make_tree(bool model)
     return tree;
 }
 
-static const TreeFileInfo some_info = {.source = (char *)(uintptr_t) "a.nrrd", .parameters = (char *)(uintptr_t) "rays: 162\n  voxel_mm: 0.25\nx: 1\n",
-                                       .created_by = (char *)(uintptr_t) "test"};
+static const TreeFileInfo some_info = {
+    .source = (char *)(uintptr_t) "a.nrrd", .parameters = (char *)(uintptr_t) "rays: 162\n  voxel_mm: 0.25\nx: 1\n", .created_by = (char *)(uintptr_t) "test"};
 
 static void assert_same(const VesselTree *a, const VesselTree *b)
 {
@@ -170,8 +170,8 @@ static void put_data(hid_t file, const char *path, hid_t type, int rank, const h
 static void missing_datasets_are_named(void **state)
 {
     (void)state;
-    static const char *const names[] = {"/nodes/center", "/nodes/radius", "/nodes/direction", "/nodes/height", "/nodes/parent", "/nodes/kind",
-                                        "/points/xyz", "/points/offset", "/blobs/center", "/blobs/width", "/blobs/offset", "/blobs/error_mm"};
+    static const char *const names[] = {"/nodes/center", "/nodes/radius",  "/nodes/direction", "/nodes/height", "/nodes/parent", "/nodes/kind",
+                                        "/points/xyz",   "/points/offset", "/blobs/center",    "/blobs/width",  "/blobs/offset", "/blobs/error_mm"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         hid_t file = fresh_file(in_folder("m.h5"));
         H5Ldelete(file, names[i], H5P_DEFAULT);
@@ -201,16 +201,11 @@ static void lies_are_found(void **state)
         hsize_t size[2];
         const void *data;
     } lie[] = {
-        {"/nodes/center", "shape", H5T_NATIVE_DOUBLE, 1, {12, 0}, number},
-        {"/nodes/center", "shape", H5T_NATIVE_DOUBLE, 2, {6, 2}, number},
-        {"/nodes/radius", "rows", H5T_NATIVE_DOUBLE, 1, {3, 0}, number},
-        {"/nodes/radius", "type", H5T_NATIVE_INT32, 1, {4, 0}, NULL},
-        {"/nodes/parent", "type", H5T_NATIVE_DOUBLE, 1, {4, 0}, number},
-        {"/nodes/radius", "radius", H5T_NATIVE_DOUBLE, 1, {4, 0}, negative},
-        {"/nodes/radius", "radius", H5T_NATIVE_DOUBLE, 1, {4, 0}, nan},
-        {"/nodes/parent", "parent", H5T_NATIVE_INT32, 1, {4, 0}, loop},
-        {"/points/offset", "offset", H5T_NATIVE_INT64, 1, {5, 0}, down},
-        {"/points/offset", "offset", H5T_NATIVE_INT64, 1, {5, 0}, open_ended},
+        {"/nodes/center", "shape", H5T_NATIVE_DOUBLE, 1, {12, 0}, number},      {"/nodes/center", "shape", H5T_NATIVE_DOUBLE, 2, {6, 2}, number},
+        {"/nodes/radius", "rows", H5T_NATIVE_DOUBLE, 1, {3, 0}, number},        {"/nodes/radius", "type", H5T_NATIVE_INT32, 1, {4, 0}, NULL},
+        {"/nodes/parent", "type", H5T_NATIVE_DOUBLE, 1, {4, 0}, number},        {"/nodes/radius", "radius", H5T_NATIVE_DOUBLE, 1, {4, 0}, negative},
+        {"/nodes/radius", "radius", H5T_NATIVE_DOUBLE, 1, {4, 0}, nan},         {"/nodes/parent", "parent", H5T_NATIVE_INT32, 1, {4, 0}, loop},
+        {"/points/offset", "offset", H5T_NATIVE_INT64, 1, {5, 0}, down},        {"/points/offset", "offset", H5T_NATIVE_INT64, 1, {5, 0}, open_ended},
         {"/points/xyz", "promises", H5T_NATIVE_DOUBLE, 2, {1u << 31, 3}, NULL},   // nothing stored
         {"/blobs/width", "rows", H5T_NATIVE_DOUBLE, 1, {4, 0}, number},
     };
@@ -297,8 +292,9 @@ static void a_full_disk_leaves_what_was_there(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(save_load_is_equality),     cmocka_unit_test(long_parameters_survive),   cmocka_unit_test(missing_datasets_are_named),
-        cmocka_unit_test(lies_are_found),            cmocka_unit_test(damaged_bytes_are_refused), cmocka_unit_test(a_full_disk_leaves_what_was_there),
+        cmocka_unit_test(save_load_is_equality),           cmocka_unit_test(long_parameters_survive),
+        cmocka_unit_test(missing_datasets_are_named),      cmocka_unit_test(lies_are_found),
+        cmocka_unit_test(damaged_bytes_are_refused),       cmocka_unit_test(a_full_disk_leaves_what_was_there),
         cmocka_unit_test(what_unpacks_to_less_is_refused),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -88,7 +88,9 @@ static Volume *load(const char *name)
 
 static void compress_to(Bytes *b, const Bytes *data, int window)
 {
-    z_stream stream = {.next_in = (Bytef *)(uintptr_t)data->byte, .avail_in = (uInt)data->length, .next_out = b->byte + b->length,
+    z_stream stream = {.next_in = (Bytef *)(uintptr_t)data->byte,
+                       .avail_in = (uInt)data->length,
+                       .next_out = b->byte + b->length,
                        .avail_out = (uInt)(sizeof b->byte - b->length)};
     assert_int_equal(deflateInit2(&stream, 9, Z_DEFLATED, window, 8, Z_DEFAULT_STRATEGY), Z_OK);
     assert_int_equal(deflate(&stream, Z_FINISH), Z_STREAM_END);
@@ -127,9 +129,11 @@ static void every_type_in_both_orders(void **state)
         size_t size;
         double low, high;    // values that the type holds, in turn
         int kind;            // 0 whole, 1 float, 2 double
-    } types[] = {{"signed char", 1, -128, 127, 0}, {"uchar", 1, 0, 255, 0}, {"int16", 2, -32768, 32767, 0}, {"unsigned short", 2, 0, 65535, 0},
-                 {"int", 4, -2147483648.0, 16777216, 0}, {"uint32_t", 4, 0, 4294967040.0, 0}, {"long long", 8, -4398046511104.0, 7, 0},
-                 {"uint64", 8, 0, 9223372036854775808.0, 0}, {"float", 4, -1.5e30, 0.375, 1}, {"double", 8, -2.25, 1e30, 2}};
+    } types[] = {{"signed char", 1, -128, 127, 0},         {"uchar", 1, 0, 255, 0},
+                 {"int16", 2, -32768, 32767, 0},           {"unsigned short", 2, 0, 65535, 0},
+                 {"int", 4, -2147483648.0, 16777216, 0},   {"uint32_t", 4, 0, 4294967040.0, 0},
+                 {"long long", 8, -4398046511104.0, 7, 0}, {"uint64", 8, 0, 9223372036854775808.0, 0},
+                 {"float", 4, -1.5e30, 0.375, 1},          {"double", 8, -2.25, 1e30, 2}};
     static Bytes b;
     for (size_t t = 0; t < sizeof types / sizeof types[0]; t++)
         for (int big = 0; big < 2; big++) {
@@ -176,8 +180,9 @@ static void nrrd_grids(void **state)
     assert_near(volume_point_of(v, vec3(1, 1, 1)), vec3(1.4, 2.5, 3.6));
     volume_free(v);
     // metres become millimetres
-    header(&b, "short", "space: left-posterior-superior\nspace units: \"m\" \"m\" \"m\"\nspace directions: (4e-4,0,0) (0,5e-4,0) (0,0,6e-4)\nspace origin: (0,0,1e-3)\n"
-                        "endian: little\nencoding: raw\n\n");
+    header(&b, "short",
+           "space: left-posterior-superior\nspace units: \"m\" \"m\" \"m\"\nspace directions: (4e-4,0,0) (0,5e-4,0) (0,0,6e-4)\nspace origin: (0,0,1e-3)\n"
+           "endian: little\nencoding: raw\n\n");
     shorts(&b, false);
     v = parse(&b);
     assert_counting(v);
@@ -186,8 +191,9 @@ static void nrrd_grids(void **state)
     volume_free(v);
     // an axis that is none of space, of one sample; lines end as in DOS
     b.length = 0;
-    put_text(&b, "NRRD0005\r\ntype: uint8\r\ndimension: 4\r\nsizes: 1 2 3 4\r\nspace dimension: 3\r\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\r\nkey:=any\r\n"
-                 "encoding: raw\r\n\r\n");
+    put_text(&b,
+             "NRRD0005\r\ntype: uint8\r\ndimension: 4\r\nsizes: 1 2 3 4\r\nspace dimension: 3\r\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\r\nkey:=any\r\n"
+             "encoding: raw\r\n\r\n");
     for (int i = 0; i < 24; i++)
         put_sample(&b, (uint64_t)i, 1, false);
     v = parse(&b);
@@ -276,9 +282,10 @@ static void metaimage(void **state)
 {
     (void)state;
     static Bytes b, data;
-    static const char start[] = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = %s\nCompressedData = %s\n"
-                                "TransformMatrix = 0 1 0 -1 0 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 0.4 0.5 0.6\nDimSize = 2 3 4\nElementType = %s\nMyOwn = key\n"
-                                "ElementDataFile = LOCAL\n";
+    static const char start[] =
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = %s\nCompressedData = %s\n"
+        "TransformMatrix = 0 1 0 -1 0 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 0.4 0.5 0.6\nDimSize = 2 3 4\nElementType = %s\nMyOwn = key\n"
+        "ElementDataFile = LOCAL\n";
     b.length = data.length = 0;
     put_text(&b, start, "True", "False", "MET_USHORT");
     shorts(&b, true);
@@ -447,7 +454,8 @@ static void lies(void **state)
     put_text(&b, "NRRD0009\ntype: uchar\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\nx");
     refused(&b, "unknown version");
     b.length = 0;
-    put_text(&b, "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 1 1 1\nspace dimension: 3\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\n\nxyz");
+    put_text(&b,
+             "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 1 1 1\nspace dimension: 3\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\n\nxyz");
     refused(&b, "3 values per voxel");
     b.length = 0;
     put_text(&b, "NRRD0004\ntype: uchar\ndimension: 2\nsizes: 1 1\nencoding: raw\n\nx");
@@ -531,8 +539,14 @@ static int remove_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_type_in_both_orders), cmocka_unit_test(nrrd_grids), cmocka_unit_test(encodings_and_skips), cmocka_unit_test(detached),
-        cmocka_unit_test(metaimage), cmocka_unit_test(nifti), cmocka_unit_test(lies), cmocka_unit_test(saved_volumes_load_equal),
+        cmocka_unit_test(every_type_in_both_orders),
+        cmocka_unit_test(nrrd_grids),
+        cmocka_unit_test(encodings_and_skips),
+        cmocka_unit_test(detached),
+        cmocka_unit_test(metaimage),
+        cmocka_unit_test(nifti),
+        cmocka_unit_test(lies),
+        cmocka_unit_test(saved_volumes_load_equal),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -29,8 +29,8 @@ typedef struct Setting {
     bool no_position, in_sequence, per_slice_scale;
 } Setting;
 
-static const Setting plain = {.encoding = EXPLICIT_LITTLE, .allocated = 16, .stored = 12, .high_bit = 11, .photometric = "MONOCHROME2", .series = "1.2.3",
-                              .copies_of = -1};
+static const Setting plain = {
+    .encoding = EXPLICIT_LITTLE, .allocated = 16, .stored = 12, .high_bit = 11, .photometric = "MONOCHROME2", .series = "1.2.3", .copies_of = -1};
 static Faults faults;
 static char folder[64];
 static const double dx = 0.5, dy = 0.4, dz = 0.75;
@@ -534,7 +534,8 @@ static int remove_folder(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(encodings_and_layouts), cmocka_unit_test(multi_frame), cmocka_unit_test(what_is_refused),
-                                       cmocka_unit_test(what_is_compressed_is_the_same), cmocka_unit_test(compressed_frames), cmocka_unit_test(what_is_damaged_is_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(encodings_and_layouts), cmocka_unit_test(multi_frame),
+                                       cmocka_unit_test(what_is_refused),       cmocka_unit_test(what_is_compressed_is_the_same),
+                                       cmocka_unit_test(compressed_frames),     cmocka_unit_test(what_is_damaged_is_refused)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

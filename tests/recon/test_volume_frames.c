@@ -79,7 +79,9 @@ static void put_samples(Bytes *b, const Grid *g, bool big, double slope, double 
 
 static void pack(Bytes *out, const Bytes *in, int window)
 {
-    z_stream stream = {.next_in = (Bytef *)(uintptr_t)in->byte, .avail_in = (uInt)in->length, .next_out = out->byte + out->length,
+    z_stream stream = {.next_in = (Bytef *)(uintptr_t)in->byte,
+                       .avail_in = (uInt)in->length,
+                       .next_out = out->byte + out->length,
                        .avail_out = (uInt)(sizeof out->byte - out->length)};
     assert_int_equal(deflateInit2(&stream, 9, Z_DEFLATED, window, 8, Z_DEFAULT_STRATEGY), Z_OK);
     assert_int_equal(deflate(&stream, Z_FINISH), Z_STREAM_END);
@@ -128,19 +130,22 @@ static void check_file(const char *name, const Grid *g, const char *frame)
 static void nrrd(void **state)
 {
     (void)state;
-    static const char *const spaces[][2] = {{"LPS", "LPS"}, {"right-anterior-superior", "RAS"}, {"left-anterior-superior", "LAS"},
-                                            {"3D-right-handed", "3D-right-handed"}, {"3D-left-handed", "3D-left-handed"}};
+    static const char *const spaces[][2] = {{"LPS", "LPS"},
+                                            {"right-anterior-superior", "RAS"},
+                                            {"left-anterior-superior", "LAS"},
+                                            {"3D-right-handed", "3D-right-handed"},
+                                            {"3D-left-handed", "3D-left-handed"}};
     static Bytes b;
     for (int left = 0; left < 2; left++)
         for (size_t s = 0; s < sizeof spaces / sizeof spaces[0]; s++) {
             Grid g = grid_of(left);
             const Vec3 *a = g.axis, o = g.origin;
             b.length = 0;
-            put_text(&b, "NRRD0004\ntype: float\ndimension: 3\nspace: %s\nsizes: %d %d %d\nspace directions: (%.9g,%.9g,%.9g) (%.9g,%.9g,%.9g) "
+            put_text(&b,
+                     "NRRD0004\ntype: float\ndimension: 3\nspace: %s\nsizes: %d %d %d\nspace directions: (%.9g,%.9g,%.9g) (%.9g,%.9g,%.9g) "
                      "(%.9g,%.9g,%.9g)\n"
-                         "space origin: (%.9g,%.9g,%.9g)\nendian: %s\nencoding: raw\n\n", spaces[s][0], NX, NY, NZ, a[0].x, a[0].y, a[0].z, a[1].x,
-                                         a[1].y, a[1].z,
-                     a[2].x, a[2].y, a[2].z, o.x, o.y, o.z, left ? "big" : "little");
+                     "space origin: (%.9g,%.9g,%.9g)\nendian: %s\nencoding: raw\n\n",
+                     spaces[s][0], NX, NY, NZ, a[0].x, a[0].y, a[0].z, a[1].x, a[1].y, a[1].z, a[2].x, a[2].y, a[2].z, o.x, o.y, o.z, left ? "big" : "little");
             put_samples(&b, &g, left, 1, 0);
             check_bytes(&b, &g, spaces[s][1]);
         }
@@ -224,8 +229,8 @@ static void nifti(void **state)
         const double q[6] = {by_sform ? 0.1 : qb, by_sform ? 0.2 : qc, by_sform ? 0 : qd, g.origin.x, g.origin.y, g.origin.z};
         for (size_t i = 0; i < 6; i++)
             put_at(&b, 256 + 4 * i, q[i], true, big);
-        const double row[12] = {g.axis[0].x, g.axis[1].x, g.axis[2].x, g.origin.x, g.axis[0].y, g.axis[1].y, g.axis[2].y, g.origin.y,
-                                g.axis[0].z, g.axis[1].z, g.axis[2].z, g.origin.z};
+        const double row[12] = {g.axis[0].x, g.axis[1].x, g.axis[2].x, g.origin.x,  g.axis[0].y, g.axis[1].y,
+                                g.axis[2].y, g.origin.y,  g.axis[0].z, g.axis[1].z, g.axis[2].z, g.origin.z};
         for (size_t i = 0; i < 12; i++)
             put_at(&b, 280 + 4 * i, row[i], true, big);
         memcpy(b.byte + 344, pair ? "ni1" : "n+1", 4);

@@ -133,7 +133,8 @@ static void dense_and_near_neighbours_are_refused(void **state)
         const char *name;
         uint64_t seed;
         char option[3][2][64];
-    } shapes[] = {{"bone", 5, {{"seed", "5"}, {"radius_mm", "1"}, {"points", "8"}}}, {"bone", 7, {{"seed", "7"}, {"radius_mm", "1"}, {"points", "8"}}},
+    } shapes[] = {{"bone", 5, {{"seed", "5"}, {"radius_mm", "1"}, {"points", "8"}}},
+                  {"bone", 7, {{"seed", "7"}, {"radius_mm", "1"}, {"points", "8"}}},
                   {"kissing", 13, {{"gap_mm", "0.4"}, {"radius_mm", "0.6"}, {"crossing_deg", "90"}}}};
     for (size_t k = WHOLE_OR_SHORT(0, 1); k < sizeof shapes / sizeof shapes[0]; k++) {
         VolumeOptions options = volume_default_options();
@@ -388,10 +389,14 @@ static void the_same_for_any_number_of_threads(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_branch_from_one_start), cmocka_unit_test(kissing_vessel_is_refused), cmocka_unit_test(dense_and_near_neighbours_are_refused),
-        cmocka_unit_test(a_sac_is_found), cmocka_unit_test(a_lobed_sac_has_several_centers),
+        cmocka_unit_test(every_branch_from_one_start),
+        cmocka_unit_test(kissing_vessel_is_refused),
+        cmocka_unit_test(dense_and_near_neighbours_are_refused),
+        cmocka_unit_test(a_sac_is_found),
+        cmocka_unit_test(a_lobed_sac_has_several_centers),
         cmocka_unit_test(a_click_anywhere),
-        cmocka_unit_test(corrections_leave_the_rest), cmocka_unit_test(the_same_for_any_number_of_threads),
+        cmocka_unit_test(corrections_leave_the_rest),
+        cmocka_unit_test(the_same_for_any_number_of_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -422,8 +422,7 @@ static void nothing_breaks_it(void **state)
             pose->quaternion[11].w = NAN;
             is_dark = true;
             break;
-        default:
-            break;
+        default: break;
         }
         pose_fill_single_tool(pose);
         const ViewPort port = {stage.canvas.framebuffer, 30, 20, 200, 150}, tiny = {stage.canvas.framebuffer, 0, 0, 1, 1}, none = {0};
@@ -461,14 +460,10 @@ static void nothing_breaks_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_straight_tube_is_evenly_round),
-        cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
-        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture),
-        cmocka_unit_test(normals_are_the_vessel_s_own),
-        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),
-        cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
-        cmocka_unit_test(tools_are_seen_from_in_each_other),
-        cmocka_unit_test(nothing_breaks_it),
+        cmocka_unit_test(a_straight_tube_is_evenly_round),           cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
+        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture), cmocka_unit_test(normals_are_the_vessel_s_own),
+        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),     cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
+        cmocka_unit_test(tools_are_seen_from_in_each_other),         cmocka_unit_test(nothing_breaks_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -132,8 +132,10 @@ static void angles_are_written_as_on_the_screen(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(views_are_those_of_the_angio_suite),  cmocka_unit_test(a_quarter_turn_is_the_other_plane),
-        cmocka_unit_test(frames_and_mirrors_agree),            cmocka_unit_test(rays_matrix_and_magnification_agree),
+        cmocka_unit_test(views_are_those_of_the_angio_suite),
+        cmocka_unit_test(a_quarter_turn_is_the_other_plane),
+        cmocka_unit_test(frames_and_mirrors_agree),
+        cmocka_unit_test(rays_matrix_and_magnification_agree),
         cmocka_unit_test(angles_are_written_as_on_the_screen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

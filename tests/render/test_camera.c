@@ -93,8 +93,8 @@ static void flat_trees_are_seen_face_on(void **state)
         for (int i = 0; i < 300; i++)
             point[i] = vec3_add_scaled(point[i], 0.2, random_vector());
         camera_orient(&again, vec3(0, 0, 0), vec3(0, 0, 0), 300, point);
-        if (fabs(fabs(normal.x) - fabs(normal.y)) > 0.1 && fabs(fabs(normal.y) - fabs(normal.z)) > 0.1 &&
-            fabs(fabs(normal.x) - fabs(normal.z)) > 0.1 && fabs(fabs(normal.z) - 0.9) > 0.05)
+        if (fabs(fabs(normal.x) - fabs(normal.y)) > 0.1 && fabs(fabs(normal.y) - fabs(normal.z)) > 0.1 && fabs(fabs(normal.x) - fabs(normal.z)) > 0.1 &&
+            fabs(fabs(normal.z) - 0.9) > 0.05)
             assert_true(vec3_dot(camera.back, again.back) > 0.99 && vec3_dot(camera.up, again.up) > 0.99);
     }
     // the coronal plane is seen from the front, head up
@@ -167,8 +167,8 @@ static void a_frame_holds_its_points(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(principal_axes_diagonalise),        cmocka_unit_test(axes_are_a_right_handed_frame),
-        cmocka_unit_test(flat_trees_are_seen_face_on),       cmocka_unit_test(straight_and_round_things_have_a_view),
+        cmocka_unit_test(principal_axes_diagonalise),  cmocka_unit_test(axes_are_a_right_handed_frame),
+        cmocka_unit_test(flat_trees_are_seen_face_on), cmocka_unit_test(straight_and_round_things_have_a_view),
         cmocka_unit_test(a_frame_holds_its_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

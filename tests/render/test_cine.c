@@ -398,7 +398,8 @@ static void loops_of_before_exchanges_are_read(void **state)
     if (!read)
         fail_msg("%s", faults.text[0]);
     const Pose *found = cine_frame(read, 0).pose;
-    assert_true(found->tool[1].node_count == 6 && found->tool[1].fitted == 0 && vec3_distance(found->tool[1].node[5].position, pose->tool[1].node[5].position) == 0);
+    assert_true(found->tool[1].node_count == 6 && found->tool[1].fitted == 0 &&
+                vec3_distance(found->tool[1].node[5].position, pose->tool[1].node[5].position) == 0);
     free(bytes);
     cine_free(read);
     cine_free(cine);
@@ -530,7 +531,8 @@ int main(void)
         cmocka_unit_test(pauses_of_the_pedal_are_left_out),
         cmocka_unit_test(an_empty_loop_shows_nothing),
         cmocka_unit_test(a_file_comes_back_the_same),
-        cmocka_unit_test(several_tools_are_kept), cmocka_unit_test(loops_of_before_exchanges_are_read),
+        cmocka_unit_test(several_tools_are_kept),
+        cmocka_unit_test(loops_of_before_exchanges_are_read),
         cmocka_unit_test(a_damaged_file_is_refused),
         cmocka_unit_test(what_cannot_be_drawn_is_refused),
         cmocka_unit_test(a_movie_lasts_as_long_as_the_loop),

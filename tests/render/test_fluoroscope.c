@@ -607,12 +607,19 @@ static void odd_frames_are_survived(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(known_thickness_gives_known_grey), cmocka_unit_test(an_exchanged_tool_is_seen_as_it_is),      cmocka_unit_test(noise_is_that_of_the_quanta),
-        cmocka_unit_test(the_same_pulse_gives_the_same_picture), cmocka_unit_test(blades_cover_what_they_are_set_to),
-        cmocka_unit_test(dsa_shows_the_vessel_alone),            cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
-        cmocka_unit_test(without_pedal_the_last_image_holds),    cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
-        cmocka_unit_test(unfit_vessels_are_told),                cmocka_unit_test(odd_frames_are_survived),
-        cmocka_unit_test(whatever_state_gl_is_in),               cmocka_unit_test(kept_layers_give_the_same_as_new_ones),
+        cmocka_unit_test(known_thickness_gives_known_grey),
+        cmocka_unit_test(an_exchanged_tool_is_seen_as_it_is),
+        cmocka_unit_test(noise_is_that_of_the_quanta),
+        cmocka_unit_test(the_same_pulse_gives_the_same_picture),
+        cmocka_unit_test(blades_cover_what_they_are_set_to),
+        cmocka_unit_test(dsa_shows_the_vessel_alone),
+        cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
+        cmocka_unit_test(without_pedal_the_last_image_holds),
+        cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
+        cmocka_unit_test(unfit_vessels_are_told),
+        cmocka_unit_test(odd_frames_are_survived),
+        cmocka_unit_test(whatever_state_gl_is_in),
+        cmocka_unit_test(kept_layers_give_the_same_as_new_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -379,7 +379,8 @@ static void the_tube_converges_with_the_pixels(void **state)
         layer_destroy(&layer);
         room_close(s);
     }
-    print_message("tube against its chord: %.2e, %.2e, %.2e, order %.2f and %.2f\n", error[0], error[1], error[2], log2(error[0] / error[1]), log2(error[1] / error[2]));
+    print_message("tube against its chord: %.2e, %.2e, %.2e, order %.2f and %.2f\n", error[0], error[1], error[2], log2(error[0] / error[1]),
+                  log2(error[1] / error[2]));
     assert_near(log2(error[0] / error[1]), 2, 0.2);
     assert_near(log2(error[1] / error[2]), 2, 0.2);
 }
@@ -581,12 +582,15 @@ static void the_lumen_is_taken_out_of_the_volume(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(thickness_is_that_of_a_ray_caster),      cmocka_unit_test(finer_meshes_come_closer_to_the_sphere),
-        cmocka_unit_test(contrast_follows_the_nodes),             cmocka_unit_test(the_ribbon_has_the_chord_of_a_cylinder),
+        cmocka_unit_test(thickness_is_that_of_a_ray_caster),
+        cmocka_unit_test(finer_meshes_come_closer_to_the_sphere),
+        cmocka_unit_test(contrast_follows_the_nodes),
+        cmocka_unit_test(the_ribbon_has_the_chord_of_a_cylinder),
         cmocka_unit_test(a_tube_is_its_wall_s_chord_and_tools_add_up),
         cmocka_unit_test(the_tube_converges_with_the_pixels),
         cmocka_unit_test(marker_bands_are_as_long_as_they_are),
-        cmocka_unit_test(shadows_keep_what_the_tool_takes_away),  cmocka_unit_test(bodies_and_volumes_are_integrated),
+        cmocka_unit_test(shadows_keep_what_the_tool_takes_away),
+        cmocka_unit_test(bodies_and_volumes_are_integrated),
         cmocka_unit_test(the_lumen_is_taken_out_of_the_volume),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -26,7 +26,8 @@ static const char scene_text[] =
     "  - {name: guide, kind: guide_catheter, elements: 20, sections: [{length_mm: 100, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}]}\n"
     "  - {name: wire, kind: wire, elements: 30, sections: [{length_mm: 160, diameter_mm: 0.9, young_modulus_gpa: 5}]}\n"
     "sheath: {entry_mm: [0,0,0], direction: [1,0,0], inserted_mm: 10}\n"
-    "script: [{t_s: 0, wire.push_mm_s: 40, wire.twist_deg_s: 0, wire.contrast_ml_s: 1.5}, {t_s: 0.2, guide.push_mm_s: 20, guide.twist_deg_s: 0}, {t_s: 1, guide.contrast_ml_s: 0.5}, {t_s: 1.2}]\n";
+    "script: [{t_s: 0, wire.push_mm_s: 40, wire.twist_deg_s: 0, wire.contrast_ml_s: 1.5}, {t_s: 0.2, guide.push_mm_s: 20, guide.twist_deg_s: 0}, {t_s: 1, "
+    "guide.contrast_ml_s: 0.5}, {t_s: 1.2}]\n";
 
 enum { STEPS = 1200, EACH = 100 };
 static Faults faults;

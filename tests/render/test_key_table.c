@@ -70,8 +70,8 @@ static void a_typed_sign_is_no_key_of_another_action(void **unused)
 
 static void key(WindowInput *input, bool is_down, int which, unsigned modifiers, bool is_repeat)
 {
-    input->event[input->event_count++] = (WindowEvent){
-        .kind = is_down ? WINDOW_KEY_DOWN_EVENT : WINDOW_KEY_UP_EVENT, .key = which, .modifiers = modifiers, .is_repeat = is_repeat};
+    input->event[input->event_count++] =
+        (WindowEvent){.kind = is_down ? WINDOW_KEY_DOWN_EVENT : WINDOW_KEY_UP_EVENT, .key = which, .modifiers = modifiers, .is_repeat = is_repeat};
 }
 
 static void feed(KeyState *state, WindowInput *input, bool is_captured)
@@ -229,8 +229,12 @@ static void random_events_end_released(void **unused)
         WindowInput input = {.has_focus = rand() % 8 != 0};
         input.event_count = rand() % 20;
         for (int i = 0; i < input.event_count; i++)
-            input.event[i] = (WindowEvent){.kind = (WindowEventKind)(rand() % 6), .key = rand() % WINDOW_KEYS, .modifiers = (unsigned)rand() % 16,
-                                           .character = (unsigned)rand() % 300, .is_repeat = rand() % 2, .device = rand() % 16};
+            input.event[i] = (WindowEvent){.kind = (WindowEventKind)(rand() % 6),
+                                           .key = rand() % WINDOW_KEYS,
+                                           .modifiers = (unsigned)rand() % 16,
+                                           .character = (unsigned)rand() % 300,
+                                           .is_repeat = rand() % 2,
+                                           .device = rand() % 16};
         feed(&state, &input, rand() % 2);
         for (int i = 0; i < ACTION_COUNT; i++) {
             assert_true(state.pressed[i] >= 0 && (state.pressed[i] == 0 || key_table[i].kind == ACTION_PRESS));
@@ -241,11 +245,15 @@ static void random_events_end_released(void **unused)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_action_has_one_row_a_key_and_help), cmocka_unit_test(the_list_of_keys_tells_of_every_action), cmocka_unit_test(a_typed_sign_is_no_key_of_another_action),
-        cmocka_unit_test(each_key_does_its_own_action_only),       cmocka_unit_test(two_keys_are_held_together),
-        cmocka_unit_test(an_orbit_never_becomes_a_push),           cmocka_unit_test(loss_of_focus_lets_go_of_everything),
-        cmocka_unit_test(a_text_field_takes_letters_but_not_releases), cmocka_unit_test(a_sign_is_typed_wherever_it_lies),
-        cmocka_unit_test(random_events_end_released)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_action_has_one_row_a_key_and_help),
+                                       cmocka_unit_test(the_list_of_keys_tells_of_every_action),
+                                       cmocka_unit_test(a_typed_sign_is_no_key_of_another_action),
+                                       cmocka_unit_test(each_key_does_its_own_action_only),
+                                       cmocka_unit_test(two_keys_are_held_together),
+                                       cmocka_unit_test(an_orbit_never_becomes_a_push),
+                                       cmocka_unit_test(loss_of_focus_lets_go_of_everything),
+                                       cmocka_unit_test(a_text_field_takes_letters_but_not_releases),
+                                       cmocka_unit_test(a_sign_is_typed_wherever_it_lies),
+                                       cmocka_unit_test(random_events_end_released)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

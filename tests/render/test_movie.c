@@ -21,14 +21,13 @@ enum { WIDTH = 320, HEIGHT = 240, FPS = 20, STEPS = 2000, FRAMES = 41 };
 static char folder[] = "/tmp/seldinger-film-XXXXXX";
 #include "tests/folder.h"
 
-static const char scene_text[] =
-    "seldinger: 1\n"
-    "vessel:\n"
-    "  tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}\n"
-    "  contact: lim\n"
-    "wire: {elements: 20, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
-    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 5}\n"
-    "script: [[0, 5, 0], [1, 0, 0], [2, 0, 0]]\n";
+static const char scene_text[] = "seldinger: 1\n"
+                                 "vessel:\n"
+                                 "  tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}\n"
+                                 "  contact: lim\n"
+                                 "wire: {elements: 20, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+                                 "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 5}\n"
+                                 "script: [[0, 5, 0], [1, 0, 0], [2, 0, 0]]\n";
 
 static void need_everything(void)
 {
@@ -163,8 +162,8 @@ static void a_film_that_cannot_be_is_said(void **state)
     assert_int_equal(command("'%s' replay '%s' --movie /nowhere/x.mp4 --quiet 2>'%s/said'; test $? = 2", SELDINGER_PROGRAM, recording, folder), 0);
     assert_int_equal(command("grep -q 'nowhere/x.mp4: ' '%s/said'", folder), 0);
     // the program by its path, ffmpeg by a PATH that has none
-    assert_int_equal(command("PATH=/nowhere '%s' replay '%s' --movie '%s/x.mp4' --quiet 2>'%s/said'; test $? = 2", SELDINGER_PROGRAM, recording, folder, folder),
-                     0);
+    assert_int_equal(
+        command("PATH=/nowhere '%s' replay '%s' --movie '%s/x.mp4' --quiet 2>'%s/said'; test $? = 2", SELDINGER_PROGRAM, recording, folder, folder), 0);
     assert_int_equal(command("grep -q 'install ffmpeg' '%s/said'", folder), 0);
     assert_int_equal(command("test -z \"$(find '%s' -name 'x.mp4*')\"", folder), 0);
 }
@@ -178,18 +177,21 @@ static void a_close_up_is_of_the_tips(void **state)
     record(recording, sizeof recording);
     const char *const options[2] = {"", "--close-up 12"};
     for (int i = 0; i < 2; i++)
-        assert_int_equal(command("'%s' replay '%s' --picture '%s/close%d.png' --quiet --no-panels --view 3d --size 320x240 %s", SELDINGER_PROGRAM, recording, folder, i,
-                                 options[i]), 0);
+        assert_int_equal(command("'%s' replay '%s' --picture '%s/close%d.png' --quiet --no-panels --view 3d --size 320x240 %s", SELDINGER_PROGRAM, recording,
+                                 folder, i, options[i]),
+                         0);
     assert_int_equal(command("cmp -s '%s/close0.png' '%s/close1.png'; test $? = 1", folder, folder), 0);
-    assert_int_equal(command("'%s' replay '%s' --picture '%s/x.png' --close-up 1 2>'%s/said'; test $? = 2 && grep -q -e '--close-up' '%s/said'", SELDINGER_PROGRAM,
-                             recording, folder, folder, folder), 0);
+    assert_int_equal(command("'%s' replay '%s' --picture '%s/x.png' --close-up 1 2>'%s/said'; test $? = 2 && grep -q -e '--close-up' '%s/said'",
+                             SELDINGER_PROGRAM, recording, folder, folder, folder),
+                     0);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(contrast_comes_and_goes_in_a_film),
-        cmocka_unit_test(a_film_that_cannot_be_is_said), cmocka_unit_test(a_close_up_is_of_the_tips),
+        cmocka_unit_test(a_film_that_cannot_be_is_said),
+        cmocka_unit_test(a_close_up_is_of_the_tips),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -155,8 +155,9 @@ static void what_cannot_be_is_said(void **state)
         int width, height;
         double fps;
         const char *path, *says;
-    } bad[] = {{1, 20, 30, place("x"), "sides of 2 to 8192"}, {20, 9000, 30, "/tmp/x", "sides of 2 to 8192"}, {20, 20, 0, "/tmp/x", "frames a second"},
-               {20, 20, NAN, "/tmp/x", "frames a second"},     {20, 20, 30, "/tmp", "not a regular file"},        {20, 20, 30, "/dev/null", "not a regular file"},
+    } bad[] = {{1, 20, 30, place("x"), "sides of 2 to 8192"},      {20, 9000, 30, "/tmp/x", "sides of 2 to 8192"},
+               {20, 20, 0, "/tmp/x", "frames a second"},           {20, 20, NAN, "/tmp/x", "frames a second"},
+               {20, 20, 30, "/tmp", "not a regular file"},         {20, 20, 30, "/dev/null", "not a regular file"},
                {20, 20, 30, "/nowhere/x.mp4", "cannot be written"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         message[0] = 0;

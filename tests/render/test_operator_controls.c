@@ -16,9 +16,19 @@ static const PanelLayout layout = {.view = {{0, 0, 0, 600, 400}, {0, 600, 0, 500
 
 static OperatorControls controls_in_front(void)
 {
-    return (OperatorControls){.xray = xray_default_control(), .patient = patient_axes_lps(), .contrast_ml_s = 3, .push_mm_s = 10, .twist_deg_s = 120,
-                  .look.camera = {.focus = {1, 2, 3}, .turn = {1, 0, 0, 0}, .width_mm = 100, .height_mm = 80, .home_focus = {4, 5, 6},
-                                  .home_turn = {1, 0, 0, 0}, .home_width_mm = 100, .home_height_mm = 80}};
+    return (OperatorControls){.xray = xray_default_control(),
+                              .patient = patient_axes_lps(),
+                              .contrast_ml_s = 3,
+                              .push_mm_s = 10,
+                              .twist_deg_s = 120,
+                              .look.camera = {.focus = {1, 2, 3},
+                                              .turn = {1, 0, 0, 0},
+                                              .width_mm = 100,
+                                              .height_mm = 80,
+                                              .home_focus = {4, 5, 6},
+                                              .home_turn = {1, 0, 0, 0},
+                                              .home_width_mm = 100,
+                                              .home_height_mm = 80}};
 }
 
 static void obey(OperatorControls *controls, const PanelActions *actions, double seconds) { controls_obey(controls, NULL, actions, &layout, seconds); }
@@ -92,7 +102,9 @@ static void the_table_carries_the_patient_where_the_key_says(void **state)
     (void)state;
     Quat turn = quat_unit((Quat){0.3, -0.5, 0.7, 0.4});
     PatientAxes lps = patient_axes_lps();
-    const PatientAxes patients[] = {lps, patient_axes_ras(), {quat_rotate(turn, lps.right), quat_rotate(turn, lps.anterior), quat_rotate(turn, lps.superior)},
+    const PatientAxes patients[] = {lps,
+                                    patient_axes_ras(),
+                                    {quat_rotate(turn, lps.right), quat_rotate(turn, lps.anterior), quat_rotate(turn, lps.superior)},
                                     {vec3_negate(lps.right), lps.anterior, lps.superior}};   // the last one mirrored
     uint64_t seed = 1;
     for (size_t i = 0; i < sizeof patients / sizeof patients[0]; i++)
@@ -409,13 +421,18 @@ static void keys_choose_what_is_seen(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_c_arm_stops_at_its_limits), cmocka_unit_test(the_table_carries_the_patient_where_the_key_says),
-                                       cmocka_unit_test(blades_and_field_keep_their_ranges), cmocka_unit_test(pulse_rates_go_round),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_c_arm_stops_at_its_limits),
+                                       cmocka_unit_test(the_table_carries_the_patient_where_the_key_says),
+                                       cmocka_unit_test(blades_and_field_keep_their_ranges),
+                                       cmocka_unit_test(pulse_rates_go_round),
                                        cmocka_unit_test(subtraction_and_roadmap_take_masks),
                                        cmocka_unit_test(pedal_and_contrast_come_from_latch_keys_and_hands),
-                                       cmocka_unit_test(a_slider_sets_what_it_shows_and_no_more), cmocka_unit_test(the_tool_goes_at_three_speeds_and_stops), cmocka_unit_test(the_keys_choose_lock_and_let_go),
+                                       cmocka_unit_test(a_slider_sets_what_it_shows_and_no_more),
+                                       cmocka_unit_test(the_tool_goes_at_three_speeds_and_stops),
+                                       cmocka_unit_test(the_keys_choose_lock_and_let_go),
                                        cmocka_unit_test(a_second_hand_moves_the_other_of_the_pair),
-                                       cmocka_unit_test(the_mouse_turns_the_c_arm_and_magnifies), cmocka_unit_test(the_mouse_moves_the_free_camera),
+                                       cmocka_unit_test(the_mouse_turns_the_c_arm_and_magnifies),
+                                       cmocka_unit_test(the_mouse_moves_the_free_camera),
                                        cmocka_unit_test(keys_choose_what_is_seen)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

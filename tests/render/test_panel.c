@@ -41,9 +41,9 @@ static int close_gl(void **state)
 
 // ---- a made-up state
 
-static const PanelFigure figures[] = {{"Time", 83.4, "s", 1, MARK_NONE},           {"Fluoroscopy", 41.2, "s", 1, MARK_GOOD},
-                                      {"Contrast", 12.5, "ml", 1, MARK_WARNING},    {"Path efficiency", 0.83, "", 2, MARK_GOOD},
-                                      {"Wall force, peak", 412, "mN", 0, MARK_BAD}, {"Distance to target", NAN, "mm", 1, MARK_NONE}};
+static const PanelFigure figures[] = {
+    {"Time", 83.4, "s", 1, MARK_NONE},           {"Fluoroscopy", 41.2, "s", 1, MARK_GOOD},     {"Contrast", 12.5, "ml", 1, MARK_WARNING},
+    {"Path efficiency", 0.83, "", 2, MARK_GOOD}, {"Wall force, peak", 412, "mN", 0, MARK_BAD}, {"Distance to target", NAN, "mm", 1, MARK_NONE}};
 static const char *const errors[] = {"1:02 wrong branch: left vertebral", "1:17 tip force above 300 mN"};
 static const PanelDevice devices[] = {{"Keyboard", HAND_READY, NULL},
                                       {"Logitech Extreme 3D", HAND_READY, "y push, z twist, trigger pedal"},
@@ -51,17 +51,45 @@ static const PanelDevice devices[] = {{"Keyboard", HAND_READY, NULL},
 
 static PanelState some_state(void)
 {
-    return (PanelState){.now_s = 90, .time_s = 83.4, .title = "Reach the aneurysm", .trainee = "A. Müller",
+    return (PanelState){.now_s = 90,
+                        .time_s = 83.4,
+                        .title = "Reach the aneurysm",
+                        .trainee = "A. Müller",
                         .instructions = "Bring the tip from the internal carotid into the aneurysm and hold it there for two seconds. Do not enter the "
                                         "posterior communicating artery.",
-                        .target = "aneurysm", .hold_s = 1.2, .hold_needed_s = 2, .figure_count = 6, .figure = figures, .error_count = 2,
-                        .error = errors, .tool_count = 1,
-                        .tool = {{.name = "wire", .what = "0.014\" guidewire, J tip, 200 elements", .inserted_mm = 120.4, .turned_deg = -35, .push_mm_s = 12,
-                                  .twist_deg_s = -40, .force_n = 0.061, .torque_n_mm = 0.0123}}, .wall_max_n = 0.18, .wall_sum_n = 0.93,
+                        .target = "aneurysm",
+                        .hold_s = 1.2,
+                        .hold_needed_s = 2,
+                        .figure_count = 6,
+                        .figure = figures,
+                        .error_count = 2,
+                        .error = errors,
+                        .tool_count = 1,
+                        .tool = {{.name = "wire",
+                                  .what = "0.014\" guidewire, J tip, 200 elements",
+                                  .inserted_mm = 120.4,
+                                  .turned_deg = -35,
+                                  .push_mm_s = 12,
+                                  .twist_deg_s = -40,
+                                  .force_n = 0.061,
+                                  .torque_n_mm = 0.0123}},
+                        .wall_max_n = 0.18,
+                        .wall_sum_n = 0.93,
                         .xray = {.pedal = 1, .pulses_s = 15, .lao_deg = 30, .cra_deg = -10, .field_mm = 160, .collimator = {0.1f, 0.2f, 0, 0.3f}},
-                        .mode = PANEL_LIVE, .fluoro_s = 41.2, .contrast_ml = 12.5, .cine_frame = 11, .cine_frames = 120, .view = VIEW_FLUOROSCOPY,
-                        .is_following = true, .step_median_us = 182, .step_p999_us = 403, .real_time_factor = 1, .frame_ms = 9.1,
-                        .missed_deadlines = 3, .device_count = 3, .device = devices};
+                        .mode = PANEL_LIVE,
+                        .fluoro_s = 41.2,
+                        .contrast_ml = 12.5,
+                        .cine_frame = 11,
+                        .cine_frames = 120,
+                        .view = VIEW_FLUOROSCOPY,
+                        .is_following = true,
+                        .step_median_us = 182,
+                        .step_p999_us = 403,
+                        .real_time_factor = 1,
+                        .frame_ms = 9.1,
+                        .missed_deadlines = 3,
+                        .device_count = 3,
+                        .device = devices};
 }
 
 static WindowInput still_input(int width, int height, double scale)
@@ -126,9 +154,13 @@ static void pictures_at_all_sizes(void **unused)
     (void)unused;
     if (!context)
         skip();
-    static const struct { int width, height; double scale; PanelView view; const char *name; } size[] = {
-        {1280, 720, 1, VIEW_FLUOROSCOPY, "1280x720"}, {1024, 600, 1, VIEW_FLUOROSCOPY, "1024x600"}, {1920, 1080, 1, VIEW_3D, "1920x1080"},
-        {2560, 1440, 2, VIEW_FLUOROSCOPY, "2560x1440@2"}, {1280, 720, 1, VIEW_ALL, "all-views"}, {2560, 1440, 1, VIEW_ALL, "2560x1440"}};
+    static const struct {
+        int width, height;
+        double scale;
+        PanelView view;
+        const char *name;
+    } size[] = {{1280, 720, 1, VIEW_FLUOROSCOPY, "1280x720"},     {1024, 600, 1, VIEW_FLUOROSCOPY, "1024x600"}, {1920, 1080, 1, VIEW_3D, "1920x1080"},
+                {2560, 1440, 2, VIEW_FLUOROSCOPY, "2560x1440@2"}, {1280, 720, 1, VIEW_ALL, "all-views"},        {2560, 1440, 1, VIEW_ALL, "2560x1440"}};
     for (size_t i = 0; i < sizeof size / sizeof size[0]; i++) {
         GlCanvas canvas = new_canvas(size[i].width, size[i].height);
         WindowInput input = still_input(size[i].width, size[i].height, size[i].scale);
@@ -153,10 +185,7 @@ static void pictures_at_all_sizes(void **unused)
 
 // ---- layout
 
-static bool overlap(PanelRect a, PanelRect b)
-{
-    return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
-}
+static bool overlap(PanelRect a, PanelRect b) { return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height; }
 
 // Any window, density and view: everything inside, nothing over anything else, the main view the largest, letters no smaller than 11 pixels.
 static void nothing_overlaps_at_any_size(void **unused)
@@ -172,8 +201,7 @@ static void nothing_overlaps_at_any_size(void **unused)
                 assert_true(l.scale >= 0.5 && (width < 1024 || height < 600 || l.scale >= 0.85));
                 PanelRect rect[VIEW_COUNT + 4] = {l.view_rect[0], l.view_rect[1], l.view_rect[2], l.top, l.left, l.right, l.bottom};
                 for (int a = 0; a < VIEW_COUNT + 4; a++) {
-                    assert_true(rect[a].x >= 0 && rect[a].y >= 0 && rect[a].x + rect[a].width <= (float)width &&
-                                rect[a].y + rect[a].height <= (float)height);
+                    assert_true(rect[a].x >= 0 && rect[a].y >= 0 && rect[a].x + rect[a].width <= (float)width && rect[a].y + rect[a].height <= (float)height);
                     for (int b = 0; b < a; b++)
                         if (overlap(rect[a], rect[b]))
                             fail_msg("%d and %d overlap at %dx%d, view %d", a, b, width, height, view);
@@ -331,15 +359,24 @@ static void every_action_has_a_button_that_works(void **unused)
 // ---- the tray
 
 static PanelTrayDevice tray_device[3];
-static const PanelTray some_tray = {.tool = "wire", .note = "'wire' is still inserted: draw it back 312 mm, to the hub, then another can be inserted", .device_count = 3, .device = tray_device};
+static const PanelTray some_tray = {.tool = "wire",
+                                    .note = "'wire' is still inserted: draw it back 312 mm, to the hub, then another can be inserted",
+                                    .device_count = 3,
+                                    .device = tray_device};
 
 static void fill_tray(void)
 {
     static const char *const name[] = {"0.014 inch wire, steel core", "0.014 inch wire, nitinol core", "0.014 inch wire, steel core, tip shaped to 45\u00b0"};
     for (int i = 0; i < 3; i++) {
         PanelTrayDevice *device = &tray_device[i];
-        *device = (PanelTrayDevice){.name = name[i], .what = "wire, steel core, 0.356 mm thick, 1900 mm long", .is_in = i == 0, .can_be_shaped = i != 1, .point_count = TRAY_POINTS,
-                                    .step_count = 3, .end_mm = {1650, 1850, 1900}, .bending_n_mm2 = {158, 40, 0.5}};
+        *device = (PanelTrayDevice){.name = name[i],
+                                    .what = "wire, steel core, 0.356 mm thick, 1900 mm long",
+                                    .is_in = i == 0,
+                                    .can_be_shaped = i != 1,
+                                    .point_count = TRAY_POINTS,
+                                    .step_count = 3,
+                                    .end_mm = {1650, 1850, 1900},
+                                    .bending_n_mm2 = {158, 40, 0.5}};
         for (int k = 0; k < TRAY_POINTS; k++) {
             device->point[k][0] = 0.2 * k;
             device->point[k][1] = i * fmax(0, 0.1 * k - 10);
@@ -354,7 +391,10 @@ static void the_tray_fits_at_any_size(void **unused)
     if (!context)
         skip();
     fill_tray();
-    static const struct { int width, height; double scale; } size[] = {{800, 600, 1}, {1024, 600, 1}, {1280, 720, 1}, {1920, 1080, 1}, {2560, 1440, 2}};
+    static const struct {
+        int width, height;
+        double scale;
+    } size[] = {{800, 600, 1}, {1024, 600, 1}, {1280, 720, 1}, {1920, 1080, 1}, {2560, 1440, 2}};
     for (size_t i = 0; i < sizeof size / sizeof size[0]; i++) {
         OperatorControls controls = new_controls(size[i].width, size[i].height);
         controls.input.scale = size[i].scale;
@@ -620,9 +660,17 @@ static void names_are_typed_and_trimmed(void **unused)
 static void broken_lines_are_joined(void **unused)
 {
     (void)unused;
-    static const struct { const char *from, *to; } text[] = {
-        {"", ""}, {"\n\n", ""}, {"One.", "One."}, {"One.\nTwo", "One.\nTwo"}, {"one\ntwo\n", "one two"}, {"along the\n   outside", "along the outside"},
-        {"Do:\n1. this\n   and that\n2. more", "Do:\n1. this and that\n2. more"}, {"a\n\nb", "a\n\nb"}, {"a\n- b", "a\n- b"}};
+    static const struct {
+        const char *from, *to;
+    } text[] = {{"", ""},
+                {"\n\n", ""},
+                {"One.", "One."},
+                {"One.\nTwo", "One.\nTwo"},
+                {"one\ntwo\n", "one two"},
+                {"along the\n   outside", "along the outside"},
+                {"Do:\n1. this\n   and that\n2. more", "Do:\n1. this and that\n2. more"},
+                {"a\n\nb", "a\n\nb"},
+                {"a\n- b", "a\n- b"}};
     char out[64];
     for (size_t i = 0; i < sizeof text / sizeof text[0]; i++) {
         panel_reflow(text[i].from, out, sizeof out);
@@ -674,8 +722,8 @@ static void hints_lead_on_with_use(void **unused)
         skip();
     for (int tools = 1; tools <= 2; tools++) {
         OperatorControls controls = new_controls(1024, 600);
-        static const ActionId follow[] = {ACTION_PEDAL, ACTION_PUSH, ACTION_TOOL_2, ACTION_OTHER_PUSH, ACTION_MAGNIFY, ACTION_CONTRAST, ACTION_ROADMAP,
-                                          ACTION_TWIST_RIGHT, ACTION_LAO, ACTION_VIEW_3D, ACTION_HELP};
+        static const ActionId follow[] = {ACTION_PEDAL,   ACTION_PUSH,        ACTION_TOOL_2, ACTION_OTHER_PUSH, ACTION_MAGNIFY, ACTION_CONTRAST,
+                                          ACTION_ROADMAP, ACTION_TWIST_RIGHT, ACTION_LAO,    ACTION_VIEW_3D,    ACTION_HELP};
         int count = sizeof follow / sizeof follow[0];
         for (int i = 0; i < count; i++) {
             const KeyAction *action = &key_table[follow[i]];
@@ -704,9 +752,19 @@ static void strange_states_draw(void **unused)
     if (!context)
         skip();
     OperatorControls controls = new_controls(640, 400);
-    controls.state = (PanelState){.time_s = NAN, .tool_count = 1, .tool = {{.inserted_mm = INFINITY, .force_n = NAN}}, .hold_needed_s = 1, .hold_s = NAN, .warning = "x",
-                              .warnings = ~0u, .fluoro_s = -1, .contrast_ml = NAN, .step_median_us = NAN, .real_time_factor = NAN,
-                              .xray = {.lao_deg = NAN, .field_mm = NAN}, .view = VIEW_ALL};
+    controls.state = (PanelState){.time_s = NAN,
+                                  .tool_count = 1,
+                                  .tool = {{.inserted_mm = INFINITY, .force_n = NAN}},
+                                  .hold_needed_s = 1,
+                                  .hold_s = NAN,
+                                  .warning = "x",
+                                  .warnings = ~0u,
+                                  .fluoro_s = -1,
+                                  .contrast_ml = NAN,
+                                  .step_median_us = NAN,
+                                  .real_time_factor = NAN,
+                                  .xray = {.lao_deg = NAN, .field_mm = NAN},
+                                  .view = VIEW_ALL};
     static const PanelFigure nameless = {0};
     controls.state.figure_count = 1;
     controls.state.figure = &nameless;
@@ -734,9 +792,15 @@ static void several_tools_are_listed(void **unused)
         static const char *const name[4] = {"guide", "catheter", "microcatheter", "wire"};
         controls.state.tool_count = 4;
         for (int k = 0; k < 4; k++)
-            controls.state.tool[k] = (PanelTool){.name = name[k], .what = "catheter 0.70 mm x 1500 mm, curved tip", .color = {80, 160, 220, 255}, .inserted_mm = 100 + k,
-                                             .turned_deg = 20, .force_n = 0.1 * k, .torque_n_mm = 0.02 * k, .note = k == 1 ? "let go" : NULL,
-                                             .mark = k == 1 ? MARK_WARNING : MARK_NONE};
+            controls.state.tool[k] = (PanelTool){.name = name[k],
+                                                 .what = "catheter 0.70 mm x 1500 mm, curved tip",
+                                                 .color = {80, 160, 220, 255},
+                                                 .inserted_mm = 100 + k,
+                                                 .turned_deg = 20,
+                                                 .force_n = 0.1 * k,
+                                                 .torque_n_mm = 0.02 * k,
+                                                 .note = k == 1 ? "let go" : NULL,
+                                                 .mark = k == 1 ? MARK_WARNING : MARK_NONE};
         for (int i = 0; i < 8; i++)
             frame(&controls);
         keep_picture(&controls.canvas, s ? "four-tools-small" : "four-tools");
@@ -835,8 +899,8 @@ static void what_a_frame_costs(void **unused)
         for (int k = 10; k < FRAMES; k++)
             mean += ms[k] / (FRAMES - 10);
         qsort(ms + 10, FRAMES - 10, sizeof *ms, by_size);
-        print_message("panel alone, %dx%d: first frame %.1f ms CPU, then mean %.2f, median %.2f, most %.2f\n", canvas.width, canvas.height, ms[0],
-                      mean, ms[10 + (FRAMES - 10) / 2], ms[FRAMES - 1]);
+        print_message("panel alone, %dx%d: first frame %.1f ms CPU, then mean %.2f, median %.2f, most %.2f\n", canvas.width, canvas.height, ms[0], mean,
+                      ms[10 + (FRAMES - 10) / 2], ms[FRAMES - 1]);
         panel_destroy(panel);
         gl_canvas_destroy(&canvas);
     }
@@ -848,9 +912,13 @@ int main(void)
                                        cmocka_unit_test(plots_keep_every_peak_and_forget_after_their_span),
                                        cmocka_unit_test(ticks_are_round),
                                        cmocka_unit_test(pictures_at_all_sizes),
-                                       cmocka_unit_test(every_action_has_a_button_that_works), cmocka_unit_test(the_tray_fits_at_any_size),
-        cmocka_unit_test(keys_choose_shape_and_take_from_the_tray), cmocka_unit_test(the_mouse_chooses_on_the_tray),
-                                       cmocka_unit_test(words_do_not_lie_on_words), cmocka_unit_test(the_newest_message_is_seen), cmocka_unit_test(a_tooltip_names_the_key),
+                                       cmocka_unit_test(every_action_has_a_button_that_works),
+                                       cmocka_unit_test(the_tray_fits_at_any_size),
+                                       cmocka_unit_test(keys_choose_shape_and_take_from_the_tray),
+                                       cmocka_unit_test(the_mouse_chooses_on_the_tray),
+                                       cmocka_unit_test(words_do_not_lie_on_words),
+                                       cmocka_unit_test(the_newest_message_is_seen),
+                                       cmocka_unit_test(a_tooltip_names_the_key),
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
@@ -858,7 +926,7 @@ int main(void)
                                        cmocka_unit_test(instructions_are_shown_until_followed),
                                        cmocka_unit_test(hints_lead_on_with_use),
                                        cmocka_unit_test(strange_states_draw),
-        cmocka_unit_test(several_tools_are_listed),
+                                       cmocka_unit_test(several_tools_are_listed),
                                        cmocka_unit_test(kept_windows_show_what_a_new_panel_shows),
                                        cmocka_unit_test(what_a_frame_costs)};
     return cmocka_run_group_tests(tests, open_gl, close_gl);

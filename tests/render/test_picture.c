@@ -120,8 +120,15 @@ static void run_open(Run *run)
     }
     run->target = (SceneTarget){.name = "bend", .point = {1, 2, 18}, .radius = 1.2};
     run->scene = (PictureScene){.vessel = run->vessel, .target_count = 1, .target = &run->target, .has_entry = true, .entry = {1, 2, 3}};
-    run->tool = (PictureTool){.node_count = NODES, .position = run->position, .radius = run->radius, .force = run->force, .time_s = 1.5,
-                              .inserted_mm = 14, .push_force_n = 0.3, .torque_n_mm = 0.1, .label = "a moment"};
+    run->tool = (PictureTool){.node_count = NODES,
+                              .position = run->position,
+                              .radius = run->radius,
+                              .force = run->force,
+                              .time_s = 1.5,
+                              .inserted_mm = 14,
+                              .push_force_n = 0.3,
+                              .torque_n_mm = 0.1,
+                              .label = "a moment"};
     run->options.width = 640;
     run->options.height = 400;
     run->options.title = "test";

@@ -105,9 +105,16 @@ static Seen see(const Playback *playback)
     const Pose *pose = playback_pose(playback);
     const float *contrast = playback_contrast(playback);
     size_t bytes = (size_t)trainer.open.tree->node_count * sizeof *contrast;
-    Seen seen = {.step = pose->step, .pulses = playback_pulses(playback)->count, .time_s = playback_time_s(playback),
-                 .pedal_s = playback_pulses(playback)->pedal_s, .injected_ml = playback_injected_ml(playback), .inserted_mm = pose->inserted_mm,
-                 .xray = pose->xray, .command = pose->command, .proximal_force = pose->report.proximal_force, .tip = pose->position[pose->node_count - 1],
+    Seen seen = {.step = pose->step,
+                 .pulses = playback_pulses(playback)->count,
+                 .time_s = playback_time_s(playback),
+                 .pedal_s = playback_pulses(playback)->pedal_s,
+                 .injected_ml = playback_injected_ml(playback),
+                 .inserted_mm = pose->inserted_mm,
+                 .xray = pose->xray,
+                 .command = pose->command,
+                 .proximal_force = pose->report.proximal_force,
+                 .tip = pose->position[pose->node_count - 1],
                  .concentration = contrast ? malloc(bytes) : NULL};
     if (contrast)
         memcpy(seen.concentration, contrast, bytes);

@@ -114,12 +114,9 @@ static void rates_stay_within_what_tubes_do(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pulses_come_at_their_rate),
-        cmocka_unit_test(the_dose_does_not_depend_on_who_looks),
-        cmocka_unit_test(the_last_image_holds),
-        cmocka_unit_test(a_new_rate_begins_at_once),
-        cmocka_unit_test(a_step_back_is_a_new_press),
-        cmocka_unit_test(rates_stay_within_what_tubes_do),
+        cmocka_unit_test(pulses_come_at_their_rate),  cmocka_unit_test(the_dose_does_not_depend_on_who_looks),
+        cmocka_unit_test(the_last_image_holds),       cmocka_unit_test(a_new_rate_begins_at_once),
+        cmocka_unit_test(a_step_back_is_a_new_press), cmocka_unit_test(rates_stay_within_what_tubes_do),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

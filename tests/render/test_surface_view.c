@@ -134,8 +134,7 @@ static void balls_are_as_large_as_the_projection_says(void **state)
             assert_true(fabs(p.y - (HEIGHT / 2.0 + 7.2)) < 1e-6);
             double r = radius[k] / 0.1;
             // a pixel is lit where any of its samples is: its edge lies within one pixel of the outline
-            assert_true(fabs(left - (p.x - r)) < 1 && fabs(right + 1 - (p.x + r)) < 1 && fabs(top - (p.y - r)) < 1 &&
-                        fabs(bottom + 1 - (p.y + r)) < 1);
+            assert_true(fabs(left - (p.x - r)) < 1 && fabs(right + 1 - (p.x + r)) < 1 && fabs(top - (p.y - r)) < 1 && fabs(bottom + 1 - (p.y + r)) < 1);
             double rim = 2 * PI * r;
             assert_true(area > PI * r * r && area < PI * r * r + rim);
             ball_free(&mesh);
@@ -174,8 +173,7 @@ static void a_tool_shows_through_exactly_the_walls_before_it(void **state)
         Camera camera = camera_at(view[v], vec3(0, 0, 0), 0.1);
         assert_true(surface_view_set_mesh(stage->view, &mesh, message, sizeof message));
         ShellStyle glass = shell_style_glass(), solid = shell_style_solid();
-        double before = redness(stage, &camera, &glass, 15), inside = redness(stage, &camera, &glass, 0),
-               behind = redness(stage, &camera, &glass, -15);
+        double before = redness(stage, &camera, &glass, 15), inside = redness(stage, &camera, &glass, 0), behind = redness(stage, &camera, &glass, -15);
         assert_true(before > 1.1 * inside && inside > 1.1 * behind && behind > 20);
         // face on each wall takes its opacity from what lies behind it
         assert_true(fabs(inside / before - (1 - glass.front_opacity)) < 0.12);

@@ -11,23 +11,24 @@
 
 #include "../geom/near.h"
 
-static const char text[] = "seldinger: 1\n"
-                           "tools:\n"
-                           "  - name: outer\n"
-                           "    kind: catheter\n"
-                           "    elements: 20\n"
-                           "    sections:\n"
-                           "      - {length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 1, attenuation_1_mm: 0.3}\n"
-                           "      - {length_mm: 10, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 2, attenuation_1_mm: 0.3}\n"
-                           "      - {length_mm: 20, diameter_mm: 0.9, inner_diameter_mm: 0.7, young_modulus_gpa: 1, attenuation_1_mm: 0.2}\n"
-                           "    tip_marker: {length_mm: 1.5, attenuation_1_mm: 5}\n"
-                           "  - name: wire\n"
-                           "    kind: wire\n"
-                           "    elements: 20\n"
-                           "    sections: [{length_mm: 90, diameter_mm: 0.4, young_modulus_gpa: 20}]\n"
-                           "    tip_marker: {length_mm: 0}\n"
-                           "    exchange: [{sections: [{length_mm: 100, diameter_mm: 0.6, young_modulus_gpa: 20}], tip_marker: {length_mm: 5, attenuation_1_mm: 7}}]\n"
-                           "rig: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], fix: [{s_mm: 0, dof: all}]}\n";
+static const char text[] =
+    "seldinger: 1\n"
+    "tools:\n"
+    "  - name: outer\n"
+    "    kind: catheter\n"
+    "    elements: 20\n"
+    "    sections:\n"
+    "      - {length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 1, attenuation_1_mm: 0.3}\n"
+    "      - {length_mm: 10, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 2, attenuation_1_mm: 0.3}\n"
+    "      - {length_mm: 20, diameter_mm: 0.9, inner_diameter_mm: 0.7, young_modulus_gpa: 1, attenuation_1_mm: 0.2}\n"
+    "    tip_marker: {length_mm: 1.5, attenuation_1_mm: 5}\n"
+    "  - name: wire\n"
+    "    kind: wire\n"
+    "    elements: 20\n"
+    "    sections: [{length_mm: 90, diameter_mm: 0.4, young_modulus_gpa: 20}]\n"
+    "    tip_marker: {length_mm: 0}\n"
+    "    exchange: [{sections: [{length_mm: 100, diameter_mm: 0.6, young_modulus_gpa: 20}], tip_marker: {length_mm: 5, attenuation_1_mm: 7}}]\n"
+    "rig: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], fix: [{s_mm: 0, dof: all}]}\n";
 
 static void stretches_end_where_sections_and_markers_do(void **state)
 {

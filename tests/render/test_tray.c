@@ -14,20 +14,21 @@
 
 #define LIBRARY SOURCE_DIR "/scenes/tools"
 
-static const char scene_text[] = "seldinger: 1\n"
-                                 "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n"
-                                 "tools:\n"
-                                 "  - name: tube   # comments stay\n"
-                                 "    kind: microcatheter\n"
-                                 "    elements: 40\n"
-                                 "    sections: [{length_mm: 300, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]\n"
-                                 "    exchange:\n"
-                                 "      - {title: a longer one, elements: 40, sections: [{length_mm: 380, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
-                                 "  - name: thread\n"
-                                 "    kind: wire\n"
-                                 "    elements: 50\n"
-                                 "    sections: [{length_mm: 380, diameter_mm: 0.36, young_modulus_gpa: 20, friction: 0.02}, {length_mm: 20, diameter_mm: 0.36, young_modulus_gpa: 0.64}]\n"
-                                 "    damping: {mass_1_s: 0.5, stiffness_s: 0.0002}\n";
+static const char scene_text[] =
+    "seldinger: 1\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n"
+    "tools:\n"
+    "  - name: tube   # comments stay\n"
+    "    kind: microcatheter\n"
+    "    elements: 40\n"
+    "    sections: [{length_mm: 300, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]\n"
+    "    exchange:\n"
+    "      - {title: a longer one, elements: 40, sections: [{length_mm: 380, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
+    "  - name: thread\n"
+    "    kind: wire\n"
+    "    elements: 50\n"
+    "    sections: [{length_mm: 380, diameter_mm: 0.36, young_modulus_gpa: 20, friction: 0.02}, {length_mm: 20, diameter_mm: 0.36, young_modulus_gpa: 0.64}]\n"
+    "    damping: {mass_1_s: 0.5, stiffness_s: 0.0002}\n";
 
 static Faults faults;
 

@@ -19,8 +19,8 @@ static VesselScene *open_scene(const TriangleMesh *mesh, const VesselTree *tree,
 static TriangleMesh *tube_mesh(Vec3 start, Vec3 direction, double length, double radius)
 {
     const TubePiece piece = {.length = length};
-    const TubeOptions tube = {.start = start, .direction = direction, .normal = vec3_normal_to(direction), .radius = radius, .piece_count = 1, .piece = &piece,
-                              .closed_ends = true};
+    const TubeOptions tube = {
+        .start = start, .direction = direction, .normal = vec3_normal_to(direction), .radius = radius, .piece_count = 1, .piece = &piece, .closed_ends = true};
     TriangleMesh *mesh = triangle_mesh_of_tube(&tube);
     assert_non_null(mesh);
     return mesh;
@@ -66,7 +66,8 @@ static void the_wire_lies_where_the_projection_says(void **state)
         for (int y = 0; y < STAGE_HEIGHT; y++)
             for (int x = 0; x < STAGE_WIDTH; x++) {
                 double d = distance_to_segment(x + 0.5 - left, y + 0.5 - top, a, b);
-                bool differs = pixel_difference(with[y][x], without[y][x]) > 0, is_in_port = x >= left && x < left + port.width && y >= top && y < top + port.height;
+                bool differs = pixel_difference(with[y][x], without[y][x]) > 0,
+                     is_in_port = x >= left && x < left + port.width && y >= top && y < top + port.height;
                 if (d < half - 0.6)
                     assert_true(differs);
                 if (d > half + 0.6)
@@ -89,7 +90,8 @@ static void cached_walls_are_those_drawn_afresh(void **state)
     if (!stage_open(&stage))
         skip();
     static StagePixels cached, fresh, turned;
-    TriangleMesh *mesh = tube_mesh(vec3(-10, 0, 0), vec3_unit(vec3(1, 0.2, 0.1)), 20, 3), *coarse = tube_mesh(vec3(-10, 0, 0), vec3_unit(vec3(1, 0.2, 0.1)), 20, 2);
+    TriangleMesh *mesh = tube_mesh(vec3(-10, 0, 0), vec3_unit(vec3(1, 0.2, 0.1)), 20, 3),
+                 *coarse = tube_mesh(vec3(-10, 0, 0), vec3_unit(vec3(1, 0.2, 0.1)), 20, 2);
     char message[256];
     VesselSceneOptions options = {.vessel = mesh, .coarse = coarse};
     VesselScene *scene = vessel_scene_create(&options, message, sizeof message);
@@ -239,7 +241,8 @@ static void arrows_stand_only_where_there_is_force(void **state)
                 }
         assert_true(count > 60 && below > 0.9 * count);
         // and the tool is yellow there, grey at its free end
-        const uint8_t *hot = with[(int)node.y][(int)node.x], *cold = with[(int)node.y][(int)camera_project(vessel_scene_projection(scene), pose->position[20]).x];
+        const uint8_t *hot = with[(int)node.y][(int)node.x],
+                      *cold = with[(int)node.y][(int)camera_project(vessel_scene_projection(scene), pose->position[20]).x];
         assert_true(hot[0] > hot[2] + 60 && hot[1] > hot[2] + 40);
         assert_true(abs(cold[0] - cold[2]) < 40);
     }

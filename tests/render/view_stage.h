@@ -97,14 +97,16 @@ static inline Pose *straight_pose(int count, Vec3 from, Vec3 along, Vec3 up, dou
 static inline Pose *coaxial_pose(double catheter, double wire, double spacing, double catheter_radius, double wire_radius)
 {
     const double tip[2] = {catheter, wire}, radius[2] = {catheter_radius, wire_radius};
-    int nodes[2] = {(int)ceil(catheter / spacing) + 1, (int)ceil(wire / spacing) + 1}, shared = nodes[0] + (wire > catheter ? (int)ceil((wire - catheter) / spacing) : 0);
+    int nodes[2] = {(int)ceil(catheter / spacing) + 1, (int)ceil(wire / spacing) + 1},
+        shared = nodes[0] + (wire > catheter ? (int)ceil((wire - catheter) / spacing) : 0);
     Pose *pose = pose_create_tools(shared, 2, nodes);
     assert_non_null(pose);
     Mat3 axes = mat3_from_columns(vec3(1, 0, 0), vec3(0, 1, 0), vec3(0, 0, 1));
     for (int k = 0; k < 2; k++) {
         for (int j = 0; j < nodes[k]; j++) {
             double x = tip[k] * j / (nodes[k] - 1);
-            pose->tool[k].node[j] = (ToolNode){.s = x, .position = vec3(x, 0, 0), .orientation = quat_from_mat3(&axes), .radius = radius[k], .carrier = x > tip[0] ? 1 : 0};
+            pose->tool[k].node[j] =
+                (ToolNode){.s = x, .position = vec3(x, 0, 0), .orientation = quat_from_mat3(&axes), .radius = radius[k], .carrier = x > tip[0] ? 1 : 0};
         }
         pose->tool[k].inserted_mm = tip[k];
     }
@@ -129,8 +131,9 @@ static inline void coaxial_looks(CoaxialLooks *c, double catheter_radius, double
 {
     c->stretch[0] = (TubeStretch){.end = HUGE_VAL, .radius = catheter_radius, .lumen = lumen, .attenuation = 0.5};
     c->stretch[1] = (TubeStretch){.end = HUGE_VAL, .radius = wire_radius, .attenuation = 0.5};
-    c->looks = (ToolLooks){.count = 2, .tool = {{"catheter", {0, 90, 255, 255}, {0, 90, 255, 255}, 1, &c->stretch[0]},
-                                               {"wire", {250, 250, 250, 255}, {10, 10, 10, 255}, 1, &c->stretch[1]}}};
+    c->looks = (ToolLooks){
+        .count = 2,
+        .tool = {{"catheter", {0, 90, 255, 255}, {0, 90, 255, 255}, 1, &c->stretch[0]}, {"wire", {250, 250, 250, 255}, {10, 10, 10, 255}, 1, &c->stretch[1]}}};
 }
 
 static inline double cpu_ms(void)

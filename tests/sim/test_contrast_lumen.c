@@ -126,7 +126,8 @@ static void flow_is_poiseuille_s_in_series_and_falls_beside_a_tool(void **state)
     assert_close(contrast_lumens_passes(lumens, 0, beside), pressure / annulus / 1000, 1e-12);
     // drawn back by 120 mm, the wire with it
     const double within[] = {200, 130, 130};
-    annulus = tube_resistance(30, 0.9) / lumen_annulus_share(0.4 / 0.9) + tube_resistance(300, 0.9) / lumen_annulus_share(0.35 / 0.9) + tube_resistance(70, 0.9);
+    annulus =
+        tube_resistance(30, 0.9) / lumen_annulus_share(0.4 / 0.9) + tube_resistance(300, 0.9) / lumen_annulus_share(0.35 / 0.9) + tube_resistance(70, 0.9);
     assert_close(contrast_lumens_passes(lumens, 0, within), pressure / annulus / 1000, 1e-12);
     // the wire alone beyond it
     const double wire_beyond[] = {200, 130, 250};
@@ -142,8 +143,11 @@ static void a_wire_without_clearance_lets_next_to_nothing_through(void **state)
     const double gap[] = {0.05, 0.01, 0.001};
     for (int i = 0; i < 3; i++) {
         char text[1000];
-        snprintf(text, sizeof text, HEAD "tools:\n  - {name: micro, kind: microcatheter, sections: [" SECTION("600", "0.8", "0.5") "]}\n"
-                 "  - {name: wire, kind: wire, sections: [{length_mm: 800, diameter_mm: %g, young_modulus_gpa: 1}]}\n", 0.5 * (1 - gap[i]));
+        snprintf(text, sizeof text,
+                 HEAD "tools:\n  - {name: micro, kind: microcatheter, sections: [" SECTION(
+                     "600", "0.8", "0.5") "]}\n"
+                                          "  - {name: wire, kind: wire, sections: [{length_mm: 800, diameter_mm: %g, young_modulus_gpa: 1}]}\n",
+                 0.5 * (1 - gap[i]));
         Scene *scene = scene_of(text);
         ContrastLumens *lumens = lumens_of(scene, NULL);
         const double in[] = {100, 200}, out[] = {100, -600};
@@ -407,11 +411,12 @@ static void a_copy_goes_on_the_same_and_no_advance_allocates(void **state)
 static void another_device_brings_saline(void **state)
 {
     (void)state;
-    Scene *scene = scene_of("seldinger: 1\ntools:\n"
-                              "  - {name: catheter, kind: catheter, sections: [{length_mm: 100, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}],\n"
-                              "     exchange: [{elements: 500, sections: [{length_mm: 80, diameter_mm: 1.2, inner_diameter_mm: 0.8, young_modulus_gpa: 1}]}]}\n"
-                              "  - {name: wire, kind: wire, inserted_mm: 20, sections: [{length_mm: 200, diameter_mm: 0.1, young_modulus_gpa: 20}]}\n"
-                              "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n");
+    Scene *scene =
+        scene_of("seldinger: 1\ntools:\n"
+                 "  - {name: catheter, kind: catheter, sections: [{length_mm: 100, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}],\n"
+                 "     exchange: [{elements: 500, sections: [{length_mm: 80, diameter_mm: 1.2, inner_diameter_mm: 0.8, young_modulus_gpa: 1}]}]}\n"
+                 "  - {name: wire, kind: wire, inserted_mm: 20, sections: [{length_mm: 200, diameter_mm: 0.1, young_modulus_gpa: 20}]}\n"
+                 "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n");
     ContrastLumens *lumens = lumens_of(scene, NULL), *copy = lumens_of(scene, NULL);
     const double withdrawn[TOOLS_MOST] = {10, -1000};
     double out[TOOLS_MOST] = {0};

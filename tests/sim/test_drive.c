@@ -72,9 +72,8 @@ static void a_stall_slows_simulated_time(void **state)
     Clock unpaced = {0};
     drive(&unpaced, false, &free_hash);
     DriveReport quiet = drive(&calm, true, &calm_hash), late = drive(&stalled, true, &stalled_hash);
-    print_message("calm: %lld misses, slowed %.4f s; stalled: %lld misses, slowed %.4f s, worst %.4f s; SCHED_FIFO %s\n",
-                  (long long)quiet.deadline_misses, quiet.slowed_s, (long long)late.deadline_misses, late.slowed_s, late.latest_s,
-                  late.real_time_priority ? "yes" : "not permitted");
+    print_message("calm: %lld misses, slowed %.4f s; stalled: %lld misses, slowed %.4f s, worst %.4f s; SCHED_FIFO %s\n", (long long)quiet.deadline_misses,
+                  quiet.slowed_s, (long long)late.deadline_misses, late.slowed_s, late.latest_s, late.real_time_priority ? "yes" : "not permitted");
     assert_true(late.deadline_misses >= 1);
     assert_true(late.slowed_s >= (STALL_MS - 1) * 1e-3);
     assert_true(late.latest_s >= (STALL_MS - 1) * 1e-3 && late.latest_s <= late.slowed_s + 1e-12);

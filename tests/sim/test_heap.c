@@ -64,7 +64,8 @@ static unsigned run_watched(const char *name, const char *text, const Vessel *ve
 }
 
 #define STIFF "sections: [{length_mm: 40, diameter_mm: 0.2, young_modulus_gpa: 100, poisson_ratio: 0.48}]"
-#define IN_AND_OUT "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 180}, {t_s: 0.6, push_mm_s: -50, twist_deg_s: 180}, {t_s: 1.1, push_mm_s: 0, twist_deg_s: 0}]\n"
+#define IN_AND_OUT                                                                                                                                             \
+    "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 180}, {t_s: 0.6, push_mm_s: -50, twist_deg_s: 180}, {t_s: 1.1, push_mm_s: 0, twist_deg_s: 0}]\n"
 #define BENT "vessel: {friction: 0.3, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: 0.5, ends: closed, path: [{line_mm: 5}, "
 #define BENDS "{arc: {radius_mm: 6, angle_deg: 170}}, {arc: {radius_mm: 5, angle_deg: 170, plane_deg: 180}}]}}\n"
 
@@ -76,17 +77,23 @@ static void steps_in_a_tube(void **state)
                        "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" IN_AND_OUT;
     run_watched("tube", text, NULL, 1200, false);
     run_watched("tube, recorded", text, NULL, 1200, true);
-    unsigned flags = run_watched("tube, pointwise form, capped", "seldinger: 1\n" BENT BENDS "wire: {elements: 100, " STIFF "}\n"
+    unsigned flags = run_watched("tube, pointwise form, capped",
+                                 "seldinger: 1\n" BENT BENDS "wire: {elements: 100, " STIFF "}\n"
                                  "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n"
-                                 "simulation: {contact_form: pointwise, contact_iterations: 20}\n" IN_AND_OUT, NULL, 250, false);
+                                 "simulation: {contact_form: pointwise, contact_iterations: 20}\n" IN_AND_OUT,
+                                 NULL, 250, false);
     assert_true(flags & STEP_NOT_CONVERGED);
-    flags = run_watched("tube, block form, capped", "seldinger: 1\n" BENT BENDS "wire: {elements: 200, " STIFF "}\n"
+    flags = run_watched("tube, block form, capped",
+                        "seldinger: 1\n" BENT BENDS "wire: {elements: 200, " STIFF "}\n"
                         "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n"
-                        "simulation: {contact_iterations: 2}\n" IN_AND_OUT, NULL, 250, false);
+                        "simulation: {contact_iterations: 2}\n" IN_AND_OUT,
+                        NULL, 250, false);
     assert_true(flags & STEP_NOT_CONVERGED);
     // the mouth 0.3 mm beside the lumen's wall
-    flags = run_watched("entry outside the wall", "seldinger: 1\n" BENT BENDS "wire: {elements: 200, " STIFF "}\n"
-                        "sheath: {entry_mm: [1, 0.8, 0], direction: [1, 0, 0], inserted_mm: 3}\n" IN_AND_OUT, NULL, 250, false);
+    flags = run_watched("entry outside the wall",
+                        "seldinger: 1\n" BENT BENDS "wire: {elements: 200, " STIFF "}\n"
+                        "sheath: {entry_mm: [1, 0.8, 0], direction: [1, 0, 0], inserted_mm: 3}\n" IN_AND_OUT,
+                        NULL, 250, false);
     assert_true(flags & STEP_DEEP);
 }
 
@@ -95,13 +102,17 @@ static void a_wire_that_snaps(void **state)
     (void)state;
     need_counting();
     // let go with 12 rad of bend: more than a step's turn
-    unsigned flags = run_watched("a coil let go in a tube", "seldinger: 1\n" BENT "{line_mm: 60}]}}\n"
+    unsigned flags = run_watched("a coil let go in a tube",
+                                 "seldinger: 1\n" BENT "{line_mm: 60}]}}\n"
                                  "wire: {elements: 100, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.3}]}\n"
                                  "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 38}\n"
-                                 "script: [{t_s: 0, push_mm_s: 0, twist_deg_s: 720}, {t_s: 1, push_mm_s: 0, twist_deg_s: 0}]\n", NULL, 600, false);
-    flags |= run_watched("a coil let go in the open", "seldinger: 1\n"
+                                 "script: [{t_s: 0, push_mm_s: 0, twist_deg_s: 720}, {t_s: 1, push_mm_s: 0, twist_deg_s: 0}]\n",
+                                 NULL, 600, false);
+    flags |= run_watched("a coil let go in the open",
+                         "seldinger: 1\n"
                          "wire: {elements: 100, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.3}]}\n"
-                         "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 38}\n", NULL, 600, false);
+                         "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 38}\n",
+                         NULL, 600, false);
     assert_true(flags & STEP_LIMITED);
 }
 
@@ -115,10 +126,12 @@ static void steps_in_a_fitted_vessel(void **state)
     VesselTree *tree = shape_tree("spiral", 1, option, "test", &faults), *model = tree ? lim_fit(tree, &options, NULL, &faults) : NULL;
     Vessel *vessel = model ? lim_vessel_create(model) : NULL;
     assert_non_null(vessel);
-    run_watched("fitted spiral, recorded", "seldinger: 1\nvessel: {friction: 0.2, shape: {name: spiral}}\nwire: {elements: 200, " STIFF "}\n"
-                "sheath: {inlet: root, inserted_mm: 1}\n"
-                "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 180}, {t_s: 0.38, push_mm_s: -50, twist_deg_s: 180}, {t_s: 0.76, push_mm_s: 0, twist_deg_s: 0}]\n",
-                vessel, 1000, true);
+    run_watched(
+        "fitted spiral, recorded",
+        "seldinger: 1\nvessel: {friction: 0.2, shape: {name: spiral}}\nwire: {elements: 200, " STIFF "}\n"
+        "sheath: {inlet: root, inserted_mm: 1}\n"
+        "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 180}, {t_s: 0.38, push_mm_s: -50, twist_deg_s: 180}, {t_s: 0.76, push_mm_s: 0, twist_deg_s: 0}]\n",
+        vessel, 1000, true);
     vessel->destroy(vessel);
     vessel_tree_free(model);
     vessel_tree_free(tree);

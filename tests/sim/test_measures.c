@@ -200,8 +200,11 @@ static void a_broken_golden_is_a_fault(void **state)
 {
     (void)state;
     static Faults faults;
-    const char *text[] = {"", "t_s,node,x_mm,y_mm,z_mm\n0,0,0,0,0\n", "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n",
-                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1.5,0,0,0\n", "# nodes: 5\n# duration_s: 1\nt_s,node,x,y,z\n0,1,0,0,0\n",
+    const char *text[] = {"",
+                          "t_s,node,x_mm,y_mm,z_mm\n0,0,0,0,0\n",
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n",
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1.5,0,0,0\n",
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x,y,z\n0,1,0,0,0\n",
                           "# tools: 5\n# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1,0,0,0\n",
                           "# tools: 2\n# nodes of tool 0: 5\n# duration_s: 1\nt_s,tool,node,x_mm,y_mm,z_mm\n0,0,1,0,0,0\n",
                           "# tools: 2\n# nodes of tool 0: 5\n# nodes of tool 1: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1,0,0,0\n",
@@ -222,10 +225,14 @@ static void a_broken_golden_is_a_fault(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quantiles_are_exact_to_one_per_cent), cmocka_unit_test(small_counts_and_the_largest_are_exact),
-        cmocka_unit_test(sha256_gives_the_standards_vectors),  cmocka_unit_test(printing_and_parsing_keeps_a_path),
+        cmocka_unit_test(quantiles_are_exact_to_one_per_cent),
+        cmocka_unit_test(small_counts_and_the_largest_are_exact),
+        cmocka_unit_test(sha256_gives_the_standards_vectors),
+        cmocka_unit_test(printing_and_parsing_keeps_a_path),
         cmocka_unit_test(a_comparison_names_first_time_node_and_distance),
-        cmocka_unit_test(another_node_in_its_place_is_no_counterpart), cmocka_unit_test(a_comparison_of_several_tools_names_the_tool), cmocka_unit_test(a_broken_golden_is_a_fault),
+        cmocka_unit_test(another_node_in_its_place_is_no_counterpart),
+        cmocka_unit_test(a_comparison_of_several_tools_names_the_tool),
+        cmocka_unit_test(a_broken_golden_is_a_fault),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,13 +17,14 @@ static const char one_tool[] = "seldinger: 1\n"
                                "wire: {elements: 60, sections: [{length_mm: 120, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
                                "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0], inserted_mm: 15.5}\n";
 
-static const char two_tools[] = "seldinger: 1\n"
-                                "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 3, path: [{line_mm: 200}]}}\n"
-                                "tools:\n"
-                                "  - {name: catheter, kind: catheter, elements: 50, inserted_mm: 12,\n"
-                                "     sections: [{length_mm: 100, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}\n"
-                                "  - {name: wire, kind: wire, elements: 90, inserted_mm: 12, sections: [{length_mm: 180, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
-                                "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n";
+static const char two_tools[] =
+    "seldinger: 1\n"
+    "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 3, path: [{line_mm: 200}]}}\n"
+    "tools:\n"
+    "  - {name: catheter, kind: catheter, elements: 50, inserted_mm: 12,\n"
+    "     sections: [{length_mm: 100, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}\n"
+    "  - {name: wire, kind: wire, elements: 90, inserted_mm: 12, sections: [{length_mm: 180, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n";
 
 static Simulator *start(const char *text, Scene **scene, Vessel **vessel)
 {

@@ -40,20 +40,26 @@ static const char scene_text[] = "seldinger: 1\n"
 static const char tools_text[] =
     "seldinger: 1\n"
     "tools:\n"
-    "  - {name: guide, kind: guide_catheter, elements: 10, inserted_mm: 10, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}]}\n"
-    "  - {name: catheter, kind: catheter, elements: 12, inserted_mm: 12, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}]}\n"
-    "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}\n"
+    "  - {name: guide, kind: guide_catheter, elements: 10, inserted_mm: 10, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, "
+    "young_modulus_gpa: 1}]}\n"
+    "  - {name: catheter, kind: catheter, elements: 12, inserted_mm: 12, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, "
+    "young_modulus_gpa: 1}]}\n"
+    "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, "
+    "young_modulus_gpa: 1}]}\n"
     "  - {name: wire, kind: wire, elements: 16, inserted_mm: 14, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
 // The same, each with another that may take its place.
 static const char devices_text[] =
     "seldinger: 1\n"
     "tools:\n"
-    "  - {name: guide, kind: guide_catheter, elements: 10, inserted_mm: 10, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}],\n"
+    "  - {name: guide, kind: guide_catheter, elements: 10, inserted_mm: 10, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, "
+    "young_modulus_gpa: 1}],\n"
     "     exchange: [{elements: 20, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}]}]}\n"
-    "  - {name: catheter, kind: catheter, elements: 12, inserted_mm: 12, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}],\n"
+    "  - {name: catheter, kind: catheter, elements: 12, inserted_mm: 12, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, "
+    "young_modulus_gpa: 1}],\n"
     "     exchange: [{elements: 9, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}]}]}\n"
-    "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}],\n"
+    "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, "
+    "young_modulus_gpa: 1}],\n"
     "     exchange: [{elements: 17, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}]}\n"
     "  - {name: wire, kind: wire, elements: 16, inserted_mm: 14, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
     "     exchange: [{elements: 11, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 200}]}]}\n"
@@ -391,7 +397,8 @@ static void what_is_read_of_a_session(void **state)
 static const char exchange_text[] =
     "seldinger: 1\n"
     "tools:\n"
-    "  - {name: micro, kind: microcatheter, elements: 10, inserted_mm: 8, sections: [{length_mm: 20, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}],\n"
+    "  - {name: micro, kind: microcatheter, elements: 10, inserted_mm: 8, sections: [{length_mm: 20, diameter_mm: 0.8, inner_diameter_mm: 0.5, "
+    "young_modulus_gpa: 1}],\n"
     "     exchange: [{elements: 16, sections: [{length_mm: 25, diameter_mm: 0.9, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}]}\n"
     "  - {name: wire, kind: wire, elements: 16, inserted_mm: 10, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
     "     exchange: [{elements: 12, sections: [{length_mm: 55, diameter_mm: 0.3, young_modulus_gpa: 100}]},\n"
@@ -436,8 +443,9 @@ static void what_is_read_of_exchanged_tools(void **state)
     if (!run)
         fail_msg("%s", faults.text[0]);
     assert_int_equal(run->step_count, STEPS);
-    static const struct { int step, tool, asked, fitted, nodes; } in[] = {{0, 1, 0, 0, 17}, {50, 1, 1, 0, 17}, {305, 1, 1, 1, 13}, {900, 1, 2, 2, 22},
-                                                                          {900, 0, 0, 0, 11}, {1204, 0, 1, 1, 17}};
+    static const struct {
+        int step, tool, asked, fitted, nodes;
+    } in[] = {{0, 1, 0, 0, 17}, {50, 1, 1, 0, 17}, {305, 1, 1, 1, 13}, {900, 1, 2, 2, 22}, {900, 0, 0, 0, 11}, {1204, 0, 1, 1, 17}};
     for (size_t i = 0; i < sizeof in / sizeof *in; i++) {
         assert_int_equal(recorded_run_commands(run, in[i].step).fitted[in[i].tool], in[i].asked);
         assert_int_equal(recorded_run_fitted(run, in[i].tool, in[i].step), in[i].fitted);
@@ -448,7 +456,8 @@ static void what_is_read_of_exchanged_tools(void **state)
         pose_from_run(pose, scene, run, k);
         assert_same_pose(pose, seen[run->frame_step[k]]);
         for (int tool = 0; tool < 2; tool++)
-            assert_true(pose->tool[tool].fitted == seen[run->frame_step[k]]->tool[tool].fitted && pose->tool[tool].node_capacity == seen[0]->tool[tool].node_capacity);
+            assert_true(pose->tool[tool].fitted == seen[run->frame_step[k]]->tool[tool].fitted &&
+                        pose->tool[tool].node_capacity == seen[0]->tool[tool].node_capacity);
     }
     assert_replays(run);
     pose_free(pose);
@@ -720,7 +729,8 @@ static bool unwritten(const char *name, const double *value, hsize_t values)
         if (value[i] == 0)
             return true;
     for (hsize_t i = 0; strcmp(name, "/wire/quaternion") == 0 && i < values; i += 4)
-        if (fabs(value[i] * value[i] + value[i + 1] * value[i + 1] + value[i + 2] * value[i + 2] + value[i + 3] * value[i + 3] - 1) > (is_rounded ? 2.1 / 512 : 1e-9))
+        if (fabs(value[i] * value[i] + value[i + 1] * value[i + 1] + value[i + 2] * value[i + 2] + value[i + 3] * value[i + 3] - 1) >
+            (is_rounded ? 2.1 / 512 : 1e-9))
             return true;
     return false;
 }
@@ -752,11 +762,10 @@ static herr_t check_motion(hid_t group, const char *name, const H5O_info_t *info
 // Every dataset is read whole: all of one kind (the rows that all have) have the same rows, and every row was written. NULL or what is wrong.
 static const char *check_file(const char *path, hsize_t count[2])
 {
-    static const char *const names[2][15] = {{"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/released", "/report/penetration_mm",
-                                              "/report/contacts", "/report/iterations", "/report/residual", "/report/linearisations",
-                                              "/report/wall_force_n", "/report/flags", "/xray"},
-                                             {"/wire/step", "/wire/position", "/wire/quaternion", "/contact/force_n", "/contact/gap_mm",
-                                              "/contact/vessel_node"}};
+    static const char *const names[2][15] = {
+        {"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/released", "/report/penetration_mm", "/report/contacts", "/report/iterations",
+         "/report/residual", "/report/linearisations", "/report/wall_force_n", "/report/flags", "/xray"},
+        {"/wire/step", "/wire/position", "/wire/quaternion", "/contact/force_n", "/contact/gap_mm", "/contact/vessel_node"}};
     static const char *const tool_names[2][5] = {{"command", "proximal", "inserted_mm", "released"}, {"position", "quaternion", "carrier"}};
     static const char *const several_names[] = {"/wire/count", "/wire/s_mm", "/wire/radius_mm"};
     hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);   // locking on

@@ -27,7 +27,8 @@ static const char tube_text[] =
     "seldinger: 1\n"
     "wire: {elements: 120, sections: [{length_mm: 200, diameter_mm: 0.36, young_modulus_gpa: 60}, {length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 5, "
     "rest_curvature_1_mm: 0.1}]}\n"
-    "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 1.5, path: [{line_mm: 20}, {arc: {radius_mm: 15, angle_deg: 90}}, "
+    "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 1.5, path: [{line_mm: 20}, {arc: {radius_mm: 15, angle_deg: "
+    "90}}, "
     "{line_mm: 10}, {arc: {radius_mm: 12, angle_deg: 120, plane_deg: 90}}, {line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 90}}, {line_mm: 80}]}, "
     "contact: tube, friction: 0.04}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 5}\n";

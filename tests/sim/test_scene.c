@@ -110,9 +110,11 @@ static void a_rest_shape_becomes_sections(void **state)
 {
     (void)state;
     // the pieces end at the tip; a section's border 0.004 mm beside a piece's moves there, another one cuts its piece
-    Scene *scene = good(VERSION SHEATH "wire:\n  sections:\n    - {length_mm: 60, diameter_mm: 0.5, young_modulus_gpa: 80}\n"
-                        "    - {length_mm: 30.004, diameter_mm: 0.4, young_modulus_gpa: 20}\n    - {length_mm: 9.996, diameter_mm: 0.3, young_modulus_gpa: 5}\n"
-                        "  rest: [{arc: {radius_mm: 50, angle_deg: 45.8366236105, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 57.2957795131, plane_deg: -30}}]\n");
+    Scene *scene =
+        good(VERSION SHEATH
+             "wire:\n  sections:\n    - {length_mm: 60, diameter_mm: 0.5, young_modulus_gpa: 80}\n"
+             "    - {length_mm: 30.004, diameter_mm: 0.4, young_modulus_gpa: 20}\n    - {length_mm: 9.996, diameter_mm: 0.3, young_modulus_gpa: 5}\n"
+             "  rest: [{arc: {radius_mm: 50, angle_deg: 45.8366236105, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 57.2957795131, plane_deg: -30}}]\n");
     static const double length[] = {50, 10, 30, 10}, curvature[] = {0, 0.02, 0.02, 0.1}, plane_deg[] = {0, 90, 90, 60}, diameter[] = {0.5, 0.5, 0.4, 0.3};
     assert_int_equal(scene->wire.section_count, 4);
     for (int i = 0; i < 4; i++) {
@@ -128,9 +130,11 @@ static void a_rest_shape_becomes_sections(void **state)
 static void a_verify_plan_is_read(void **state)
 {
     (void)state;
-    Scene *scene = good(WHOLE "script: [[0, 1, 0], [2, 0, 0]]\nverify:\n  elements: [10, 20]\n  cases:\n    - {name: a, quantity: wall_force_n, take: mean, s_mm: 50, from_s_mm: 20,"
-                        " axis: [0, 0, -2], from_t_s: 1, t_s: 2, scale: 10, reference: -4, tolerance_percent: [5, 1], order: 1.5, floor: 0.001}\n"
-                        "    - {name: b, quantity: penetration_mm, reference: 0, tolerance: 0.005}\n");
+    Scene *scene = good(
+        WHOLE
+        "script: [[0, 1, 0], [2, 0, 0]]\nverify:\n  elements: [10, 20]\n  cases:\n    - {name: a, quantity: wall_force_n, take: mean, s_mm: 50, from_s_mm: 20,"
+        " axis: [0, 0, -2], from_t_s: 1, t_s: 2, scale: 10, reference: -4, tolerance_percent: [5, 1], order: 1.5, floor: 0.001}\n"
+        "    - {name: b, quantity: penetration_mm, reference: 0, tolerance: 0.005}\n");
     const VerifyPlan *plan = &scene->verify;
     const VerifyCase *a = &plan->cases[0], *b = &plan->cases[1];
     assert_int_equal(plan->case_count, 2);
@@ -290,7 +294,7 @@ static void each_fault_has_its_line_and_column(void **state)
             found |= !strncmp(faults.text[j], start, strlen(start)) && strstr(faults.text[j], one->words);
         if (scene || !found)
             wrong++, print_error("case %zu:\n%s-- expected %s … %s\n-- %d faults, the first: %s\n", i, one->text, one->place, one->words, faults.count,
-                     faults.count ? faults.text[0] : "");
+                                 faults.count ? faults.text[0] : "");
     }
     assert_int_equal(wrong, 0);
 }
@@ -309,8 +313,20 @@ static void all_faults_come_in_one_pass(void **state)
                       "targets: [{name: a}]\n"));
     // version; radius; line_cm and no piece in its place; friction; contac; elements; diameter_cm and its lack; modulus;
     // direction; second sheath; step; target without point and radius
-    const char *words[] = {"seldinger",       "radius_mm",  "line_mm", "friction",  "'contact'", "elements",  "expected 'diameter_mm'", "has no key 'diameter_mm'",
-                           "young_modulus_gpa", "no length", "duplicate", "step_ms", "has no key 'point_mm'", "has no key 'radius_mm'"};
+    const char *words[] = {"seldinger",
+                           "radius_mm",
+                           "line_mm",
+                           "friction",
+                           "'contact'",
+                           "elements",
+                           "expected 'diameter_mm'",
+                           "has no key 'diameter_mm'",
+                           "young_modulus_gpa",
+                           "no length",
+                           "duplicate",
+                           "step_ms",
+                           "has no key 'point_mm'",
+                           "has no key 'radius_mm'"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
         bool found = false;
         for (int j = 0; j < faults.count && j < FAULTS_CAPACITY; j++)

@@ -87,9 +87,10 @@ static void the_first_tool_is_the_scenes_wire(void **state)
 static void each_tool_has_its_own_keys(void **state)
 {
     (void)state;
-    Scene *scene = good(TOOLS("  - {name: a, kind: catheter, " SECTION("300", "2", "1.8") ", inserted_mm: 20, friction_inside: 0.2, tip_marker: {length_mm: 2, attenuation_1_mm: 4}}\n"
-                              "  - {name: b, kind: wire, " SECTION("400", "1", "0") ", inserted_mm: 0, hand_limit_n: 5, elements: 30, damping: {mass_1_s: 1},"
-                              " tip_marker: {length_mm: 5, attenuation_1_mm: 6}, length_mm: 350}\n"));
+    Scene *scene = good(TOOLS("  - {name: a, kind: catheter, " SECTION(
+        "300", "2", "1.8") ", inserted_mm: 20, friction_inside: 0.2, tip_marker: {length_mm: 2, attenuation_1_mm: 4}}\n"
+                           "  - {name: b, kind: wire, " SECTION("400", "1", "0") ", inserted_mm: 0, hand_limit_n: 5, elements: 30, damping: {mass_1_s: 1},"
+                                                                                 " tip_marker: {length_mm: 5, attenuation_1_mm: 6}, length_mm: 350}\n"));
     const SceneTool *a = &scene->tool[0], *b = &scene->tool[1];
     assert_near(scene->wire.inserted, 20, 0);        // its own, not the sheath's 50
     assert_near(a->wire.inserted, 20, 0);
@@ -111,8 +112,10 @@ static void each_tool_has_its_own_keys(void **state)
 static void a_rig_begins_with_the_whole_first_tool(void **state)
 {
     (void)state;
-    Scene *scene = good(VERSION "rig: {fix: [{s_mm: 0, dof: all}], gravity_m_s2: [0, 0, -10]}\ntools:\n  - {name: a, kind: catheter, " SECTION("60", "2", "1.8") "}\n"
-                        "  - {name: b, kind: catheter, " SECTION("90", "1", "0.5") ", inserted_mm: 30}\n  - {name: c, kind: wire, " SECTION("90", "0.4", "0") "}\n");
+    Scene *scene = good(VERSION "rig: {fix: [{s_mm: 0, dof: all}], gravity_m_s2: [0, 0, -10]}\ntools:\n  - {name: a, kind: catheter, " SECTION(
+        "60", "2", "1.8") "}\n"
+                          "  - {name: b, kind: catheter, " SECTION("90", "1", "0.5") ", inserted_mm: 30}\n  - {name: c, kind: wire, " SECTION("90", "0.4",
+                                                                                                                                              "0") "}\n");
     assert_int_equal(scene->wire.fix_count, 1);
     assert_near(scene->wire.inserted, 0, 0);         // as without `tools:`
     assert_near(scene_tool_wire(scene, 1).inserted, 30, 0);
@@ -157,7 +160,8 @@ static void a_script_moves_the_tools_it_names(void **state)
 static void bare_columns_move_the_first_tool(void **state)
 {
     (void)state;
-    const char *const forms[] = {"[{t_s: 0, push_mm_s: 7, twist_deg_s: 8}, {t_s: 1}]", "[[0, 7, 8], [1, 0, 0]]", "[{t_s: 0, guide.push_mm_s: 7, guide.twist_deg_s: 8}, {t_s: 1}]"};
+    const char *const forms[] = {"[{t_s: 0, push_mm_s: 7, twist_deg_s: 8}, {t_s: 1}]", "[[0, 7, 8], [1, 0, 0]]",
+                                 "[{t_s: 0, guide.push_mm_s: 7, guide.twist_deg_s: 8}, {t_s: 1}]"};
     for (int i = 0; i < 3; i++) {
         char text[2000];
         snprintf(text, sizeof text, THREE "script: %s\n", forms[i]);
@@ -181,7 +185,8 @@ static void a_row_in_place_lets_a_tool_go(void **state)
 {
     (void)state;
     int cursor = 0;
-    Scene *scene = good(THREE "script: [{t_s: 0, wire.released: 1, guide.push_mm_s: 7, guide.twist_deg_s: 0}, {t_s: 1, released: 1}, {t_s: 2, wire.released: 0}, {t_s: 3}]\n");
+    Scene *scene = good(
+        THREE "script: [{t_s: 0, wire.released: 1, guide.push_mm_s: 7, guide.twist_deg_s: 0}, {t_s: 1, released: 1}, {t_s: 2, wire.released: 0}, {t_s: 3}]\n");
     assert_int_equal(script_tools_at(scene->script, 0.5, &cursor).released, 4);
     assert_int_equal(script_tools_at(scene->script, 1.5, &cursor).released, 1);
     assert_int_equal(script_tools_at(scene->script, 2.5, &cursor).released, 0);
@@ -225,7 +230,8 @@ static void each_fault_of_a_script_has_its_place(void **state)
         snprintf(place, sizeof place, "s.csv:%s: ", broken_script[i].place);
         Script *script = script_parse_tools(broken_script[i].text, strlen(broken_script[i].text), "s.csv", &tools, &faults);
         if (script || !says(place, broken_script[i].words))
-            wrong++, print_error("%s-- expected %s%s, got: %s\n", broken_script[i].text, place, broken_script[i].words, faults.count ? faults.text[0] : "nothing");
+            wrong++,
+                print_error("%s-- expected %s%s, got: %s\n", broken_script[i].text, place, broken_script[i].words, faults.count ? faults.text[0] : "nothing");
         script_free(script);
     }
     assert_int_equal(wrong, 0);
@@ -268,24 +274,28 @@ static const Broken broken[] = {
     {NAMED("abcdefghijklmnopqrstuvwxyzabcdef"), "5:12", "at most 31 letters"},
     // lumen
     {WITH("name: a, kind: wire, " SECTION("700", "1.8", "0")), "5:5", "only 1.8 mm wide"},
-    {WITH("name: a, kind: wire, sections: [{length_mm: 650, diameter_mm: 1, young_modulus_gpa: 1}, {length_mm: 50, diameter_mm: 1.9, young_modulus_gpa: 1}]"), "5:5",
-     "'a' is up to 1.9 mm thick"},
+    {WITH("name: a, kind: wire, sections: [{length_mm: 650, diameter_mm: 1, young_modulus_gpa: 1}, {length_mm: 50, diameter_mm: 1.9, young_modulus_gpa: 1}]"),
+     "5:5", "'a' is up to 1.9 mm thick"},
     {TOOLS("  - {name: a, kind: catheter, " SECTION("300", "2", "0") "}\n" WIRE), "5:5", "which is solid"},
     {TOOLS("  - {name: a, kind: catheter, sections: [{length_mm: 250, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1},"
-           " {length_mm: 50, diameter_mm: 2, inner_diameter_mm: 0.3, young_modulus_gpa: 1}]}\n" WIRE), "5:5", "only 0.3 mm wide"},
+           " {length_mm: 50, diameter_mm: 2, inner_diameter_mm: 0.3, young_modulus_gpa: 1}]}\n" WIRE),
+     "5:5", "only 0.3 mm wide"},
     // lengths
     {WITH("name: a, kind: wire, " SECTION("249", "0.36", "0")), "5:5", "make it at least 300 mm long"},
     {WITH("name: a, kind: wire, " SECTION("310", "0.36", "0") ", inserted_mm: 61"), "5:133", "make it at least 311 mm long or insert at most 60 mm"},
     {WITH("name: a, kind: wire, " SECTION("400", "0.36", "0") ", inserted_mm: 401"), "5:133", "at most 400"},
     {WITH("name: a, kind: wire, " SECTION("400", "0.36", "0") ", inserted_mm: -1"), "5:133", "out of range"},
     {WITH("name: a, kind: wire, length_mm: 0, " SECTION("400", "0.36", "0")), "5:38", "out of range"},
-    {TOOLS("  - {name: a, kind: wire, length_mm: 50, sections: [{length_mm: 100, diameter_mm: 1, young_modulus_gpa: 1}, {length_mm: 50, diameter_mm: 1, young_modulus_gpa: 1}]}\n"),
+    {TOOLS("  - {name: a, kind: wire, length_mm: 50, sections: [{length_mm: 100, diameter_mm: 1, young_modulus_gpa: 1}, {length_mm: 50, diameter_mm: 1, "
+           "young_modulus_gpa: 1}]}\n"),
      "4:38", "sections beyond the first are 50 mm long"},
     {VERSION "rig: {start_mm: [0, 0, 0]}\ntools: [{name: a, kind: wire, " SECTION("60", "1", "0") ", inserted_mm: 3}]\n", "3:133", "needs a sheath"},
-    {VERSION "rig: {start_mm: [0, 0, 0]}\ntools:\n" GUIDE "  - {name: a, kind: wire, " SECTION("90", "0.36", "0") ", inserted_mm: 91}\n", "5:132", "at most 90"},
+    {VERSION "rig: {start_mm: [0, 0, 0]}\ntools:\n" GUIDE "  - {name: a, kind: wire, " SECTION("90", "0.36", "0") ", inserted_mm: 91}\n", "5:132",
+     "at most 90"},
     {VERSION "rig: {start_mm: [0, 0, 0]}\ntools:\n" GUIDE "  - {name: a, kind: wire, " SECTION("299", "0.36", "0") "}\n", "5:5", "insert at most 299 mm"},
     // rest shapes
-    {WITH("name: a, kind: wire, sections: [{length_mm: 700, diameter_mm: 1, young_modulus_gpa: 1, rest_curvature_1_mm: -2}]"), "5:114", "tighter than the tool's own radius 0.5 mm"},
+    {WITH("name: a, kind: wire, sections: [{length_mm: 700, diameter_mm: 1, young_modulus_gpa: 1, rest_curvature_1_mm: -2}]"), "5:114",
+     "tighter than the tool's own radius 0.5 mm"},
     {WITH("name: a, kind: wire, " SECTION("400", "0.36", "0") ", rest: [{arc: {radius_mm: 0.3, angle_deg: 10}}]"), "5:127", "smaller than the tool's diameter"},
     {WITH("name: a, kind: catheter, " SECTION("400", "0.36", "0") ", rest: [{line_mm: 401}]"), "5:130", "the tool 400 mm"},
     // a device that does not exist
@@ -295,13 +305,26 @@ static const Broken broken[] = {
     {THREE "script: [{t_s: 0, wire.push_mm_s: 1}]\n", "7:10", "needs 'wire.twist_deg_s' too"},
     {THREE "script: [{t_s: 0, push_mm_s: 1, wire.push_mm_s: 1, wire.twist_deg_s: 0}]\n", "7:10", "not both"},
     {THREE "script: [{t_s: 0, wire.push_mm_s: 1001, wire.twist_deg_s: 0}]\n", "7:10", "wire.push_mm_s 1001 is out of range"},
-    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 50}}\n"), "5:113", "does not make the core yield"},
-    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 1, angle_deg: 300, mandrel_mm: 1}}\n"), "5:113", "a longer tip, a smaller angle or a thinner mandrel"},
-    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 400, mandrel_mm: 1}}\n"), "", "angle_deg"},
-    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, mandrel_mm: 1}}\n"), "", "'angle_deg'"},
-    {TOOLS(GUIDE "  - {name: wire, kind: wire, core: nitinol, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}\n"), "", "springs back from any such bend"},
-    {TOOLS(GUIDE "  - {name: wire, kind: wire, core: gold, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}\n"), "", "steel, nitinol"},
-    {TOOLS("  - {name: guide, kind: guide_catheter, shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}, " SECTION("300", "2", "1.8") "}\n" WIRE), "", "only a wire's tip can be shaped by hand"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: "
+                 "45, mandrel_mm: 50}}\n"),
+     "5:113", "does not make the core yield"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 1, angle_deg: "
+                 "300, mandrel_mm: 1}}\n"),
+     "5:113", "a longer tip, a smaller angle or a thinner mandrel"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: "
+                 "400, mandrel_mm: 1}}\n"),
+     "", "angle_deg"},
+    {TOOLS(GUIDE
+           "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, mandrel_mm: 1}}\n"),
+     "", "'angle_deg'"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, core: nitinol, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: "
+                 "5, angle_deg: 45, mandrel_mm: 1}}\n"),
+     "", "springs back from any such bend"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, core: gold, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, "
+                 "angle_deg: 45, mandrel_mm: 1}}\n"),
+     "", "steel, nitinol"},
+    {TOOLS("  - {name: guide, kind: guide_catheter, shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}, " SECTION("300", "2", "1.8") "}\n" WIRE), "",
+     "only a wire's tip can be shaped by hand"},
 };
 
 static void a_tip_is_shaped_by_hand(void **state)
@@ -356,10 +379,13 @@ static void each_fault_has_its_line_and_column(void **state)
 static void all_faults_come_in_one_pass(void **state)
 {
     (void)state;
-    assert_null(parse(TOOLS("  - {name: a b, kind: balloon, " SECTION("300", "2", "0.5") ", inserted_mm: 301}\n"
-                            "  - {name: c, kind: wire, " SECTION("100", "0.8", "0") "}\n"
-                            "  - {name: c, kind: wire, sections: [{length_mm: 100}]}\n") "script: [{t_s: 0, d.push_mm_s: 1}]\n"));
-    const char *const words[] = {"'a b'", "'balloon'", "0.5 mm wide", "at most 300", "has 250 mm outside", "used on line 5", "'diameter_mm'", "'young_modulus_gpa'", "d.push_mm_s"};
+    assert_null(parse(TOOLS("  - {name: a b, kind: balloon, " SECTION(
+        "300", "2", "0.5") ", inserted_mm: 301}\n"
+                           "  - {name: c, kind: wire, " SECTION(
+                               "100", "0.8", "0") "}\n"
+                                                  "  - {name: c, kind: wire, sections: [{length_mm: 100}]}\n") "script: [{t_s: 0, d.push_mm_s: 1}]\n"));
+    const char *const words[] = {"'a b'",          "'balloon'",     "0.5 mm wide",         "at most 300", "has 250 mm outside",
+                                 "used on line 5", "'diameter_mm'", "'young_modulus_gpa'", "d.push_mm_s"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (!says("", words[i]))
             fail_msg("no fault says '%s'", words[i]);
@@ -390,7 +416,9 @@ static void write_text(const char *path, const char *text)
     assert_int_equal(fclose(file), 0);
 }
 
-#define DEVICE VERSION "kind: catheter\nsource: this test\nsections: [{length_mm: 400, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 2}, {length_mm: 20, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]\n"
+#define DEVICE                                                                                                                                                 \
+    VERSION "kind: catheter\nsource: this test\nsections: [{length_mm: 400, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 2}, {length_mm: 20, "   \
+            "diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]\n"
 #define EXTRA "rest: [{arc: {radius_mm: 5, angle_deg: 90}}]\ntip_marker: {length_mm: 1, attenuation_1_mm: 8}\nfriction_inside: 0.1\n"
 
 static void a_device_file_gives_what_the_scene_does_not(void **state)
@@ -401,9 +429,10 @@ static void a_device_file_gives_what_the_scene_does_not(void **state)
     snprintf(scene_path, sizeof scene_path, "%s/scene.yaml", folder);
     snprintf(device_path, sizeof device_path, "%s/device.yaml", folder);
     write_text(device_path, DEVICE EXTRA);
-    write_text(scene_path, VERSION SHEATH "tools:\n  - {name: as_it_is, device: device.yaml}\n"
-                                          "  - {name: changed, device: device.yaml, kind: wire, length_mm: 450, tip_marker: {length_mm: 9}, friction_inside: 0.3,"
-                                          " sections: [{length_mm: 500, diameter_mm: 0.4, young_modulus_gpa: 3}]}\n");
+    write_text(scene_path,
+               VERSION SHEATH "tools:\n  - {name: as_it_is, device: device.yaml}\n"
+                              "  - {name: changed, device: device.yaml, kind: wire, length_mm: 450, tip_marker: {length_mm: 9}, friction_inside: 0.3,"
+                              " sections: [{length_mm: 500, diameter_mm: 0.4, young_modulus_gpa: 3}]}\n");
     faults_clear(&faults);
     Scene *scene = scene_load(scene_path, &faults);
     if (!scene)
@@ -531,8 +560,13 @@ static void a_quoted_stiffness_is_that_of_the_shaft(void **state)
     static const struct {
         const char *device;
         double bending;
-    } quoted[] = {{"wire-035-amplatz.yaml", 291},   {"wire-035-j.yaml", 291},    {"wire-035-amplatz-ultra-stiff.yaml", 2005}, {"wire-035-meier.yaml", 4280},
-                  {"wire-035-lunderquist.yaml", 4857}, {"wire-014-steel.yaml", 158}, {"wire-014-nitinol.yaml", 47}};
+    } quoted[] = {{"wire-035-amplatz.yaml", 291},
+                  {"wire-035-j.yaml", 291},
+                  {"wire-035-amplatz-ultra-stiff.yaml", 2005},
+                  {"wire-035-meier.yaml", 4280},
+                  {"wire-035-lunderquist.yaml", 4857},
+                  {"wire-014-steel.yaml", 158},
+                  {"wire-014-nitinol.yaml", 47}};
     for (size_t i = 0; i < sizeof quoted / sizeof *quoted; i++) {
         Scene *scene = scene_of(1, &quoted[i].device);
         assert_non_null(scene);
@@ -570,7 +604,8 @@ static void each_device_goes_through_the_one_it_names(void **state)
     assert_near(wire_length(&drawn_out->tool[1].wire), 700, 1e-9);
     scene_free(drawn_out);
     // all four, one in another
-    Scene *scene = scene_of(4, (const char *const[]){"guide-6f-straight.yaml", "catheter-5f-vertebral.yaml", "microcatheter-two-markers.yaml", "wire-014-nitinol.yaml"});
+    Scene *scene =
+        scene_of(4, (const char *const[]){"guide-6f-straight.yaml", "catheter-5f-vertebral.yaml", "microcatheter-two-markers.yaml", "wire-014-nitinol.yaml"});
     assert_non_null(scene);
     assert_int_equal(scene->tool_count, 4);
     assert_near(scene_tool_attenuation(scene, 2, 1500 - 30.5), 8, 0);    // the second band of a microcatheter

@@ -323,7 +323,8 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     practice_end(p);
     // on the way nothing is counted
     p = practice_begin("seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n"
-                       "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", rules: {wrong_branch_mm: 5}"), t);
+                       "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", rules: {wrong_branch_mm: 5}"),
+                       t);
     f = practice_go(p, 10, 3.7);
     assert_int_equal(f.error_total, 0);
     f = practice_go(p, 0, 2);
@@ -443,7 +444,8 @@ static void normal_bends_are_no_buckling(void **state)
                 most = fmax(most, practice_go(p, k == 1 ? -25 : 25, 0.1).tool[0].lost_mm / score_figures(p->score).tool[0].lost_limit_mm);
         }
         ScoreFigures f = score_figures(p->score);
-        print_message("bend %zu: at most %.2f of the limit %.2f mm; pushed %.2f N\n", i, most, f.tool[0].lost_limit_mm, simulator_last(p->simulator)->proximal_force);
+        print_message("bend %zu: at most %.2f of the limit %.2f mm; pushed %.2f N\n", i, most, f.tool[0].lost_limit_mm,
+                      simulator_last(p->simulator)->proximal_force);
         assert_int_equal(f.error[ERROR_BUCKLING].count, 0);
         assert_true(most < 0.8);
         practice_end(p);
@@ -585,8 +587,10 @@ static void a_catheter_kicks_when_its_wire_leaves(void **state)
     (void)state;
     double peak[2];
     for (int fast = 0; fast < 2; fast++) {
-        Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("rest: [{arc: {radius_mm: 8, angle_deg: 90}}], ")
-                                     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(50) EXERCISE(", rules: {kick_mm_s: 60}"), NULL);
+        Practice *p = practice_begin(
+            "seldinger: 1\n" TWO_TOOLS("rest: [{arc: {radius_mm: 8, angle_deg: 90}}], ") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(50)
+                EXERCISE(", rules: {kick_mm_s: 60}"),
+            NULL);
         practice_go_tools(p, 50, 60, 0.5);
         ScoreFigures f = practice_go_tools(p, 0, 0, 1);
         assert_int_equal(f.error_total, 0);
@@ -661,8 +665,10 @@ static void what_is_drawn_out_is_at_the_mouth(void **state)
 {
     (void)state;
     VesselTree *t = forked(1);
-    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [30, 0, 0], direction: [1, 0, 0]}\n"
-                                 "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", tool: wire, rules: {wrong_branch_mm: 3}"), t);
+    Practice *p = practice_begin(
+        "seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [30, 0, 0], direction: [1, 0, 0]}\n"
+                                       "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", tool: wire, rules: {wrong_branch_mm: 3}"),
+        t);
     ScoreFigures f = practice_go_tools(p, 0, -50, 1);
     assert_near(f.tool[1].behind_mm, 50, 1e-3);
     assert_int_equal(f.error_total, 0);
@@ -717,9 +723,11 @@ static void a_tool_that_stays_keeps_its_place(void **state)
 static void each_tip_bears_its_own(void **state)
 {
     (void)state;
-    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(90)
-                                 "vessel: {friction: 0.1, contact: tube, tube: {radius_mm: 2, normal: [0, 1, 0], ends: closed, path: [{arc: {radius_mm: 15, "
-                                 "angle_deg: 90}}, {line_mm: 20}]}}\n" EXERCISE(", rules: {tip_length_mm: 6, tip_force_n: 0.02}"), NULL);
+    Practice *p =
+        practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(
+                           90) "vessel: {friction: 0.1, contact: tube, tube: {radius_mm: 2, normal: [0, 1, 0], ends: closed, path: [{arc: {radius_mm: 15, "
+                               "angle_deg: 90}}, {line_mm: 20}]}}\n" EXERCISE(", rules: {tip_length_mm: 6, tip_force_n: 0.02}"),
+                       NULL);
     practice_go_tools(p, 20, 40, 0.9);
     practice_go_tools(p, 0, 20, 0.5);
     ScoreFigures f = practice_go_tools(p, 0, 0, 2);
@@ -761,9 +769,11 @@ static void each_tip_bears_its_own(void **state)
 static void a_tools_place_is_where_it_is(void **state)
 {
     (void)state;
-    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(90)
-                                 "vessel: {friction: 0, contact: tube, tube: {radius_mm: 1.5, normal: [0, 1, 0], path: [{arc: {radius_mm: 15, angle_deg: 90}}, "
-                                 "{line_mm: 40}]}}\n", NULL);
+    Practice *p =
+        practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(
+                           90) "vessel: {friction: 0, contact: tube, tube: {radius_mm: 1.5, normal: [0, 1, 0], path: [{arc: {radius_mm: 15, angle_deg: 90}}, "
+                               "{line_mm: 40}]}}\n",
+                       NULL);
     Stepper *stepper = simulator_stepper(p->simulator);
     double off = 0, slip = 0;
     for (int i = 0; i < 900; i++) {

@@ -15,8 +15,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define SCENE "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" AT(9) \
-    "exercise: {title: \"Go \\\"there\\\" <now>\", target: there, hold_s: 0.5, rules: {blind_mm: 2, contrast_ml: 1}, par: {time_s: 0.5, path_ratio: 1}}\n"
+#define SCENE                                                                                                                                                  \
+    "seldinger: 1\n" TOOL                                                                                                                                      \
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" AT(9) "exercise: {title: \"Go \\\"there\\\" <now>\", target: there, hold_s: 0.5, " \
+                                                                                  "rules: {blind_mm: 2, contrast_ml: 1}, par: {time_s: 0.5, path_ratio: 1}}\n"
 
 static Faults faults;
 

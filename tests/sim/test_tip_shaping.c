@@ -126,9 +126,12 @@ static void what_a_wire_does_not_keep_is_told(void **state)
 {
     (void)state;
     const WireSection wire = piece(20, 0.3556, 0.637);
-    const struct { TipShaping shaping; const char *why; } cases[] = {{{21, 1, 1}, "the wire is 20 mm long"},
-                                                                     {{5, 1, 20}, "does not make the core yield"},
-                                                                     {{1, 3, 1}, "a longer tip, a smaller angle or a thinner mandrel"}};
+    const struct {
+        TipShaping shaping;
+        const char *why;
+    } cases[] = {{{21, 1, 1}, "the wire is 20 mm long"},
+                 {{5, 1, 20}, "does not make the core yield"},
+                 {{1, 3, 1}, "a longer tip, a smaller angle or a thinner mandrel"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         TipShaped shaped;
         char why[256] = "";
@@ -141,8 +144,8 @@ static void what_a_wire_does_not_keep_is_told(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_moment_is_that_of_the_stresses),  cmocka_unit_test(a_core_springs_back_by_the_moment_it_was_held_with),
-        cmocka_unit_test(a_core_is_as_stiff_as_its_section),   cmocka_unit_test(the_tip_keeps_the_angle_at_its_place),
-        cmocka_unit_test(bends_before_are_pressed_straight),   cmocka_unit_test(what_a_wire_does_not_keep_is_told)};
+        cmocka_unit_test(the_moment_is_that_of_the_stresses), cmocka_unit_test(a_core_springs_back_by_the_moment_it_was_held_with),
+        cmocka_unit_test(a_core_is_as_stiff_as_its_section),  cmocka_unit_test(the_tip_keeps_the_angle_at_its_place),
+        cmocka_unit_test(bends_before_are_pressed_straight),  cmocka_unit_test(what_a_wire_does_not_keep_is_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

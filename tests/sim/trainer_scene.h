@@ -66,7 +66,8 @@ static inline void assert_same_figures(const ScoreFigures *a, const ScoreFigures
     SAME(state), SAME(has_exercise), SAME(has_xray), SAME(points), SAME(part), SAME(start_s), SAME(time_s), SAME(fluoroscopy_s), SAME(pulses);
     SAME(dose_area_cm2), SAME(contrast_ml), SAME(path_mm), SAME(way_mm), SAME(remaining_mm), SAME(least_remaining_mm), SAME(efficiency);
     SAME(inserted_mm), SAME(withdrawn_mm), SAME(wall_force_peak_n), SAME(wall_impulse_n_s), SAME(tip_force_n), SAME(tip_force_peak_n), SAME(tool[0].lost_mm);
-    SAME(tool[0].lost_limit_mm), SAME(tip_node), SAME(tool[0].off_way_mm), SAME(blind_mm), SAME(target_distance_mm), SAME(held_s), SAME(reached_s), SAME(error_total);
+    SAME(tool[0].lost_limit_mm), SAME(tip_node), SAME(tool[0].off_way_mm), SAME(blind_mm), SAME(target_distance_mm), SAME(held_s), SAME(reached_s),
+        SAME(error_total);
     for (int i = 0; i < ERROR_COUNT; i++)
         SAME(error[i].count), SAME(error[i].is_on), SAME(error[i].last_s);
 #undef SAME

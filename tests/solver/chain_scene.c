@@ -68,8 +68,7 @@ static void add_element(ChainScene *s, int i)
     double e = o->young_modulus, shear = e / (2 + 2 * o->poisson_ratio);
     double kappa = 6 * (1 + o->poisson_ratio) / (7 + 6 * o->poisson_ratio);
     double phi = 12 * e * inertia / (kappa * shear * area * l0 * l0);
-    double c = (4 + phi) * e * inertia / ((1 + phi) * l0), d = (2 - phi) * e * inertia / ((1 + phi) * l0), g = shear * 2 * inertia / l0,
-           k = e * area / l0;
+    double c = (4 + phi) * e * inertia / ((1 + phi) * l0), d = (2 - phi) * e * inertia / ((1 + phi) * l0), g = shear * 2 * inertia / l0, k = e * area / l0;
     Vec3 chord = vec3_sub(s->position[i + 1], s->position[i]);
     double length = vec3_norm(chord);
     Vec3 t = vec3_scale(chord, 1 / length);
@@ -236,8 +235,8 @@ Vessel *chain_scene_spiral(double radius, bool in_space)
         double curvature = pow(a, 4) / (c * pow(1 + a * a, 1.5)), ds = c * sqrt(1 + a * a) / (a * a) * 3 * PI / ARCS;
         piece[i + 1] = (TubePiece){.arc_radius = 1 / curvature, .angle = ds * curvature, .plane = in_space && i > 0 ? 0.12 : 0};
     }
-    TubeOptions options = {.start = vec3(0, 0, 0), .direction = vec3(1, 0, 0), .normal = vec3(0, 1, 0), .radius = radius,
-                           .piece_count = ARCS + 1, .piece = piece};
+    TubeOptions options = {
+        .start = vec3(0, 0, 0), .direction = vec3(1, 0, 0), .normal = vec3(0, 1, 0), .radius = radius, .piece_count = ARCS + 1, .piece = piece};
     Faults faults = {0};
     return tube_vessel_create(&options, "spiral", &faults);
 }
@@ -245,8 +244,7 @@ Vessel *chain_scene_spiral(double radius, bool in_space)
 Vessel *chain_scene_straight(double radius)
 {
     TubePiece piece = {.length = 500};
-    TubeOptions options = {.start = vec3(0, 0, 0), .direction = vec3(1, 0, 0), .normal = vec3(0, 1, 0), .radius = radius,
-                           .piece_count = 1, .piece = &piece};
+    TubeOptions options = {.start = vec3(0, 0, 0), .direction = vec3(1, 0, 0), .normal = vec3(0, 1, 0), .radius = radius, .piece_count = 1, .piece = &piece};
     Faults faults = {0};
     return tube_vessel_create(&options, "straight", &faults);
 }
@@ -254,8 +252,13 @@ Vessel *chain_scene_straight(double radius)
 Vessel *chain_scene_capsule(double radius)
 {
     TubePiece piece = {.length = 10};
-    TubeOptions options = {.start = vec3(0, 0.3, -0.1), .direction = vec3(0.98401, -0.17362, 0.03984), .normal = vec3(0, 1, 0), .radius = radius,
-                           .piece_count = 1, .piece = &piece, .closed_ends = true};
+    TubeOptions options = {.start = vec3(0, 0.3, -0.1),
+                           .direction = vec3(0.98401, -0.17362, 0.03984),
+                           .normal = vec3(0, 1, 0),
+                           .radius = radius,
+                           .piece_count = 1,
+                           .piece = &piece,
+                           .closed_ends = true};
     Faults faults = {0};
     return tube_vessel_create(&options, "capsule", &faults);
 }

@@ -36,24 +36,41 @@ typedef struct OneBeam {
 // One element of the standard wire.
 static void make(OneBeam *beam, double length, double curvature, double plane)
 {
-    beam->section = (WireSection){.length = length, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3,
-                                  .rest_curvature = curvature, .rest_plane = plane};
+    beam->section = (WireSection){
+        .length = length, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3, .rest_curvature = curvature, .rest_plane = plane};
     beam->options = wire_default_options();
     beam->options.elements = beam->options.section_count = 1;
     beam->options.section = &beam->section;
     char why[256];
     assert_true(wire_create(&beam->wire, &beam->options, why, sizeof why));
     double *a = beam->array;
-    beam->rest = (BeamRest){.length = a, .extend = a + 1, .axial = a + 2, .near = a + 3, .far = a + 4, .twist = a + 5, .half_w = a + 6,
-                            .half_y = a + 7, .half_z = a + 8, .curvature = a + 9, .bending = a + 10, .shear = a + 11};
+    beam->rest = (BeamRest){.length = a,
+                            .extend = a + 1,
+                            .axial = a + 2,
+                            .near = a + 3,
+                            .far = a + 4,
+                            .twist = a + 5,
+                            .half_w = a + 6,
+                            .half_y = a + 7,
+                            .half_z = a + 8,
+                            .curvature = a + 9,
+                            .bending = a + 10,
+                            .shear = a + 11};
     wire_rest(&beam->wire, &beam->options, &beam->rest);
     wire_destroy(&beam->wire);
 }
 
 static BeamInput input_of(const BeamRest *r)
 {
-    return (BeamInput){.length = r->length[0], .extend = r->extend[0], .axial = r->axial[0], .near = r->near[0], .far = r->far[0],
-                       .twist = r->twist[0], .half_w = r->half_w[0], .half_y = r->half_y[0], .half_z = r->half_z[0]};
+    return (BeamInput){.length = r->length[0],
+                       .extend = r->extend[0],
+                       .axial = r->axial[0],
+                       .near = r->near[0],
+                       .far = r->far[0],
+                       .twist = r->twist[0],
+                       .half_w = r->half_w[0],
+                       .half_y = r->half_y[0],
+                       .half_z = r->half_z[0]};
 }
 
 // The exact rest arc, from the origin along +x, bent towards e2 turned by `plane`.
@@ -64,8 +81,7 @@ static void at_rest(BeamInput *in, double length, double curvature, double plane
     in->x1 = vec3(0, 0, 0);
     in->q1 = quat_identity();
     in->q2 = quat_from_rotation_vector(vec3_scale(axis, angle));
-    in->x2 = curvature == 0 ? vec3(length, 0, 0)
-                            : vec3_add_scaled(vec3(sin(angle) / curvature, 0, 0), (1 - cos(angle)) / curvature, normal);
+    in->x2 = curvature == 0 ? vec3(length, 0, 0) : vec3_add_scaled(vec3(sin(angle) / curvature, 0, 0), (1 - cos(angle)) / curvature, normal);
 }
 
 static void deform(BeamInput *in, double scale)
@@ -111,8 +127,7 @@ static void force_is_minus_energy_gradient(void **state)
             beam_element(&in, &out);
             Vec3 axis = vec3_unit(random_vec(1));
             double h = 1e-5, scale = 1e-8 * (in.axial * in.length + in.near);
-            double expected[4] = {-vec3_dot(out.force2, axis), vec3_dot(out.force2, axis), vec3_dot(out.moment1, axis),
-                                  vec3_dot(out.moment2, axis)};
+            double expected[4] = {-vec3_dot(out.force2, axis), vec3_dot(out.force2, axis), vec3_dot(out.moment1, axis), vec3_dot(out.moment2, axis)};
             for (int dof = 0; dof < 4; dof++) {
                 double energy[2];
                 for (int side = 0; side < 2; side++) {
@@ -343,14 +358,14 @@ static void make_chain(Chain *c)
     BeamRest *r = &c->beam.rest;
     BeamPose *p = &c->beam.pose;
     BeamInertia *m = &c->beam.inertia;
-    double **array[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z, &r->curvature, &r->bending,
-                        &r->shear, &p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz, &m->mass, &m->lateral, &m->excess, &m->ax, &m->ay, &m->az,
-                        &m->tx, &m->ty, &m->tz, &c->beam.drag};
+    double **array[] = {&r->length,  &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z,   &r->curvature,
+                        &r->bending, &r->shear,  &p->x,     &p->y,    &p->z,   &p->qw,    &p->qx,     &p->qy,     &p->qz,       &m->mass,
+                        &m->lateral, &m->excess, &m->ax,    &m->ay,   &m->az,  &m->tx,    &m->ty,     &m->tz,     &c->beam.drag};
     for (size_t k = 0; k < sizeof array / sizeof *array; k++)
         *array[k] = c->array[k];
-    WireSection section[2] = {{.length = 10, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3},
-                              {.length = 10, .diameter = 0.3, .young_modulus = 5e3, .poisson_ratio = 0.3, .density = 6.45e-3,
-                               .rest_curvature = 0.2, .rest_plane = 0.4}};
+    WireSection section[2] = {
+        {.length = 10, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3},
+        {.length = 10, .diameter = 0.3, .young_modulus = 5e3, .poisson_ratio = 0.3, .density = 6.45e-3, .rest_curvature = 0.2, .rest_plane = 0.4}};
     WireOptions options = wire_default_options();
     options.elements = E;
     options.section_count = 2;
@@ -522,11 +537,17 @@ static void sheath_joins_the_chain(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_force_at_rest),          cmocka_unit_test(force_is_minus_energy_gradient),
-        cmocka_unit_test(rigid_motion_changes_nothing), cmocka_unit_test(reversed_and_mirrored),
-        cmocka_unit_test(twist_is_exact),            cmocka_unit_test(tangent_is_the_derivative),
-        cmocka_unit_test(tangent_is_positive), cmocka_unit_test(spin_of_a_bent_rest_shape),      cmocka_unit_test(chain_equals_elements),
-        cmocka_unit_test(sheath_gradient),           cmocka_unit_test(sheath_joins_the_chain),
+        cmocka_unit_test(no_force_at_rest),
+        cmocka_unit_test(force_is_minus_energy_gradient),
+        cmocka_unit_test(rigid_motion_changes_nothing),
+        cmocka_unit_test(reversed_and_mirrored),
+        cmocka_unit_test(twist_is_exact),
+        cmocka_unit_test(tangent_is_the_derivative),
+        cmocka_unit_test(tangent_is_positive),
+        cmocka_unit_test(spin_of_a_bent_rest_shape),
+        cmocka_unit_test(chain_equals_elements),
+        cmocka_unit_test(sheath_gradient),
+        cmocka_unit_test(sheath_joins_the_chain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -358,8 +358,7 @@ static void load_kept(BlockCondenser *k, int m, int offset, int every)
 }
 
 // Another right-hand side and then the first one again, without condensing again: x to the bit.
-static void turns_to_the_same(BlockCondenser *k, const BlockFactor *f, const BlockChain *a, const double *b, int offset, int every,
-                              const double *x)
+static void turns_to_the_same(BlockCondenser *k, const BlockFactor *f, const BlockChain *a, const double *b, int offset, int every, const double *x)
 {
     size_t n = (size_t)a->count * N;
     double *y = malloc(3 * n * sizeof *y);
@@ -632,7 +631,8 @@ static void prints_timings(void **state)
         qsort(condense, RUNS, sizeof *condense, by_value);
         qsort(diagonal, RUNS, sizeof *diagonal, by_value);
         qsort(unsymmetric, RUNS, sizeof *unsymmetric, by_value);
-        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, unsymmetric %6.2f us, condense to a tenth %6.2f us, diagonal of the inverse %6.2f us "
+        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, unsymmetric %6.2f us, condense to a tenth %6.2f us, "
+                      "diagonal of the inverse %6.2f us "
                       "(medians)\n",
                       m, factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], unsymmetric[RUNS / 2], condense[RUNS / 2], diagonal[RUNS / 2]);
         block_condenser_destroy(condenser);
@@ -651,9 +651,17 @@ int main(void)
 {
     level_given = simd_level();
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(solves_as_dense),       cmocka_unit_test(inverse_diagonal_as_dense), cmocka_unit_test(refuses_indefinite),
-        cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(same_bits_everywhere), 
-        cmocka_unit_test(condensed_solves_as_whole), cmocka_unit_test(condensed_with_unknowns_left_out), cmocka_unit_test(unsymmetric_with_unknowns_left_out), cmocka_unit_test(prints_timings),
+        cmocka_unit_test(solves_as_dense),
+        cmocka_unit_test(inverse_diagonal_as_dense),
+        cmocka_unit_test(refuses_indefinite),
+        cmocka_unit_test(lu_solves_unsymmetric),
+        cmocka_unit_test(unit_rows_are_exact),
+        cmocka_unit_test(mirrored_signs_to_the_bit),
+        cmocka_unit_test(same_bits_everywhere),
+        cmocka_unit_test(condensed_solves_as_whole),
+        cmocka_unit_test(condensed_with_unknowns_left_out),
+        cmocka_unit_test(unsymmetric_with_unknowns_left_out),
+        cmocka_unit_test(prints_timings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

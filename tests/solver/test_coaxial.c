@@ -53,13 +53,17 @@ static void make_mix(Mix *m, int count, bool borders, bool tip, double length, d
             place[0] = s1 + own * (0.12 + 0.1 * k + 0.03 * random_unit()), place[1] = s1 + own * (0.55 + 0.1 * k + 0.03 * random_unit());
         for (int i = 0; i < SECTIONS; i++) {
             double bending = 40 + 20 * random_unit(), plane = PI * random_unit(), curvature = curl * random_unit();
-            m->section[k][i] = (CoaxialSection){.end = place[i], .bending = bending, .axial = 2e3 * (1.5 + 0.5 * random_unit()), .torsion = bending / 1.3,
-                                                .shear = 5e2 * (1.5 + 0.5 * random_unit()), .curve = {curvature * cos(plane), curvature * sin(plane)}};
+            m->section[k][i] = (CoaxialSection){.end = place[i],
+                                                .bending = bending,
+                                                .axial = 2e3 * (1.5 + 0.5 * random_unit()),
+                                                .torsion = bending / 1.3,
+                                                .shear = 5e2 * (1.5 + 0.5 * random_unit()),
+                                                .curve = {curvature * cos(plane), curvature * sin(plane)}};
         }
         m->tool[k] = (CoaxialTool){ends ? 2 : SECTIONS, m->section[k]};
         double phi = PI * random_unit();
-        m->in.span[k] = (CoaxialSpan){.tool = &m->tool[k], .s1 = s1, .s2 = s1 + own, .phi1 = phi, .phi2 = phi + bend * random_unit(), .has_tip = ends,
-                                        .spread = spread ? 2 * length : 0};
+        m->in.span[k] = (CoaxialSpan){
+            .tool = &m->tool[k], .s1 = s1, .s2 = s1 + own, .phi1 = phi, .phi2 = phi + bend * random_unit(), .has_tip = ends, .spread = spread ? 2 * length : 0};
     }
     m->in.x1 = random_vec(1);
     m->in.q1 = quat_from_rotation_vector(random_vec(2));
@@ -145,7 +149,6 @@ static void gradient_is_exact(void **state)
     print_message("gradient against differences: %.1e of the largest entry\n", worst);
     assert_true(worst < 1e-6);
 }
-
 
 // --- laws ---
 
@@ -299,12 +302,19 @@ static void mirrored_and_reversed(void **state)
 static void one_tool_is_a_beam(void **state)
 {
     (void)state;
-    static const struct { double length, curvature, plane; } shape[] = {{1.5, 0, 0}, {0.4, 0, 0}, {1.5, 0.1, 0}, {1.5, 0.3, 1.1}, {3, 0.2, -2.3}};
+    static const struct {
+        double length, curvature, plane;
+    } shape[] = {{1.5, 0, 0}, {0.4, 0, 0}, {1.5, 0.1, 0}, {1.5, 0.3, 1.1}, {3, 0.2, -2.3}};
     double worst = 0, worst_tangent = 0;
     for (int trial = 0; trial < 100; trial++) {
         int n = trial % 5;
         double length = shape[n].length, curvature = shape[n].curvature, plane = shape[n].plane;
-        WireSection section = {.length = length, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3, .rest_curvature = curvature,
+        WireSection section = {.length = length,
+                               .diameter = 0.36,
+                               .young_modulus = 80e3,
+                               .poisson_ratio = 0.3,
+                               .density = 6.45e-3,
+                               .rest_curvature = curvature,
                                .rest_plane = plane};
         WireOptions options = wire_default_options();
         options.elements = options.section_count = 1;
@@ -313,21 +323,47 @@ static void one_tool_is_a_beam(void **state)
         char why[256];
         assert_true(wire_create(&wire, &options, why, sizeof why));
         double a[BEAM_REST_ARRAYS];
-        BeamRest rest = {.length = a, .extend = a + 1, .axial = a + 2, .near = a + 3, .far = a + 4, .twist = a + 5, .half_w = a + 6, .half_y = a + 7,
-                         .half_z = a + 8, .curvature = a + 9, .bending = a + 10, .shear = a + 11};
+        BeamRest rest = {.length = a,
+                         .extend = a + 1,
+                         .axial = a + 2,
+                         .near = a + 3,
+                         .far = a + 4,
+                         .twist = a + 5,
+                         .half_w = a + 6,
+                         .half_y = a + 7,
+                         .half_z = a + 8,
+                         .curvature = a + 9,
+                         .bending = a + 10,
+                         .shear = a + 11};
         wire_rest(&wire, &options, &rest);
         wire_destroy(&wire);
         WireStiffness k = wire_stiffness(&section);
-        CoaxialSection own = {.end = 9, .bending = k.bending, .axial = k.axial, .torsion = k.torsion, .shear = k.shear,
+        CoaxialSection own = {.end = 9,
+                              .bending = k.bending,
+                              .axial = k.axial,
+                              .torsion = k.torsion,
+                              .shear = k.shear,
                               .curve = {curvature * cos(plane), curvature * sin(plane)}};
         CoaxialTool tool = {1, &own};
         CoaxialInput in = {.q1 = quat_from_rotation_vector(random_vec(2)), .count = 1, .span = {{.tool = &tool, .s1 = 2, .s2 = 2 + length}}};
         double angle = curvature * length;
-        in.q2 = quat_mul(quat_mul(in.q1, quat_from_rotation_vector(vec3(0, -sin(plane) * angle, cos(plane) * angle))), quat_from_rotation_vector(random_vec(0.2)));
+        in.q2 =
+            quat_mul(quat_mul(in.q1, quat_from_rotation_vector(vec3(0, -sin(plane) * angle, cos(plane) * angle))), quat_from_rotation_vector(random_vec(0.2)));
         in.x2 = vec3_add(quat_rotate(quat_mul(in.q1, quat_from_rotation_vector(vec3(0, -sin(plane) * angle / 2, cos(plane) * angle / 2))), vec3(length, 0, 0)),
                          random_vec(0.05 * length));
-        BeamInput beam = {.x1 = in.x1, .x2 = in.x2, .q1 = in.q1, .q2 = in.q2, .length = a[0], .extend = a[1], .axial = a[2], .near = a[3], .far = a[4],
-                          .twist = a[5], .half_w = a[6], .half_y = a[7], .half_z = a[8]};
+        BeamInput beam = {.x1 = in.x1,
+                          .x2 = in.x2,
+                          .q1 = in.q1,
+                          .q2 = in.q2,
+                          .length = a[0],
+                          .extend = a[1],
+                          .axial = a[2],
+                          .near = a[3],
+                          .far = a[4],
+                          .twist = a[5],
+                          .half_w = a[6],
+                          .half_y = a[7],
+                          .half_z = a[8]};
         BeamOutput expected;
         BeamTangent expected_tangent;
         CoaxialOutput out;
@@ -363,7 +399,8 @@ static void two_elements(bool tip, double twist, double at, double *energy, doub
     double node = 0, turned = twist > 0 ? 0.4 : 0;
     for (int e = 0; e < 2; e++) {
         CoaxialInput in = {.count = 1, .x1 = vec3(1.5 * e, 0.1 * e, 0), .x2 = vec3(1.5 + 1.5 * e, 0.1 - 0.2 * e, 0)};
-        in.q1 = quat_from_rotation_vector(vec3(1.5 * twist * e, 0, 0.2 * e)), in.q2 = quat_from_rotation_vector(vec3(twist * (1.5 + e), twist * e, 0.2 - 0.3 * e));
+        in.q1 = quat_from_rotation_vector(vec3(1.5 * twist * e, 0, 0.2 * e)),
+        in.q2 = quat_from_rotation_vector(vec3(twist * (1.5 + e), twist * e, 0.2 - 0.3 * e));
         in.span[0] = (CoaxialSpan){.tool = &tool[0], .s1 = 0, .s2 = 1.5};
         in.span[1] = (CoaxialSpan){.tool = &tool[1], .s1 = at, .phi1 = turned, .phi2 = turned};
         CoaxialOutput out;
@@ -396,8 +433,8 @@ static void nothing_jumps_at_a_node(void **state)
         two_elements(tip, is_twisted ? 0.1 : 0, at - 1e-9, &energy[0], &force[0]);
         two_elements(tip, is_twisted ? 0.1 : 0, at + 1e-9, &energy[1], &force[1]);
         double by_energy = fabs(energy[1] / energy[0] - 1), by_force = fabs(force[1] / force[0] - 1);
-        print_message("%s passes a node%s: energy jumps by %.1e of itself, forces by %.1e\n", tip ? "a tip" : "a border", is_twisted ? ", twisted" : "", by_energy,
-                      by_force);
+        print_message("%s passes a node%s: energy jumps by %.1e of itself, forces by %.1e\n", tip ? "a tip" : "a border", is_twisted ? ", twisted" : "",
+                      by_energy, by_force);
         assert_true(tip && is_twisted ? by_energy < 1e-6 && by_force < 5e-4 : by_energy < 1e-8 && by_force < 1e-8);
     }
 }
@@ -431,8 +468,13 @@ static CoaxialInput element_input(const Chain *c, int e)
     CoaxialInput in = {.x1 = c->x[e], .x2 = c->x[e + 1], .q1 = c->q[e], .q2 = c->q[e + 1], .count = c->element[e].count};
     for (int n = 0; n < in.count; n++) {
         int k = c->element[e].tool[n];
-        in.span[n] = (CoaxialSpan){.tool = c->tool[k], .s1 = c->place[e][k], .s2 = c->place[e + 1][k], .phi1 = c->turn[e][k], .phi2 = c->turn[e + 1][k],
-                                   .has_tip = n > 0 && n == in.count - 1 && c->element[e].has_tip, .spread = c->element[e].spread};
+        in.span[n] = (CoaxialSpan){.tool = c->tool[k],
+                                   .s1 = c->place[e][k],
+                                   .s2 = c->place[e + 1][k],
+                                   .phi1 = c->turn[e][k],
+                                   .phi2 = c->turn[e + 1][k],
+                                   .has_tip = n > 0 && n == in.count - 1 && c->element[e].has_tip,
+                                   .spread = c->element[e].spread};
     }
     return in;
 }
@@ -683,15 +725,15 @@ static void straight_tool_in_curved_tube(void **state)
         }
         double low = 1e9, high = -1e9, order = before > 0 ? log(before / error[0]) / log(3) : 0;
         int most = 0;
-        for (int n = 0; n < 800; n += elements > WHOLE_OR_SHORT(15, 5) ? 7 : 1) {
+        for (int n = 0; n<800; n += elements> WHOLE_OR_SHORT(15, 5) ? 7 : 1) {
             straight_into_curved(&c, elements, 10.013 + 0.05 * n);
             assert_true(chain_settle(&c, 60));
             most = c.iterations > most ? c.iterations : most;
             low = fmin(low, -c.gradient[8]), high = fmax(high, -c.gradient[8]);
         }
         double ripple = (high - low) / 0.03;
-        print_message("%2d elements: tip %.2e mm off (order %.2f), where the border is on a node %.1e; angle %.1e; push %.9f to %.9f N; %d iterations\n", elements,
-                      error[0], order, error[1], turned, low, high, most);
+        print_message("%2d elements: tip %.2e mm off (order %.2f), where the border is on a node %.1e; angle %.1e; push %.9f to %.9f N; %d iterations\n",
+                      elements, error[0], order, error[1], turned, low, high, most);
         assert_true(error[1] < 3 * 30 * STRETCH && fabs(turned) < 3 * STRETCH);
         assert_true(ripple < 1e-6 && fabs(low / 0.03 - 1) < 1e-6);
         assert_true(before == 0 || elements == 45 || order > 2.7);       // 45: the stretch is all that is left
@@ -747,7 +789,9 @@ static double base_of(Chain *c, double tip)
 static void two_curved_tubes(void **state)
 {
     (void)state;
-    static const struct { double length, base, tip; } known[] = {{0, 197.7856, 116.721}, {0, 258.8720, 74.708}, {60, 279.7368, 61.973}};
+    static const struct {
+        double length, base, tip;
+    } known[] = {{0, 197.7856, 116.721}, {0, 258.8720, 74.708}, {60, 279.7368, 61.973}};
     static Chain c, best;
     double root = sqrt(24 * 0.05 * 0.05 * 1.3 * (1.0 / 60 + 1.0 / 40));
     for (int n = 0; n < WHOLE_OR_SHORT(3, 1); n++) {
@@ -776,8 +820,8 @@ static void two_curved_tubes(void **state)
                 step = step > 0.011 ? 0.3 * step : step;
             }
             double error = fabs(base[1] / degree - known[n].base);
-            print_message("L sqrt(c) %.4f, %2d elements: base %.5f (%.2e off, order %.2f), tip %.4f degrees\n", root * length, elements, base[1] / degree, error,
-                          before > 0 ? log2(before / error) : 0, middle / degree);
+            print_message("L sqrt(c) %.4f, %2d elements: base %.5f (%.2e off, order %.2f), tip %.4f degrees\n", root * length, elements, base[1] / degree,
+                          error, before > 0 ? log2(before / error) : 0, middle / degree);
             assert_true(fabs(middle / degree - known[n].tip) < 5 * error + 1e-3);
             if (elements > 8)
                 assert_true(fabs(log2(before / error) - 2) < 0.1);
@@ -922,8 +966,8 @@ static void bend_leaves_a_catheter(void **state)
         }
         worst_again = fmax(worst_again, fmax(fabs(push - push_first[k]), vec3_distance(tip, tip_first[k])));
     }
-    print_message("bend leaves: force off by %.1e N, tip by %.1e mm, %d rounds differ by %.1e; shortest element %.3f of the others, %d iterations\n", worst_push,
-                  worst_tip, ROUNDS, worst_again, shortest, most);
+    print_message("bend leaves: force off by %.1e N, tip by %.1e mm, %d rounds differ by %.1e; shortest element %.3f of the others, %d iterations\n",
+                  worst_push, worst_tip, ROUNDS, worst_again, shortest, most);
     assert_true(worst_push < 1e-6 && worst_tip < 2e-4 && worst_again < 1e-7 && shortest < 0.1);
 }
 
@@ -941,7 +985,8 @@ static void order_of_a_bend_at_a_tip(void **state)
             before = c;
         }
         double angle, error = vec3_distance(c.x[c.nodes - 1], leaving_tip(66, &angle)), push = -c.gradient[8];
-        print_message("bend 6 mm out, %d elements: tip %.2e mm off (order %.2f), push %.8f N\n", elements, error, last > 0 ? log(last / error) / log(3) : 0, push);
+        print_message("bend 6 mm out, %d elements: tip %.2e mm off (order %.2f), push %.8f N\n", elements, error, last > 0 ? log(last / error) / log(3) : 0,
+                      push);
         assert_true(fabs(push + 0.075) < 1e-6);
         assert_true(last == 0 || log(last / error) / log(3) > 2.5);
         last = error;
@@ -988,8 +1033,8 @@ static void wire_in_a_stiff_bend(void **state)
             double *range = is_bent ? bent : straight;
             range[0] = fmin(range[0], out.tension[1]), range[1] = fmax(range[1], out.tension[1]);
         }
-        print_message("wire in a bend, %d elements: %.6f to %.6f N before and after, %.6f to %.6f N in it: %.6f lower\n", elements, straight[0], straight[1], bent[0],
-                      bent[1], straight[0] - bent[0]);
+        print_message("wire in a bend, %d elements: %.6f to %.6f N before and after, %.6f to %.6f N in it: %.6f lower\n", elements, straight[0], straight[1],
+                      bent[0], bent[1], straight[0] - bent[0]);
         // the tube gives way by EI_wire / EI_tube = 1e-5, twice that in the square
         assert_true(fabs(straight[1] - bent[0] - 0.075) < 3e-5 * 0.075 + 1e-6 && fabs(straight[0] - bent[1] - 0.075) < 3e-5 * 0.075 + 1e-6);
     }
@@ -1215,7 +1260,10 @@ static void print_times(void)
                     best[part] = fmin(best[part], ((double)(at[1].tv_sec - at[0].tv_sec) * 1e9 + (double)(at[1].tv_nsec - at[0].tv_nsec)) / 64);
                 }
             }
-            print_message("%d tools, %s: element %.0f ns, with its tangent %.0f ns\n", count, kind == 0 ? "straight" : kind == 1 ? "curved" : "curved, two borders each",
+            print_message("%d tools, %s: element %.0f ns, with its tangent %.0f ns\n", count,
+                          kind == 0   ? "straight"
+                          : kind == 1 ? "curved"
+                                      : "curved, two borders each",
                           best[0], best[1]);
         }
 }

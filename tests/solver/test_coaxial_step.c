@@ -16,8 +16,14 @@
 static WireSection tube_section(double length, double bending, double curvature, double outer, double inner)
 {
     double second = PI / 64 * (outer * outer * outer * outer - inner * inner * inner * inner);
-    return (WireSection){.length = length, .diameter = outer, .inner_diameter = inner, .young_modulus = bending / second, .poisson_ratio = 0.3,
-                         .density = 2e-3, .rest_curvature = curvature, .friction = -1};
+    return (WireSection){.length = length,
+                         .diameter = outer,
+                         .inner_diameter = inner,
+                         .young_modulus = bending / second,
+                         .poisson_ratio = 0.3,
+                         .density = 2e-3,
+                         .rest_curvature = curvature,
+                         .friction = -1};
 }
 
 typedef struct Coaxial {
@@ -367,8 +373,8 @@ static void friction_acts_between_neighbours(void **state)
         for (int k = 0; k < 3; k++)
             push[moved][k] = r->push[k];
         StepEnergy e = stepper_energy(c.stepper);
-        print_message("%s: push %.4f %.4f %.4f N, friction takes %.2e of the hands' %.2e mJ a step\n", moved ? "both" : "wire alone", r->push[0], r->push[1], r->push[2],
-                      e.friction, e.hand);
+        print_message("%s: push %.4f %.4f %.4f N, friction takes %.2e of the hands' %.2e mJ a step\n", moved ? "both" : "wire alone", r->push[0], r->push[1],
+                      r->push[2], e.friction, e.hand);
         assert_true(e.friction > 0 && fabs(e.friction / e.hand - 1) < 0.1);
         stepper_destroy(c.stepper);
     }
@@ -380,7 +386,8 @@ static void friction_acts_between_neighbours(void **state)
 static Vessel *winding_tube_as(Quat turn, bool mirrored)
 {
     TubePiece piece[] = {line_piece(20), arc_piece(15, 90, 0), line_piece(10), arc_piece(10, 90, mirrored ? -90 : 90), line_piece(30)};
-    TubeOptions options = {.direction = quat_rotate(turn, vec3(1, 0, 0)), .normal = quat_rotate(turn, vec3(0, 1, 0)), .radius = 2, .piece_count = 5, .piece = piece};
+    TubeOptions options = {
+        .direction = quat_rotate(turn, vec3(1, 0, 0)), .normal = quat_rotate(turn, vec3(0, 1, 0)), .radius = 2, .piece_count = 5, .piece = piece};
     Faults faults = {0};
     Vessel *vessel = tube_vessel_create(&options, "test", &faults);
     assert_non_null(vessel);
@@ -441,7 +448,8 @@ static void three_tools_stay_in_the_tube(void **state)
         nodes = stepper_state(c.stepper)->node_count > nodes ? stepper_state(c.stepper)->node_count : nodes;
         assert_true(fabs(r->push[0]) < 2 && fabs(r->push[1]) < 2 && fabs(r->push[2]) < 2);
     }
-    print_message("deepest %.4f mm, at most %d nodes of %d, %d steps stopped at the contact solve's cap\n", deepest, nodes, stepper_node_capacity(c.stepper), stuck);
+    print_message("deepest %.4f mm, at most %d nodes of %d, %d steps stopped at the contact solve's cap\n", deepest, nodes, stepper_node_capacity(c.stepper),
+                  stuck);
     assert_true(deepest < 0.05 && nodes > 85 && stuck < 60);
     // every tool's nodes lie on one line, in order, as far apart as they are along the tool
     for (int k = 0; k < 3; k++) {
@@ -483,8 +491,11 @@ static void turned_and_mirrored_scenes_go_the_same_way(void **state)
         const WireState *w = stepper_state(c.stepper);
         tip[i] = quat_rotate(quat_conjugate(turn[i]), w->position[w->node_count - 1]);
         tip[i].z *= mirrored ? -1 : 1;
-        print_message("%s: tip %.7f %.7f %.7f, pushes %.7f %.7f %.7f\n", i == 0 ? "as it is" : i == 1 ? "turned" : "mirrored", tip[i].x, tip[i].y, tip[i].z, push[i][0], push[i][1],
-                      push[i][2]);
+        print_message("%s: tip %.7f %.7f %.7f, pushes %.7f %.7f %.7f\n",
+                      i == 0   ? "as it is"
+                      : i == 1 ? "turned"
+                               : "mirrored",
+                      tip[i].x, tip[i].y, tip[i].z, push[i][0], push[i][1], push[i][2]);
         stepper_destroy(c.stepper);
         vessel->destroy(vessel);
     }
@@ -636,18 +647,22 @@ static void tools_are_exchanged_at_the_hub(void **state)
     (void)state;
     Vessel *vessel = winding_tube();
     Coaxial c = {0};
-    WireSection longer[2] = {tube_section(170, 200, 0, 1.4, 1.0), tube_section(12, 60, 0.03, 1.4, 1.0)}, stiff[2] = {tube_section(360, 150, 0, 0.6, 0), tube_section(30, 2, 0.1, 0.6, 0)},
-                wide = tube_section(100, 50, 0, 1.2, 1.0);
+    WireSection longer[2] = {tube_section(170, 200, 0, 1.4, 1.0), tube_section(12, 60, 0.03, 1.4, 1.0)},
+                stiff[2] = {tube_section(360, 150, 0, 0.6, 0), tube_section(30, 2, 0.1, 0.6, 0)}, wide = tube_section(100, 50, 0, 1.2, 1.0);
     c.section[0][0] = tube_section(150, 60, 0, 1.2, 1.0);
     c.section[0][1] = tube_section(10, 20, 0.1, 1.2, 1.0);
     c.section[1][0] = tube_section(350, 20, 0, 0.36, 0);
     c.section[1][1] = tube_section(30, 1, 0.1, 0.36, 0);
-    c.options = (StepperOptions){.contact = contact_default_options(), .vessel = vessel, .wall_friction = 0.05, .inner_friction = {0}};      // which would hold a twist that the old one took with it
+    c.options = (StepperOptions){.contact = contact_default_options(),
+                                 .vessel = vessel,
+                                 .wall_friction = 0.05,
+                                 .inner_friction = {0}}; // which would hold a twist that the old one took with it
     c.options.wire = tool_options(c.section[0], 2, 80, 1);
     c.options.wire.damping_stiffness = 0.2;
     c.options.wire.damping_mass = 1e-3;
     c.inner[0] = tool_options(c.section[1], 2, 120, 3);
-    StepperSpare spare[3] = {{.tool = 0, .wire = tool_options(longer, 2, 100, 0), .friction_inside = 0.03}, {.tool = 1, .wire = tool_options(stiff, 2, 140, 0)},
+    StepperSpare spare[3] = {{.tool = 0, .wire = tool_options(longer, 2, 100, 0), .friction_inside = 0.03},
+                             {.tool = 1, .wire = tool_options(stiff, 2, 140, 0)},
                              {.tool = 0, .wire = tool_options(&wide, 1, 40, 0), .friction_inside = 0.05}};
     c.options.spare = spare;
     c.options.spare_count = 3;
@@ -739,8 +754,8 @@ static void the_outermost_hand_slips_by_its_own_push(void **state)
         double r = 1 / SOFTER, end = 0.9 + 6 * SOFTER;
         Vec3 tip = vec3(51.02 + 10 * sin(0.9) + r * (sin(end) - sin(0.9)), 10 * (1 - cos(0.9)) + r * (cos(0.9) - cos(end)), 0);
         error[fine] = stepper_tool_inserted(c.stepper, 0) - 46.53;
-        print_message("steps of %.1f ms: slipped for %.0f ms, back to %.3f mm (46.53); the tip of the other is %.1e mm from where it would be\n", c.options.dt, slipping,
-                      46.53 + error[fine], vec3_distance(after, tip));
+        print_message("steps of %.1f ms: slipped for %.0f ms, back to %.3f mm (46.53); the tip of the other is %.1e mm from where it would be\n", c.options.dt,
+                      slipping, 46.53 + error[fine], vec3_distance(after, tip));
         assert_true(slipping > 100 && slipping < 1000 && vec3_distance(after, tip) < 1);
         stepper_destroy(c.stepper);
     }
@@ -769,7 +784,8 @@ static void a_valve_holds_what_no_hand_does(void **state)
                 slid_out = i;
         }
         double apart = stepper_tool_inserted(c.stepper, 1) - stepper_tool_inserted(c.stepper, 0);
-        print_message("valve of %.2f N: hand feels %.4f N, tips %.3f mm apart (at first 6), bend out after %d steps\n", weak ? 0.03 : 0.1, push, apart, slid_out);
+        print_message("valve of %.2f N: hand feels %.4f N, tips %.3f mm apart (at first 6), bend out after %d steps\n", weak ? 0.03 : 0.1, push, apart,
+                      slid_out);
         if (weak)
             assert_true(slid_out > 0 && apart > 15);
         else
@@ -781,11 +797,16 @@ static void a_valve_holds_what_no_hand_does(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_straight_wire_in_a_curved_tube), cmocka_unit_test(turned_tubes_follow_up_to_the_fold),
-        cmocka_unit_test(a_bend_leaves_the_catheter),       cmocka_unit_test(equal_bends_with_flush_tips_rest), cmocka_unit_test(tools_leave_the_sheath),
+        cmocka_unit_test(a_straight_wire_in_a_curved_tube),
+        cmocka_unit_test(turned_tubes_follow_up_to_the_fold),
+        cmocka_unit_test(a_bend_leaves_the_catheter),
+        cmocka_unit_test(equal_bends_with_flush_tips_rest),
+        cmocka_unit_test(tools_leave_the_sheath),
         cmocka_unit_test(a_softer_part_turned_in_the_sheath_does_work),
-        cmocka_unit_test(friction_in_a_bend),               cmocka_unit_test(friction_acts_between_neighbours),
-        cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
+        cmocka_unit_test(friction_in_a_bend),
+        cmocka_unit_test(friction_acts_between_neighbours),
+        cmocka_unit_test(three_tools_stay_in_the_tube),
+        cmocka_unit_test(a_restored_run_repeats),
         cmocka_unit_test(hands_stop_and_slip),
         cmocka_unit_test(end_stops_at_the_hub_around_it),
         cmocka_unit_test(events_leave_the_energy),

@@ -51,8 +51,15 @@ static void make_tool(Run *run, Random *random, int k, double outer, double inne
     double modulus = inner > 0 ? draw_log(random, 300, 10000) : draw_log(random, 5000, 230000), softer = draw(random, 0.1, 1), curved = draw(random, 0, 1);
     double length[SECTIONS] = {260 + 95 * k, draw(random, 5, 30), draw(random, 3, 25)};
     for (int i = 0; i < SECTIONS; i++)
-        run->section[k][i] = (WireSection){.length = length[i], .diameter = outer, .inner_diameter = inner, .poisson_ratio = 0.3, .density = 4e-3, .friction = -1,
-                                           .young_modulus = modulus * (i == 0 ? 1 : i == 1 ? softer : softer * softer)};
+        run->section[k][i] = (WireSection){.length = length[i],
+                                           .diameter = outer,
+                                           .inner_diameter = inner,
+                                           .poisson_ratio = 0.3,
+                                           .density = 4e-3,
+                                           .friction = -1,
+                                           .young_modulus = modulus * (i == 0   ? 1
+                                                                       : i == 1 ? softer
+                                                                                : softer * softer)};
     if (curved > 0.4)
         run->section[k][1].rest_curvature = draw(random, 0, 0.15);
     if (curved > 0.6) {
@@ -207,7 +214,8 @@ static void random_hands_on_random_tools(void **state)
         limited += out.limited;
         stuck += out.stuck;
         if (!is_good(&out))
-            print_message("seed %d: diverged %d, repeats %d, finite %d, deepest %.3f mm, push %.2f N\n", seed, out.diverged, out.repeats, out.is_finite, out.deepest, out.push);
+            print_message("seed %d: diverged %d, repeats %d, finite %d, deepest %.3f mm, push %.2f N\n", seed, out.diverged, out.repeats, out.is_finite,
+                          out.deepest, out.push);
         assert_true(is_good(&out));
     }
     print_message("%d scenes of %d steps: %d motions cut, %d steps not converged\n", made, STEPS, limited, stuck);
@@ -226,8 +234,8 @@ int main(int argc, char **argv)
             bad += !is_good(&o);
             limited += o.limited;
             stuck += o.stuck;
-            printf("%s seed %d: %s%s%s deepest %.3f mm, push %.2f N, cut %d, not converged %d, slips %d\n", is_good(&o) ? "    " : "BAD ", seed + i, o.diverged ? "DIVERGED " : "",
-                   o.repeats ? "" : "DIFFERS ", o.is_finite ? "" : "NAN ", o.deepest, o.push, o.limited, o.stuck, o.slips);
+            printf("%s seed %d: %s%s%s deepest %.3f mm, push %.2f N, cut %d, not converged %d, slips %d\n", is_good(&o) ? "    " : "BAD ", seed + i,
+                   o.diverged ? "DIVERGED " : "", o.repeats ? "" : "DIFFERS ", o.is_finite ? "" : "NAN ", o.deepest, o.push, o.limited, o.stuck, o.slips);
             fflush(stdout);
         }
         printf("%d scenes, %d bad; of %d steps %d cut, %d not converged\n", made, bad, made * STEPS, limited, stuck);

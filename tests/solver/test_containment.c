@@ -72,13 +72,21 @@ static double tube_outside(const Tube *tube, Vec3 x, double tool_radius)
     return least + tool_radius - tube->radius;
 }
 
-#define LINE(l) {.length = (l)}
-#define ARC(r, degrees, plane_degrees) {.arc_radius = (r), .angle = (degrees) * PI / 180, .plane = (plane_degrees) * PI / 180}
+#define LINE(l)                                                                                                                                                \
+    {                                                                                                                                                          \
+        .length = (l)                                                                                                                                          \
+    }
+#define ARC(r, degrees, plane_degrees)                                                                                                                         \
+    {                                                                                                                                                          \
+        .arc_radius = (r), .angle = (degrees)*PI / 180, .plane = (plane_degrees)*PI / 180                                                                      \
+    }
 
 static const Tube capsule = {.count = 1, .radius = 1.25, .piece = {LINE(10)}};
 static const Tube bends = {.count = 5, .radius = 1.25, .piece = {LINE(8), ARC(9, 110, 0), ARC(8, 150, 180), ARC(12, 120, 90), LINE(20)}};
-static const Tube coil = {.count = 10, .radius = 0.35, .piece = {LINE(5), ARC(5, 100, 12), ARC(4.4, 100, 12), ARC(3.8, 100, 12), ARC(3.3, 100, 12),
-                          ARC(2.9, 100, 12), ARC(2.5, 100, 12), ARC(2.2, 100, 12), ARC(1.9, 100, 12), ARC(1.7, 100, 12)}};
+static const Tube coil = {.count = 10,
+                          .radius = 0.35,
+                          .piece = {LINE(5), ARC(5, 100, 12), ARC(4.4, 100, 12), ARC(3.8, 100, 12), ARC(3.3, 100, 12), ARC(2.9, 100, 12), ARC(2.5, 100, 12),
+                                    ARC(2.2, 100, 12), ARC(1.9, 100, 12), ARC(1.7, 100, 12)}};
 static const Tube dead_end = {.count = 3, .radius = 0.48, .piece = {LINE(15), ARC(15, 70, 0), LINE(10)}};
 static const Tube wide = {.count = 3, .radius = 4, .piece = {LINE(30), ARC(30, 90, 0), LINE(60)}};
 
@@ -159,8 +167,8 @@ static Outcome run(const Case *c)
     static double deepest[STEPS_MAX];
     Tube tube = *c->tube;
     tube_lay(&tube);
-    TubeOptions options = {.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = tube.radius, .piece_count = tube.count, .piece = tube.piece,
-                           .closed_ends = true};
+    TubeOptions options = {
+        .direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = tube.radius, .piece_count = tube.count, .piece = tube.piece, .closed_ends = true};
     Faults faults = {0};
     Vessel *vessel = tube_vessel_create(&options, "test", &faults);
     assert_non_null(vessel);

@@ -127,8 +127,8 @@ static void coarse_elements_stay_inside(void **state)
                     sum += r->proximal_force, count++;
             }
             push[k] = sum / count;
-            print_message("%-8s elements of %4.1f mm: curve %+.4f mm outside at worst (points: %.4f), mean push %.5f N\n", course[c].name, size[k],
-                          deepest, reported, push[k]);
+            print_message("%-8s elements of %4.1f mm: curve %+.4f mm outside at worst (points: %.4f), mean push %.5f N\n", course[c].name, size[k], deepest,
+                          reported, push[k]);
             stepper_destroy(s);
             assert_true(deepest < 0.02 && reported < 0.02);
         }
@@ -183,7 +183,8 @@ static void a_ridge_between_nodes_holds(void **state)
             const WireState *w = stepper_state(s);
             int e = slot->element;
             Vec3 x = slot_place(slot, s->wire.length[e], w->position[e], quat_rotate(w->orientation[e], vec3(1, 0, 0)), w->position[e + 1],
-                                quat_rotate(w->orientation[e + 1], vec3(1, 0, 0))).position;
+                                quat_rotate(w->orientation[e + 1], vec3(1, 0, 0)))
+                         .position;
             VesselMemory memory = {.node = 0};
             VesselHit hit;
             ridge_query(&ridge, 1, &x, 1, &memory, &hit);
@@ -230,7 +231,9 @@ static void sleepers_miss_nothing(void **state)
 {
     (void)state;
     static const Run run[] = {
-        {"slow, turning", 4, 0.02, 0.006, 1, 1500, 200, 0.4}, {"200 mm/s in and out", 3, 0.2, 0, 1, 300, 280, 1.2}, {"two turns a second", 2.5, 0.05, 0.0126, 0.5, 700, 0, 0.6},
+        {"slow, turning", 4, 0.02, 0.006, 1, 1500, 200, 0.4},
+        {"200 mm/s in and out", 3, 0.2, 0, 1, 300, 280, 1.2},
+        {"two turns a second", 2.5, 0.05, 0.0126, 0.5, 700, 0, 0.6},
         {"long elements", 3, 0.1, 0.01, 5, 600, 500, 0.9},
     };
     for (int k = 0; k < 4; k++) {
@@ -335,8 +338,8 @@ static void push_is_smooth(void **state)
     for (int k = 0; k < 2; k++)
         for (int j = 0; j < 2; j++) {
             Smoothness r = slow_push(bend[k], friction[j], 1);
-            print_message("bend %g mm, mu %g, elements of 1 mm: mean push %.4f N, largest change in a step %.3f %%, swing within an element %.2f %%\n",
-                          bend[k], friction[j], r.mean, 100 * r.jump, 100 * r.ripple);
+            print_message("bend %g mm, mu %g, elements of 1 mm: mean push %.4f N, largest change in a step %.3f %%, swing within an element %.2f %%\n", bend[k],
+                          friction[j], r.mean, 100 * r.jump, 100 * r.ripple);
             // contacts at nodes alone: swings of 2.4 and 1.8 % in the bend of 8 mm
             assert_true(r.jump < 2e-3 && r.ripple < (friction[j] > 0 ? 0.011 : 0.018));
         }
@@ -460,7 +463,7 @@ static void comes_back_from_outside(void **state)
         Vec3 side = b.options.wire.normal;
         for (int i = 0; i < s->state.node_count; i++) {
             double part = fmin(1, fmax(0, (i - s->first_free - 3) / 3.0));
-            s->state.position[i] = vec3_add_scaled(s->state.position[i], part * throw[k / 2], side);
+            s->state.position[i] = vec3_add_scaled(s->state.position[i], part * throw [k / 2], side);
             s->clearance[i] = 0;
         }
         double outside = 0;   // by the wall nearest to where a node now is, be it another branch's
@@ -476,7 +479,7 @@ static void comes_back_from_outside(void **state)
             last = step_once(s, 0, 0)->penetration;
             finite &= all_finite(s);
         }
-        print_message("%s: thrown %g mm aside, %.3f mm outside; in the end %.4f mm\n", v->kind, throw[k / 2], outside, last);
+        print_message("%s: thrown %g mm aside, %.3f mm outside; in the end %.4f mm\n", v->kind, throw [k / 2], outside, last);
         assert_true(finite && outside > 0.5 && last < 0.02);   // five radii of the wire
         stepper_destroy(s);
     }

@@ -23,9 +23,18 @@ typedef struct Pulley {
 
 static const Pulley QUARTER = {"90 deg", 3, {{.length = 30}, {.arc_radius = 15, .angle = PI / 2}, {.length = 80}}, 15, PI / 2, 70, {0, 1, 0}};
 static const Pulley HALF = {"180 deg", 3, {{.length = 30}, {.arc_radius = 15, .angle = PI}, {.length = 80}}, 15, PI, 95, {-1, 0, 0}};
-static const Pulley S_SHAPE = {"S", 5, {{.length = 30}, {.arc_radius = 15, .angle = PI / 2}, {.length = 10}, {.arc_radius = 15, .angle = PI / 2, .plane = PI}, {.length = 80}}, 15, PI, 95, {1, 0, 0}};
-static const Pulley OUT_OF_PLANE = {"out of plane", 5, {{.length = 30}, {.arc_radius = 15, .angle = PI / 2}, {.length = 10}, {.arc_radius = 15, .angle = PI / 2, .plane = PI / 2}, {.length = 80}}, 15, PI, 95, {0, 0, 1}};
-
+static const Pulley S_SHAPE = {
+    "S",      5,  {{.length = 30}, {.arc_radius = 15, .angle = PI / 2}, {.length = 10}, {.arc_radius = 15, .angle = PI / 2, .plane = PI}, {.length = 80}},
+    15,       PI, 95,
+    {1, 0, 0}};
+static const Pulley OUT_OF_PLANE = {
+    "out of plane",
+    5,
+    {{.length = 30}, {.arc_radius = 15, .angle = PI / 2}, {.length = 10}, {.arc_radius = 15, .angle = PI / 2, .plane = PI / 2}, {.length = 80}},
+    15,
+    PI,
+    95,
+    {0, 0, 1}};
 
 typedef struct Drag {
     double force;            // [N] at the sheath, mean over the last element's length of travel
@@ -271,8 +280,12 @@ static void rest_is_rest(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(capstan_pull), cmocka_unit_test(capstan_push), cmocka_unit_test(friction_does_not_depend_on_speed),
-        cmocka_unit_test(turning_takes_friction_away), cmocka_unit_test(sections_have_their_own_friction), cmocka_unit_test(rest_is_rest),
+        cmocka_unit_test(capstan_pull),
+        cmocka_unit_test(capstan_push),
+        cmocka_unit_test(friction_does_not_depend_on_speed),
+        cmocka_unit_test(turning_takes_friction_away),
+        cmocka_unit_test(sections_have_their_own_friction),
+        cmocka_unit_test(rest_is_rest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

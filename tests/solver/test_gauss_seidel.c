@@ -165,7 +165,8 @@ static Vec3 random_unit(void)
 static void problem_randomise(Problem *p, double young, double length, double friction, double offset)
 {
     int m = p->chain.count;
-    double d = 0.36, area = PI * d * d / 4, inertia = area * d * d / 16, shear = young / 2.6, phi = 12 * young * inertia / (0.886 * shear * area * length * length);
+    double d = 0.36, area = PI * d * d / 4, inertia = area * d * d / 16, shear = young / 2.6,
+           phi = 12 * young * inertia / (0.886 * shear * area * length * length);
     double k = young * inertia / (1 + phi), a = 12 * k / pow(length, 3), b = 6 * k / pow(length, 2), c = (4 + phi) * k / length, dd = (2 - phi) * k / length;
     double ka = young * area / length, g = shear * 2 * inertia / length, mass = 6.45e-3 * area * length;
     Vec3 t = random_unit();
@@ -236,10 +237,11 @@ static void assert_laws(const Problem *p, double tolerance, const char *what)
     for (int i = 0; i < 6 * p->chain.count; i++)
         u = fmax(u, fabs(p->u[i]));
     // momentum to the rounding of a solve (some hundred eps) and the cut of forces to their cones, of which a node may have several; nothing pulls; cone to rounding; violations times the stiffness of a node are small against the forces
-    if (!(l.momentum <= 1e-12 * (a * u + b + top) + 10 * tolerance * top && l.pull == 0 && l.cone <= 1e-9 && l.penetration * a <= 1e3 * tolerance * top + 1e-12 * a &&
-          l.complement * a <= 1e3 * tolerance * top * top + 1e-12 * a * top && l.direction <= 1e3 * tolerance * top + 1e-12 * a)) {
-        print_message("%s: momentum %.2e pull %.2e cone %.2e penetration %.2e complement %.2e direction %.2e, top %.2e stiffness %.2e\n", what,
-                      l.momentum, l.pull, l.cone, l.penetration, l.complement, l.direction, l.top, a);
+    if (!(l.momentum <= 1e-12 * (a * u + b + top) + 10 * tolerance * top && l.pull == 0 && l.cone <= 1e-9 &&
+          l.penetration * a <= 1e3 * tolerance * top + 1e-12 * a && l.complement * a <= 1e3 * tolerance * top * top + 1e-12 * a * top &&
+          l.direction <= 1e3 * tolerance * top + 1e-12 * a)) {
+        print_message("%s: momentum %.2e pull %.2e cone %.2e penetration %.2e complement %.2e direction %.2e, top %.2e stiffness %.2e\n", what, l.momentum,
+                      l.pull, l.cone, l.penetration, l.complement, l.direction, l.top, a);
         fail_msg("laws of contact broken");
     }
 }
@@ -359,12 +361,14 @@ static void survives_random_problems(void **state)
         assert_true(isfinite(r.residual) && isfinite(l.momentum) && isfinite(l.top) && isfinite(l.penetration));
         assert_true(l.pull == 0 && l.cone <= 1e-9 && r.cone_violation <= 1e-9);
         if (!(l.penetration < 1e-4))
-            print_message("  penetrates %.1e: E %g friction %g length %g contacts %d nodes %d residual %.1e after %d\n", l.penetration, young, friction, length, contacts, nodes, r.residual, r.iterations);
+            print_message("  penetrates %.1e: E %g friction %g length %g contacts %d nodes %d residual %.1e after %d\n", l.penetration, young, friction, length,
+                          contacts, nodes, r.residual, r.iterations);
         bool easy = friction < 0.5;
         all += easy, hard += !easy;
         solved += easy && r.converged, solved_hard += !easy && r.converged;
         if (!r.converged)
-            print_message("  not converged: E %g friction %g length %g contacts %d nodes %d residual %.1e after %d\n", young, friction, length, contacts, nodes, r.residual, r.iterations);
+            print_message("  not converged: E %g friction %g length %g contacts %d nodes %d residual %.1e after %d\n", young, friction, length, contacts, nodes,
+                          r.residual, r.iterations);
         if (r.converged)
             assert_laws(&p, 1e-6, "random");
         problem_destroy(&p);
@@ -482,13 +486,70 @@ static void wire_in_tubes(void **state)
     (void)state;
     const Scene scenes[] = {
         {.name = "spiral 0.2 mm 80 GPa mu 0", .young = 8e4, .length = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
-        {.name = "spiral 0.2 mm 80 GPa mu 0.2", .young = 8e4, .length = 0.2, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
-        {.name = "spiral 0.5 mm 80 GPa mu 0.2", .young = 8e4, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
-        {.name = "spiral 0.5 mm 100 GPa mu 0.2", .young = 1e5, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
-        {.name = "spiral 0.5 mm 100 GPa mu 0.5", .young = 1e5, .length = 0.5, .friction = 0.5, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
-        {.name = "spiral 1.5 mm 80 GPa mu 0.2", .young = 8e4, .length = 1.5, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.8, .twist = 0.005},
-        {.name = "spiral 0.2 mm 0.05 GPa mu 0.2", .young = 50, .length = 0.2, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
-        {.name = "straight, J tip, twisting", .young = 8e4, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .tube = 0.6, .twist = 0.05, .straight = true, .tip_curvature = 0.1},
+        {.name = "spiral 0.2 mm 80 GPa mu 0.2",
+         .young = 8e4,
+         .length = 0.2,
+         .friction = 0.2,
+         .elements = 200,
+         .push = 500,
+         .pull = 300,
+         .tube = 0.5,
+         .twist = 0.005},
+        {.name = "spiral 0.5 mm 80 GPa mu 0.2",
+         .young = 8e4,
+         .length = 0.5,
+         .friction = 0.2,
+         .elements = 200,
+         .push = 500,
+         .pull = 300,
+         .tube = 0.5,
+         .twist = 0.005},
+        {.name = "spiral 0.5 mm 100 GPa mu 0.2",
+         .young = 1e5,
+         .length = 0.5,
+         .friction = 0.2,
+         .elements = 200,
+         .push = 500,
+         .pull = 300,
+         .tube = 0.5,
+         .twist = 0.005},
+        {.name = "spiral 0.5 mm 100 GPa mu 0.5",
+         .young = 1e5,
+         .length = 0.5,
+         .friction = 0.5,
+         .elements = 200,
+         .push = 500,
+         .pull = 300,
+         .tube = 0.5,
+         .twist = 0.005},
+        {.name = "spiral 1.5 mm 80 GPa mu 0.2",
+         .young = 8e4,
+         .length = 1.5,
+         .friction = 0.2,
+         .elements = 200,
+         .push = 500,
+         .pull = 300,
+         .tube = 0.8,
+         .twist = 0.005},
+        {.name = "spiral 0.2 mm 0.05 GPa mu 0.2",
+         .young = 50,
+         .length = 0.2,
+         .friction = 0.2,
+         .elements = 200,
+         .push = 500,
+         .pull = 300,
+         .tube = 0.5,
+         .twist = 0.005},
+        {.name = "straight, J tip, twisting",
+         .young = 8e4,
+         .length = 0.5,
+         .friction = 0.2,
+         .elements = 200,
+         .push = 500,
+         .tube = 0.6,
+         .twist = 0.05,
+         .straight = true,
+         .tip_curvature = 0.1},
     };
     for (size_t n = WHOLE_OR_SHORT(0, 2); n < sizeof scenes / sizeof *scenes; n += WHOLE_OR_SHORT(1, 5)) {
         enum { STEPS = 800 };

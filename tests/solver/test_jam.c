@@ -82,8 +82,8 @@ static void a_jammed_tool_costs_little(void **state)
     (void)state;
     for (double friction = 0.3; friction < 0.6; friction += WHOLE_OR_SHORT(0.1, 0.4)) {
         JamFigures f = force_in(friction);
-        print_message("friction %.1f: push up to %.0f N; a step %.0f us (free %.0f us), %.0f contact iterations, at most %.0f; deepest %.4f mm\n", friction, f.push, f.jammed_us,
-                      f.free_us, f.iterations, f.most_iterations, f.deepest);
+        print_message("friction %.1f: push up to %.0f N; a step %.0f us (free %.0f us), %.0f contact iterations, at most %.0f; deepest %.4f mm\n", friction,
+                      f.push, f.jammed_us, f.free_us, f.iterations, f.most_iterations, f.deepest);
         assert_true(f.push > 500);                                           // it is a jam
         assert_true(f.iterations <= 35 && f.jammed_us < 30 * f.free_us);     // 51 to 73 iterations where nothing ends a step
         assert_true(f.most_iterations <= 200);                                // 289 where nothing ends a step

@@ -44,8 +44,15 @@ typedef struct Chain {
 static const WireSection motley[] = {
     {.length = 20, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3, .friction = -1},
     {.length = 15, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3, .rest_curvature = 0.12, .friction = -1},
-    {.length = 10, .diameter = 0.9, .inner_diameter = 0.7, .young_modulus = 2e3, .poisson_ratio = 0.45, .density = 2e-3, .rest_curvature = -0.2,
-     .rest_plane = 1.1, .friction = -1},
+    {.length = 10,
+     .diameter = 0.9,
+     .inner_diameter = 0.7,
+     .young_modulus = 2e3,
+     .poisson_ratio = 0.45,
+     .density = 2e-3,
+     .rest_curvature = -0.2,
+     .rest_plane = 1.1,
+     .friction = -1},
     {.length = 8, .diameter = 0.2, .young_modulus = 500, .poisson_ratio = 0.48, .density = 1e-2, .rest_plane = -2, .rest_curvature = 0.3, .friction = -1}};
 enum { SECTIONS = sizeof motley / sizeof *motley };
 
@@ -56,9 +63,9 @@ static void chain_at_rest(Chain *c, double curl)
     BeamRest *r = &c->beam.rest;
     BeamPose *p = &c->beam.pose;
     BeamInertia *m = &c->beam.inertia;
-    double **array[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z, &r->curvature, &r->bending,
-                        &r->shear, &p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz, &m->mass, &m->lateral, &m->excess, &m->ax, &m->ay, &m->az,
-                        &m->tx, &m->ty, &m->tz, &c->beam.drag};
+    double **array[] = {&r->length,  &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z,   &r->curvature,
+                        &r->bending, &r->shear,  &p->x,     &p->y,    &p->z,   &p->qw,    &p->qx,     &p->qy,     &p->qz,       &m->mass,
+                        &m->lateral, &m->excess, &m->ax,    &m->ay,   &m->az,  &m->tx,    &m->ty,     &m->tz,     &c->beam.drag};
     for (size_t k = 0; k < sizeof array / sizeof *array; k++)
         *array[k] = c->array[k];
     WireOptions options = wire_default_options();
@@ -112,9 +119,19 @@ static double chain_energy(const Chain *c)
     const BeamRest *r = &c->beam.rest;
     double energy = 0;
     for (int i = 0; i < E; i++) {
-        BeamInput in = {.x1 = c->x[i], .x2 = c->x[i + 1], .q1 = c->q[i], .q2 = c->q[i + 1], .length = r->length[i], .extend = r->extend[i],
-                        .axial = r->axial[i], .near = r->near[i], .far = r->far[i], .twist = r->twist[i], .half_w = r->half_w[i],
-                        .half_y = r->half_y[i], .half_z = r->half_z[i]};
+        BeamInput in = {.x1 = c->x[i],
+                        .x2 = c->x[i + 1],
+                        .q1 = c->q[i],
+                        .q2 = c->q[i + 1],
+                        .length = r->length[i],
+                        .extend = r->extend[i],
+                        .axial = r->axial[i],
+                        .near = r->near[i],
+                        .far = r->far[i],
+                        .twist = r->twist[i],
+                        .half_w = r->half_w[i],
+                        .half_y = r->half_y[i],
+                        .half_z = r->half_z[i]};
         BeamOutput out;
         beam_element(&in, &out);
         energy += out.energy;
@@ -338,8 +355,8 @@ static void energy_never_grows(void **state)
                     Stepper *s = plucked(&own, vec3(0, hard ? -0.6 * size : 0.02 * size, hard ? size : 0), fine ? 0.1 : 1);
                     most[fine] = growth(s, 100 * (fine ? 10 : 1), &lost[fine]);
                 }
-                print_message("energy: %-11s plucked %-6s %-8s grows in a step of 1 and 0.1 ms by %.0e, %.0e at most; gone in 0.1 s %.3f, %.3f\n",
-                              name[kind], hard ? "hard" : "softly", damped ? "damped" : "undamped", most[0], most[1], lost[0], lost[1]);
+                print_message("energy: %-11s plucked %-6s %-8s grows in a step of 1 and 0.1 ms by %.0e, %.0e at most; gone in 0.1 s %.3f, %.3f\n", name[kind],
+                              hard ? "hard" : "softly", damped ? "damped" : "undamped", most[0], most[1], lost[0], lost[1]);
                 assert_true(most[0] < 1e-8 && most[1] < 1e-8);
             }
 }
@@ -371,7 +388,8 @@ static void runs_move_rigidly_and_mirror(void **state)
     for (int trial = 0; trial < 3; trial++) {
         Quat turn = random_turn();
         Vec3 shift = random_vec(50);
-        Stepper *plain = wandering(quat_identity(), vec3(0, 0, 0), 1), *moved = wandering(turn, shift, 1), *mirror = wandering(quat_identity(), vec3(0, 0, 0), -1);
+        Stepper *plain = wandering(quat_identity(), vec3(0, 0, 0), 1), *moved = wandering(turn, shift, 1),
+                *mirror = wandering(quat_identity(), vec3(0, 0, 0), -1);
         for (int k = 0; k < 300; k++) {
             double advance = k < 200 ? 0.05 : -0.05, twist = k < 100 ? 0.01 : -0.006;
             const StepReport *a = step_once(plain, advance, twist), *c = step_once(moved, advance, twist), *m = step_once(mirror, advance, -twist);
@@ -434,7 +452,8 @@ static Flight fly(const Bench *bench, double rate, double time)
         step_once(s, 0, 0);
     // about the centre of mass, which moves with the linear momentum
     Vec3 after = momentum(s, &wire, &later);
-    Flight f = {.linear = vec3_distance(after, linear) / vec3_norm(linear), .angular = vec3_distance(later, angular) / vec3_norm(angular),
+    Flight f = {.linear = vec3_distance(after, linear) / vec3_norm(linear),
+                .angular = vec3_distance(later, angular) / vec3_norm(angular),
                 .energy = 1 - energy_of(s) / energy};
     wire_destroy(&wire);
     stepper_destroy(s);
@@ -581,8 +600,8 @@ static void no_spike_as_nodes_pass_the_mouth(void **state)
             Stepper *s = bench_make(&b);
             Trace t = feed(s, pull ? -0.001 : 0.001, kind == 2 ? 0.001 : 0, 4000);
             print_message("%s at 1 mm/s, %-9s: force %.2e N, jumps %.3f %% in a step, spikes %.3f %%; torque %.2e N mm, jumps %.3f %%\n",
-                          pull ? "pull" : "push", name[kind], t.force_mean, 100 * t.force_jump / t.force_mean, 100 * t.beyond / t.force_mean,
-                          t.torque_mean, 100 * t.torque_jump / t.torque_mean);
+                          pull ? "pull" : "push", name[kind], t.force_mean, 100 * t.force_jump / t.force_mean, 100 * t.beyond / t.force_mean, t.torque_mean,
+                          100 * t.torque_jump / t.torque_mean);
             assert_true(t.beyond < 0.02 * t.force_mean);
             // where the stiffness at the mouth changes, the configurational push -M^2 / 2 EI truly steps
             if (!border)
@@ -658,11 +677,16 @@ static void times_of_assembly_and_correction(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_force_at_rest_nor_at_borders), cmocka_unit_test(rigid_motion_of_a_bent_chain),
-        cmocka_unit_test(force_is_the_derivative_of_energy), cmocka_unit_test(tangent_is_the_derivative_of_force),
-        cmocka_unit_test(energy_never_grows), cmocka_unit_test(runs_move_rigidly_and_mirror),
-        cmocka_unit_test(momentum_of_a_flying_wire), cmocka_unit_test(damping_leaves_rigid_rotation_alone),
-        cmocka_unit_test(reciprocity), cmocka_unit_test(no_spike_as_nodes_pass_the_mouth),
+        cmocka_unit_test(no_force_at_rest_nor_at_borders),
+        cmocka_unit_test(rigid_motion_of_a_bent_chain),
+        cmocka_unit_test(force_is_the_derivative_of_energy),
+        cmocka_unit_test(tangent_is_the_derivative_of_force),
+        cmocka_unit_test(energy_never_grows),
+        cmocka_unit_test(runs_move_rigidly_and_mirror),
+        cmocka_unit_test(momentum_of_a_flying_wire),
+        cmocka_unit_test(damping_leaves_rigid_rotation_alone),
+        cmocka_unit_test(reciprocity),
+        cmocka_unit_test(no_spike_as_nodes_pass_the_mouth),
         cmocka_unit_test(times_of_assembly_and_correction),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -68,7 +68,8 @@ static void push_does_not_go_to_and_fro(void **state)
     double work = 0;
     for (int k = 0; k < 2; k++) {
         Push push = push_in(wall, friction[k], 1);
-        print_message("mu %.2f: mean push %.4f N, changes by %.2f %% of it a step of 1 ms; work %.2f mJ\n", friction[k], push.mean, 100 * push.change, push.work);
+        print_message("mu %.2f: mean push %.4f N, changes by %.2f %% of it a step of 1 ms; work %.2f mJ\n", friction[k], push.mean, 100 * push.change,
+                      push.work);
         assert_true(push.mean > 0.4 && push.change < most[k]);
         work = push.work;
     }

@@ -78,8 +78,8 @@ typedef struct Sac {
 static void sac_start(Sac *sac, double radius, double length, double element, double mirror)
 {
     TubePiece piece = {.length = 0.5};
-    TubeOptions options = {.start = {0, 0, 0}, .direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = radius, .piece_count = 1, .piece = &piece,
-                           .closed_ends = true};
+    TubeOptions options = {
+        .start = {0, 0, 0}, .direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = radius, .piece_count = 1, .piece = &piece, .closed_ends = true};
     Faults faults = {0};
     sac->vessel = tube_vessel_create(&options, "sac", &faults);
     sac->element = element;
@@ -140,12 +140,14 @@ static Coil coil_up(SelfContactMode mode, double radius, double speed, double le
 static void a_wire_coils_in_a_sac(void **state)
 {
     (void)state;
-    const struct { double radius, speed, element; } scene[] = {{4, 0.05, 1}, {4, 0.05, 1.5}, {4, 0.2, 1}, {3, 0.2, 1.5}, {3, 0.05, 1}, {4, 0.05, 0.5}};
+    const struct {
+        double radius, speed, element;
+    } scene[] = {{4, 0.05, 1}, {4, 0.05, 1.5}, {4, 0.2, 1}, {3, 0.2, 1.5}, {3, 0.05, 1}, {4, 0.05, 0.5}};
     for (size_t k = WHOLE_OR_SHORT(0, 2); k < WHOLE_OR_SHORT(sizeof scene / sizeof *scene, 3); k++) {
         Coil on = coil_up(SELF_CONTACT_AUTO, scene[k].radius, scene[k].speed, 60, scene[k].element);
         print_message("sac of %g mm, %3.0f mm/s, elements of %.1f mm: least distance %.4f mm (2 r = 0.36), its own word %.4f mm deep, %d contacts; "
-                      "limited %d, not converged %d steps; wall %.4f mm deep\n", scene[k].radius, scene[k].speed * 1000, scene[k].element, on.least,
-                      on.overlap, on.contacts, on.limited, on.unconverged, on.deepest);
+                      "limited %d, not converged %d steps; wall %.4f mm deep\n",
+                      scene[k].radius, scene[k].speed * 1000, scene[k].element, on.least, on.overlap, on.contacts, on.limited, on.unconverged, on.deepest);
         assert_true(on.least > 0.36 - 0.01 && on.contacts > 2 && on.overlap < 0.01);
         assert_true(on.limited <= 5 && on.deepest < 0.05);
     }
@@ -219,7 +221,8 @@ static double loop_error(int elements, double bend, double dip)
     double reference = loop_force(bend, straight, stiffness, 0.36);
     Vec3 tip = tip_of(s);
     print_message("loop of radius %g mm, %g mm too long, %d elements: force on its base %.6f N, elastica %.6f N (%+.3f %%), tip %.5f mm above the axis; "
-                  "%d contacts\n", bend, dip, elements, force, reference, 100 * (force / reference - 1), tip.y, step_report(s)->self_contacts);
+                  "%d contacts\n",
+                  bend, dip, elements, force, reference, 100 * (force / reference - 1), tip.y, step_report(s)->self_contacts);
     assert_int_equal(step_report(s)->self_contacts, 1);
     assert_true(fabs(tip.y - 0.36) < 1e-3);
     stepper_destroy(s);
@@ -401,8 +404,8 @@ static void two_tools_coil(void **state)
             if (k > 400)
                 coil.least = fmin(coil.least, sac_distance(&sac));
         }
-        print_message("two tools%s: least distance %.4f mm (wire 0.36, catheter 0.6), %.4f mm deep, %d contacts, limited %d\n",
-                      off ? ", no contact" : "", coil.least, coil.overlap, coil.contacts, coil.limited);
+        print_message("two tools%s: least distance %.4f mm (wire 0.36, catheter 0.6), %.4f mm deep, %d contacts, limited %d\n", off ? ", no contact" : "",
+                      coil.least, coil.overlap, coil.contacts, coil.limited);
         if (off)
             assert_true(coil.least < 0.1);
         else
@@ -414,8 +417,12 @@ static void two_tools_coil(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_near_changes_no_bit), cmocka_unit_test(a_loop_presses_on_its_base), cmocka_unit_test(forces_are_equal_and_opposite),
-        cmocka_unit_test(mirrored_and_restored),       cmocka_unit_test(two_tools_coil),             cmocka_unit_test(a_wire_coils_in_a_sac),
+        cmocka_unit_test(nothing_near_changes_no_bit),
+        cmocka_unit_test(a_loop_presses_on_its_base),
+        cmocka_unit_test(forces_are_equal_and_opposite),
+        cmocka_unit_test(mirrored_and_restored),
+        cmocka_unit_test(two_tools_coil),
+        cmocka_unit_test(a_wire_coils_in_a_sac),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

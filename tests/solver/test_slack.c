@@ -86,7 +86,7 @@ static void one_line_pushes_as_the_closed_forms(void **state)
         TwoRods rods = bend(90, 0, 120, is_held);
         double expected = (is_held ? 20.0 : 60.0 * 20 / 80) / (2 * RADIUS * RADIUS), push = push_at(&rods, middle_of_bend(&rods, 90));
         print_message("one line, %s: push %.6f N, closed form %.6f\n", is_held ? "held" : "free", push, expected);
-        assert_true(fabs(push - expected) < 5e-4 * expected); 
+        assert_true(fabs(push - expected) < 5e-4 * expected);
         two_rods_free(&rods);
     }
 }
@@ -138,7 +138,8 @@ static void finer_links_change_little(void **state)
         push[i] = push_at(&rods, middle_of_bend(&rods, 90));
         two_rods_free(&rods);
     }
-    print_message("links of 1, 0.5, 0.25 mm: lost motion at 0.2 N %.5f, %.5f, %.5f mm; push %.5f, %.5f, %.5f N\n", lost[0], lost[1], lost[2], push[0], push[1], push[2]);
+    print_message("links of 1, 0.5, 0.25 mm: lost motion at 0.2 N %.5f, %.5f, %.5f mm; push %.5f, %.5f, %.5f N\n", lost[0], lost[1], lost[2], push[0], push[1],
+                  push[2]);
     assert_true(fabs(lost[2] / lost[1] - 1) < 0.01 && fabs(push[2] / push[1] - 1) < 0.02);
 }
 
@@ -165,7 +166,8 @@ static void what_one_line_gives_up(void **state)
     const double degree = 180 / PI_, force = 0.2;
     for (int is_held = 1; is_held >= 0; is_held--) {
         print_message("\ncatheter EI 60, %s; wire EI 20; R 20 mm, 40 mm straight before the bend, 2 mm after it\n"
-                      "theta     c   2 c theta | lost motion, part of 2 c theta, at 0.05, 0.2, 0.5 N | tip: mm, degrees | exit, degrees: rest, pushed, drawn | push, N: one line, two rods\n",
+                      "theta     c   2 c theta | lost motion, part of 2 c theta, at 0.05, 0.2, 0.5 N | tip: mm, degrees | exit, degrees: rest, pushed, drawn | "
+                      "push, N: one line, two rods\n",
                       is_held ? "held by the vessel" : "free from its hub on");
         for (double degrees = 90; degrees < 200; degrees += 90)
             for (int n = 0; n < 4; n++) {
@@ -180,9 +182,10 @@ static void what_one_line_gives_up(void **state)
                 two.pressed = 0;
                 int middle = middle_of_bend(&two, degrees);
                 double push[2] = {push_at(&one, middle), push_at(&two, middle)};
-                print_message("%5.0f  %.2f   %.4f mm |  %.3f  %.3f  %.3f | %.4f  %+.3f | %+.3f  %+.3f  %+.3f | %.5f  %.5f (%+.1f %%)\n", degrees, c, exact, lost[0] / exact,
-                              lost[1] / exact, lost[2] / exact, hypot(rest.x - shared.x, rest.y - shared.y), (rest.angle - shared.angle) * degree, rest.exit * degree,
-                              pushed * degree, drawn * degree, push[0], push[1], 100 * (push[1] / push[0] - 1));
+                print_message("%5.0f  %.2f   %.4f mm |  %.3f  %.3f  %.3f | %.4f  %+.3f | %+.3f  %+.3f  %+.3f | %.5f  %.5f (%+.1f %%)\n", degrees, c, exact,
+                              lost[0] / exact, lost[1] / exact, lost[2] / exact, hypot(rest.x - shared.x, rest.y - shared.y),
+                              (rest.angle - shared.angle) * degree, rest.exit * degree, pushed * degree, drawn * degree, push[0], push[1],
+                              100 * (push[1] / push[0] - 1));
                 assert_true(lost[0] > 0 && lost[0] <= lost[1] && lost[1] <= lost[2] && lost[2] < 1.2 * exact);
                 two_rods_free(&one);
                 two_rods_free(&two);

@@ -38,8 +38,11 @@ static void create(Problem *p, int nodes, int size, int walls, int slides)
     p->factor = block_factor_create(nodes, size);
     p->b = calloc((size_t)(nodes * size), sizeof *p->b);
     p->u = calloc((size_t)(nodes * size), sizeof *p->u);
-    p->set = (ContactSet){.count = walls, .capacity = walls, .point = calloc((size_t)walls + 1, sizeof *p->set.point),
-                          .slide_count = slides, .slide = calloc((size_t)slides + 1, sizeof *p->set.slide)};
+    p->set = (ContactSet){.count = walls,
+                          .capacity = walls,
+                          .point = calloc((size_t)walls + 1, sizeof *p->set.point),
+                          .slide_count = slides,
+                          .slide = calloc((size_t)slides + 1, sizeof *p->set.slide)};
     p->solver = contact_solver_create(nodes, size, walls + slides);
     assert_non_null(p->factor);
     assert_non_null(p->solver);
@@ -187,7 +190,11 @@ static void gives_and_holds_at(ContactForm form, int size, int unknown, int tria
     *diagonal(&p, 1, unknown, unknown) = k;
     *diagonal(&p, 1, unknown + 1, unknown + 1) = k * radius * radius;
     p.b[size] = 2;                       // a neighbour that has nothing to do with it
-    p.set.slide[0] = (ContactSlide){.node = 1, .unknown = unknown, .radius = radius, .bound = bound, .give = give,
+    p.set.slide[0] = (ContactSlide){.node = 1,
+                                    .unknown = unknown,
+                                    .radius = radius,
+                                    .bound = bound,
+                                    .give = give,
                                     .held = {held * cos(angle + across * PI / 2), held * sin(angle + across * PI / 2)}};
     double *f = p.set.slide[0].force, x[2] = {0, 0};
     if (trial % 3 == 1)
@@ -239,8 +246,8 @@ static void held_and_frictionless(void **state)
                     *diagonal(&p, i, q, q) = 4;
                     p.b[8 * i + q] = 8;
                 }
-            p.set.slide[0] = (ContactSlide){.node = 1, .unknown = 6, .radius = what == 3 ? 0 : 0.5, 
-                                            .bound = what == 4 ? 0 : 2, .give = 1e-3, .force = {0.1, 0.1}};
+            p.set.slide[0] =
+                (ContactSlide){.node = 1, .unknown = 6, .radius = what == 3 ? 0 : 0.5, .bound = what == 4 ? 0 : 2, .give = 1e-3, .force = {0.1, 0.1}};
             if (what == 0 || what == 2)
                 unit_row(&p, 1, 6, 0.3);
             if (what == 1 || what == 2)
@@ -341,7 +348,8 @@ static void chain_takes_off_bounds(void **state)
                 if (direction == 5 && n % WHOLE_OR_SHORT(1, 3) == 0)         // thousands of sweeps
                     pull_chain(CONTACT_POINTWISE, sizes[t], direction * PI / 4, pulls[n], most[1]);
             }
-    print_message("chain of 100 slides: up to %d factorisations from rest, %d turned round; %d and %d sweeps\n", most[0][0], most[0][1], most[1][0], most[1][1]);
+    print_message("chain of 100 slides: up to %d factorisations from rest, %d turned round; %d and %d sweeps\n", most[0][0], most[0][1], most[1][0],
+                  most[1][1]);
 }
 
 // --- A wire in a spiral, with tools inside ---
@@ -474,8 +482,11 @@ static void slides_and_walls(void **state)
             const double coupling = trial % 2 ? 0.8 : 0.1, bounds[] = {1e-3, 1e-2, 0.1};
             embed(&w, size, coupling, 1, tools * places, &p);
             for (int k = 0; k < p.set.slide_count; k++) // not in the chain's order
-                p.set.slide[k] = (ContactSlide){.node = every * (k % places), .unknown = 6 + 2 * (k / places), .radius = 0.1 + 0.05 * (k / places),
-                                                .bound = bounds[stage % 3] * (1.1 + uniform()), .give = 1e-4};
+                p.set.slide[k] = (ContactSlide){.node = every * (k % places),
+                                                .unknown = 6 + 2 * (k / places),
+                                                .radius = 0.1 + 0.05 * (k / places),
+                                                .bound = bounds[stage % 3] * (1.1 + uniform()),
+                                                .give = 1e-4};
             for (int k = 0; k < p.set.slide_count; k++) {
                 ContactSlide *c = &p.set.slide[k];
                 c->held[0] = 0.7 * c->bound * uniform(), c->held[1] = 0.7 * c->bound * uniform();
@@ -525,7 +536,8 @@ static void slides_and_walls(void **state)
             destroy(&p);
         }
     }
-    print_message("slides with walls: %d solves, %.1f factorisations on average, up to %d, and up to %d from their solution\n", solves, (double)sum / solves, most, warm);
+    print_message("slides with walls: %d solves, %.1f factorisations on average, up to %d, and up to %d from their solution\n", solves, (double)sum / solves,
+                  most, warm);
     assert_true(warm <= 3);
     chain_scene_destroy(&w);
     vessel->destroy(vessel);

@@ -17,8 +17,11 @@
 // --- statics ---
 
 static const double elastica[5][4] = {      // alpha, w/L, u/L, tip angle
-    {0.01, 0.00333330, 0.00000667, 0.00499995}, {1, 0.30172077, 0.05643324, 0.46135195}, {2, 0.49345748, 0.16064172, 0.78174983},
-    {5, 0.71379152, 0.38762836, 1.21536812},    {10, 0.81060902, 0.55499560, 1.43028554}};
+    {0.01, 0.00333330, 0.00000667, 0.00499995},
+    {1, 0.30172077, 0.05643324, 0.46135195},
+    {2, 0.49345748, 0.16064172, 0.78174983},
+    {5, 0.71379152, 0.38762836, 1.21536812},
+    {10, 0.81060902, 0.55499560, 1.43028554}};
 
 typedef struct Bent {
     double w, u, angle;
@@ -74,8 +77,7 @@ static void rolled_up_by_an_end_moment(void **state)
             assert_int_equal(settle(s, 42, 200, 1e-11), 0);
             double error = fabs(stepper_state(s)->position[n / 2 / turns].y / (100 / PI / turns) - 1);
             double closed = vec3_norm(tip_of(s)), energy = stepper_elastic_energy(s) / (2 * PI * PI * EI_STANDARD / 100 * turns * turns);
-            print_message("roll-up %d turn(s) N %-3d mid-node height error %.1e  tip %.1e mm  energy error %.1e\n", turns, n, error, closed,
-                          fabs(energy - 1));
+            print_message("roll-up %d turn(s) N %-3d mid-node height error %.1e  tip %.1e mm  energy error %.1e\n", turns, n, error, closed, fabs(energy - 1));
             assert_true(error < 5e-5 && closed < 1e-5 && fabs(energy - 1) < 1e-6);
             if (before > 0)
                 assert_true(before / error > 14);
@@ -117,8 +119,8 @@ static void bathe_bolourchi(void **state)
             Bench b;
             bench_start(&b, 100 * PI / 4, n, QUASI_STATIC);
             // a round section with the second moment of the 1 x 1 square, 1/12
-            b.section[0] = (WireSection){.length = 100 * PI / 4, .diameter = pow(64 / PI / 12, 0.25), .young_modulus = 1e7, .density = 1e-3,
-                                         .rest_curvature = 0.01};
+            b.section[0] =
+                (WireSection){.length = 100 * PI / 4, .diameter = pow(64 / PI / 12, 0.25), .young_modulus = 1e7, .density = 1e-3, .rest_curvature = 0.01};
             b.options.wire.direction = vec3(0, 1, 0);
             b.options.wire.normal = vec3(1, 0, 0);
             bench_load(&b, 100 * PI / 4, vec3(0, 0, reference[k][0]), vec3(0, 0, 0), 20 * QUASI_STATIC);
@@ -231,8 +233,8 @@ static void pinned_column_after_buckling(void **state)
     for (int k = 0; k < 4000; k++)
         step_once(s, 0, 0);
     Vec3 middle = stepper_state(s)->position[10], e = quat_rotate(stepper_state(s)->orientation[0], vec3(1, 0, 0));
-    print_message("pinned, P/Pcr 1.063663: shortening %.6f (0.118796), middle %.6f (0.211120), slope %.3f deg\n", 1 - tip_of(s).x / 50,
-                  middle.z / 50, atan2(e.z, e.x) * 180 / PI);
+    print_message("pinned, P/Pcr 1.063663: shortening %.6f (0.118796), middle %.6f (0.211120), slope %.3f deg\n", 1 - tip_of(s).x / 50, middle.z / 50,
+                  atan2(e.z, e.x) * 180 / PI);
     assert_true(fabs((1 - tip_of(s).x / 50) / 0.118796 - 1) < 0.01 && fabs(middle.z / 50 / 0.211120 - 1) < 0.005);
     stepper_destroy(s);
 }
@@ -492,8 +494,8 @@ static void push_back_of_a_bent_wire(void **state)
         }
         last = force;
     }
-    print_message("push back %.6f N (M^2/2EI %.6f), worst error %.2f %%, largest jump in a step %.2f %%\n", last, expected,
-                  100 * worst / fabs(expected), 100 * jump / fabs(expected));
+    print_message("push back %.6f N (M^2/2EI %.6f), worst error %.2f %%, largest jump in a step %.2f %%\n", last, expected, 100 * worst / fabs(expected),
+                  100 * jump / fabs(expected));
     assert_true(worst < 0.005 * fabs(expected) && jump < 0.002 * fabs(expected));
     stepper_destroy(s);
 }

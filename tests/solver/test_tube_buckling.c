@@ -123,7 +123,8 @@ static void sinusoidal_buckling_under_weight(void **state)
             char name[64];
             snprintf(name, sizeof name, "under weight, %d el., F/Fcr %.2f", elements, ratio[k]);
             if (ratio[k] < 1)
-                assert_true(fabs(row(name, "deflection mm", q / (bending * p * p * p * p - force * p * p + weight / r), amplitude)) < (ratio[k] < 0.95 ? 2e-3 : 1e-2));
+                assert_true(fabs(row(name, "deflection mm", q / (bending * p * p * p * p - force * p * p + weight / r), amplitude)) <
+                            (ratio[k] < 0.95 ? 2e-3 : 1e-2));
             else {
                 print_message("%-34s buckled: %.3f mm\n", name, amplitude);
                 assert_true(amplitude > 0.05);
@@ -152,8 +153,17 @@ typedef struct WhipCase {
 } WhipCase;
 static const WhipCase WHIP[] = {
     {0.05, 15, 20, 181.1746, 4, {{45, 17.83615, 0.03418676}, {90, 37.87811, 0.06410942}, {120, 54.39612, 0.07858114}, {150, 77.21460, 0.08374464}}},
-    {0.1, 15, 30, 278.1325, 6, {{45, 3.79652, 0.04921640}, {90, 7.85135, 0.09581644}, {150, 14.31289, 0.14835018}, {200, 21.88031, 0.17614101},
-                                {230, 28.75088, 0.18033995}, {260, 40.74134, 0.16671464}}},
+    {0.1,
+     15,
+     30,
+     278.1325,
+     6,
+     {{45, 3.79652, 0.04921640},
+      {90, 7.85135, 0.09581644},
+      {150, 14.31289, 0.14835018},
+      {200, 21.88031, 0.17614101},
+      {230, 28.75088, 0.18033995},
+      {260, 40.74134, 0.16671464}}},
 };
 
 static double whip_tip(const Stepper *s, double end)

@@ -17,7 +17,6 @@
 
 #include "tube_scene.h"
 
-
 static const double SIZES[] = {1, 0.5, 0.25};    // [mm] elements
 
 typedef struct PlanarCase {
@@ -28,23 +27,26 @@ typedef struct PlanarCase {
     double energy, force_x, force_y, sum, moment, tip_x, tip_y;     // reference for EI = 1
 } PlanarCase;
 
-#define LINE(l) {.length = l}
-#define ARC(r, degrees) {.arc_radius = r, .angle = degrees * PI / 180}
-#define BACK(r, degrees) {.arc_radius = r, .angle = degrees * PI / 180, .plane = PI}
+#define LINE(l)                                                                                                                                                \
+    {                                                                                                                                                          \
+        .length = l                                                                                                                                            \
+    }
+#define ARC(r, degrees)                                                                                                                                        \
+    {                                                                                                                                                          \
+        .arc_radius = r, .angle = degrees * PI / 180                                                                                                           \
+    }
+#define BACK(r, degrees)                                                                                                                                       \
+    {                                                                                                                                                          \
+        .arc_radius = r, .angle = degrees * PI / 180, .plane = PI                                                                                              \
+    }
 
 static const PlanarCase PLANAR[] = {
-    {"arc", 3, {LINE(10), ARC(15, 90), LINE(50)}, 0.5, 30, 0, 0,
-     0.0269982, -0.0024641, -0.0050075, 0.0162813, -0.0131138, 25.14895, 11.71988},
-    {"S", 4, {LINE(10), ARC(12, 60), BACK(12, 60), LINE(60)}, 0.3, 40, 0, 0,
-     0.0530575, -0.0004281, -0.0067147, 0.0551153, -0.0215634, 36.07430, 12.30000},
-    {"J in a straight channel", 1, {LINE(100)}, 0.6, 30, 15, 0.05,
-     0.0052527, 0, 0.0020520, 0.0094490, 0.0075580, 29.85949, 0.6},
-    {"U, wide", 3, {LINE(8), ARC(10, 180), LINE(60)}, 0.8, 45, 0, 0,
-     0.1372798, -0.0009005, -0.0074532, 0.0083851, -0.0156290, 3.32446, 20.8},
-    {"J in an arc", 3, {LINE(10), ARC(15, 90), LINE(50)}, 0.5, 30, 10, 0.15,
-     0.0106998, -0.0022260, -0.0042500, 0.0365900, -0.0091050, 24.06319, 11.46777},
-    {"J against an arc", 3, {LINE(10), ARC(15, 90), LINE(50)}, 0.5, 30, 10, -0.08,
-     0.0753509, -0.0028558, -0.0078290, 0.0471200, -0.0354500, 25.0184, 11.1662},
+    {"arc", 3, {LINE(10), ARC(15, 90), LINE(50)}, 0.5, 30, 0, 0, 0.0269982, -0.0024641, -0.0050075, 0.0162813, -0.0131138, 25.14895, 11.71988},
+    {"S", 4, {LINE(10), ARC(12, 60), BACK(12, 60), LINE(60)}, 0.3, 40, 0, 0, 0.0530575, -0.0004281, -0.0067147, 0.0551153, -0.0215634, 36.07430, 12.30000},
+    {"J in a straight channel", 1, {LINE(100)}, 0.6, 30, 15, 0.05, 0.0052527, 0, 0.0020520, 0.0094490, 0.0075580, 29.85949, 0.6},
+    {"U, wide", 3, {LINE(8), ARC(10, 180), LINE(60)}, 0.8, 45, 0, 0, 0.1372798, -0.0009005, -0.0074532, 0.0083851, -0.0156290, 3.32446, 20.8},
+    {"J in an arc", 3, {LINE(10), ARC(15, 90), LINE(50)}, 0.5, 30, 10, 0.15, 0.0106998, -0.0022260, -0.0042500, 0.0365900, -0.0091050, 24.06319, 11.46777},
+    {"J against an arc", 3, {LINE(10), ARC(15, 90), LINE(50)}, 0.5, 30, 10, -0.08, 0.0753509, -0.0028558, -0.0078290, 0.0471200, -0.0354500, 25.0184, 11.1662},
 };
 enum { PLANAR_COUNT = sizeof PLANAR / sizeof *PLANAR };
 
@@ -150,7 +152,8 @@ static void mesh_makes_no_difference(void **state)
 {
     (void)state;
     NEED_WHOLE_RUNS();
-    static const TubePiece piece[] = {{.length = 20}, {.arc_radius = 20, .angle = PI / 2}, {.length = 20}, {.arc_radius = 20, .angle = PI / 2, .plane = PI / 2}, {.length = 60}};
+    static const TubePiece piece[] = {
+        {.length = 20}, {.arc_radius = 20, .angle = PI / 2}, {.length = 20}, {.arc_radius = 20, .angle = PI / 2, .plane = PI / 2}, {.length = 60}};
     static const double size[] = {0.25, 0.5, 1, 2, 4, 5};
     double length = 40 + 20 * PI + 40 - fmod(40 + 20 * PI, 20), energy[6];
     Vessel *tube = tube_of(piece, 5, 0.18 + 0.1);
@@ -210,7 +213,8 @@ static void clearance_is_lumen_less_tool(void **state)
     double most = 0;
     for (int k = 0; k < 400; k++)
         most = fmax(most, step_once(s, 0.1, 0)->wall_force_max);
-    print_message("straight wire of three diameters in a tube of its own width: largest wall force %.1e N, tip off the axis by %.1e mm\n", most, hypot(tip_of(s).y, tip_of(s).z));
+    print_message("straight wire of three diameters in a tube of its own width: largest wall force %.1e N, tip off the axis by %.1e mm\n", most,
+                  hypot(tip_of(s).y, tip_of(s).z));
     assert_true(most < 1e-9 && hypot(tip_of(s).y, tip_of(s).z) < 1e-12);
     stepper_destroy(s);
     tube->destroy(tube);
@@ -244,8 +248,10 @@ static void tip_of_a_curved_wire_on_a_straight_wall(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(equilibria_of_wires_in_channels), cmocka_unit_test(stiffness_and_step_make_no_difference),
-        cmocka_unit_test(mesh_makes_no_difference),        cmocka_unit_test(clearance_is_lumen_less_tool),
+        cmocka_unit_test(equilibria_of_wires_in_channels),
+        cmocka_unit_test(stiffness_and_step_make_no_difference),
+        cmocka_unit_test(mesh_makes_no_difference),
+        cmocka_unit_test(clearance_is_lumen_less_tool),
         cmocka_unit_test(tip_of_a_curved_wire_on_a_straight_wall),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -98,9 +98,9 @@ static void bad_friction(Bench *b) { b->options.wall_friction = -1; }
 static void wrong_options_are_refused(void **state)
 {
     (void)state;
-    static const Spoil spoil[] = {no_elements, many_elements, no_length, nan_length, no_diameter, wide_bore, no_modulus, endless_modulus,
-                                  incompressible, no_density, tight_curl, few_elements_a_turn, nan_friction, far_fix, nan_load, far_load,
-                                  no_direction, too_far_in, nan_step, bad_friction};
+    static const Spoil spoil[] = {no_elements,    many_elements, no_length,  nan_length,          no_diameter,  wide_bore, no_modulus, endless_modulus,
+                                  incompressible, no_density,    tight_curl, few_elements_a_turn, nan_friction, far_fix,   nan_load,   far_load,
+                                  no_direction,   too_far_in,    nan_step,   bad_friction};
     for (size_t k = 0; k < sizeof spoil / sizeof *spoil; k++) {
         Bench b;
         bench_start(&b, 100, 20, 1);

@@ -118,8 +118,8 @@ static void equilibrium_in_an_arc(void **state)
         inner += vec3_norm(node[i].force);
     for (int i = 0; i <= 60; i++)
         deepest = fmax(deepest, isfinite(node[i].gap) ? -node[i].gap : 0);
-    print_message("arc: energy %.6f (0.026998), inner wall %.8f (0.00845749), tip force %.8f (0.00782224), tip (%.3f, %.3f), deepest %.1e, push %.6f\n",
-                  energy, inner, tip, tip_of(s).x, tip_of(s).y, deepest, step_report(s)->proximal_force);
+    print_message("arc: energy %.6f (0.026998), inner wall %.8f (0.00845749), tip force %.8f (0.00782224), tip (%.3f, %.3f), deepest %.1e, push %.6f\n", energy,
+                  inner, tip, tip_of(s).x, tip_of(s).y, deepest, step_report(s)->proximal_force);
     assert_true(fabs(energy / 0.026998 - 1) < 0.005);
     assert_true(fabs(inner / 0.00845749 - 1) < 0.02 && fabs(tip / 0.00782224 - 1) < 0.02);
     assert_true(vec3_distance(tip_of(s), vec3(25.149, 11.720, 0)) < 0.02 && deepest < 0.005);

@@ -11,8 +11,14 @@ bool two_rods_make(TwoRods *rods, double before, double radius, double angle, do
 {
     int first = (int)lround(before / h), bend = (int)lround(radius * angle / h), last = (int)lround(after / h), links = first + bend + last;
     size_t nodes = (size_t)links + 1;
-    *rods = (TwoRods){.links = links, .h = h, .catheter = 60, .wire = 20, .reach = links, .rest = calloc(nodes, sizeof *rods->rest),
-                      .x = calloc(2 * nodes, sizeof *rods->x), .gradient = calloc(2 * nodes, sizeof *rods->gradient)};
+    *rods = (TwoRods){.links = links,
+                      .h = h,
+                      .catheter = 60,
+                      .wire = 20,
+                      .reach = links,
+                      .rest = calloc(nodes, sizeof *rods->rest),
+                      .x = calloc(2 * nodes, sizeof *rods->x),
+                      .gradient = calloc(2 * nodes, sizeof *rods->gradient)};
     if (!rods->rest || !rods->x || !rods->gradient)
         return false;
     // a border of the arc at a node takes half of its turn there
@@ -51,7 +57,8 @@ static void spread(TwoRods *rods, int i, const Link *link)
 {
     const double *x = rods->x + 2 * i;
     double *g = rods->gradient + 2 * i, l2 = link->length * link->length;
-    double vx = link->by_length * link->x / link->length - link->by_angle * link->y / l2, vy = link->by_length * link->y / link->length + link->by_angle * link->x / l2;
+    double vx = link->by_length * link->x / link->length - link->by_angle * link->y / l2,
+           vy = link->by_length * link->y / link->length + link->by_angle * link->x / l2;
     double s = sin(x[1] / 2), c = cos(x[1] / 2), s1 = sin(x[3] / 2), c1 = cos(x[3] / 2);
     g[0] += -vx * s - vy * c;
     g[1] += -vx * x[0] * c / 2 + vy * x[0] * s / 2;

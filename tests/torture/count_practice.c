@@ -37,8 +37,8 @@ int main(int argc, char **argv)
             contrast += (double)run->xray[i].contrast_ml_s * step_s;
         }
     }
-    printf("%.3f %.1f %.0f %.1f %.1f %d %d %.0f\n", (double)run->step_count * step_s, way, turns, pedal, contrast, exchanges, occurrences(run->scene_text, "shaped_tip:"),
-           run->xray ? (double)run->xray[run->step_count - 1].bookmark : 0);
+    printf("%.3f %.1f %.0f %.1f %.1f %d %d %.0f\n", (double)run->step_count * step_s, way, turns, pedal, contrast, exchanges,
+           occurrences(run->scene_text, "shaped_tip:"), run->xray ? (double)run->xray[run->step_count - 1].bookmark : 0);
     recorded_run_free(run);
     return 0;
 }

@@ -323,7 +323,8 @@ static long answer(int i, const long *argument)
         }
         if (mode == SHORT && kind & MOVES && argument[2] > 1)
             changed[2] = argument[2] / 2;
-        if (mode == INTERRUPTED && !(kind & BY_DESCRIPTOR && argument[0] == STDOUT_FILENO) && (kind & (MOVES | WRITES)) && kind & BY_DESCRIPTOR && atomic_fetch_add(&moved, 1) % 2 == 0)
+        if (mode == INTERRUPTED && !(kind & BY_DESCRIPTOR && argument[0] == STDOUT_FILENO) && (kind & (MOVES | WRITES)) && kind & BY_DESCRIPTOR &&
+            atomic_fetch_add(&moved, 1) % 2 == 0)
             return -EINTR;
     }
     return real_call(call, changed[0], changed[1], changed[2], changed[3], changed[4], changed[5]);

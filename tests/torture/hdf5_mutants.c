@@ -59,7 +59,8 @@ static const char one_tool[] = "seldinger: 1\n"
 static const char two_tools[] =
     "seldinger: 1\n"
     "tools:\n"
-    "  - {name: catheter, kind: catheter, elements: 8, inserted_mm: 10, sections: [{length_mm: 40, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 1}],\n"
+    "  - {name: catheter, kind: catheter, elements: 8, inserted_mm: 10, sections: [{length_mm: 40, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: "
+    "1}],\n"
     "     exchange: [{elements: 9, sections: [{length_mm: 40, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 1}]}]}\n"
     "  - {name: wire, kind: wire, elements: 10, inserted_mm: 12, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n"
@@ -115,7 +116,8 @@ static void make_trees(void)
     memcpy(tree->kind, model->kind, n);
     memcpy(tree->point, model->point, (size_t)model->point_count * sizeof *tree->point);
     memcpy(tree->point_offset, model->point_offset, (n + 1) * sizeof *tree->point_offset);
-    need(tree_file_save(tree, NULL, in_folder(file_name[TREE]), &faults) && tree_file_save(model, NULL, in_folder(file_name[MODEL]), &faults), "write the trees");
+    need(tree_file_save(tree, NULL, in_folder(file_name[TREE]), &faults) && tree_file_save(model, NULL, in_folder(file_name[MODEL]), &faults),
+         "write the trees");
     put_variable_text(in_folder(file_name[TREE]));
     vessel_tree_free(tree);
     vessel_tree_free(model);
@@ -182,8 +184,15 @@ static void put_other_dataset(hid_t file, const char *path)
     switch (below(7)) {
     case 0: H5Pset_external(creation, "/etc/passwd", 0, H5F_UNLIMITED); break;
     case 1: H5Pset_chunk(creation, rank, chunk); break;
-    case 2: H5Pset_chunk(creation, rank, chunk); H5Pset_deflate(creation, 9); break;
-    case 3: H5Pset_chunk(creation, rank, chunk); H5Pset_shuffle(creation); H5Pset_fletcher32(creation); break;
+    case 2:
+        H5Pset_chunk(creation, rank, chunk);
+        H5Pset_deflate(creation, 9);
+        break;
+    case 3:
+        H5Pset_chunk(creation, rank, chunk);
+        H5Pset_shuffle(creation);
+        H5Pset_fletcher32(creation);
+        break;
     case 4: H5Pset_virtual(creation, space, below(2) ? "." : "/tmp/other.h5", "/other", space); break;
     case 5: H5Pset_layout(creation, H5D_COMPACT); break;
     default: break;
@@ -245,8 +254,11 @@ static void change_value(hid_t file, const char *path)
 
 static void change_attribute(hid_t file, const Objects *objects)
 {
-    static const char *const name[] = {"version", "iso_level", "kernel", "source", "parameters", "created_by", "step_ms", "path", "contact", "files", "sha256", "name", "kind"};
-    const char *which = name[below(13)], *place = below(3) ? "/" : below(2) && H5Lexists(file, "/tools", H5P_DEFAULT) > 0 ? "/tools/1" : objects->path[below(objects->count)];
+    static const char *const name[] = {"version", "iso_level", "kernel", "source", "parameters", "created_by", "step_ms",
+                                       "path",    "contact",   "files",  "sha256", "name",       "kind"};
+    const char *which = name[below(13)], *place = below(3)                                                 ? "/"
+                                                  : below(2) && H5Lexists(file, "/tools", H5P_DEFAULT) > 0 ? "/tools/1"
+                                                                                                           : objects->path[below(objects->count)];
     static const char bytes[1 << 16];
     H5Adelete_by_name(file, place, which, H5P_DEFAULT);
     if (below(4) == 0)
@@ -485,8 +497,8 @@ int main(int argument_count, char **argument)
     for (int kind = 0; kind < KINDS; kind++)
         for (int structure = 1; structure >= 0; structure--) {
             Tally t = torture(kind, structure, (count + structure) / 2, seed);
-            printf("%-20s %-10s %7d %8d %7d %8d %6d %7d %10.1f\n", kind_name[kind], structure ? "structure" : "bytes", t.made, t.refused, t.read, t.signals, t.late,
-                   t.silent, (double)t.most_kb / 1000);
+            printf("%-20s %-10s %7d %8d %7d %8d %6d %7d %10.1f\n", kind_name[kind], structure ? "structure" : "bytes", t.made, t.refused, t.read, t.signals,
+                   t.late, t.silent, (double)t.most_kb / 1000);
             wrong += t.signals + t.late + t.silent;
             made += t.made;
         }

@@ -89,19 +89,25 @@ static const char scene[] = "seldinger: 1\n"
                             "wire: {elements: 12, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
                             "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 15}\n"
                             "script: [[0, 50, 90], [0.03, 0, 0]]\n";
-static const char tools[] = "seldinger: 1\n"
-                            "vessel: {model: model.h5, friction: 0.1}\n"
-                            "tools:\n"
-                            "  - {name: catheter, kind: catheter, elements: 8, inserted_mm: 2, sections: [{length_mm: 20, diameter_mm: 1, inner_diameter_mm: 0.8, "
-                            "young_modulus_gpa: 1}]}\n"
-                            "  - {name: wire, kind: wire, elements: 8, inserted_mm: 3, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
-                            "sheath: {inlet: root}\n"
-                            "script: [[0, 5, 0], [0.02, 0, 0]]\n";
+static const char tools[] =
+    "seldinger: 1\n"
+    "vessel: {model: model.h5, friction: 0.1}\n"
+    "tools:\n"
+    "  - {name: catheter, kind: catheter, elements: 8, inserted_mm: 2, sections: [{length_mm: 20, diameter_mm: 1, inner_diameter_mm: 0.8, "
+    "young_modulus_gpa: 1}]}\n"
+    "  - {name: wire, kind: wire, elements: 8, inserted_mm: 3, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "sheath: {inlet: root}\n"
+    "script: [[0, 5, 0], [0.02, 0, 0]]\n";
 
-static const char *const inputs[] = {
-    "synth arc -o arc.nrrd --voxel-mm 0.4 --threads 1", "synth capsule -o capsule.h5 --points 30", "synth capsule -o capsule.stl --cell-mm 0.5",
-    "fit capsule.h5 -o model.h5 --threads 1", "export model.h5 -o line.swc", "run scene.yaml --record run.h5", "run tools.yaml --record tools.h5",
-    "check check/scene.yaml --update", NULL};
+static const char *const inputs[] = {"synth arc -o arc.nrrd --voxel-mm 0.4 --threads 1",
+                                     "synth capsule -o capsule.h5 --points 30",
+                                     "synth capsule -o capsule.stl --cell-mm 0.5",
+                                     "fit capsule.h5 -o model.h5 --threads 1",
+                                     "export model.h5 -o line.swc",
+                                     "run scene.yaml --record run.h5",
+                                     "run tools.yaml --record tools.h5",
+                                     "check check/scene.yaml --update",
+                                     NULL};
 static const char *const large_inputs[] = {"synth tree --branches 5 --sacs 1 -o tree.nrrd --voxel-mm 0.5 --threads 1", "synth y -o y.stl --cell-mm 0.5",
                                            "segment tree.nrrd --start 0,0,0 -o tree.h5 --threads 1", "fit tree.h5 -o tree-model.h5 --threads 1", NULL};
 
@@ -386,7 +392,7 @@ static int judge_file(const char *path, const struct stat *status, int kind, str
         return 0;
     bool is_recording = ends_with(name, ".h5") && (!strncmp(left.c->command, "run", 3) || left.c->traits & WINDOW);
     bool is_extra = !strcmp(name, "recorded.csv") || !strcmp(name, "run.json");      // a recording's first part, a session file before its page
-    if (is_unfinished(name) ? left.killed
+    if (is_unfinished(name)                                  ? left.killed
         : is_extra && left.failed                            ? true
         : has_name(left.c->outputs, name) && is_former(name) ? left.failed
         : is_recording || left.c->traits & WINDOW            ? is_readable(name)
@@ -667,8 +673,7 @@ static void judge_killed(const Case *c, const char *how)
     const char *odd = odd_file(c, true, true);
     if (odd)
         fault(c, how, "%s", odd);
-    if (has_name(c->outputs, "t.h5") && !strncmp(c->command, "run", 3) && !is_former("t.h5") &&
-        run_quietly(in("work", ""), "report t.h5 --quiet") != 0) {
+    if (has_name(c->outputs, "t.h5") && !strncmp(c->command, "run", 3) && !is_former("t.h5") && run_quietly(in("work", ""), "report t.h5 --quiet") != 0) {
         char words[300];
         lines_of(in(".", "complained.after"), words, sizeof words);
         fault(c, how, "a recording of which no report can be made: %s", words);
@@ -730,14 +735,10 @@ static const struct Limit {
     long from, to, factor;   // values from..to, each the former times factor; 0: plus one
     bool keeps_quiet;        // standard error is closed
 } limits[] = {
-    {"closed descriptors", closed, 1, 7, 0, true},
-    {"soft stack", soft_stack, 32 << 10, 512 << 10, 2, false},
-    {"stack", hard_stack, 64 << 10, 1 << 20, 2, false},
-    {"address space", address_space, 32 << 20, 2L << 30, 0, false},
-    {"open files", open_files, 3, 20, 0, false},
-    {"file size", file_size, 1, 256 << 10, 4, false},
-    {"no home", without_home, 0, 0, 0, false},
-    {"read-only folder", read_only, 0, 0, 0, false},
+    {"closed descriptors", closed, 1, 7, 0, true},      {"soft stack", soft_stack, 32 << 10, 512 << 10, 2, false},
+    {"stack", hard_stack, 64 << 10, 1 << 20, 2, false}, {"address space", address_space, 32 << 20, 2L << 30, 0, false},
+    {"open files", open_files, 3, 20, 0, false},        {"file size", file_size, 1, 256 << 10, 4, false},
+    {"no home", without_home, 0, 0, 0, false},          {"read-only folder", read_only, 0, 0, 0, false},
 };
 
 static long next_value(const struct Limit *limit, long value)
