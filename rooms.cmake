@@ -1,5 +1,5 @@
-# Rooms and what each may include: a room's own folder of links is all that its sources see of ours, so that a wrong arrow does not compile.
-# tests/tools/arrows has the same table and tries each arrow.
+# Rooms and what each may use: a room's own folder of links is all that its sources see of ours, so that a wrong include does not compile. Of another room they
+# see one header, ROOM/ROOM.h, and what that includes. tests/tools/arrows has the same table and tries each arrow.
 set(ROOMS base geom solver recon input sim render cli bench)
 set(ROOM_base)
 set(ROOM_geom base)
@@ -9,42 +9,49 @@ set(ROOM_input base)
 set(ROOM_sim base geom solver recon input)
 set(ROOM_render base geom recon input sim)
 set(ROOM_cli base geom solver recon input sim render)
-set(ROOM_bench base geom solver recon input sim render cli)
-# what the headers of the first include of the second stays behind them: they are found from each other's folder, not from the room
-set(ROOM_BEHIND_render sim solver)
+# bench measures the parts of all rooms and looks into them, as the tests do
 
 # what libseldinger.so is made of
 set(LIBRARY_ROOMS base geom solver recon input sim)
 
-# The headers of `room` as links in `folder`.
-function(link_headers room folder)
-  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR}/${room} ${CMAKE_SOURCE_DIR}/${room}/*.h)
-  file(MAKE_DIRECTORY ${folder})
+# What other rooms see of `room`: its header, and the text that includes kernels. Behind them, where only these headers find it, lies the rest.
+function(publish_room room)
+  set(front ${CMAKE_BINARY_DIR}/rooms/public/${room})
+  set(behind ${front}/${room})
+  file(MAKE_DIRECTORY ${behind})
+  foreach(name ${room}.h each_simd.inc)
+    if(EXISTS ${CMAKE_SOURCE_DIR}/${room}/${name})
+      file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${room}/${name} ${front}/${name} SYMBOLIC)
+    endif()
+  endforeach()
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR}/${room} ${CMAKE_SOURCE_DIR}/${room}/*.h)
   foreach(header ${headers})
-    file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${room}/${header} ${folder}/${header} SYMBOLIC)
+    get_filename_component(folder ${behind}/${header} DIRECTORY)
+    file(MAKE_DIRECTORY ${folder})
+    file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${room}/${header} ${behind}/${header} SYMBOLIC)
+    # "" is looked up beside the header first
+    file(CREATE_LINK ${behind} ${folder}/${room} SYMBOLIC)
+    foreach(lower ${ROOM_${room}})
+      file(CREATE_LINK ${CMAKE_BINARY_DIR}/rooms/public/${lower} ${folder}/${lower} SYMBOLIC)
+    endforeach()
   endforeach()
 endfunction()
 
+file(REMOVE_RECURSE ${CMAKE_BINARY_DIR}/rooms)     # links are not followed
 foreach(room ${ROOMS})
   set(folder ${CMAKE_BINARY_DIR}/rooms/${room})
-  file(GLOB_RECURSE former LIST_DIRECTORIES false ${folder}/*)     # links are not followed
-  if(former)
-    file(REMOVE ${former})
-  endif()
   file(MAKE_DIRECTORY ${folder})
-  set(behind ${ROOM_BEHIND_${room}})
-  foreach(seen ${room} ${ROOM_${room}})
-    if(seen IN_LIST behind)
-      continue()
-    endif()
-    file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${seen} ${folder}/${seen} SYMBOLIC)
-  endforeach()
-  if(behind)
-    list(POP_FRONT behind before)
-    link_headers(${before} ${folder}/${before})
-    link_headers(${behind} ${folder}/${before}/${behind})
-    file(CREATE_LINK . ${folder}/${before}/${behind}/${behind} SYMBOLIC)
+  if(room STREQUAL bench)
+    foreach(seen ${ROOMS})
+      file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${seen} ${folder}/${seen} SYMBOLIC)
+    endforeach()
+    continue()
   endif()
+  publish_room(${room})
+  file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${room} ${folder}/${room} SYMBOLIC)
+  foreach(seen ${ROOM_${room}})
+    file(CREATE_LINK ${CMAKE_BINARY_DIR}/rooms/public/${seen} ${folder}/${seen} SYMBOLIC)
+  endforeach()
 endforeach()
 
 # seldinger_room(TARGET ROOM): the target's sources are of that room.

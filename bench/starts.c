@@ -47,10 +47,10 @@ typedef struct Trial {
     double cpu_s;
 } Trial;
 
-typedef struct Session {
+typedef struct Trials {
     int seeds;
     Trial *trial;            // (KINDS, seeds)
-} Session;
+} Trials;
 
 static double centreline_distance(const VesselTree *tree, Vec3 x, double *radius)
 {
@@ -150,7 +150,7 @@ static void score_trial(Trial *trial, const Kind *kind, const VesselTree *truth,
 
 static void run_trial(void *context, long index)
 {
-    const Session *session = context;
+    const Trials *session = context;
     const Kind *kind = &kinds[index / session->seeds];
     int seed = (int)(index % session->seeds) + 1;
     Trial *trial = &session->trial[index];
@@ -287,7 +287,7 @@ static void print_verdict(FILE *out, const char *what, double found, double limi
 
 bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Faults *faults)
 {
-    Session session = {seeds, calloc((size_t)KINDS * (size_t)seeds, sizeof(Trial))};
+    Trials session = {seeds, calloc((size_t)KINDS * (size_t)seeds, sizeof(Trial))};
     bool good = session.trial != NULL;
     cJSON *list = cJSON_AddArrayToObject(root, "starts");
     int seen = 0, right = 0, false_refusals = 0, hidden = 0, missing = 0, silent = 0;

@@ -164,10 +164,10 @@ typedef struct Trial {           // one run of a tracker
     bool failed;
 } Trial;
 
-typedef struct Session {
+typedef struct Trials {
     const Angiogram *image;
     Trial *trial;                // 1 + (METHODS - 1) branches
-} Session;
+} Trials;
 
 // A node of the branch `way` mm from where it begins, and one further on.
 static RbtSeed seed_at(const Angiogram *image, const TrackBranch *branch, double way)
@@ -197,7 +197,7 @@ static double blur_of(const Angiogram *image, const RbtParameters *parameters)
 
 static void run_trial(void *context, long index)
 {
-    const Session *session = context;
+    const Trials *session = context;
     const Angiogram *image = session->image;
     Trial *trial = &session->trial[index];
     int method = index == 0 ? CLICK : 1 + (int)((index - 1) / image->plan.branch_count), which = index == 0 ? 0 : (int)((index - 1) % image->plan.branch_count);
@@ -294,7 +294,7 @@ static bool run_case(const Case *c, Group *groups, bool click_only, int threads,
     if (good)
         image.known.block = shape_blocks(image.shape, &image.known.block_count);
     long runs = good ? 1 + (click_only ? 0 : (METHODS - 1) * (long)image.plan.branch_count) : 0;
-    Session session = {&image, calloc((size_t)runs + 1, sizeof(Trial))};
+    Trials session = {&image, calloc((size_t)runs + 1, sizeof(Trial))};
     good = good && session.trial;
     if (good)
         parallel_for(threads, runs, run_trial, &session, NULL);

@@ -3,8 +3,7 @@
 #include "cli/check_golden.h"
 #include "cli/check_verify.h"
 
-#include "sim/compare.h"
-#include "sim/scene_list.h"
+#include "sim/sim.h"
 
 #include <sys/stat.h>
 

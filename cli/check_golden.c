@@ -1,7 +1,7 @@
 #include "cli/check_golden.h"
 
 #include "cli/output_plan.h"
-#include "sim/golden.h"
+#include "sim/sim.h"
 
 #include <stdlib.h>
 #include <unistd.h>

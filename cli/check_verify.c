@@ -3,9 +3,7 @@
 // no further: the order is then at least what brought it there.
 #include "cli/check_verify.h"
 
-#include "sim/scene_list.h"
-#include "sim/simulator.h"
-#include "sim/verify_run.h"
+#include "sim/sim.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,7 @@
 // What the verbs share: how faults, notes and progress are printed.
 #include "cli/cli.h"
 
-#include "base/heap.h"
-#include "base/output.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

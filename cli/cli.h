@@ -2,12 +2,9 @@
 #ifndef SELDINGER_CLI_CLI_H
 #define SELDINGER_CLI_CLI_H
 
-#include "base/options.h"
-#include "base/parallel.h"
-#include "base/process.h"
-#include "base/progress_bar.h"
+#include "base/base.h"
 #include "geom/geom.h"
-#include "sim/open_vessel.h"
+#include "sim/sim.h"
 
 #include <cJSON.h>
 #include <stdio.h>

@@ -1,10 +1,9 @@
 // seldinger devices: what is plugged in, what of it can drive the tool, and why the rest cannot.
 #include "cli/cli.h"
 
-#include "base/output.h"
+#include "base/base.h"
 #include "cli/output_plan.h"
-#include "input/device_report.h"
-#include "input/devices_watch.h"
+#include "input/input.h"
 
 #include <stdlib.h>
 

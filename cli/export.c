@@ -1,14 +1,11 @@
 // seldinger export: surfaces, centrelines and recordings for other programs.
 #include "cli/cli.h"
 
-#include "base/output.h"
+#include "base/base.h"
 #include "cli/file_kind.h"
 #include "cli/output_plan.h"
-#include "recon/surface/centreline_write.h"
-#include "recon/surface/model_surface.h"
-#include "recon/tree_file.h"
-#include "sim/recording.h"
-#include "sim/recording_export.h"
+#include "recon/recon.h"
+#include "sim/sim.h"
 
 #include <string.h>
 

@@ -1,9 +1,7 @@
 #include "cli/file_kind.h"
 
-#include "base/regular_file.h"
-#include "recon/hdf5_reader.h"
-#include "recon/surface/surface_file.h"
-#include "recon/volume/volume_file.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <errno.h>
 #include <stdbool.h>

@@ -3,10 +3,9 @@
 
 #include "cli/fit_options.h"
 #include "cli/output_plan.h"
-#include "recon/fit/fit_figures.h"
-#include "recon/fit/measure_report.h"
+#include "recon/recon.h"
 #ifdef SELDINGER_RENDER
-#include "render/picture_model.h"
+#include "render/render.h"
 #endif
 
 #include <stdlib.h>

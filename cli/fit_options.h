@@ -2,10 +2,9 @@
 #ifndef SELDINGER_CLI_FIT_OPTIONS_H
 #define SELDINGER_CLI_FIT_OPTIONS_H
 
-#include "base/option_table.h"
+#include "base/base.h"
 #include "cli/junction_sheets.h"
-#include "recon/fit/reach_report.h"
-#include "recon/fit/tree_fit.h"
+#include "recon/recon.h"
 
 typedef struct FitCommand {
     const char *tree, *output, *json, *picture;

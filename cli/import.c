@@ -2,12 +2,9 @@
 #include "cli/cli.h"
 
 #include "cli/import_options.h"
-#include "base/output.h"
+#include "base/base.h"
 #include "cli/output_plan.h"
-#include "recon/surface/centreline_file.h"
-#include "recon/surface/import_figures.h"
-#include "recon/surface/mesh_centreline.h"
-#include "recon/tree_file.h"
+#include "recon/recon.h"
 
 #include <stdlib.h>
 #include <time.h>

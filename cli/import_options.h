@@ -2,8 +2,8 @@
 #ifndef SELDINGER_CLI_IMPORT_OPTIONS_H
 #define SELDINGER_CLI_IMPORT_OPTIONS_H
 
-#include "base/option_table.h"
-#include "recon/surface/import_surface.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 enum { IMPORT_FILES = 1024 };
 

@@ -1,17 +1,14 @@
 // seldinger info: what a file is and its figures, for people or as JSON. The figures are gathered once as JSON; the text is that, printed plainly.
 #include "cli/cli.h"
 
-#include "base/heap.h"
-#include "base/plain_json.h"
+#include "base/base.h"
 #include "cli/file_kind.h"
 #include "cli/junction_sheets.h"
 #include "cli/output_plan.h"
-#include "recon/describe.h"
-#include "recon/fit/reach_report.h"
-#include "render/tree_page.h"
-#include "sim/describe_run.h"
+#include "recon/recon.h"
+#include "render/render.h"
+#include "sim/sim.h"
 #ifdef SELDINGER_RENDER
-#include "render/picture_model.h"
 #endif
 
 #include <stdlib.h>

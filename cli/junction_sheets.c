@@ -1,11 +1,10 @@
 // See junction_sheets.h.
 #include "cli/junction_sheets.h"
 
-#include "geom/reach.h"
-#include "recon/tree_file.h"
-#include "recon/volume/volume_file.h"
+#include "geom/geom.h"
+#include "recon/recon.h"
 #ifdef SELDINGER_RENDER
-#include "render/picture.h"
+#include "render/render.h"
 #endif
 
 #include <stdio.h>

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_CLI_JUNCTION_SHEETS_H
 #define SELDINGER_CLI_JUNCTION_SHEETS_H
 
-#include "base/faults.h"
-#include "geom/vessel_tree.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 typedef struct JunctionSheets {
     const char *picture;     // the first page; NULL: none are wanted

@@ -1,8 +1,7 @@
 // seldinger: the table of verbs.
 #include "cli/cli.h"
 
-#include "base/options_manual.h"
-#include "base/process.h"
+#include "base/base.h"
 
 #include <string.h>
 

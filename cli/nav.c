@@ -2,9 +2,8 @@
 #include "cli/cli.h"
 
 #include "cli/output_plan.h"
-#include "render/trainer_figures.h"
-#include "sim/replay_again.h"
-#include "sim/session_files.h"
+#include "render/render.h"
+#include "sim/sim.h"
 
 #include <stdlib.h>
 

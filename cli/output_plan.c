@@ -1,7 +1,7 @@
 #include "cli/output_plan.h"
 
-#include "base/path_resolve.h"
-#include "recon/volume/volume_file.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <dirent.h>
 #include <stdio.h>

@@ -3,8 +3,8 @@
 #ifndef SELDINGER_CLI_OUTPUT_PLAN_H
 #define SELDINGER_CLI_OUTPUT_PLAN_H
 
-#include "base/output.h"
-#include "sim/scene.h"
+#include "base/base.h"
+#include "sim/sim.h"
 
 #include <limits.h>
 

@@ -1,6 +1,6 @@
 #include "cli/point_table.h"
 
-#include "base/whole_file.h"
+#include "base/base.h"
 
 #include <math.h>
 #include <stdlib.h>

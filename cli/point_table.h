@@ -2,8 +2,8 @@
 #ifndef SELDINGER_CLI_POINT_TABLE_H
 #define SELDINGER_CLI_POINT_TABLE_H
 
-#include "base/faults.h"
-#include "geom/linear.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,10 +1,10 @@
 // seldinger query: field, gradient and Taubin distance of a model at points (CSV in, CSV out).
 #include "cli/cli.h"
 
-#include "base/output.h"
+#include "base/base.h"
 #include "cli/output_plan.h"
 #include "cli/point_table.h"
-#include "recon/tree_file.h"
+#include "recon/recon.h"
 
 #include <stdarg.h>
 #include <stddef.h>

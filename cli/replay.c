@@ -3,12 +3,9 @@
 
 #include "cli/replay_options.h"
 #include "cli/output_plan.h"
-#include "sim/replay_again.h"
+#include "sim/sim.h"
 #ifdef SELDINGER_RENDER
-#include "render/film.h"
-#include "render/replay_window.h"
-#include "render/trainer.h"
-#include "sim/session_files.h"
+#include "render/render.h"
 #endif
 
 #include <inttypes.h>

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_CLI_REPLAY_OPTIONS_H
 #define SELDINGER_CLI_REPLAY_OPTIONS_H
 
-#include "base/option_table.h"
+#include "base/base.h"
 
 typedef struct ReplayOptions {
     const char *recording, *scene_folder, *picture, *movie, *sessions;

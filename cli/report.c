@@ -1,14 +1,11 @@
 // seldinger report: a session's file, its recording beside it and earlier sessions of the same trainee as one page, and that printed by a browser.
 #include "cli/cli.h"
 
-#include "base/heap.h"
-#include "base/output.h"
+#include "base/base.h"
 #include "cli/file_kind.h"
 #include "cli/output_plan.h"
-#include "render/page_pdf.h"
-#include "render/session_report.h"
-#include "sim/recover.h"
-#include "sim/session_files.h"
+#include "render/render.h"
+#include "sim/sim.h"
 
 #include <stdlib.h>
 #include <string.h>

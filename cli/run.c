@@ -1,9 +1,9 @@
 // seldinger run: a scene headless, with what it leaves: summary, final state, recording, picture.
 #include "cli/cli.h"
 
-#include "base/process.h"
+#include "base/base.h"
 #include "cli/run_options.h"
-#include "sim/run_summary.h"
+#include "sim/sim.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 #include "cli/run_chart.h"
 
 #ifdef SELDINGER_RENDER
-#include "render/picture.h"
+#include "render/render.h"
 #endif
 
 #include <stdio.h>

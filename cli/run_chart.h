@@ -2,7 +2,7 @@
 #ifndef SELDINGER_CLI_RUN_CHART_H
 #define SELDINGER_CLI_RUN_CHART_H
 
-#include "sim/simulator.h"
+#include "sim/sim.h"
 
 typedef struct RunChart RunChart;
 

@@ -1,8 +1,8 @@
 #include "cli/run_files.h"
 
-#include "sim/run_summary.h"
+#include "sim/sim.h"
 #ifdef SELDINGER_RENDER
-#include "render/picture_moments.h"
+#include "render/render.h"
 #endif
 
 #include <stdlib.h>

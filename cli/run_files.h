@@ -4,7 +4,7 @@
 
 #include "cli/output_plan.h"
 #include "cli/run_chart.h"
-#include "sim/headless.h"
+#include "sim/sim.h"
 
 typedef struct RunFiles {    // NULL: not wanted
     const char *record, *summary, *final, *score, *picture, *chart;

@@ -1,6 +1,6 @@
 #include "cli/run_hands.h"
 
-#include "input/hand.h"
+#include "input/input.h"
 
 #include <pthread.h>
 #include <stdio.h>

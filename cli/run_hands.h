@@ -3,8 +3,7 @@
 #ifndef SELDINGER_CLI_RUN_HANDS_H
 #define SELDINGER_CLI_RUN_HANDS_H
 
-#include "sim/hand_set.h"
-#include "sim/scene.h"
+#include "sim/sim.h"
 
 typedef struct RunHands RunHands;
 

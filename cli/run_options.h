@@ -2,7 +2,7 @@
 #ifndef SELDINGER_CLI_RUN_OPTIONS_H
 #define SELDINGER_CLI_RUN_OPTIONS_H
 
-#include "base/option_table.h"
+#include "base/base.h"
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
 

@@ -2,16 +2,11 @@
 #include "cli/cli.h"
 
 #include "cli/segment_options.h"
-#include "base/heap.h"
+#include "base/base.h"
 #include "cli/output_plan.h"
-#include "recon/track/rbt_track.h"
-#include "recon/track/segment_parameters.h"
-#include "recon/track/segment_report.h"
-#include "recon/track/trace.h"
-#include "recon/tree_file.h"
-#include "recon/volume/volume_file.h"
+#include "recon/recon.h"
 #ifdef SELDINGER_RENDER
-#include "render/picture.h"
+#include "render/render.h"
 #endif
 
 #include <stdlib.h>

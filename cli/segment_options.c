@@ -1,7 +1,7 @@
 #include "cli/segment_options.h"
 
 #include "cli/cli.h"
-#include "recon/track/rbt_parameters.h"
+#include "recon/recon.h"
 
 // The figures name the point as it was written.
 static const char *take_start(void *structure, const Option *option, const char *text)

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_CLI_SEGMENT_OPTIONS_H
 #define SELDINGER_CLI_SEGMENT_OPTIONS_H
 
-#include "base/option_table.h"
-#include "geom/linear.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 enum { SEGMENT_POINTS = 64 };
 

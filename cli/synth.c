@@ -3,8 +3,7 @@
 
 #include "cli/synth_options.h"
 #include "cli/output_plan.h"
-#include "recon/phantom/phantom_report.h"
-#include "recon/tree_file.h"
+#include "recon/recon.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_CLI_SYNTH_OPTIONS_H
 #define SELDINGER_CLI_SYNTH_OPTIONS_H
 
-#include "base/option_table.h"
-#include "recon/phantom/phantom_write.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 enum { SHAPE_OPTIONS = 19 };
 

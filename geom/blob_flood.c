@@ -2,7 +2,7 @@
 // half space alone lets a few more cells pass than the ball meets; for the agreement of near cells more is as good.
 #include "geom/blob_flood.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include "geom/power_walk.h"
 

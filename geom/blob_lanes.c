@@ -1,6 +1,6 @@
 #include "geom/blob_lanes.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include <string.h>
 

@@ -12,7 +12,7 @@
 // points, and one Taubin step is up to 2.3 times too long.
 #include "geom/blobby.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 // A blob's share of the field f, its gradient slope * d and its Hessian slope * I + bend * d d', d = x - centre.
 typedef struct BlobTerm {

@@ -2,10 +2,7 @@
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/field_lanes.h"
 
-#include "base/assert.h"
-
-#include "base/same_math.h"
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <stddef.h>
 #if SIMD_HAS_AVX

@@ -14,8 +14,7 @@
 // asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
 // section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
 #include "geom/blob_flood.h"
-#include "base/assert.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "geom/blobby.h"
 #include "geom/field_lanes.h"
 #include "geom/power_blocks.h"

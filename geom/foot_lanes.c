@@ -2,7 +2,7 @@
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/foot_lanes.h"
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <string.h>
 

@@ -1,18 +1,35 @@
-// geom: shapes. Vectors, the vessel tree, blobby fields, and the one interface through which the solver sees a vessel.
-// Depends on nothing; never sees a file, a device, a clock or OpenGL. Lengths mm, angles rad.
+// geom: shapes. Vectors, vessel trees, blobby fields, triangle meshes, and the one interface through which the solver sees a vessel (vessel.h).
+// Uses base only; sees no file, device, clock or OpenGL. Lengths mm, angles rad.
 #ifndef SELDINGER_GEOM_GEOM_H
 #define SELDINGER_GEOM_GEOM_H
 
-#include "base/faults.h"
-#include "base/simd.h"
-#include "geom/blobby.h"
-#include "geom/isosurface.h"
 #include "geom/linear.h"
+#include "geom/random.h"
+
+// trees of nodes, with or without a model of the wall
+#include "geom/vessel_tree.h"
+#include "geom/blobby.h"
+#include "geom/blob_flood.h"
+#include "geom/power_blocks.h"
 #include "geom/power_walk.h"
-#include "geom/tree_surface.h"
+
+// vessels: the wall as the solver asks for it
 #include "geom/vessel.h"
+#include "geom/grid_vessel.h"
+#include "geom/mesh_vessel.h"
+#include "geom/tube_mesh.h"
+
+// their surfaces as triangles
+#include "geom/isosurface.h"
+#include "geom/tree_surface.h"
+#include "geom/mesh_closure.h"
+#include "geom/mesh_decimate.h"
+#include "geom/surface_parts.h"
+
+// what a tool can reach, and what looks wrong
+#include "geom/ghost_lumens.h"
+#include "geom/reach.h"
 #include "geom/vessel_branches.h"
 #include "geom/vessel_findings.h"
-#include "geom/vessel_tree.h"
 
 #endif

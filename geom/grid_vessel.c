@@ -6,7 +6,7 @@
 // thirds: those that may be next to a block, of those the ones that may be next to each 3 x 3 x 3 of its points, of those the next.
 #include "geom/grid_vessel.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include "geom/key_map.h"
 

@@ -23,8 +23,7 @@
 // a prediction with the gap's change in it (nothing: what remains is the wall's own waviness), memories and hits turned over in registers (AVX2 slower),
 // lanes in the order of their models' size, blobs fetched ahead, cell tests of a whole batch in one call (nothing, 1 %), second steps side by side (1 %).
 #include "geom/foot_lanes.h"
-#include "base/assert.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"

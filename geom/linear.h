@@ -6,7 +6,7 @@
 #ifndef SELDINGER_GEOM_LINEAR_H
 #define SELDINGER_GEOM_LINEAR_H
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <math.h>
 #include <stdbool.h>

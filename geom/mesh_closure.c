@@ -2,7 +2,7 @@
 // there are. Triangles from each open edge to one point make it so.
 #include "geom/mesh_closure.h"
 
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

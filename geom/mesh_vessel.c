@@ -33,8 +33,7 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
 
 #else
 
-#include "base/assert.h"
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 #include "geom/tree_surface.h"
 #include "geom/triangle_groups.h"
 

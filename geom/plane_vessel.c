@@ -1,7 +1,7 @@
 // A half space: gap = (x - point) . normal, exact everywhere, no node, no inlet. For friction tests (incline, stick, slip).
 #include "geom/vessel.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
 #include "geom/power_blocks.h"
-#include "base/assert.h"
+#include "base/base.h"
 #include "geom/power_walk.h"
 
 #include <stdlib.h>

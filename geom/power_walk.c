@@ -7,7 +7,7 @@
 // ball that it is inside of.
 #include "geom/power_walk.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 enum { WAYS_MAX = 64 };
 

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_GEOM_RANDOM_H
 #define SELDINGER_GEOM_RANDOM_H
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "geom/linear.h"
 
 #include <stdint.h>

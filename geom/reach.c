@@ -6,7 +6,7 @@
 // neighbouring places of one station and of the next. It is run only where the line itself is shut.
 #include "geom/reach.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/vessel_branches.h"

@@ -14,7 +14,7 @@
 //
 // A block of the lattice (sparse_march.h) is touched only where some model reaches it, and left again where bounds of the kernels say that it is all outside
 // or all inside: work and memory grow with the surface. The lattice point (i, j, k) lies at cell * (i, j, k), for every tree the same.
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 #include "geom/blobby.h"
 #include "geom/isosurface.h"
 #include "geom/power_walk.h"

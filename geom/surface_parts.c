@@ -2,7 +2,7 @@
 // vertices of each node and part are tried.
 #include "geom/surface_parts.h"
 
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 #include "geom/key_map.h"
 
 #include <stdlib.h>

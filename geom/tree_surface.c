@@ -2,7 +2,7 @@
 // triangle at the root's plane; vertices closer to it than a twentieth of an edge are moved onto it first, so that no slivers remain.
 #include "geom/tree_surface.h"
 
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 #include "geom/blobby.h"
 
 #include <stdlib.h>

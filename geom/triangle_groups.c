@@ -2,7 +2,7 @@
 // instruction set, with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
 #include "geom/triangle_groups.h"
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #define KERNEL_TEXT "geom/triangle_groups_kernel.inc"
 #include "base/each_simd.inc"

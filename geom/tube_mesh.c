@@ -1,7 +1,7 @@
 // Surfaces of vessels that are no trees: rings along a tube's centreline, and a square of a plane.
 #include "geom/tube_mesh.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

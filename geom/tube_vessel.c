@@ -15,8 +15,7 @@
 // at points that happen to lie in its plane. So a wire that leaves at an angle leans on the bell, tangent at first. There gap = D - L with D the distance
 // to the circle of radius (radius + L) in the end plane. Two radii beyond the end, where the bell is further than any tool's radius, there is no wall.
 #include "geom/vessel.h"
-#include "base/assert.h"
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

@@ -8,7 +8,7 @@
 #ifndef SELDINGER_GEOM_VESSEL_H
 #define SELDINGER_GEOM_VESSEL_H
 
-#include "base/assert.h"
+#include "base/base.h"
 #include "geom/linear.h"
 #include "geom/vessel_tree.h"
 

@@ -1,7 +1,6 @@
 #include "geom/vessel_findings.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "geom/blobby.h"
 
 #include <stdlib.h>

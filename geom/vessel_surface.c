@@ -8,7 +8,7 @@
 //
 // Vertices start near the middles of crossed edges, wherever the crossing is, and are then moved onto the wall along its normal: that keeps those
 // round one lattice point apart, and triangles have no angle below some 10 degrees. (Starting at the crossings: angles below 0.1.)
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 #include "geom/sparse_march.h"
 
 #include <limits.h>

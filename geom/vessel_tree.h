@@ -10,7 +10,7 @@
 #ifndef SELDINGER_GEOM_VESSEL_TREE_H
 #define SELDINGER_GEOM_VESSEL_TREE_H
 
-#include "base/faults.h"
+#include "base/base.h"
 #include "geom/linear.h"
 
 #include <stdbool.h>

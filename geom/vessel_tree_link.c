@@ -1,6 +1,6 @@
 // The tree's derived lists: neighbours, near nodes, who sees which blob. See vessel_tree.h.
 #include "geom/vessel_tree.h"
-#include "base/assert.h"
+#include "base/base.h"
 
 #include "geom/blob_flood.h"
 

@@ -1,7 +1,6 @@
 #include "input/device_map.h"
 
-#include "base/text_file.h"
-#include "base/yaml_reader.h"
+#include "base/base.h"
 #include "input/hand_port.h"
 #include "input/hid_report.h"
 

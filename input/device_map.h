@@ -37,7 +37,7 @@
 #ifndef SELDINGER_INPUT_DEVICE_MAP_H
 #define SELDINGER_INPUT_DEVICE_MAP_H
 
-#include "input/input.h"
+#include "input/script.h"
 
 #include <stdbool.h>
 #include <stddef.h>

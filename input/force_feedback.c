@@ -1,6 +1,6 @@
 #include "input/force_feedback.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "input/map_state.h"
 
 #include <math.h>

@@ -8,7 +8,7 @@
 #ifndef SELDINGER_INPUT_HAND_H
 #define SELDINGER_INPUT_HAND_H
 
-#include "base/faults.h"
+#include "base/base.h"
 #include "input/device_map.h"
 #include "input/hand_info.h"
 #include "input/hand_port.h"

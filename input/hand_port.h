@@ -5,7 +5,8 @@
 #ifndef SELDINGER_INPUT_HAND_PORT_H
 #define SELDINGER_INPUT_HAND_PORT_H
 
-#include <stdatomic.h>
+#include "base/base.h"
+
 #include <stdint.h>
 
 typedef enum { HAND_ABSENT, HAND_READY, HAND_LOST } HandState;   // LOST: was there, unplugged or silent; may come back
@@ -36,18 +37,18 @@ typedef enum {
 
 typedef struct HandPort {
     // from the hand
-    _Atomic int drives;              // HandDrives
-    _Atomic double push_mm_s;        // requested rate, > 0 into the patient
-    _Atomic double twist_deg_s;
-    _Atomic double advanced_mm;      // total displacement
-    _Atomic double turned_deg;
-    _Atomic unsigned buttons;        // HAND_ bits held now
-    _Atomic int state;               // HandState
-    _Atomic int64_t reports;         // read so far
+    ATOMIC(int) drives;              // HandDrives
+    ATOMIC(double) push_mm_s;        // requested rate, > 0 into the patient
+    ATOMIC(double) twist_deg_s;
+    ATOMIC(double) advanced_mm;      // total displacement
+    ATOMIC(double) turned_deg;
+    ATOMIC(unsigned) buttons;        // HAND_ bits held now
+    ATOMIC(int) state;               // HandState
+    ATOMIC(int64_t) reports;         // read so far
     // to the hand, after each step
-    _Atomic double force_n;          // the reaction of the tool that it moves, > 0 where the tool pushes back against a push; of locked tools their sum
-    _Atomic double torque_n_mm;
-    _Atomic int64_t step;            // increases while the simulation runs, for a watchdog
+    ATOMIC(double) force_n;          // the reaction of the tool that it moves, > 0 where the tool pushes back against a push; of locked tools their sum
+    ATOMIC(double) torque_n_mm;
+    ATOMIC(int64_t) step;            // increases while the simulation runs, for a watchdog
 } HandPort;
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef SELDINGER_INPUT_HAND_SLOT_H
 #define SELDINGER_INPUT_HAND_SLOT_H
 
+#include "base/base.h"
 #include "input/force_feedback.h"
 #include "input/hand_info.h"
 #include "input/map_state.h"
@@ -16,7 +17,7 @@ typedef struct HandShared {
     HidTransport transport;
     pthread_mutex_t lock;            // HandInfo of each slot, and messages
     pthread_cond_t wake;
-    _Atomic bool quit, paused;
+    ATOMIC(bool) quit, paused;
     char message[MESSAGES_KEPT][HAND_MESSAGE_LENGTH];
     int message_first, message_count;
 } HandShared;
@@ -35,7 +36,7 @@ typedef struct HandSlot {
     int64_t tell_from_us;            // when the watchdog may be reported again
     pthread_t thread;
     bool has_thread, encoder_runs;   // the scanner's: the thread is there, and for an encoder
-    _Atomic bool has_ended;          // the device was removed; the scanner joins the thread
+    ATOMIC(bool) has_ended;          // the device was removed; the scanner joins the thread
     HandInfo info;                   // under the lock
 } HandSlot;
 

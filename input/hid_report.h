@@ -6,7 +6,7 @@
 #ifndef SELDINGER_INPUT_HID_REPORT_H
 #define SELDINGER_INPUT_HID_REPORT_H
 
-#include "base/faults.h"
+#include "base/base.h"
 
 #include <stdbool.h>
 #include <stddef.h>

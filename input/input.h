@@ -1,73 +1,15 @@
-// input: the operator's motion, as one command (push, twist) per tool from a script (here), or as a port written by gamepads (gamepad.h), HID and USB
-// devices (hand.h) according to a device map (device_map.h). Uses base/faults.h only.
+// input: what an operator does, as one command (push, twist) for each tool: from a script, or from a gamepad, HID or USB device through a device map. Uses
+// base only. Reading order: command.h, script.h; hand.h (a device that is open), hand_port.h (what the simulation reads of it).
 #ifndef SELDINGER_INPUT_INPUT_H
 #define SELDINGER_INPUT_INPUT_H
 
-#include "base/faults.h"
-
-#include <stdbool.h>
-#include <stddef.h>
-
-typedef struct Command {
-    double push_mm_s;        // > 0 into the patient
-    double twist_deg_s;      // right-handed about the direction of advance
-} Command;
-
-enum { TOOLS_MOST = 4, EXCHANGES_MOST = 4, TOOL_NAME_SIZE = 32 };
-
-typedef struct ToolCommands {
-    Command tool[TOOLS_MOST];    // outermost first; a tool that is not named is pinned: 0
-    unsigned released;           // bit k: tool k is released and held only by the friction of its valve
-    int fitted[TOOLS_MOST];      // device of tool k: 0 the scene's, 1, 2, … those under its `exchange:`
-    double contrast_ml_s;        // that a script injects …
-    int contrast_tool;           // … through this tool, 1 the outermost; 0: none
-} ToolCommands;
-
-typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last
-    int count;
-    const char *name[TOOLS_MOST + 1];
-    const char *kind[TOOLS_MOST];    // "wire", "microcatheter" …
-} ToolNames;
-
-typedef struct ScriptRow {
-    double t_s;
-    Command command;                 // of the first tool
-    Command inner[TOOLS_MOST - 1];   // of those within it
-    unsigned released;               // as in ToolCommands
-    int fitted[TOOLS_MOST];          // as in ToolCommands
-    double contrast_ml_s[TOOLS_MOST];    // of each tool; at most one has any
-} ScriptRow;
-
-typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
-    int count;
-    ScriptRow *row;
-} Script;
-
-enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400, SCRIPT_MOST_ML_S = 50 };
-
-// Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults: wrong header, not a number, times that
-// go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row. A fourth column, released, is 1 while the tool is released
-// and 0 (default) while it is held.
-Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
-// For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s, or
-// NAME.released, NAME.exchange and NAME.contrast_ml_s (contrast agent through that tool, 0 to 50, one tool at a time), for any of them, in any order.
-Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
-// Reads the file (at most 64 MiB) and parses it.
-Script *script_load(const char *path, Faults *faults);
-Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults);
-// Without a scene: the tools are those named in the header, in its order; a single unnamed one if there are none.
-typedef struct ScriptTools {
-    ToolNames names;         // point into `text`
-    char text[TOOLS_MOST][TOOL_NAME_SIZE];
-} ScriptTools;
-Script *script_load_any(const char *path, ScriptTools *tools, Faults *faults);
-void script_free(Script *script);
-Command *script_row_command(ScriptRow *row, int tool);
-// Checks one row, also for rows from elsewhere (a scene's inline script); `before` is the row before it or NULL, `tools` NULL if there is one.
-bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults);
-double script_duration_s(const Script *script);
-// Commands at simulated time t (zero before the first row and after the end, but `fitted`, which stays as it was). `cursor` remembers the row between calls, start with 0.
-ToolCommands script_tools_at(const Script *script, double t_s, int *cursor);
-Command script_at(const Script *script, double t_s, int *cursor);      // the first tool's
+#include "input/command.h"
+#include "input/script.h"
+#include "input/device_map.h"
+#include "input/device_report.h"
+#include "input/devices_watch.h"
+#include "input/gamepad.h"
+#include "input/hand.h"
+#include "input/hand_port.h"
 
 #endif

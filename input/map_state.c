@@ -1,7 +1,7 @@
 #include "input/map_state.h"
 
-#include "base/same_math.h"
-#include "input/input.h"
+#include "base/base.h"
+#include "input/command.h"
 
 #include <math.h>
 #include <stdio.h>

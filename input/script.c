@@ -1,8 +1,6 @@
-#include "input/input.h"
+#include "input/script.h"
 
-#include "base/nearest_name.h"
-#include "base/number_table.h"
-#include "base/text_file.h"
+#include "base/base.h"
 
 #include <math.h>
 #include <stdio.h>

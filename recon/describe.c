@@ -1,7 +1,6 @@
 #include "recon/describe.h"
 
-#include "base/heap.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/surface/mesh_check.h"
 #include "recon/volume/volume_file.h"
 

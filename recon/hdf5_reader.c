@@ -2,8 +2,7 @@
 #define ZLIB_CONST
 #include "recon/hdf5_reader.h"
 
-#include "base/heap.h"
-#include "base/process.h"
+#include "base/base.h"
 #include "recon/hdf5_silence.h"
 #include "recon/hdf5_source.h"
 

@@ -15,7 +15,7 @@
 #ifndef SELDINGER_RECON_HDF5_READER_H
 #define SELDINGER_RECON_HDF5_READER_H
 
-#include "base/faults.h"
+#include "base/base.h"
 
 #include <stdint.h>
 

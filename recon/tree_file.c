@@ -3,8 +3,7 @@
 // the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
-#include "base/heap.h"
-#include "base/whole_file.h"
+#include "base/base.h"
 #include "recon/hdf5_reader.h"
 #include "recon/hdf5_silence.h"
 

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RECON_TREE_FILE_H
 #define SELDINGER_RECON_TREE_FILE_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 
 typedef struct TreeFileInfo {  // root attributes
     char *source;            // the input files

@@ -6,10 +6,10 @@
 #ifndef SELDINGER_RENDER_ANGIOSCOPE_H
 #define SELDINGER_RENDER_ANGIOSCOPE_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 #include "render/tool_look.h"
 #include "render/view_port.h"
-#include "sim/pose.h"
+#include "sim/sim.h"
 
 typedef struct Angioscope Angioscope;
 

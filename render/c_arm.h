@@ -8,8 +8,8 @@
 #ifndef SELDINGER_RENDER_C_ARM_H
 #define SELDINGER_RENDER_C_ARM_H
 
-#include "geom/linear.h"
-#include "sim/xray.h"
+#include "geom/geom.h"
+#include "sim/sim.h"
 
 #define C_ARM_SOURCE_MM 785.0          // source to isocentre, as in common angiography systems
 #define C_ARM_NEAREST_MM 20.0          // visible points must be further than this from the source's plane

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_CAMERA_H
 #define SELDINGER_RENDER_CAMERA_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 typedef struct Camera {
     Vec3 right, up, back;      // orthonormal, right-handed; back points towards the eye

@@ -5,8 +5,8 @@
 #ifndef SELDINGER_RENDER_CINE_H
 #define SELDINGER_RENDER_CINE_H
 
-#include "base/faults.h"
-#include "sim/pose.h"
+#include "base/base.h"
+#include "sim/sim.h"
 
 typedef struct CineFrame {
     const Pose *pose;            // at the pulse; X-ray settings and time are its own

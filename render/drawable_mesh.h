@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_DRAWABLE_MESH_H
 #define SELDINGER_RENDER_DRAWABLE_MESH_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 
 #include <stddef.h>
 

@@ -1,6 +1,6 @@
 #include "render/film.h"
 
-#include "base/progress_bar.h"
+#include "base/base.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "render/movie_file.h"
@@ -8,7 +8,7 @@
 #include "render/png_file.h"
 #include "render/scene_views.h"
 #include "render/trainer_panel.h"
-#include "sim/rescore.h"
+#include "sim/sim.h"
 
 #include <math.h>
 #include <stdio.h>

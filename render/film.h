@@ -3,8 +3,7 @@
 #define SELDINGER_RENDER_FILM_H
 
 #include "render/panel.h"
-#include "sim/open_vessel.h"
-#include "sim/recording.h"
+#include "sim/sim.h"
 
 typedef struct FilmOptions {
     int width, height;               // [pixel]

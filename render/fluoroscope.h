@@ -12,7 +12,7 @@
 
 #include "render/fluoroscope_options.h"
 #include "render/view_port.h"
-#include "sim/pose.h"
+#include "sim/sim.h"
 
 typedef struct Fluoroscope Fluoroscope;
 

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
 #define SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
 
-#include "geom/mesh_closure.h"
+#include "geom/geom.h"
 #include "render/fluoroscope_options.h"
 
 enum { ELLIPSOIDS_MOST = 40 };

@@ -2,10 +2,10 @@
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_OPTIONS_H
 #define SELDINGER_RENDER_FLUOROSCOPE_OPTIONS_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 #include "render/c_arm.h"
 #include "render/tool_look.h"
-#include "sim/pose.h"
+#include "sim/sim.h"
 
 #include <stdbool.h>
 

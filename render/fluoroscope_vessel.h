@@ -7,7 +7,7 @@
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_VESSEL_H
 #define SELDINGER_RENDER_FLUOROSCOPE_VESSEL_H
 
-#include "geom/mesh_closure.h"
+#include "geom/geom.h"
 #include "render/fluoroscope_options.h"
 
 typedef struct LumenMesh {

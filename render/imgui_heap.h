@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RENDER_IMGUI_HEAP_H
 #define SELDINGER_RENDER_IMGUI_HEAP_H
 
-#include "base/heap.h"
+#include "base/base.h"
 
 #include <cstdlib>
 #include <imgui.h>

@@ -3,7 +3,7 @@
 // are BT.709 in studio range and say so, as players expect of high definition.
 #include "render/movie_file.h"
 
-#include "base/part_file.h"
+#include "base/base.h"
 #include "render/message.h"
 
 #include <errno.h>

@@ -6,7 +6,7 @@
 #include "render/c_arm.h"
 #include "render/panel.h"
 #include "render/vessel_scene.h"
-#include "sim/hand_grip.h"
+#include "sim/sim.h"
 
 typedef struct OperatorControls {
     XrayControl xray;            // pedal and contrast of keys and panel; buttons of input devices are added by controls_xray

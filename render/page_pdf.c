@@ -1,7 +1,6 @@
 #include "render/page_pdf.h"
 
-#include "base/output.h"
-#include "base/whole_file.h"
+#include "base/base.h"
 
 #include <signal.h>
 #include <stdio.h>

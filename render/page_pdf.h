@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_PAGE_PDF_H
 #define SELDINGER_RENDER_PAGE_PDF_H
 
-#include "base/faults.h"
+#include "base/base.h"
 
 // Writes the page as PDF, printed by chromium. False with a fault: also if chromium is not installed. SIGINT, SIGTERM and SIGHUP are deferred until
 // temporary copies of the page are removed.

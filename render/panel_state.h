@@ -2,10 +2,10 @@
 #ifndef SELDINGER_RENDER_PANEL_STATE_H
 #define SELDINGER_RENDER_PANEL_STATE_H
 
-#include "input/hand_port.h"
+#include "input/input.h"
 #include "render/key_table.h"
 #include "render/panel_layout.h"
-#include "sim/xray.h"
+#include "sim/sim.h"
 
 #include <stdbool.h>
 #include <stddef.h>

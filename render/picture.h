@@ -11,9 +11,8 @@
 #define SELDINGER_RENDER_PICTURE_H
 
 #include "geom/geom.h"
-#include "geom/reach.h"
 #include "render/tool_look.h"
-#include "sim/pose.h"
+#include "sim/sim.h"
 
 typedef struct PictureOptions {
     int width, height;         // [pixel] 64 to 8192; default 1600 x 1000; projections and moments are cut to the height that they need

@@ -1,5 +1,5 @@
 // A model's surface coloured by its distance to the data, and the paper's Table 4 as a histogram.
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "render/message.h"
 #include "render/picture_page.h"
 

@@ -3,7 +3,7 @@
 //
 // A slice through node i holds the node's centre, its axis (to the right) and its worst point. Contour: f_i = 0 by marching squares on bilinear
 // cells; its neighbours' contours, faint, show where the wall jumps from one local model to the next.
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "render/message.h"
 #include "render/picture_page.h"
 

@@ -3,7 +3,7 @@
 // The plane holds the joining line (to the right) and, as far as that allows, the parent's direction (up). The wall is the zero of the field as a tool meets
 // it: each pixel's corner is answered by the node to which a walk leads from the nearest node around.
 #include "render/message.h"
-#include "geom/power_walk.h"
+#include "geom/geom.h"
 #include "render/picture_page.h"
 
 #include <stdlib.h>

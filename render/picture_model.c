@@ -1,7 +1,6 @@
 #include "render/picture_model.h"
 
-#include "geom/isosurface.h"
-#include "geom/tree_surface.h"
+#include "geom/geom.h"
 #include "render/picture.h"
 
 #include <stdlib.h>

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_RENDER_PICTURE_MODEL_H
 #define SELDINGER_RENDER_PICTURE_MODEL_H
 
-#include "base/faults.h"
-#include "geom/vessel_tree.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 // picture_of_fit() and picture_of_error(): false with a fault where there is none. A tree without a model has no picture.
 bool picture_model_fit(const char *path, const VesselTree *model, Faults *faults);

@@ -1,6 +1,6 @@
 #include "render/picture_moments.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 #include "render/picture.h"
 
 #include <stdio.h>

@@ -2,8 +2,7 @@
 #ifndef SELDINGER_RENDER_PICTURE_MOMENTS_H
 #define SELDINGER_RENDER_PICTURE_MOMENTS_H
 
-#include "sim/moments.h"
-#include "sim/open_vessel.h"
+#include "sim/sim.h"
 
 // False with a fault where there is none, the run being as good as it was.
 bool picture_moments(const char *path, const char *title, const Scene *scene, OpenVessel *open, const Moments *moments, Faults *faults);

@@ -4,8 +4,7 @@
 #define SELDINGER_RENDER_PLAYBACK_H
 
 #include "render/pulse_clock.h"
-#include "sim/contrast_injection.h"
-#include "sim/pose.h"
+#include "sim/sim.h"
 
 typedef struct Playback Playback;
 

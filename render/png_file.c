@@ -1,7 +1,7 @@
 // No time stamp and a fixed compression level: the same pixels give the same bytes.
 #include "render/png_file.h"
 
-#include "base/part_file.h"
+#include "base/base.h"
 #include "render/message.h"
 
 #include <errno.h>

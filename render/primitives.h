@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_PRIMITIVES_H
 #define SELDINGER_RENDER_PRIMITIVES_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 #include "render/color_map.h"
 
 #include <stdbool.h>

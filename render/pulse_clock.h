@@ -4,7 +4,7 @@
 #ifndef SELDINGER_RENDER_PULSE_CLOCK_H
 #define SELDINGER_RENDER_PULSE_CLOCK_H
 
-#include "sim/xray.h"
+#include "sim/sim.h"
 
 #include <stdbool.h>
 #include <stdint.h>

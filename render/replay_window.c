@@ -5,8 +5,7 @@
 #include "render/timeline.h"
 #include "render/trainer_panel.h"
 #include "render/window.h"
-#include "sim/clock.h"
-#include "sim/rescore.h"
+#include "sim/sim.h"
 
 #include <stdio.h>
 #include <stdlib.h>

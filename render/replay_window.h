@@ -3,8 +3,7 @@
 #define SELDINGER_RENDER_REPLAY_WINDOW_H
 
 #include "render/panel.h"
-#include "sim/open_vessel.h"
-#include "sim/recording.h"
+#include "sim/sim.h"
 
 typedef struct ReplayWindowOptions {
     const char *name;                // of the recording, for the strip below

@@ -1,8 +1,7 @@
 #include "render/scene_views.h"
 
-#include "base/heap.h"
-#include "base/sort_doubles.h"
-#include "recon/volume/volume_file.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <stdio.h>
 #include <stdlib.h>

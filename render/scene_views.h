@@ -4,7 +4,7 @@
 
 #include "render/operator_controls.h"
 #include "render/views.h"
-#include "sim/open_vessel.h"
+#include "sim/sim.h"
 
 // Everything visible: the wall, the volume behind it if the scene has one, the tool at the start. Needs a current GL context. NULL with faults.
 // `note` (capacity bytes): empty, or what is missing in the pictures.

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_SESSION_FIGURES_H
 #define SELDINGER_RENDER_SESSION_FIGURES_H
 
-#include "sim/session.h"
+#include "sim/sim.h"
 
 #include <stdio.h>
 

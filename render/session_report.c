@@ -1,11 +1,8 @@
 #include "render/session_report.h"
 
-#include "base/text_file.h"
+#include "base/base.h"
 #include "render/session_page.h"
-#include "sim/open_vessel.h"
-#include "sim/recording.h"
-#include "sim/session_files.h"
-#include "sim/tube_tree.h"
+#include "sim/sim.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -2,8 +2,7 @@
 #ifndef SELDINGER_RENDER_SESSION_REPORT_H
 #define SELDINGER_RENDER_SESSION_REPORT_H
 
-#include "sim/open_vessel.h"
-#include "sim/session.h"
+#include "sim/sim.h"
 
 // HTML of `session`, which lies at `path`; earlier ones of the trainee lie in the folder `with`. What cannot be had is said on standard error, and the page is
 // shorter. To be freed; NULL with a fault where there is no memory.

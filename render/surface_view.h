@@ -4,7 +4,7 @@
 #ifndef SELDINGER_RENDER_SURFACE_VIEW_H
 #define SELDINGER_RENDER_SURFACE_VIEW_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 #include "render/camera.h"
 #include "render/primitives.h"
 

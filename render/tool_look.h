@@ -3,7 +3,7 @@
 #define SELDINGER_RENDER_TOOL_LOOK_H
 
 #include "render/color_map.h"
-#include "sim/scene.h"
+#include "sim/sim.h"
 
 typedef struct TubeStretch {     // of a tool, from the border before it to `end`
     double end;                  // [mm] from the proximal end; the last one counts to the tip wherever it is

@@ -1,7 +1,6 @@
 #include "render/trainer.h"
 
-#include "input/gamepad.h"
-#include "input/hand.h"
+#include "input/input.h"
 #include "render/gl_canvas.h"
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
@@ -9,10 +8,7 @@
 #include "render/trainer_cine.h"
 #include "render/trainer_panel.h"
 #include "render/trainer_tray.h"
-#include "sim/clock.h"
-#include "sim/live_session.h"
-#include "sim/recover.h"
-#include "sim/session_files.h"
+#include "sim/sim.h"
 
 #include <stdarg.h>
 #include <stdio.h>

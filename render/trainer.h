@@ -2,11 +2,10 @@
 #ifndef SELDINGER_RENDER_TRAINER_H
 #define SELDINGER_RENDER_TRAINER_H
 
-#include "base/process.h"
-#include "input/device_map.h"
+#include "base/base.h"
+#include "input/input.h"
 #include "render/panel.h"
-#include "sim/open_vessel.h"
-#include "sim/recording.h"
+#include "sim/sim.h"
 
 enum { TRAINER_MAPS = 8 };
 

@@ -1,7 +1,6 @@
 #include "render/trainer_cine.h"
 
-#include "base/output.h"
-#include "base/whole_file.h"
+#include "base/base.h"
 #include "render/gl_canvas.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "render/trainer_figures.h"
 
-#include "base/output.h"
+#include "base/base.h"
 
 #include <cJSON.h>
 

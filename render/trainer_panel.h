@@ -4,8 +4,7 @@
 
 #include "render/operator_controls.h"
 #include "render/views.h"
-#include "sim/realtime.h"
-#include "sim/score.h"
+#include "sim/sim.h"
 
 enum { PANEL_FIGURES = 12, PANEL_ERRORS = 12, PANEL_DEVICES = 14, PANEL_LABELS = 24 };
 

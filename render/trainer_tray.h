@@ -3,8 +3,7 @@
 #define SELDINGER_RENDER_TRAINER_TRAY_H
 
 #include "render/panel.h"
-#include "sim/pose.h"
-#include "sim/tray_devices.h"
+#include "sim/sim.h"
 
 enum { TRAY_WORDS = 320 };
 

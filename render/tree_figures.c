@@ -1,7 +1,7 @@
 // The report's figures. Colours are classes that the page's style sheet sets for light, dark and paper.
 #include "render/tree_figures.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 #include "render/page.h"
 #include "render/tick_step.h"
 

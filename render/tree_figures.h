@@ -3,7 +3,7 @@
 #define SELDINGER_RENDER_TREE_FIGURES_H
 
 #include "geom/geom.h"
-#include "recon/tree_file.h"
+#include "recon/recon.h"
 
 #include <stdio.h>
 

@@ -1,6 +1,6 @@
 #include "render/tree_page.h"
 
-#include "base/output.h"
+#include "base/base.h"
 #include "render/page.h"
 #include "render/tree_figures.h"
 

@@ -4,7 +4,7 @@
 #define SELDINGER_RENDER_TREE_PAGE_H
 
 #include "geom/geom.h"
-#include "recon/tree_file.h"
+#include "recon/recon.h"
 
 // `name` is what the tree was loaded from. False with faults where the file cannot be written or memory runs out.
 bool tree_page_write(const char *path, const char *name, const VesselTree *tree, const TreeFileInfo *info, Faults *faults);

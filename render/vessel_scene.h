@@ -10,12 +10,12 @@
 #ifndef SELDINGER_RENDER_VESSEL_SCENE_H
 #define SELDINGER_RENDER_VESSEL_SCENE_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 #include "render/color_map.h"
 #include "render/vessel_scene_camera.h"
 #include "render/tool_look.h"
 #include "render/view_port.h"
-#include "sim/pose.h"
+#include "sim/sim.h"
 
 typedef struct VesselScene VesselScene;
 

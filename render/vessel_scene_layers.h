@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_VESSEL_SCENE_LAYERS_H
 #define SELDINGER_RENDER_VESSEL_SCENE_LAYERS_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 #include "render/camera.h"
 #include "render/view_port.h"
 

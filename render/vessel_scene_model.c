@@ -1,7 +1,7 @@
 // A tip at the border of two power cells asks for their models in turn: the last eight are kept.
 #include "render/vessel_scene_model.h"
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 
 #include <stdlib.h>
 

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_VESSEL_SCENE_MODEL_H
 #define SELDINGER_RENDER_VESSEL_SCENE_MODEL_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "render/vessel_scene_strokes.h"
 
 typedef struct ModelWires ModelWires;

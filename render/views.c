@@ -1,6 +1,6 @@
 #include "render/views.h"
 
-#include "geom/mesh_decimate.h"
+#include "geom/geom.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
 

@@ -1,6 +1,6 @@
 #include "sim/compare.h"
 
-#include "base/number_table.h"
+#include "base/base.h"
 
 #include <limits.h>
 #include <stdio.h>

@@ -1,9 +1,7 @@
 #include "sim/contact_surface.h"
 
-#include "geom/grid_vessel.h"
-#include "geom/mesh_vessel.h"
-#include "geom/tree_surface.h"
-#include "recon/surface/mesh_check.h"
+#include "geom/geom.h"
+#include "recon/recon.h"
 
 #include <stdarg.h>
 #include <stdio.h>

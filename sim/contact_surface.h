@@ -3,7 +3,7 @@
 #ifndef SELDINGER_SIM_CONTACT_SURFACE_H
 #define SELDINGER_SIM_CONTACT_SURFACE_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 #include "sim/scene.h"
 
 // Receives remarks that are not faults about the file or vessel `path`, one line each.

@@ -7,7 +7,7 @@
 // flows, J > W, the branches between the tip and the first fork that carries more run backwards: they come first.
 #include "sim/contrast.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "sim/contrast_network.h"
 
 #include <stdlib.h>

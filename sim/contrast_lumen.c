@@ -1,6 +1,6 @@
 #include "sim/contrast_lumen.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

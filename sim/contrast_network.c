@@ -3,7 +3,7 @@
 // moves the contents of each cell by nearly one cell, which upwind transport does without numerical diffusion at any speed.
 #include "sim/contrast_network.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

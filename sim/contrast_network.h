@@ -3,7 +3,7 @@
 #ifndef SELDINGER_SIM_CONTRAST_NETWORK_H
 #define SELDINGER_SIM_CONTRAST_NETWORK_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 
 typedef struct ContrastOptions {
     double step_s;           // [s] the cells are this long in transit time, 0.001 to 0.1, default 0.005

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_DESCRIBE_RUN_H
 #define SELDINGER_SIM_DESCRIBE_RUN_H
 
-#include "base/faults.h"
+#include "base/base.h"
 
 #include <cJSON.h>
 

@@ -33,7 +33,7 @@
 #ifndef SELDINGER_SIM_EXERCISE_H
 #define SELDINGER_SIM_EXERCISE_H
 
-#include "base/yaml_reader.h"
+#include "base/base.h"
 #include "input/input.h"
 
 enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };

@@ -1,11 +1,8 @@
 // A problem with the cache is never an error: the shape is then fitted again.
 #include "sim/fitted_shape.h"
 
-#include "base/process.h"
-#include "base/sha256.h"
-#include "recon/fit/field_fit.h"
-#include "recon/phantom/phantom.h"
-#include "recon/tree_file.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <errno.h>
 #include <stdio.h>

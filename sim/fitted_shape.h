@@ -2,8 +2,8 @@
 #ifndef SELDINGER_SIM_FITTED_SHAPE_H
 #define SELDINGER_SIM_FITTED_SHAPE_H
 
-#include "base/parallel.h"
-#include "recon/fit/lim_fit.h"
+#include "base/base.h"
+#include "recon/recon.h"
 #include "sim/scene.h"
 
 // The scene's shape as a model, from the user's cache ($SELDINGER_CACHE, else below $XDG_CACHE_HOME or ~/.cache) if this program has fitted it

@@ -1,7 +1,6 @@
 #include "sim/golden.h"
 
-#include "base/output.h"
-#include "base/text_file.h"
+#include "base/base.h"
 #include "sim/drive.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 #include "sim/hand_grip.h"
 
-#include "input/hand_port.h"
+#include "input/input.h"
 
 // The partner: the next tool inside the chosen one; for the innermost tool the next around it; for a single tool itself. Both together are the pair.
 static int hand_grip_partner(const HandGrip *grip, int tool_count)

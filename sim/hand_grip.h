@@ -11,8 +11,8 @@
 typedef struct HandGrip {
     int chosen;              // moved by inputs that select no tool
     unsigned locked;         // bit k: tool k moves as tool k - 1 does
-    unsigned released;       // bit k: no hand holds tool k (input/input.h)
-    int fitted[TOOLS_MOST];  // which of its devices each tool should be (input/input.h); a tool not at its hub stays as it is, see hand_grip_fit()
+    unsigned released;       // bit k: no hand holds tool k (input/command.h)
+    int fitted[TOOLS_MOST];  // which of its devices each tool should be (input/command.h); a tool not at its hub stays as it is, see hand_grip_fit()
 } HandGrip;
 
 // The tool that a hand moves which drives this (HandDrives of input/hand_port.h).

@@ -7,9 +7,9 @@
 #ifndef SELDINGER_SIM_HAND_SET_H
 #define SELDINGER_SIM_HAND_SET_H
 
-#include "input/hand_port.h"
+#include "input/input.h"
 #include "sim/hand_grip.h"
-#include "solver/step.h"
+#include "solver/solver.h"
 
 enum { HANDS_SAMPLED = 64 };
 

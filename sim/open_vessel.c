@@ -2,11 +2,8 @@
 // converts it into triangles or a grid if `contact:` requires that.
 #include "sim/open_vessel.h"
 
-#include "geom/mesh_vessel.h"
-#include "geom/tube_mesh.h"
-#include "recon/fit/lim_fit.h"
-#include "recon/phantom/phantom.h"
-#include "recon/tree_file.h"
+#include "geom/geom.h"
+#include "recon/recon.h"
 #include "sim/contact_surface.h"
 #include "sim/fitted_shape.h"
 #include "sim/tube_tree.h"

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_SIM_OPEN_VESSEL_H
 #define SELDINGER_SIM_OPEN_VESSEL_H
 
-#include "base/parallel.h"
-#include "geom/isosurface.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "sim/contact_surface.h"
 
 typedef struct OpenVessel {

@@ -1,9 +1,7 @@
 #define _GNU_SOURCE   // locks of an open file, not of a process
 #include "sim/ordered_file.h"
 
-#include "base/assert.h"
-
-#include "base/heap.h"
+#include "base/base.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,8 +1,8 @@
 // Reading a recording back (recon/hdf5_reader.h checks what it holds). Rows that one dataset has more than another (a file still being written) are left out.
 #include "sim/recording.h"
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "recon/hdf5_reader.h"
+#include "recon/recon.h"
 
 #include <ctype.h>
 #include <stdint.h>

@@ -1,11 +1,8 @@
 #include "sim/recording.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "base/heap.h"
-#include "base/part_file.h"
-#include "base/sha256.h"
-#include "recon/hdf5_silence.h"
+#include "recon/recon.h"
 #include "sim/ordered_file.h"
 
 #include <errno.h>

@@ -1,8 +1,7 @@
 #include "sim/recording_export.h"
 
-#include "base/heap.h"
-#include "base/output.h"
-#include "recon/surface/vtp_write.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <inttypes.h>
 #include <stdlib.h>

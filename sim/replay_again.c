@@ -1,6 +1,6 @@
 #include "sim/replay_again.h"
 
-#include "base/sha256.h"
+#include "base/base.h"
 #include "sim/replay_scene.h"
 
 #include <stdlib.h>

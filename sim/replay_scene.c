@@ -1,8 +1,7 @@
 #define _XOPEN_SOURCE 700   // realpath
 #include "sim/replay_scene.h"
 
-#include "base/output.h"
-#include "base/yaml_edit.h"
+#include "base/base.h"
 
 #include <errno.h>
 #include <limits.h>

@@ -2,7 +2,7 @@
 // arcs. An arc of radius R whose plane is turned by the sum of all plane angles up to it is therefore a rest curvature 1 / R in that direction.
 #include "sim/rest_shape.h"
 
-#include "base/sort_doubles.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_SIM_REST_SHAPE_H
 #define SELDINGER_SIM_REST_SHAPE_H
 
-#include "geom/vessel.h"
-#include "solver/wire.h"
+#include "geom/geom.h"
+#include "solver/solver.h"
 
 // The pieces end at the tip; the rest of the wire, at its proximal end, is straight. An arc's plane turns that of the arc before it. Cuts the wire's
 // sections at the pieces' borders and sets their rest curvature. A section's border nearer than 0.01 mm to a piece's moves there: a sliver would be

@@ -1,7 +1,6 @@
 #include "sim/run_summary.h"
 
-#include "base/heap.h"
-#include "base/output.h"
+#include "base/base.h"
 
 #include <cJSON.h>
 #include <inttypes.h>

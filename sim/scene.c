@@ -1,7 +1,7 @@
 // Accessors and destruction of a scene; scene_read.c creates it.
 #include "sim/scene.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

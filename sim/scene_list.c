@@ -1,7 +1,6 @@
 #include "sim/scene_list.h"
 
-#include "base/heap.h"
-#include "base/text_file.h"
+#include "base/base.h"
 #include "sim/compare.h"
 
 #include <dirent.h>

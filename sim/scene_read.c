@@ -2,8 +2,7 @@
 // the file; each continues after a fault, so one pass finds all.
 #include "sim/scene_reading.h"
 
-#include "base/number_table.h"
-#include "base/text_file.h"
+#include "base/base.h"
 #include "sim/yaml_vector.h"
 
 #include <stdio.h>

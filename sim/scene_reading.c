@@ -1,6 +1,6 @@
 #include "sim/scene_reading.h"
 
-#include "base/text_file.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

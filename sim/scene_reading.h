@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_SCENE_READING_H
 #define SELDINGER_SIM_SCENE_READING_H
 
-#include "base/yaml_reader.h"
+#include "base/base.h"
 #include "sim/scene.h"
 
 typedef struct ToolReading { // how a tool was read, for the rules that relate tools

@@ -5,7 +5,7 @@
 // beyond the start with its whole length, a_o = L_o.
 #include "sim/scene_reading.h"
 
-#include "base/text_file.h"
+#include "base/base.h"
 #include "sim/rest_shape.h"
 
 #include <ctype.h>

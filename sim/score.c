@@ -1,6 +1,6 @@
 #include "sim/score.h"
 
-#include "geom/power_walk.h"
+#include "geom/geom.h"
 #include "sim/score_tool.h"
 #include "sim/score_way.h"
 

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_SIM_SCORE_SHEATH_H
 #define SELDINGER_SIM_SCORE_SHEATH_H
 
-#include "geom/vessel.h"
+#include "geom/geom.h"
 #include "solver/solver.h"
 
 typedef struct ScoreSheath {

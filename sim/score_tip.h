@@ -5,7 +5,6 @@
 #ifndef SELDINGER_SIM_SCORE_TIP_H
 #define SELDINGER_SIM_SCORE_TIP_H
 
-#include "solver/beam.h"
 #include "solver/solver.h"
 
 typedef struct ScoreTip {

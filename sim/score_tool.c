@@ -1,6 +1,6 @@
 #include "sim/score_tool.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
 // in first by climbing from there to the root.
 #include "sim/score_way.h"
 
-#include "geom/power_walk.h"
+#include "geom/geom.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_SIM_SCORE_WAY_H
 #define SELDINGER_SIM_SCORE_WAY_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 
 typedef struct ScoreWay {
     const VesselTree *tree;      // NULL: none, distances are straight

@@ -1,7 +1,6 @@
 #include "sim/session.h"
 
-#include "base/sha256.h"
-#include "base/text_file.h"
+#include "base/base.h"
 #include "sim/score_json.h"
 
 #include <dirent.h>

@@ -1,7 +1,7 @@
 #include "sim/session_files.h"
 
-#include "base/output.h"
-#include "recon/hdf5_reader.h"
+#include "base/base.h"
+#include "recon/recon.h"
 #include "sim/ordered_file.h"
 
 #include <dirent.h>

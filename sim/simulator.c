@@ -1,8 +1,8 @@
 // One step follows the paper's loop: feed the sheath, detect, assemble, factor, solve the contact, correct.
 #include "sim/simulator.h"
 
-#include "base/assert.h"
-#include "solver/validate.h"
+#include "base/base.h"
+#include "solver/solver.h"
 
 #include <stdlib.h>
 #include <string.h>

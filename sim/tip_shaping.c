@@ -14,7 +14,7 @@
 // ribbon lie lower, 0.006. The coil around the core keeps nothing and carries nothing here; bends before this one are taken as pressed straight.
 #include "sim/tip_shaping.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <math.h>
 #include <stdio.h>

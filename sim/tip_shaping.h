@@ -3,7 +3,7 @@
 #ifndef SELDINGER_SIM_TIP_SHAPING_H
 #define SELDINGER_SIM_TIP_SHAPING_H
 
-#include "solver/wire.h"
+#include "solver/solver.h"
 
 #include <stddef.h>
 

@@ -1,6 +1,6 @@
 #include "sim/tray_devices.h"
 
-#include "base/yaml_edit.h"
+#include "base/base.h"
 
 #include <dirent.h>
 #include <math.h>

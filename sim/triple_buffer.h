@@ -3,11 +3,12 @@
 #ifndef SELDINGER_SIM_TRIPLE_BUFFER_H
 #define SELDINGER_SIM_TRIPLE_BUFFER_H
 
-#include <stdatomic.h>
+#include "base/base.h"
+
 #include <stdbool.h>
 
 typedef struct TripleBuffer {
-    _Atomic unsigned between;        // index of the waiting slot, with TRIPLE_FRESH where the reader has not seen it
+    ATOMIC(unsigned) between;        // index of the waiting slot, with TRIPLE_FRESH where the reader has not seen it
     unsigned writing, reading;       // each side's own
 } TripleBuffer;
 

@@ -2,7 +2,7 @@
 // and polylines need no special code here.
 #include "sim/tube_tree.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_TUBE_TREE_H
 #define SELDINGER_SIM_TUBE_TREE_H
 
-#include "geom/vessel.h"
+#include "geom/geom.h"
 
 // Nodes half a radius apart along the axis, 48 samples a node (and on closed ends), all exactly on the surface. `tube` is a tube vessel of `options`.
 // NULL with a fault where the axis cannot be followed or memory runs out.

@@ -6,8 +6,8 @@
 #ifndef SELDINGER_SIM_VERIFY_H
 #define SELDINGER_SIM_VERIFY_H
 
-#include "base/yaml_reader.h"
-#include "geom/linear.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "input/input.h"
 
 enum { VERIFY_MOST_ELEMENTS = 8, VERIFY_MOST_CASES = 100, VERIFY_NAME = 64 };

@@ -1,6 +1,6 @@
 // Measures the cases of a VerifyPlan while a simulator runs.
 #include "sim/simulator.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "sim/verify.h"
 
 #include <stdlib.h>

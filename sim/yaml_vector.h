@@ -2,8 +2,8 @@
 #ifndef SELDINGER_SIM_YAML_VECTOR_H
 #define SELDINGER_SIM_YAML_VECTOR_H
 
-#include "base/yaml_reader.h"
-#include "geom/linear.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 // [x, y, z], each within +-largest. False if the key is absent (a fault with `required`) or wrong; the output then keeps its value.
 bool yaml_map_vector(const YamlMap *map, const char *key, bool required, double largest, Vec3 *vector);

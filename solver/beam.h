@@ -6,7 +6,7 @@
 #ifndef SELDINGER_SOLVER_BEAM_H
 #define SELDINGER_SOLVER_BEAM_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 #include "solver/block_chain.h"
 
 typedef struct BeamRest {    // what an element is when nothing acts on it, (E) each

@@ -1,7 +1,6 @@
 // A chain of beam elements into the blocks of its linear system, LANES elements at a time: lanes compute element by element what
 // beam_equations.h says, then the tile is transposed into blocks. Compiled once per instruction set (beam_chain.inc).
-#include "base/assert.h"
-#include "base/simd_kernel.h"
+#include "base/base.h"
 #include "solver/beam_equations.h"
 
 #include <string.h>

@@ -1,7 +1,6 @@
 // One element: the equations of beam_equations.h, and what the chain and the sheath take from a length.
 #include "solver/beam_equations.h"
-#include "base/assert.h"
-#include "base/same_math.h"
+#include "base/base.h"
 
 void beam_element(const BeamInput *in, BeamOutput *out)
 {

@@ -27,7 +27,7 @@
 #ifndef SELDINGER_SOLVER_BEAM_EQUATIONS_H
 #define SELDINGER_SOLVER_BEAM_EQUATIONS_H
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 #include "solver/beam.h"
 
 #if defined(__GNUC__) && !defined(__clang__)

@@ -11,9 +11,8 @@
 // Pivots stay scalar: multiplying with explicit inverses of 6x6 blocks is faster by a third but loses the square root of the condition.
 #include "solver/block_chain.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "base/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>

@@ -6,9 +6,8 @@
 // Interleaved as in block_chain.c, and for the same reason.
 #include "solver/block_condense.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "base/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>

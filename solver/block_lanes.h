@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SOLVER_BLOCK_LANES_H
 #define SELDINGER_SOLVER_BLOCK_LANES_H
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <stddef.h>
 

@@ -5,9 +5,8 @@
 // The right-hand side travels as one more column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
 #include "solver/block_lu.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "base/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>

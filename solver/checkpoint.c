@@ -1,7 +1,7 @@
 // Checkpoints: everything that the next step depends on. Restored, a run repeats bit for bit.
 // The hash is FNV-1a taken word by word (8 bytes) in four lanes, with a shift that carries high bits down; bytes would cost 100 us.
 #include "solver/self_contact.h"
-#include "base/assert.h"
+#include "base/base.h"
 #include "solver/tools_internal.h"
 
 #include <stdlib.h>

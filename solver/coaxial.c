@@ -27,9 +27,8 @@
 // Left out: angle with length (torques), borders' second order, negative parts. Axial and torsion likewise: (dlen - dl - T df)^2, f = integral of dS / EA.
 #include "solver/coaxial.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "base/same_math.h"
 #include "solver/beam_equations.h"
 
 #include <stddef.h>

@@ -2,8 +2,7 @@
 //   F11 = F22 = 1 / (3 B) + 1 / S,  F12 = -1 / (6 B) + 1 / S,  their slopes with l_k:  b_k / (B^2 l_k) (1/3 or -1/6) - kappa G A_k / S^2
 #include "solver/coaxial_lanes.h"
 
-#include "base/assert.h"
-#include "base/simd_kernel.h"
+#include "base/base.h"
 #include "solver/beam_equations.h"
 
 #if defined(__GNUC__) && !defined(__clang__)

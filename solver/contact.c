@@ -6,7 +6,7 @@
 // follows their turns with its levers.
 #include "solver/contact.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include "solver/block_chain.h"
 

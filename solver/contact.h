@@ -25,7 +25,7 @@
 #ifndef SELDINGER_SOLVER_CONTACT_H
 #define SELDINGER_SOLVER_CONTACT_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 

@@ -4,7 +4,7 @@
 // with f0 the forces that r has already. W takes three solves of the chain a pair; then there are three equations a pair, eliminated with row pivoting.
 #include "solver/contact_forms.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -11,7 +11,7 @@
 #ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
 #define SELDINGER_SOLVER_CONTACT_ROWS_H
 
-#include "base/assert.h"
+#include "base/base.h"
 #include "solver/block_chain.h"
 
 #include <stdbool.h>

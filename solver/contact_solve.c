@@ -1,7 +1,7 @@
 // The two forms of a contact solve behind one call, and their work space.
 #include "solver/contact_solve.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include "solver/contact_forms.h"
 

@@ -1,8 +1,7 @@
 // exp(r/2) = (cos(a/2), sin(a/2) r/a), a = |r|, by series in (a/2)^2: what is cut is below 1e-16 at 2.5 rad.
 #include "solver/node_turn.h"
 
-#include "base/assert.h"
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 INLINE Quat turned(double rx, double ry, double rz, Quat q)
 {

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SOLVER_NODE_TURN_H
 #define SELDINGER_SOLVER_NODE_TURN_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #define NODE_TURN_MAX 2.5
 

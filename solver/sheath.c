@@ -11,9 +11,7 @@
 // whole. It is taken at the length of the step's end and at the curvature of its start, because curvature is what stays.
 #include "solver/sheath.h"
 
-#include "base/assert.h"
-
-#include "base/same_math.h"
+#include "base/base.h"
 
 // Unit, in the node's frame: the axis about which rest curvature turns, e3 turned about e1; half_y and half_z hold it times a sine.
 static Vec3 bending_axis(const BeamRest *rest, int index)

@@ -4,7 +4,7 @@
 // 3 mm. Elements longer than 10 mm would want more than 15, but bend no tool round so narrow a corner anyway.
 #include "solver/slot.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 static const double SPACING = 0.6;       // [mm] between contact points, at most
 enum { SLOTS_MAX = 15 };                 // of an element

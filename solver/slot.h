@@ -8,7 +8,7 @@
 #ifndef SELDINGER_SOLVER_SLOT_H
 #define SELDINGER_SOLVER_SLOT_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 typedef struct Slot {
     int element;

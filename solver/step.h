@@ -11,7 +11,7 @@
 #ifndef SELDINGER_SOLVER_STEP_H
 #define SELDINGER_SOLVER_STEP_H
 
-#include "geom/vessel.h"
+#include "geom/geom.h"
 #include "solver/contact_solve.h"
 #include "solver/wire.h"
 

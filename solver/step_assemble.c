@@ -6,7 +6,7 @@
 // Unknowns are six a node in space axes; for nodes in the sheath they are in the line's axes, so that "stays on the line" is unit rows.
 // Reactions are read from node 0's rows as they were before its constraints.
 #include "solver/tools_internal.h"
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <string.h>
 

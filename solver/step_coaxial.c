@@ -4,7 +4,7 @@
 // Mass: all tools at a node move together across the tangent t; along it each has its own velocity, t . dx/dt - dS/dt for one that lies inside, and its
 // own spin, t . omega + dphi/dt. What S carries from node to node (convection) is left out: of order v^2 dm/ds.
 #include "solver/coaxial_lanes.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "solver/tools_internal.h"
 
 #include <string.h>

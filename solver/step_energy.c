@@ -1,8 +1,7 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
 #include "solver/self_contact.h"
-#include "base/assert.h"
+#include "base/base.h"
 #include "solver/tools_internal.h"
-#include "base/same_math.h"
 
 static double element_energy(const Stepper *s, int i, int held)
 {

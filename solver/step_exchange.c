@@ -2,7 +2,7 @@
 // All that a step needs of the spare tools is made at the start, so that an exchange allocates nothing.
 #include "solver/tools_internal.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include <string.h>
 

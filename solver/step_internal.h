@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SOLVER_STEP_INTERNAL_H
 #define SELDINGER_SOLVER_STEP_INTERNAL_H
 
-#include "base/assert.h"
+#include "base/base.h"
 #include "solver/beam.h"
 #include "solver/coaxial.h"
 #include "solver/sheath.h"

@@ -1,7 +1,7 @@
 // Where a point of a tool is, how it moves, and what the wall does to the tool's end: for whoever watches a run step by step. No question to the vessel.
 #include "solver/tools_internal.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 static bool is_carrier(const Stepper *s, int c, int k) { return s->tool_count == 1 || s->carrier[c] == k; }
 static double material_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) ? s->wire.s[c] : slide_at(s, c, k); }

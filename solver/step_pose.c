@@ -1,7 +1,7 @@
 // What the iterate's pose says, and the way back to the step's start.
 #include "solver/tools_internal.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <string.h>
 

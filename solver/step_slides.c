@@ -4,9 +4,8 @@
 // M' over it, less T times the turn. Tools with clearance do not follow a jump of curvature at once: M is averaged over l = 7.3 sqrt(c / kappa), which the two
 // rods in contact give; else a couple at the end of a bend would bear a friction that grows without bound as elements shrink.
 
-#include "base/assert.h"
+#include "base/base.h"
 #include "solver/tools_internal.h"
-#include "base/same_math.h"
 
 static const double FOLLOWS = 7.3;
 static const double GIVE = 1e-4;         // [mm] by which tools that stick on each other follow a force, elastically

@@ -3,7 +3,7 @@
 // As tools slide, nodes come and go at the tips (where a tool leaves the one around it), and unknowns where an inner tip passes a node.
 #include "solver/tools_internal.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

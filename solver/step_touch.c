@@ -11,7 +11,7 @@
 // All is at the step's end: the tool slides by `slides`, so the point of the tool that will be there is as much behind.
 #include "solver/step_internal.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SOLVER_TOOLS_INTERNAL_H
 #define SELDINGER_SOLVER_TOOLS_INTERNAL_H
 
-#include "base/assert.h"
+#include "base/base.h"
 #include "solver/step_internal.h"
 
 #include <stdio.h>

@@ -5,9 +5,8 @@
 // about the axis), which is small but keeps the rotational blocks positive definite.
 #include "solver/wire.h"
 
-#include "base/assert.h"
+#include "base/base.h"
 
-#include "base/same_math.h"
 #include "solver/beam.h"
 
 #include <stdio.h>

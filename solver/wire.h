@@ -6,7 +6,7 @@
 #ifndef SELDINGER_SOLVER_WIRE_H
 #define SELDINGER_SOLVER_WIRE_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 #include <stdint.h>

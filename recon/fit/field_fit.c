@@ -1,8 +1,7 @@
 #include "recon/fit/field_fit.h"
 
-#include "base/heap.h"
-#include "base/sort_doubles.h"
-#include "geom/blobby.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/fit/field_refine.h"
 
 #include <stdlib.h>

@@ -10,8 +10,8 @@
 #ifndef SELDINGER_RECON_FIT_FIELD_FIT_H
 #define SELDINGER_RECON_FIT_FIELD_FIT_H
 
-#include "base/parallel.h"
-#include "geom/vessel_tree.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 typedef struct FieldFitOptions {
     // The mean residual below which no blob is added: a fifth of target_mm where that is given, else the larger of tolerance_voxels and tolerance; without a

@@ -1,7 +1,7 @@
 #include "recon/fit/field_model.h"
 
-#include "base/parallel.h"
-#include "geom/blob_flood.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 #include <stdlib.h>
 #include <string.h>

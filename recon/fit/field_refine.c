@@ -5,8 +5,7 @@
 // by size, none within 0.8 R of one taken before.
 #include "recon/fit/field_refine.h"
 
-#include "base/parallel.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

@@ -10,10 +10,8 @@
 // where they are violated. Without them a fit of signed blobs grows spurious sheets where there are no data.
 #include "recon/fit/field_rows.h"
 
-#include "base/parallel.h"
-#include "base/same_math.h"
-#include "geom/power_blocks.h"
-#include "geom/power_walk.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -5,7 +5,7 @@
 #ifndef SELDINGER_RECON_FIT_FIELD_ROWS_H
 #define SELDINGER_RECON_FIT_FIELD_ROWS_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/fit/fit_lanes.h"
 
 enum { FIELD_TILE = 64, GUARD_TILE = 128 };

@@ -4,8 +4,7 @@
 // linearisation holds |g| and the direction of g. A region is some two dozen blobs that follow each other along the tree; its rows are those of all
 // nodes that see one of them, so an accepted step lowers the sum of squares of the whole tree, independently of the other regions. Regions that share
 // a node's rows are solved one after the other, in the order of their colours: the result does not depend on the threads.
-#include "base/parallel.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/fit/field_model.h"
 #include "recon/fit/lim_energy.h"
 

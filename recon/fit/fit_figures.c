@@ -1,7 +1,6 @@
 #include "recon/fit/fit_figures.h"
 
-#include "base/heap.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

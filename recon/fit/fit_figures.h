@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_FIT_FIT_FIGURES_H
 #define SELDINGER_RECON_FIT_FIT_FIGURES_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 
 #include <cJSON.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "recon/fit/fit_lanes.h"
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <string.h>
 

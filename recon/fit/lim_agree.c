@@ -1,11 +1,8 @@
 // Rays from the node's centre to its own model's wall, as long as they stay in its cell, on rings about its direction; from there to the mixed wall.
 #include "recon/fit/lim_agree.h"
 
-#include "base/parallel.h"
-#include "base/same_math.h"
-#include "geom/blobby.h"
-#include "geom/power_walk.h"
-#include "geom/vessel.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 enum { RINGS = 15, AROUND = LIM_AGREED_MOST / RINGS, STRIDES = 30 };
 

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RECON_FIT_LIM_AGREE_H
 #define SELDINGER_RECON_FIT_LIM_AGREE_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 
 enum { LIM_AGREED_MOST = 240 };   // points of a node, at most
 

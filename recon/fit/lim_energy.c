@@ -9,7 +9,7 @@
 //   dkappa = dN / (2|g|^3) - 3 kappa g.dg / |g|^2
 #include "recon/fit/lim_energy.h"
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -6,7 +6,7 @@
 #ifndef SELDINGER_RECON_FIT_LIM_ENERGY_H
 #define SELDINGER_RECON_FIT_LIM_ENERGY_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stddef.h>
 

@@ -11,11 +11,8 @@
 // of the aneurysm); starting from scratch (1.3 times the jumps, more work).
 #include "recon/fit/lim_fit.h"
 
-#include "base/heap.h"
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
-#include "geom/blobby.h"
-#include "geom/power_walk.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/fit/lim_agree.h"
 
 #include <stdlib.h>

@@ -7,8 +7,8 @@
 #ifndef SELDINGER_RECON_FIT_LIM_FIT_H
 #define SELDINGER_RECON_FIT_LIM_FIT_H
 
-#include "base/parallel.h"
-#include "geom/vessel_tree.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/fit/lim_model.h"
 
 LimFitOptions lim_fit_default_options(void);

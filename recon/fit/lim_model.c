@@ -9,8 +9,8 @@
 // coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
 #include "recon/fit/lim_model.h"
 
-#include "base/same_math.h"
-#include "geom/blobby.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/fit/lim_energy.h"
 
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_FIT_LIM_MODEL_H
 #define SELDINGER_RECON_FIT_LIM_MODEL_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 

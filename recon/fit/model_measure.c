@@ -3,12 +3,8 @@
 // r = 5 mm came to lie up to 0.5 mm outside, where another vessel's cell begins that no tool in the lumen meets (2 mm of "jump").
 #include "recon/fit/model_measure.h"
 
-#include "base/parallel.h"
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
-#include "geom/blobby.h"
-#include "geom/power_walk.h"
-#include "geom/vessel.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/fit/lim_agree.h"
 
 #include <stdlib.h>

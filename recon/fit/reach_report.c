@@ -1,9 +1,8 @@
 // See reach_report.h.
 #include "recon/fit/reach_report.h"
 
-#include "geom/ghost_lumens.h"
-#include "base/heap.h"
-#include "geom/vessel_branches.h"
+#include "geom/geom.h"
+#include "base/base.h"
 
 enum { STOPS_SHOWN = 12, GHOSTS_SHOWN = 6 };
 

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_FIT_REACH_REPORT_H
 #define SELDINGER_RECON_FIT_REACH_REPORT_H
 
-#include "geom/reach.h"
+#include "geom/geom.h"
 
 #include <cJSON.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "recon/fit/tree_fit.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 #include "recon/volume/blurred_edge.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 // The synthetic shapes by name, and their options.
 #include "recon/phantom/phantom.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/phantom/phantom_parts.h"
 #include "recon/phantom/random_tree.h"
 

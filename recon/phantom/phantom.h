@@ -28,8 +28,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_H
 
-#include "geom/isosurface.h"
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/phantom/phantom_block.h"
 #include "recon/phantom/phantom_field.h"
 #include "recon/volume/volume.h"

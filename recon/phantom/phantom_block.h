@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_BLOCK_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_BLOCK_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 typedef struct ShapeBlock {  // a box
     Vec3 center, axis[3];    // unit, at right angles

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_FIELD_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_FIELD_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 

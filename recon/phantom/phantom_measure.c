@@ -2,10 +2,8 @@
 // model's, both as long as the ray stays in the node's power cell. 200 rays a node, Fibonacci directions.
 #include "recon/phantom/phantom_measure.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
-#include "geom/blobby.h"
-#include "geom/power_walk.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 #include <stdlib.h>
 

@@ -6,8 +6,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_PARTS_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_PARTS_H
 
-#include "geom/random.h"
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/phantom/phantom_block.h"
 
 #include <stdint.h>

@@ -1,7 +1,7 @@
 // Truth of a synthetic shape as a tree: nodes on the centreline with points on the true surface.
 #include "recon/phantom/phantom.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/phantom/phantom_parts.h"
 
 #include <stdlib.h>

@@ -4,8 +4,7 @@
 // that its second moment w^2 / 12 is the voxel's own. It adds to the blur: b^2 = psf^2 + w^2 / 12.
 #include "recon/phantom/phantom.h"
 
-#include "base/parallel.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/phantom/phantom_parts.h"
 
 #include <stdlib.h>

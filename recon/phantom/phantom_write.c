@@ -1,6 +1,6 @@
 #include "recon/phantom/phantom_write.h"
 
-#include "base/output.h"
+#include "base/base.h"
 #include "recon/tree_file.h"
 #include "recon/volume/volume_file.h"
 

@@ -1,6 +1,6 @@
 #include "recon/phantom/random_tree.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/phantom/phantom_field.h"
 
 #include <stdlib.h>

@@ -6,8 +6,8 @@
 #ifndef SELDINGER_RECON_PHANTOM_RANDOM_TREE_H
 #define SELDINGER_RECON_PHANTOM_RANDOM_TREE_H
 
-#include "base/faults.h"
-#include "geom/random.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/phantom/phantom_parts.h"
 
 typedef struct RandomTreeOptions {

@@ -1,7 +1,7 @@
 // See centreline_file.h. SWC: `id type x y z radius parent` a line (Cannon et al. 1998); a curve runs from a branching to the next or to an end.
 #include "recon/surface/centreline_file.h"
 
-#include "base/whole_file.h"
+#include "base/base.h"
 #include "recon/surface/vtp_file.h"
 
 #include <cjson/cJSON.h>

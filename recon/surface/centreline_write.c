@@ -1,7 +1,6 @@
 #include "recon/surface/centreline_write.h"
 
-#include "base/heap.h"
-#include "base/output.h"
+#include "base/base.h"
 #include "recon/surface/vtp_write.h"
 
 #include <cJSON.h>

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_RECON_SURFACE_CENTRELINE_WRITE_H
 #define SELDINGER_RECON_SURFACE_CENTRELINE_WRITE_H
 
-#include "base/faults.h"
-#include "geom/vessel_tree.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 #include <stdio.h>
 

@@ -5,8 +5,7 @@
 // bends exact curves at ends and ostia by half a radius.
 #include "recon/surface/import_curves.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

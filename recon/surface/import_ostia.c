@@ -5,7 +5,7 @@
 // radius of the branch from one and a half of its radii inside the parent's wall on.
 #include "recon/surface/import_ostia.h"
 
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/link_lattice.h"
 
 #include <stdlib.h>

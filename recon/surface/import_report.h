@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_REPORT_H
 #define SELDINGER_RECON_SURFACE_IMPORT_REPORT_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 

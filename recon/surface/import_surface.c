@@ -6,8 +6,7 @@
 // where inscribed spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/surface/import_surface.h"
 
-#include "base/heap.h"
-#include "base/parallel.h"
+#include "base/base.h"
 #include "recon/surface/import_ostia.h"
 #include "recon/surface/mesh_tree.h"
 

@@ -6,7 +6,7 @@
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_SURFACE_H
 #define SELDINGER_RECON_SURFACE_IMPORT_SURFACE_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/surface/centreline_file.h"
 #include "recon/surface/import_curves.h"
 #include "recon/surface/import_report.h"

@@ -3,8 +3,7 @@
 // pole lies an eighth of the lumen's area.
 #include "recon/surface/import_wall.h"
 
-#include "base/disjoint_sets.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/surface/mesh_edges.h"
 
 #include <stdlib.h>

@@ -8,7 +8,7 @@
 // lost).
 #include "recon/surface/mesh_centreline.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/surface/mesh_lumen.h"
 #include "recon/track/path_heap.h"
 
@@ -20,7 +20,7 @@ static const double LID_REACH = 3, LID_COSINE = 0.94, LID_SHARE = 0.15;   // a r
 static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6,   // LEAST: voxels
     PINCHED = 0.25;                                                                                                                  // of the narrower side
 
-typedef struct Finding {
+typedef struct LineSearch {
     const Lumen *lumen;
     const MeshTree *tree;
     const SurfaceMesh *mesh; // closed
@@ -37,7 +37,7 @@ typedef struct Finding {
     Vec3 cut;                // … and the first of those places
     int *end, end_count;     // the voxel at each free end; the start first …
     int *end_point;          // … and the curve's point a radius before it
-} Finding;
+} LineSearch;
 
 // --- paths ---
 
@@ -47,7 +47,7 @@ static int compare_tips(const void *a, const void *b)
     return x->way != y->way ? (x->way < y->way) - (x->way > y->way) : (x->place > y->place) - (x->place < y->place);
 }
 
-static bool find_ways(Finding *f, int start)
+static bool find_ways(LineSearch *f, int start)
 {
     const Lumen *l = f->lumen;
     for (int i = 0; i < l->count; i++) {
@@ -81,7 +81,7 @@ static bool find_ways(Finding *f, int start)
 }
 
 // Voxels that no neighbour is farther than, farthest first.
-static bool find_tips(Finding *f)
+static bool find_tips(LineSearch *f)
 {
     const Lumen *l = f->lumen;
     int room = 1024;
@@ -127,7 +127,7 @@ typedef struct Path {
     double first_radius, last_radius;    // of the spheres in which points are not centred: of those that the ends hang on; 0: free
 } Path;
 
-static double inscribed(const Finding *f, Vec3 p, double reach)
+static double inscribed(const LineSearch *f, Vec3 p, double reach)
 {
     Vec3 foot;
     int triangle = 0;
@@ -136,7 +136,7 @@ static double inscribed(const Finding *f, Vec3 p, double reach)
 }
 
 // Appends in steps of STEP radii.
-static bool path_to(const Finding *f, Path *path, Vec3 to)
+static bool path_to(const LineSearch *f, Path *path, Vec3 to)
 {
     Vec3 from = path->count ? path->point[path->count - 1] : to;
     double length = vec3_distance(from, to), done = 0;
@@ -185,7 +185,7 @@ static void path_free(Path *path)
 }
 
 // Moves the points between the walls that pairs of opposite rays square to the curve meet, and smooths; ends that hang on other curves stay.
-static void path_centre(const Finding *f, Path *path)
+static void path_centre(const LineSearch *f, Path *path)
 {
     for (int pass = 0; pass < CENTRING_PASSES; pass++) {
         // a free end follows its neighbours, except in the last passes
@@ -219,7 +219,7 @@ static void path_centre(const Finding *f, Path *path)
 
 // The middle of the flat lid ahead of a curve's last point: of the wall that rays meet in one direction, each ray for the area it stands for. The wall
 // of a tube or of a round tip has no such direction. `outward`: the curve's own.
-static bool find_lid(const Finding *f, Vec3 from, Vec3 outward, double radius, Vec3 *middle)
+static bool find_lid(const LineSearch *f, Vec3 from, Vec3 outward, double radius, Vec3 *middle)
 {
     Vec3 u = vec3_normal_to(outward), v = vec3_cross(outward, u), hit[LID_RAYS], normal[LID_RAYS];
     double area[LID_RAYS];
@@ -259,7 +259,7 @@ static bool find_lid(const Finding *f, Vec3 from, Vec3 outward, double radius, V
 }
 
 // Leads the last point on to the lid ahead, which is about a radius off; false if out of memory.
-static bool path_lead_out(const Finding *f, Path *path)
+static bool path_lead_out(const LineSearch *f, Path *path)
 {
     int tip = path->count - 1, back = tip;
     double radius = path->radius[tip], arc = 0;
@@ -296,7 +296,7 @@ static void path_trim(Path *path)
 }
 
 // The voxels within the curve points' inscribed spheres are theirs.
-static void own_spheres(Finding *f, int first_point)
+static void own_spheres(LineSearch *f, int first_point)
 {
     const Lumen *l = f->lumen;
     for (int i = first_point; i < f->set->point_count; i++) {
@@ -320,7 +320,7 @@ static void own_spheres(Finding *f, int first_point)
 }
 
 // `tip`: the set's point a radius before the last one's lid, `front`: before the first one's.
-static bool add_curve(Finding *f, Path *path, int *tip, int *front)
+static bool add_curve(LineSearch *f, Path *path, int *tip, int *front)
 {
     int first = f->set->point_count;
     if (path->count < 2)
@@ -343,7 +343,7 @@ static bool add_curve(Finding *f, Path *path, int *tip, int *front)
 }
 
 // Where the path from a voxel first is well within a curve's sphere, or the start.
-static int way_joins(const Finding *f, int voxel)
+static int way_joins(const LineSearch *f, int voxel)
 {
     while (f->from[voxel] >= 0 && !(f->owner[voxel] >= 0 && f->depth[voxel] < ATTACHED))
         voxel = f->from[voxel];
@@ -351,7 +351,7 @@ static int way_joins(const Finding *f, int voxel)
 }
 
 // Whether the path from a tip leaves the curves as far as a vessel or an aneurysm does, by more than a few voxels.
-static bool is_branch(const Finding *f, int tip)
+static bool is_branch(const LineSearch *f, int tip)
 {
     const float *d = f->lumen->distance;
     double widest = 0, sum = 0;
@@ -376,7 +376,7 @@ static bool is_branch(const Finding *f, int tip)
 }
 
 // A voxel next to the tip whose path comes from elsewhere: a loop closes at the tip. -1 if there is none. `join`: where the tip's path joins.
-static int beyond_loop(const Finding *f, int tip, int join)
+static int beyond_loop(const LineSearch *f, int tip, int join)
 {
     int place[3], best = -1;
     double farthest = 0;
@@ -400,7 +400,7 @@ static int beyond_loop(const Finding *f, int tip, int join)
     return best;
 }
 
-static bool path_along(const Finding *f, Path *path, int tip, int join)
+static bool path_along(const LineSearch *f, Path *path, int tip, int join)
 {
     bool good = true;
     for (int i = tip; good && i != join; i = f->from[i])
@@ -408,7 +408,7 @@ static bool path_along(const Finding *f, Path *path, int tip, int join)
     return good;
 }
 
-static bool path_end_at(const Finding *f, Path *path, int point)
+static bool path_end_at(const LineSearch *f, Path *path, int point)
 {
     Vec3 p = f->set->point[point];
     double radius = f->set->radius[point];
@@ -421,7 +421,7 @@ static bool path_end_at(const Finding *f, Path *path, int point)
 }
 
 // From the joint of a tip's path through the loop that closes there to the joint on the other side.
-static bool path_through(const Finding *f, Path *path, int tip, int join, int other)
+static bool path_through(const LineSearch *f, Path *path, int tip, int join, int other)
 {
     Path back = {0};
     int there = way_joins(f, other);
@@ -452,7 +452,7 @@ static bool is_pinched(const Path *path, Vec3 *place)
     return least >= 0 && path->radius[least] < PINCHED * fmin(before, after);
 }
 
-static bool add_branch(Finding *f, int tip)
+static bool add_branch(LineSearch *f, int tip)
 {
     Path path = {0};
     int join = way_joins(f, tip);
@@ -489,7 +489,7 @@ static bool add_branch(Finding *f, int tip)
 }
 
 // All curves of the lumen from a voxel at an end.
-static bool find_curves(Finding *f, int start)
+static bool find_curves(LineSearch *f, int start)
 {
     curve_set_free(f->set);
     f->set = curve_set_create();
@@ -579,7 +579,7 @@ static int label(const Lumen *l, const ImportOptions *options, int *component, i
 }
 
 // The voxel at the end nearest to the requested root, else at the widest end.
-static int choose_start(const Finding *f, const ImportOptions *options)
+static int choose_start(const LineSearch *f, const ImportOptions *options)
 {
     int best = f->end[0];
     double most = -INFINITY;
@@ -603,15 +603,15 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
     if (l) {
         size_t n = (size_t)l->count + 1;
         int *component = malloc(n * sizeof *component), start = -1;
-        Finding f = {.lumen = l,
-                     .tree = tree,
-                     .mesh = &closed,
-                     .component = component,
-                     .cost = malloc(n * sizeof(float)),
-                     .length = malloc(n * sizeof(float)),
-                     .from = malloc(n * sizeof(int)),
-                     .owner = malloc(n * sizeof(int)),
-                     .depth = malloc(n * sizeof(float))};
+        LineSearch f = {.lumen = l,
+                        .tree = tree,
+                        .mesh = &closed,
+                        .component = component,
+                        .cost = malloc(n * sizeof(float)),
+                        .length = malloc(n * sizeof(float)),
+                        .from = malloc(n * sizeof(int)),
+                        .owner = malloc(n * sizeof(int)),
+                        .depth = malloc(n * sizeof(float))};
         good = component && f.cost && f.length && f.from && f.owner && f.depth;
         f.wanted = good ? label(l, options, component, &start) : -1;
         // once from any end to find the ends, then from the root

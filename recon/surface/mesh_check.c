@@ -2,7 +2,7 @@
 // two triangles, then each component is turned outwards by the sign of its volume, openings closed by fans about their loops' middles.
 #include "recon/surface/mesh_check.h"
 
-#include "base/disjoint_sets.h"
+#include "base/base.h"
 #include "recon/surface/mesh_edges.h"
 
 #include <stdarg.h>

@@ -2,10 +2,7 @@
 // what passes through a common side and no row slips between them.
 #include "recon/surface/mesh_lumen.h"
 
-#include "base/disjoint_sets.h"
-#include "base/heap.h"
-#include "base/parallel.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/surface/mesh_edges.h"
 
 #include <stdlib.h>

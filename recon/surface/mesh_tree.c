@@ -2,7 +2,7 @@
 // (Ericson 2005, Real-Time Collision Detection, 5.1.5). Ray: Moeller and Trumbore 1997. Solid angle: Van Oosterom and Strackee 1983.
 #include "recon/surface/mesh_tree.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 

@@ -1,7 +1,6 @@
 #include "recon/surface/model_surface.h"
 
-#include "geom/surface_parts.h"
-#include "geom/tree_surface.h"
+#include "geom/geom.h"
 
 #include <inttypes.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_SURFACE_MODEL_SURFACE_H
 #define SELDINGER_RECON_SURFACE_MODEL_SURFACE_H
 
-#include "base/faults.h"
+#include "base/base.h"
 #include "recon/surface/surface_write.h"
 
 typedef struct ModelSurfaceOptions {

@@ -1,7 +1,7 @@
 // See surface_file.h. Text formats are read by a cursor over a NUL-terminated copy; once bad it stays bad.
 #include "recon/surface/surface_file.h"
 
-#include "base/whole_file.h"
+#include "base/base.h"
 #include "recon/surface/vtp_file.h"
 
 #include <limits.h>

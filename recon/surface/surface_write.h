@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_SURFACE_SURFACE_WRITE_H
 #define SELDINGER_RECON_SURFACE_SURFACE_WRITE_H
 
-#include "geom/isosurface.h"
+#include "geom/geom.h"
 
 #include <stdio.h>
 

@@ -4,8 +4,8 @@
 #ifndef SELDINGER_RECON_SURFACE_VTP_FILE_H
 #define SELDINGER_RECON_SURFACE_VTP_FILE_H
 
-#include "base/faults.h"
-#include "geom/linear.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 typedef struct VtpCells {
     int count;               // C

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_SURFACE_VTP_WRITE_H
 #define SELDINGER_RECON_SURFACE_VTP_WRITE_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdio.h>
 

@@ -1,7 +1,7 @@
 // Dijkstra's search over 26 neighbours on slices across the link, the first at its start, the last at its end.
 #include "recon/track/link_lattice.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/track/path_heap.h"
 
 #include <stdlib.h>

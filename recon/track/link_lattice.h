@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RECON_TRACK_LINK_LATTICE_H
 #define SELDINGER_RECON_TRACK_LINK_LATTICE_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 typedef struct LinkPath {    // {0}: none; free(point)
     Vec3 *point;             // (count) from the parent's axis to the child's first node

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_TRACK_LUMEN_LINES_H
 #define SELDINGER_RECON_TRACK_LUMEN_LINES_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 

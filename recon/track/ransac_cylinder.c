@@ -5,7 +5,7 @@
 // PRAXIS, keeps no state between calls.
 #include "recon/track/ransac_cylinder.h"
 
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,8 +3,7 @@
 #ifndef SELDINGER_RECON_TRACK_RANSAC_CYLINDER_H
 #define SELDINGER_RECON_TRACK_RANSAC_CYLINDER_H
 
-#include "geom/linear.h"
-#include "geom/random.h"
+#include "geom/geom.h"
 
 #include <stdint.h>
 

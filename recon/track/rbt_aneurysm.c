@@ -1,8 +1,6 @@
 #include "recon/track/rbt_aneurysm.h"
 
-#include "base/heap.h"
-#include "base/parallel.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/cast_rays.h"
 #include "recon/track/rbt_branch.h"
 #include "recon/track/rbt_trunk.h"

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_TRACK_RBT_ANEURYSM_H
 #define SELDINGER_RECON_TRACK_RBT_ANEURYSM_H
 
-#include "base/faults.h"
+#include "base/base.h"
 #include "recon/track/rbt_tracker.h"
 
 // Adds an aneurysm as branch `number`; false with a fault if it has no wall, or if memory runs out.

@@ -9,9 +9,7 @@
 // searched for tubes that leave it (rbt_exits.h), and the branch continues from the widest one that tracks.
 #include "recon/track/rbt_branch.h"
 
-#include "base/heap.h"
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/cast_rays.h"
 #include "recon/track/rbt_exits.h"
 #include "recon/track/rbt_paint.h"

@@ -3,8 +3,7 @@
 //
 // Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
 #include "recon/track/rbt_branches.h"
-#include "base/heap.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/rbt_branch.h"
 #include "recon/track/rbt_links.h"
 #include "recon/track/rbt_sacs.h"

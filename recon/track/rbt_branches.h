@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RECON_TRACK_RBT_BRANCHES_H
 #define SELDINGER_RECON_TRACK_RBT_BRANCHES_H
 
-#include "base/parallel.h"
+#include "base/base.h"
 #include "recon/track/rbt_residue.h"
 
 typedef struct RbtEnds {     // why each branch ended, by number; free both arrays

@@ -4,7 +4,7 @@
 // piece after one that is none is an exit. (Walking back from the last pieces instead missed exits that soon fork.)
 #include "recon/track/rbt_exits.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 
 #include <stdint.h>
 #include <stdlib.h>

@@ -2,8 +2,7 @@
 // voxels, with the same cost: the length of a step over the fourth power of the brightness between background (0) and the child's lumen (1).
 #include "recon/track/rbt_link_path.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/path_heap.h"
 #include "recon/volume/bspline.h"
 

@@ -2,7 +2,7 @@
 // (1), mean of its own and the spline's: it keeps to the middle and crosses what is dim only where it must.
 #include "recon/track/rbt_links.h"
 
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/track/rbt_branch.h"
 #include "recon/track/path_heap.h"
 #include "recon/volume/bspline.h"

@@ -8,8 +8,7 @@
 // Tried before: without nodes on the links 31 to 40 of 131 ostia stayed closed; a cylinder of the child's radius on the straight link opened them,
 // but not where the image shows the mouth.
 #include "recon/track/rbt_ostia.h"
-#include "base/parallel.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/lumen_lines.h"
 #include "recon/track/rbt_link_path.h"
 #include "recon/track/rbt_ring.h"

@@ -1,7 +1,7 @@
 // The parameters of the tracking: defaults, the paper's values, and the table used by trace files and --help.
 #include "recon/track/rbt_parameters.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 
 #include <stddef.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RECON_TRACK_RBT_PARAMETERS_H
 #define SELDINGER_RECON_TRACK_RBT_PARAMETERS_H
 
-#include "geom/linear.h"
+#include "geom/geom.h"
 
 #include <stdbool.h>
 #include <stddef.h>

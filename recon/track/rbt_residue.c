@@ -2,8 +2,7 @@
 // the pieces form a forest by reachability (as in rbt_exits.c). The deepest leaf with its path to the root is a limb, then the deepest of the rest,
 // and so on; short ones are ragged edges.
 #include "recon/track/rbt_residue.h"
-#include "base/heap.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/path_heap.h"
 #include "recon/volume/bspline.h"
 

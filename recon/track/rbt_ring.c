@@ -1,8 +1,7 @@
 // See rbt_ring.h. The level is half way between the background beside the vessel and the brightness at the ring's middle, so that a dim place has an edge too.
 #include "recon/track/rbt_ring.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/cast_rays.h"
 
 enum { SAMPLES_MOST = 160, SCALE_NODES = 8, ROUNDS = 2 };

@@ -5,8 +5,7 @@
 // An aneurysm that is not spherical gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its
 // walls the one whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A spherical one keeps a single centre.
 #include "recon/track/rbt_sacs.h"
-#include "base/heap.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/cast_rays.h"
 #include "recon/volume/bspline.h"
 

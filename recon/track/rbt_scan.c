@@ -3,8 +3,7 @@
 // takes the ring's third and fourth brightest twelfth for all of it, so that a neighbour may touch the vessel and a band scores nothing.
 #include "recon/track/rbt_scan.h"
 
-#include "base/parallel.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/volume/volume_noise.h"
 
 #include <stdlib.h>

@@ -2,8 +2,7 @@
 // nearest to their middles, weighed by length^-4, is nearer to the middle of the lumen, and the direction across which they lie is the axis.
 #include "recon/track/rbt_start.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/rbt_branch.h"
 
 #include <stdlib.h>

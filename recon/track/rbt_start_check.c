@@ -3,8 +3,7 @@
 // test_starts).
 #include "recon/track/rbt_start_check.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/track/rbt_scan.h"
 #include "recon/track/rbt_start.h"
 #include "recon/volume/volume_noise.h"

@@ -1,7 +1,7 @@
 // Builds the tree from its seeds: clicked branches, branches found from them, aneurysms, cuts and links, and the report.
 #include "recon/track/rbt_track.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 #include "recon/track/cast_rays.h"
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_aneurysm.h"

@@ -4,8 +4,8 @@
 #ifndef SELDINGER_RECON_TRACK_RBT_TRACK_H
 #define SELDINGER_RECON_TRACK_RBT_TRACK_H
 
-#include "base/parallel.h"
-#include "geom/vessel_tree.h"
+#include "base/base.h"
+#include "geom/geom.h"
 #include "recon/track/rbt_parameters.h"
 #include "recon/track/rbt_report.h"
 #include "recon/volume/volume.h"

@@ -1,6 +1,6 @@
 #include "recon/track/rbt_tracker.h"
 
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/volume/bspline.h"
 
 #include <stdlib.h>

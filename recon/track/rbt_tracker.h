@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RECON_TRACK_RBT_TRACKER_H
 #define SELDINGER_RECON_TRACK_RBT_TRACKER_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_parameters.h"
 #include "recon/track/rbt_report.h"

@@ -1,7 +1,6 @@
 #include "recon/track/segment_parameters.h"
 
-#include "base/heap.h"
-#include "base/same_math.h"
+#include "base/base.h"
 #include "recon/volume/blurred_edge.h"
 #include "recon/volume/volume_noise.h"
 

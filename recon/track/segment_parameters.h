@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_TRACK_SEGMENT_PARAMETERS_H
 #define SELDINGER_RECON_TRACK_SEGMENT_PARAMETERS_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/track/rbt_parameters.h"
 #include "recon/track/rbt_report.h"
 #include "recon/volume/volume.h"

@@ -1,8 +1,7 @@
 // YAML by libyaml's document interface: it keeps the line and column of every node, and this walker refuses what libyaml accepts (duplicate and
 // unknown keys, several documents).
 #include "recon/track/trace.h"
-#include "base/heap.h"
-#include "base/whole_file.h"
+#include "base/base.h"
 #include "recon/track/cast_rays.h"
 
 #include <stdio.h>
@@ -366,7 +365,7 @@ void trace_free(Trace *trace)
     free(trace);
 }
 
-static void yaml_fault(const yaml_parser_t *parser, const char *path, Faults *faults)
+static void report_yaml_error(const yaml_parser_t *parser, const char *path, Faults *faults)
 {
     faults_add(faults, path, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1,
                "is not YAML: %s; expected a map such as `branches: [...]`", parser->problem ? parser->problem : "unreadable");
@@ -411,7 +410,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
     trace->parameters = rbt_default_parameters();
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, length);
     if (!yaml_parser_load(&parser, &document)) {
-        yaml_fault(&parser, path, faults);
+        report_yaml_error(&parser, path, faults);
     } else {
         Walk walk = {&document, path, faults};
         yaml_node_t *root = yaml_document_get_root_node(&document);
@@ -422,7 +421,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
         bool has_root = root != NULL;
         yaml_document_delete(&document);
         if (has_root && !yaml_parser_load(&parser, &document)) {
-            yaml_fault(&parser, path, faults);
+            report_yaml_error(&parser, path, faults);
         } else if (has_root) {
             root = yaml_document_get_root_node(&document);
             if (root)

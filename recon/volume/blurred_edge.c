@@ -1,7 +1,6 @@
 #include "recon/volume/blurred_edge.h"
 
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 #include "recon/volume/bspline.h"
 
 #include <math.h>

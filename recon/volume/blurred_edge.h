@@ -2,7 +2,7 @@
 #ifndef SELDINGER_BLURRED_EDGE_H
 #define SELDINGER_BLURRED_EDGE_H
 
-#include "geom/vessel_tree.h"
+#include "geom/geom.h"
 #include "recon/volume/volume.h"
 
 // Where a disc of radius R blurred by b (standard deviation) is steepest [mm]: its slope is R/b^2 exp(-(R^2 + x^2) / (2 b^2)) I1(R x / b^2),

@@ -6,7 +6,7 @@
 // Lines are sampled in blocks: places and cells of a block at once, then sample by sample with the cell's taps in registers, which the next sample
 // mostly shares (a ray takes ten samples a voxel). Lanes of samples would have to gather each of their 64 taps.
 #include "recon/volume/bspline.h"
-#include "base/simd_kernel.h"
+#include "base/base.h"
 
 #include <string.h>
 

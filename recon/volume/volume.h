@@ -6,8 +6,8 @@
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_H
 #define SELDINGER_RECON_VOLUME_VOLUME_H
 
-#include "base/faults.h"
-#include "geom/linear.h"
+#include "base/base.h"
+#include "geom/geom.h"
 
 #include <stddef.h>
 

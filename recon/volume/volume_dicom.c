@@ -10,7 +10,7 @@
 // Two passes: headers of all files of the folder, then the samples file by file, so that no more than one file is in memory beside the volume.
 #include "recon/volume/volume_dicom.h"
 
-#include "base/regular_file.h"
+#include "base/base.h"
 #include "recon/volume/volume_dicom_pixels.h"
 
 #include <ctype.h>

@@ -1,7 +1,6 @@
 #include "recon/volume/volume_dicom_pixels.h"
 
-#include "base/process.h"
-#include "base/regular_file.h"
+#include "base/base.h"
 
 #include <errno.h>
 #include <fcntl.h>

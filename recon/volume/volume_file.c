@@ -1,8 +1,7 @@
 // Choice of the reader by content, the files that a volume is made of, NRRD output.
 #include "recon/volume/volume_file.h"
 
-#include "base/part_file.h"
-#include "base/regular_file.h"
+#include "base/base.h"
 #include "recon/volume/volume_dicom.h"
 #include "recon/volume/volume_metaimage.h"
 #include "recon/volume/volume_nifti.h"

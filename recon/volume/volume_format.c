@@ -4,7 +4,7 @@
 // stream cannot grow by more than 1032 times, a number written as text takes two bytes. Nor is more of a file read than its header promises.
 #include "recon/volume/volume_format.h"
 
-#include "base/regular_file.h"
+#include "base/base.h"
 
 #include <ctype.h>
 #include <errno.h>

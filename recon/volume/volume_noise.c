@@ -1,10 +1,7 @@
 // sigma = 1.4826 MAD / sqrt(2) for differences of independent values; the Gaussian is applied axis by axis.
 #include "recon/volume/volume_noise.h"
 
-#include "base/heap.h"
-#include "base/parallel.h"
-#include "base/same_math.h"
-#include "base/sort_doubles.h"
+#include "base/base.h"
 
 #include <stdlib.h>
 #include <string.h>

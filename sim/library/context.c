@@ -1,7 +1,7 @@
 #include "sim/library/context.h"
 
-#include "base/heap.h"
-#include "recon/hdf5_silence.h"
+#include "base/base.h"
+#include "recon/recon.h"
 #include "sim/library/allocator.h"
 
 #include <locale.h>

@@ -2,9 +2,8 @@
 #ifndef SELDINGER_SIM_LIBRARY_CONTEXT_H
 #define SELDINGER_SIM_LIBRARY_CONTEXT_H
 
-#include "base/faults.h"
-#include "base/parallel.h"
-#include "recon/tree_file.h"
+#include "base/base.h"
+#include "recon/recon.h"
 #include "seldinger/recording.h"
 #include "sim/open_vessel.h"
 #include "sim/recording.h"

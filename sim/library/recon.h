@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_LIBRARY_RECON_H
 #define SELDINGER_SIM_LIBRARY_RECON_H
 
-#include "recon/volume/volume.h"
+#include "recon/recon.h"
 #include "seldinger/recon.h"
 #include "sim/library/context.h"
 

@@ -1,10 +1,7 @@
 #include "sim/library/recon.h"
 
-#include "base/heap.h"
-#include "recon/fit/tree_fit.h"
-#include "recon/track/rbt_track.h"
-#include "recon/track/segment_parameters.h"
-#include "recon/track/trace.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <stdio.h>
 #include <stdlib.h>

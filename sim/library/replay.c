@@ -1,4 +1,4 @@
-#include "base/heap.h"
+#include "base/base.h"
 #include "sim/library/context.h"
 #include "sim/replay.h"
 

@@ -1,6 +1,6 @@
 #include "seldinger/simulator.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 #include "sim/library/context.h"
 #include "sim/lesson.h"
 

@@ -1,6 +1,6 @@
 #include "sim/library/recon.h"
 
-#include "base/heap.h"
+#include "base/base.h"
 #include "sim/library/wall_query.h"
 
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 #include "sim/library/recon.h"
 
-#include "base/heap.h"
-#include "recon/volume/volume_file.h"
+#include "base/base.h"
+#include "recon/recon.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_LIBRARY_WALL_QUERY_H
 #define SELDINGER_SIM_LIBRARY_WALL_QUERY_H
 
-#include "geom/vessel.h"
+#include "geom/geom.h"
 #include "seldinger/base.h"
 
 // `normal` may be NULL; the other pointers are not.

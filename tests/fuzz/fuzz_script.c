@@ -1,6 +1,6 @@
 // Any bytes as a script: a script that keeps its promises, or faults.
 // Covers: input/script.c base/number_table.c
-#include "input/input.h"
+#include "input/script.h"
 
 #include <stdint.h>
 #include <stdlib.h>

@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "base/number_table.h"
-#include "input/input.h"
+#include "input/script.h"
 
 #include <math.h>
 #include <stdio.h>

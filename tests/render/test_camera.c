@@ -9,14 +9,14 @@
 #include <cmocka.h>
 
 static uint32_t random_state;
-static double random_unit(void)
+static double draw_unit(void)
 {
     random_state = random_state * 1664525u + 1013904223u;
     return (double)(random_state >> 8) / (double)(1u << 24);
 }
 static Vec3 random_vector(void)
 {
-    double x = random_unit(), y = random_unit(), z = random_unit();
+    double x = draw_unit(), y = draw_unit(), z = draw_unit();
     return vec3(2 * x - 1, 2 * y - 1, 2 * z - 1);
 }
 
@@ -32,7 +32,7 @@ static void principal_axes_diagonalise(void **state)
     random_state = 1;
     for (int round = 0; round < 200; round++) {
         // a known spectrum, turned at random
-        double value[3], known[3] = {random_unit(), 1 + random_unit(), 3 + random_unit()};
+        double value[3], known[3] = {draw_unit(), 1 + draw_unit(), 3 + draw_unit()};
         Quat q = quat_from_rotation_vector(vec3_scale(random_vector(), 3));
         Sym3 a = {0};
         for (int k = 0; k < 3; k++) {

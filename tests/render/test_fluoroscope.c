@@ -170,7 +170,7 @@ static void noise_is_that_of_the_quanta(void **state)
         float part = 0.6f;
         s->frame.contrast = &part;
         room_draw(s);
-        Moments half[2] = {room_moments(s, 40, 40, 360, 180), room_moments(s, 40, 220, 360, 360)};
+        PixelMoments half[2] = {room_moments(s, 40, 40, 360, 180), room_moments(s, 40, 220, 360, 360)};
         for (int h = 0; h < 2; h++) {
             double attenuation = h ? 0.6 * 0.105 * 20 : 0, transmission = 0.27 * exp(-attenuation);
             // sigma of 1.75 I^0.72 where sigma of I is sqrt(I / quanta); a step of 255 adds 1/12
@@ -210,7 +210,7 @@ static void the_same_pulse_gives_the_same_picture(void **state)
     other->frame.pulse = 2;
     room_draw(other);
     assert_memory_equal(first, other->rgb, bytes);
-    Moments m = room_moments(other, 60, 60, 100, 100);
+    PixelMoments m = room_moments(other, 60, 60, 100, 100);
     for (int y = 60; y < 100; y++)
         for (int x = 60; x < 100; x++) {
             size_t at = (size_t)(y * 160 + x) * 3;
@@ -270,7 +270,7 @@ static void dsa_shows_the_vessel_alone(void **state)
     const CArm *c_arm = &s->view->c_arm;
     for (int y = 30; y < 290; y += 20)
         for (int x = 30; x < 290; x += 20) {
-            Moments m = room_moments(s, x, y, x + 20, y + 20);
+            PixelMoments m = room_moments(s, x, y, x + 20, y + 20);
             double a = anatomy_along(&s->view->anatomy, c_arm_source(c_arm), pixel_ray(c_arm, 320, x + 10, y + 10));
             double transmission = fmin(exp(s->view->tone.exposure - a), 1);
             double sigma = flat * s->view->options.dsa_gain * sqrt(2 / (s->view->options.quanta * s->view->options.dsa_dose * transmission));

@@ -64,10 +64,10 @@ static inline void room_draw(XrayRoom *s)
 // 0 to 255; y up.
 static inline int room_grey(const XrayRoom *s, int x, int y) { return s->rgb[((size_t)(s->side - 1 - y) * (size_t)s->side + (size_t)x) * 3]; }
 
-typedef struct Moments {
+typedef struct PixelMoments {
     double mean, deviation;
-} Moments;
-static inline Moments room_moments(const XrayRoom *s, int x0, int y0, int x1, int y1)
+} PixelMoments;
+static inline PixelMoments room_moments(const XrayRoom *s, int x0, int y0, int x1, int y1)
 {
     double sum = 0, square = 0, count = 0;
     for (int y = y0; y < y1; y++)
@@ -77,7 +77,7 @@ static inline Moments room_moments(const XrayRoom *s, int x0, int y0, int x1, in
             square += g * g;
             count++;
         }
-    return (Moments){sum / count, sqrt(fmax(square / count - sum / count * sum / count, 0))};
+    return (PixelMoments){sum / count, sqrt(fmax(square / count - sum / count * sum / count, 0))};
 }
 
 // A float layer, rows from the bottom; the caller's to free.

@@ -14,14 +14,14 @@
 
 static uint64_t seed = 7;
 
-static double random_unit(void)          // in [-1, 1]
+static double draw_unit(void)          // in [-1, 1]
 {
     seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
     return (double)(seed >> 11) * 0x1p-52 - 1;
 }
 static Vec3 random_vec(double scale)
 {
-    double x = random_unit(), y = random_unit(), z = random_unit();
+    double x = draw_unit(), y = draw_unit(), z = draw_unit();
     return vec3(scale * x, scale * y, scale * z);
 }
 
@@ -293,7 +293,7 @@ static void tangent_is_positive(void **state)
         beam_tangent(&in, &out, 1, &t);
         double u[12], q = 0;
         for (int i = 0; i < 12; i++)
-            u[i] = random_unit();
+            u[i] = draw_unit();
         for (int i = 0; i < 6; i++)
             for (int j = 0; j < 6; j++) {
                 q += u[i] * t.k11[i * 6 + j] * u[j] + u[6 + i] * t.k22[i * 6 + j] * u[6 + j] + 2 * u[6 + i] * t.k21[i * 6 + j] * u[j];
@@ -379,7 +379,7 @@ static void make_chain(Chain *c)
         Quat q = quat_from_rotation_vector(random_vec(0.2));
         p->x[i] = x.x, p->y[i] = x.y, p->z[i] = x.z;
         p->qw[i] = q.w, p->qx[i] = q.x, p->qy[i] = q.y, p->qz[i] = q.z;
-        m->mass[i] = 1 + random_unit(), m->lateral[i] = 1 + random_unit(), m->excess[i] = random_unit();
+        m->mass[i] = 1 + draw_unit(), m->lateral[i] = 1 + draw_unit(), m->excess[i] = draw_unit();
         m->ax[i] = a.x, m->ay[i] = a.y, m->az[i] = a.z, m->tx[i] = t.x, m->ty[i] = t.y, m->tz[i] = t.z;
     }
     wire_destroy(&wire);

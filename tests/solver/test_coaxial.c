@@ -17,14 +17,14 @@
 
 static uint64_t seed = 11;
 
-static double random_unit(void)          // in [-1, 1]
+static double draw_unit(void)          // in [-1, 1]
 {
     seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
     return (double)(seed >> 11) * 0x1p-52 - 1;
 }
 static Vec3 random_vec(double scale)
 {
-    double x = random_unit(), y = random_unit(), z = random_unit();
+    double x = draw_unit(), y = draw_unit(), z = draw_unit();
     return vec3(scale * x, scale * y, scale * z);
 }
 
@@ -45,31 +45,31 @@ static void make_mix(Mix *m, int count, bool borders, bool tip, double length, d
 {
     *m = (Mix){0};
     m->in.count = count;
-    bool spread = random_unit() > 0.5;
+    bool spread = draw_unit() > 0.5;
     for (int k = 0; k < count; k++) {
         bool ends = tip && k == count - 1 && k > 0;
-        double s1 = 3 * random_unit(), own = length * (1 + 0.01 * random_unit()), place[SECTIONS] = {s1 - 1, s1 + 20, s1 + 30};
+        double s1 = 3 * draw_unit(), own = length * (1 + 0.01 * draw_unit()), place[SECTIONS] = {s1 - 1, s1 + 20, s1 + 30};
         if (borders || ends)
-            place[0] = s1 + own * (0.12 + 0.1 * k + 0.03 * random_unit()), place[1] = s1 + own * (0.55 + 0.1 * k + 0.03 * random_unit());
+            place[0] = s1 + own * (0.12 + 0.1 * k + 0.03 * draw_unit()), place[1] = s1 + own * (0.55 + 0.1 * k + 0.03 * draw_unit());
         for (int i = 0; i < SECTIONS; i++) {
-            double bending = 40 + 20 * random_unit(), plane = PI * random_unit(), curvature = curl * random_unit();
+            double bending = 40 + 20 * draw_unit(), plane = PI * draw_unit(), curvature = curl * draw_unit();
             m->section[k][i] = (CoaxialSection){.end = place[i],
                                                 .bending = bending,
-                                                .axial = 2e3 * (1.5 + 0.5 * random_unit()),
+                                                .axial = 2e3 * (1.5 + 0.5 * draw_unit()),
                                                 .torsion = bending / 1.3,
-                                                .shear = 5e2 * (1.5 + 0.5 * random_unit()),
+                                                .shear = 5e2 * (1.5 + 0.5 * draw_unit()),
                                                 .curve = {curvature * cos(plane), curvature * sin(plane)}};
         }
         m->tool[k] = (CoaxialTool){ends ? 2 : SECTIONS, m->section[k]};
-        double phi = PI * random_unit();
+        double phi = PI * draw_unit();
         m->in.span[k] = (CoaxialSpan){
-            .tool = &m->tool[k], .s1 = s1, .s2 = s1 + own, .phi1 = phi, .phi2 = phi + bend * random_unit(), .has_tip = ends, .spread = spread ? 2 * length : 0};
+            .tool = &m->tool[k], .s1 = s1, .s2 = s1 + own, .phi1 = phi, .phi2 = phi + bend * draw_unit(), .has_tip = ends, .spread = spread ? 2 * length : 0};
     }
     m->in.x1 = random_vec(1);
     m->in.q1 = quat_from_rotation_vector(random_vec(2));
-    Vec3 half = random_vec(0.5 * bend), twist = vec3(bend * random_unit(), 0, 0);
+    Vec3 half = random_vec(0.5 * bend), twist = vec3(bend * draw_unit(), 0, 0);
     Quat middle = quat_mul(m->in.q1, quat_from_rotation_vector(half));
-    double along = length * (1 + 0.003 * random_unit()), aside = 0.1 * bend * length * random_unit(), up = 0.1 * bend * length * random_unit();
+    double along = length * (1 + 0.003 * draw_unit()), aside = 0.1 * bend * length * draw_unit(), up = 0.1 * bend * length * draw_unit();
     m->in.x2 = vec3_add(m->in.x1, quat_rotate(middle, vec3(along, aside, up)));
     m->in.q2 = quat_mul(quat_mul(middle, quat_from_rotation_vector(half)), quat_from_rotation_vector(vec3_add(twist, random_vec(0.3 * bend))));
 }

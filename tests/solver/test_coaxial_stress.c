@@ -18,17 +18,17 @@
 enum { STEPS = 1500, SAVED = 700, RESTORED = 900, SECTIONS = 3 };
 static const double HAND_LIMIT = 20;
 
-typedef struct Random {
+typedef struct Draws {
     uint64_t state;
-} Random;
+} Draws;
 
-static double draw(Random *random, double low, double high)
+static double draw(Draws *random, double low, double high)
 {
     random->state = random->state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
     return low + (high - low) * (double)(random->state >> 11) / 9007199254740992.0;
 }
 
-static double draw_log(Random *random, double low, double high) { return exp(draw(random, log(low), log(high))); }
+static double draw_log(Draws *random, double low, double high) { return exp(draw(random, log(low), log(high))); }
 
 typedef struct Run {
     WireSection section[4][SECTIONS];
@@ -46,7 +46,7 @@ typedef struct Outcome {
     double gained, work;
 } Outcome;
 
-static void make_tool(Run *run, Random *random, int k, double outer, double inner)
+static void make_tool(Run *run, Draws *random, int k, double outer, double inner)
 {
     double modulus = inner > 0 ? draw_log(random, 300, 10000) : draw_log(random, 5000, 230000), softer = draw(random, 0.1, 1), curved = draw(random, 0, 1);
     double length[SECTIONS] = {260 + 95 * k, draw(random, 5, 30), draw(random, 3, 25)};
@@ -81,7 +81,7 @@ static void make_tool(Run *run, Random *random, int k, double outer, double inne
     o->has_sheath = true;
 }
 
-static bool make(Run *run, Random *random)
+static bool make(Run *run, Draws *random)
 {
     *run = (Run){0};
     run->tools = 2 + (int)draw(random, 0, 3);
@@ -114,7 +114,7 @@ typedef struct Hands {       // each keeps a speed for a while
     unsigned released;
 } Hands;
 
-static void renew(Hands *hands, Random *random, int tools)
+static void renew(Hands *hands, Draws *random, int tools)
 {
     for (int k = 0; k < tools; k++) {
         double what = draw(random, 0, 1);
@@ -139,7 +139,7 @@ static void step(Stepper *s, const Hands *hands)
     step_solve(s);
 }
 
-static Outcome drive(Run *run, Random *random, bool speaks)
+static Outcome drive(Run *run, Draws *random, bool speaks)
 {
     Outcome out = {.repeats = true, .is_finite = true};
     Hands hands[STEPS];
@@ -188,7 +188,7 @@ static bool is_good(const Outcome *o) { return !o->diverged && o->repeats && o->
 
 static bool run_seed(int seed, Outcome *out, bool speaks)
 {
-    Random random = {UINT64_C(0x9e3779b97f4a7c15) * (uint64_t)(seed + 1)};
+    Draws random = {UINT64_C(0x9e3779b97f4a7c15) * (uint64_t)(seed + 1)};
     for (int i = 0; i < 8; i++)
         draw(&random, 0, 1);
     Run run;

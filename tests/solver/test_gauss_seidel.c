@@ -151,7 +151,7 @@ static ContactReport problem_solve(Problem *p, ContactForm form, int iterations,
     return contact_solve(p->solver, &p->chain, p->factor, p->b, &p->set, &o, p->u);
 }
 
-static Vec3 random_unit(void)
+static Vec3 draw_unit(void)
 {
     for (;;) {
         Vec3 v = {uniform(), uniform(), uniform()};
@@ -169,7 +169,7 @@ static void problem_randomise(Problem *p, double young, double length, double fr
            phi = 12 * young * inertia / (0.886 * shear * area * length * length);
     double k = young * inertia / (1 + phi), a = 12 * k / pow(length, 3), b = 6 * k / pow(length, 2), c = (4 + phi) * k / length, dd = (2 - phi) * k / length;
     double ka = young * area / length, g = shear * 2 * inertia / length, mass = 6.45e-3 * area * length;
-    Vec3 t = random_unit();
+    Vec3 t = draw_unit();
     const double tv[3] = {t.x, t.y, t.z};
     Mat3 cross = mat3_skew(t);
     memset(p->chain.diag, 0, (size_t)m * 36 * sizeof(double));
@@ -194,7 +194,7 @@ static void problem_randomise(Problem *p, double young, double length, double fr
     assert_true(block_chain_factor(&p->chain, p->factor));
     Vec3 side = vec3_normal_to(t), other = vec3_cross(t, side);
     for (int i = 0; i < m; i++) {
-        Vec3 v = vec3_scale(random_unit(), 0.02 * uniform());
+        Vec3 v = vec3_scale(draw_unit(), 0.02 * uniform());
         v = vec3_add_scaled(v, 0.05, t);
         p->b[6 * i] = mass * v.x, p->b[6 * i + 1] = mass * v.y, p->b[6 * i + 2] = mass * v.z;
     }
@@ -202,7 +202,7 @@ static void problem_randomise(Problem *p, double young, double length, double fr
     double wave = pow(k / (mass / length), 0.25), load = 2 * k / pow(wave, 3);
     for (int n = 0; n < 3; n++) {
         int i = (int)(fabs(uniform()) * m);
-        Vec3 f = vec3_scale(random_unit(), uniform() * load);
+        Vec3 f = vec3_scale(draw_unit(), uniform() * load);
         p->b[6 * i] += f.x, p->b[6 * i + 1] += f.y, p->b[6 * i + 2] += f.z;
     }
     for (int n = 0; n < p->set.count; n++) {
@@ -348,7 +348,7 @@ static void survives_random_problems(void **state)
         problem_randomise(&p, young, length, friction, t / 160 % 2 ? -0.02 : 0.004);
         for (int i = 0; i < contacts; i++) {
             if (t % 5 == 1)
-                p.set.point[i].force = vec3_scale(random_unit(), 10);
+                p.set.point[i].force = vec3_scale(draw_unit(), 10);
             if (t % 5 == 2)
                 p.set.point[i].force = vec3_scale(p.set.point[i].normal, 1e-3);
             if (t % 5 == 3 && i == 0)
@@ -601,7 +601,7 @@ static void levers(void **state)
             ContactPoint *c = &p.set.point[i];
             c->xi = i % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0;
             for (int e = 0; e < 2; e++)
-                c->lever[e] = vec3_add_scaled(c->lever[e], 0.1, random_unit());
+                c->lever[e] = vec3_add_scaled(c->lever[e], 0.1, draw_unit());
         }
         ContactPoint block[K];
         ContactReport a = problem_solve(&p, CONTACT_BLOCK, 200, 1e-9);
@@ -638,9 +638,9 @@ static void curvature_follows_levers(void **state)
                 chain.diag[36 * i + 7 * k] = 2;
         for (int k = 0; k < 36; k++)
             chain.lower[k] = chain.lower[36 + k] = 0.1; // no unit rows
-        ContactPoint c = {.node = 1, .xi = trial % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0, .tool_radius = 0.3, .normal = random_unit()};
+        ContactPoint c = {.node = 1, .xi = trial % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0, .tool_radius = 0.3, .normal = draw_unit()};
         for (int e = 0; e < 2; e++)
-            c.lever[e] = vec3_scale(random_unit(), 0.5);
+            c.lever[e] = vec3_scale(draw_unit(), 0.5);
         Vec3 e = vec3_normal_to(c.normal), f = vec3_cross(c.normal, e);
         double along = -0.5 - fabs(uniform()), across = -0.2; // hollow: both eigenvalues of -H positive
         c.hessian = (Sym3){along * e.x * e.x + across * f.x * f.x, along * e.x * e.y + across * f.x * f.y, along * e.x * e.z + across * f.x * f.z,

@@ -17,17 +17,17 @@
 
 static uint64_t seed = 11;
 
-static double random_unit(void)          // in [-1, 1]
+static double draw_unit(void)          // in [-1, 1]
 {
     seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
     return (double)(seed >> 11) * 0x1p-52 - 1;
 }
 static Vec3 random_vec(double scale)
 {
-    double x = random_unit(), y = random_unit(), z = random_unit();
+    double x = draw_unit(), y = draw_unit(), z = draw_unit();
     return vec3(scale * x, scale * y, scale * z);
 }
-static Quat random_turn(void) { return quat_from_rotation_vector(vec3_scale(vec3_unit(random_vec(1)), 3 * random_unit())); }
+static Quat random_turn(void) { return quat_from_rotation_vector(vec3_scale(vec3_unit(random_vec(1)), 3 * draw_unit())); }
 
 // --- a chain of its own, without a stepper ---
 
@@ -213,7 +213,7 @@ static void force_is_the_derivative_of_energy(void **state)
     chain_force(&c, b);
     double power = 0;
     for (int k = 0; k < UNKNOWNS; k++) {
-        u[k] = random_unit();
+        u[k] = draw_unit();
         power -= b[k] * u[k];
     }
     for (double h = 4e-3; h > 4e-4; h /= 2) {
@@ -243,7 +243,7 @@ static double tangent_error(double curl, double h)
     chain_force(&c, b);
     seed = 5;
     for (int k = 0; k < UNKNOWNS; k++)
-        u[k] = random_unit();
+        u[k] = draw_unit();
     block_chain_multiply(&c.blocks, u, product);
     double size = fmax(largest(product, 0, 6, UNKNOWNS), largest(product, 3, 6, UNKNOWNS));
     for (int s = 0; s < 2; s++) {

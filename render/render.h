@@ -1,0 +1,21 @@
+// render: window, views, pictures, films and pages of reports. Uses base, geom, recon, input and sim. What draws needs OpenGL 3.3 through EGL.
+#ifndef SELDINGER_RENDER_RENDER_H
+#define SELDINGER_RENDER_RENDER_H
+
+// pages
+#include "render/page_pdf.h"
+#include "render/session_report.h"
+#include "render/tree_page.h"
+
+// pictures and films
+#include "render/film.h"
+#include "render/picture.h"
+#include "render/picture_model.h"
+#include "render/picture_moments.h"
+
+// the window
+#include "render/replay_window.h"
+#include "render/trainer.h"
+#include "render/trainer_figures.h"
+
+#endif
