@@ -114,7 +114,7 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const Ste
     for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
         int64_t start = trace ? bench_cpu_ns() : 0;
         Command command = bench_command(scene, i, &cursor);
-        simulator_step(simulator, command);
+        simulator_step_one_tool(simulator, command);
         fed = fmin(length, fmax(0, fed + command.push_mm_s * scene->dt / 1000));
         if (trace) {
             trace->us[i] = (double)(bench_cpu_ns() - start) / 1000;

@@ -369,7 +369,7 @@ static bool loop_step(Simulator *simulator, const Scene *scene, const LoopOption
     const WireState *state = simulator_state(simulator);
     if (o->without_friction)
         memcpy(judge->before, state->position, (size_t)judge->node_count * sizeof *judge->before);
-    simulator_step(simulator, command);
+    simulator_step_one_tool(simulator, command);
     const StepReport *report = simulator_last(simulator);
     double fed = fmin(hand->length, fmax(0, hand->fed + command.push_mm_s * scene->dt / 1000));
     hand->travel += fabs(fed - hand->fed);

@@ -46,7 +46,7 @@ static bool take_moments(Studio *studio, Faults *faults)
     int64_t steps = bench_steps(scene, 6000), first = steps > MOMENTS * 33 ? steps - MOMENTS * 33 : 0;
     for (int64_t i = 0, taken = 0; good && taken < MOMENTS; i++) {
         ToolCommands commands = scene->script ? script_tools_at(scene->script, (double)i * scene->dt / 1000, &cursor) : (ToolCommands){0};
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         lesson_step(lesson, simulator, &commands, &xray);
         if (i < first || (i - first) % 33 != 0)
             continue;

@@ -77,7 +77,7 @@ static double force_difference(const NodeReport *node, const NodeReport *exact, 
 static void solve_again(Simulator *solver, const Checkpoint *start, Command command, NodeReport *node)
 {
     stepper_restore(simulator_stepper(solver), start);
-    simulator_step(solver, command);
+    simulator_step_one_tool(solver, command);
     stepper_node_report(simulator_stepper(solver), node);
 }
 
@@ -91,7 +91,7 @@ static void compare_forces(Simulator *const solver[SOLVERS], const Scene *scene,
     for (int64_t i = 0; i < steps; i++) {
         Command command = bench_command(scene, i, &cursor);
         start = stepper_save(simulator_stepper(solver[RUN]), start);
-        simulator_step(solver[RUN], command);
+        simulator_step_one_tool(solver[RUN], command);
         bool capped = simulator_last(solver[RUN])->flags & STEP_NOT_CONVERGED;
         if ((i % every != 0 && !capped) || !start || simulator_last(solver[RUN])->active == 0)
             continue;
@@ -259,7 +259,7 @@ void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, dou
     Detection d = {.vessel = vessel, .reach = 1};   // the query range of a step at this speed
     for (int64_t i = 0; i <= step; i++) {
         memcpy(before, simulator_state(simulator)->position, (size_t)nodes * sizeof *before);
-        simulator_step(simulator, bench_command(scene, i, &cursor));
+        simulator_step_one_tool(simulator, bench_command(scene, i, &cursor));
     }
     stepper_node_report(simulator_stepper(simulator), node);
     for (int i = 0; i < nodes; i++)

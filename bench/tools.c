@@ -84,7 +84,7 @@ static bool run(const Scene *scene, const Vessel *vessel, double depth, double s
     int64_t steps = quick ? 200 : (int64_t)(end_s * 1000 / scene->dt), begin = bench_cpu_ns();
     for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
         ToolCommands commands = commands_at(scene->tool_count, (double)i * scene->dt / 1000, feed_s, speed);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         for (int k = 0; k < scene->tool_count; k++)
             row->push_most = fmax(row->push_most, fabs(simulator_last(simulator)->push[k]));
     }

@@ -36,7 +36,7 @@ bool wall_stiff_run(const Vessel *vessel, double diameter_mm, double length_mm, 
         double fed = simulator_state(simulator)->inserted;
         for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
             Command command = bench_command(scene, i, &cursor);
-            simulator_step(simulator, command);
+            simulator_step_one_tool(simulator, command);
             fed = fmin(length_mm, fed + command.push_mm_s * scene->dt / 1000);
             const StepReport *last = simulator_last(simulator);
             out->deepest_mm = fmax(out->deepest_mm, last->penetration);

@@ -117,7 +117,7 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
             commands = options->hand(options->hand_context);
         else
             commands = settled(&commands);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
         bool goes_on = !options->after_step || options->after_step(options->context, simulator, &commands);
         if (options->paced)

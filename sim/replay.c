@@ -28,7 +28,7 @@ ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_
     int64_t count = steps < 0 || steps > run->step_count ? run->step_count : steps;
     for (int64_t i = 0; i < count; i++) {
         ToolCommands commands = recorded_run_commands(run, i);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         verdict.steps = i + 1;
         if (verdict.first_different < 0) {
             verdict.recorded = run->state_hash[i];

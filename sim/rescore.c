@@ -67,7 +67,7 @@ void rescore_advance(Rescore *rescore, int64_t to, double budget_s)
     while (rescore->different < 0 && rescore->steps < to && clock_s(CLOCK_MONOTONIC) < until) {
         int64_t i = rescore->steps++;
         ToolCommands commands = recorded_run_commands(run, i);
-        simulator_step_tools(rescore->simulator, &commands);
+        simulator_step(rescore->simulator, &commands);
         lesson_step(rescore->lesson, rescore->simulator, &commands, rescore->was_watched ? &run->xray[i] : NULL);
         if (simulator_hash(rescore->simulator) != run->state_hash[i])
             rescore->different = i;

@@ -1,4 +1,4 @@
-// Scores a trainee's run: figures, handling errors, points. One Score per simulator, stepped by the same thread right after each simulator_step; the
+// Scores a trainee's run: figures, handling errors, points. One Score per simulator, stepped by the same thread right after each simulator_step(); the
 // figures are plain data to be copied into a pose. The same steps give the same figures, so a replay has the session's score. A step allocates
 // nothing, makes no vessel query and takes well under 1 us; the tip is located in the tree every 10 ms.
 //
@@ -48,7 +48,7 @@ typedef struct Score Score;
 // To be called before the first step. `tree` may be NULL (no tree) and must outlive the score. NULL if out of memory.
 Score *score_create(Simulator *simulator, const VesselTree *tree);
 void score_free(Score *score);
-// To be called after each simulator_step, with the same arguments. `xray` NULL: no viewer, so no motion counts as blind.
+// To be called after each simulator_step(), with the same arguments. `xray` NULL: no viewer, so no motion counts as blind.
 void score_step(Score *score, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 ScoreFigures score_figures(const Score *score);
 const ScoreEvent *score_events(const Score *score, int *count);

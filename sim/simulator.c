@@ -199,7 +199,7 @@ static void accumulate(Simulator *simulator)
     measure_targets(simulator);
 }
 
-void simulator_step(Simulator *simulator, Command command) { simulator_step_tools(simulator, &(ToolCommands){.tool = {command}}); }
+void simulator_step_one_tool(Simulator *simulator, Command command) { simulator_step(simulator, &(ToolCommands){.tool = {command}}); }
 
 // A refused exchange is not retried until the command changes.
 static void exchange(Simulator *simulator, const ToolCommands *commands)
@@ -224,7 +224,7 @@ static void exchange(Simulator *simulator, const ToolCommands *commands)
     }
 }
 
-void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
+void simulator_step(Simulator *simulator, const ToolCommands *commands)
 {
     exchange(simulator, commands);
     Stepper *stepper = simulator->stepper;
@@ -248,9 +248,10 @@ void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
             step_factor(stepper);
             lap(&clock, STAGE_FACTOR);
         }
-        step_contact(stepper);
+        ContactProblem contacts = step_contacts(stepper);
+        ContactReport solved = contact_solve(&contacts);
         lap(&clock, STAGE_CONTACT);
-        needs = step_judge(stepper);
+        needs = step_judge(stepper, &solved);
         lap(&clock, STAGE_JUDGE);
     }
     step_correct(stepper);

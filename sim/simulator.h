@@ -78,8 +78,8 @@ typedef struct Simulator Simulator;
 Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults);
 void simulator_destroy(Simulator *simulator);
 
-void simulator_step(Simulator *simulator, Command command);       // with several tools the inner ones are pinned
-void simulator_step_tools(Simulator *simulator, const ToolCommands *commands);
+void simulator_step_one_tool(Simulator *simulator, Command command);       // with several tools the inner ones are pinned
+void simulator_step(Simulator *simulator, const ToolCommands *commands);
 
 // Watches the energy from now on: costs about one assembly per step, outside the timed stages.
 void simulator_watch_energy(Simulator *simulator);

@@ -86,8 +86,8 @@ static void add_levered(double *block, int stride, double k[3][3], double w, Vec
 static void add_push(const ContactPoint *p, Vec3 push, const unsigned mask[2], int n, double *b)
 {
     const double weight[2] = {1 - p->xi, p->xi};
-    for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++) {
-        Vec3 f = vec3_scale(push, weight[e]), m = p->xi > 0 ? vec3_cross(p->lever[e], push) : vec3(0, 0, 0);
+    for (int e = 0; e < (p->is_between ? 2 : 1); e++) {
+        Vec3 f = vec3_scale(push, weight[e]), m = p->is_between ? vec3_cross(p->lever[e], push) : vec3(0, 0, 0);
         const double all[6] = {f.x, f.y, f.z, m.x, m.y, m.z};
         for (int r = 0; r < 6; r++)
             b[(size_t)n * (size_t)(p->node + e) + (size_t)r] += mask[e] >> r & 1 ? all[r] : 0;
@@ -129,7 +129,7 @@ void contact_add_curvature(const ContactSet *set, BlockChain *chain, double *b)
         double force = vec3_dot(p->force, p->normal);
         if (!(force > 0))
             continue;
-        bool has_two = p->xi > 0 && p->node + 1 < chain->count;
+        bool has_two = p->is_between && p->node + 1 < chain->count;
         const unsigned mask[2] = {contact_free_dofs(chain, p->node), has_two ? contact_free_dofs(chain, p->node + 1) : 0};
         if (p->roll > 0 && has_two)
             add_roll(p, force, mask, chain, b);

@@ -31,7 +31,8 @@
 
 typedef struct ContactPoint {
     int node;
-    double xi;               // [0, 1); 0: at the node, the usual case
+    bool is_between;         // nodes `node` and node + 1; false: at the node, the usual case
+    double xi;               // [0, 1) share of node + 1
     Vec3 lever[2];           // [mm] how the axis at a point between nodes follows the turns of its two nodes (a cubic's slopes); 0 at a node
     Vec3 normal;             // unit, into the lumen
     double gap;              // [mm] at x_n, tool radius already taken off

@@ -94,7 +94,7 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slide
                         .chain_node = p->node,
                         .stride = chain->size,
                         .point = i,
-                        .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1,
+                        .nodes = p->is_between && p->node + 1 < chain->count ? 2 : 1,
                         .weight = {1, 0},
                         .normal = p->normal,
                         .gap = p->gap,

@@ -95,36 +95,9 @@ void contact_solver_destroy(ContactSolver *s)
 
 bool contact_needs_factor(const ContactSet *set, const ContactOptions *options) { return set->slide_count == 0 || options->form == CONTACT_POINTWISE; }
 
-ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
-                            const ContactOptions *options, double *u)
+static void take_forces(const ContactSolver *solver, int count, ContactSet *set)
 {
-    SEL_REQUIRE(set->count + set->slide_count <= solver->capacity, "the solver has room for all contacts and slides");
-    SEL_REQUIRE(chain->count <= solver->node_count && chain->size == solver->matrix.size, "the solver was made for such a chain");
-    SEL_ASSERT(options->max_iterations > 0 && options->tolerance > 0, "a solve may iterate");
-    bool by_points = options->form == CONTACT_POINTWISE;
-    int count = contact_rows_fill(set, chain, !by_points, solver->row, contact_pairs_far(solver->pairs)), all = set->count + set->slide_count + set->pair_count;
-    solver->banded = count - set->pair_count;
-    solver->wall_count = 0;
-    for (int i = 0; i < solver->banded; i++)
-        if (!solver->row[i].slide)
-            solver->wall[solver->wall_count++] = i;
-    ContactReport report;
-    if (!by_points)
-        block_condenser_survey(solver->condenser, chain);
-    for (int i = count; i < all; i++) {
-        const double *slip = set->slide[solver->row[i].point].slip;
-        bool known = isfinite(slip[0]) && isfinite(slip[1]);
-        solver->motion[i] = vec3(known && solver->row[i].mask[0] & 1 ? slip[0] : 0, known && solver->row[i].mask[0] & 2 ? slip[1] : 0, 0);
-    }
-    if (by_points)
-        report = contact_pointwise(solver, chain, factor, b, count, options, u);
-    else if (count < all)
-        report = contact_slides(solver, chain, b, count, all, options, u);
-    else if (!contact_condensed(solver, chain, b, count, options, u, &report))
-        report = contact_newton(solver, chain, factor, b, count, options, u);
-    if (!by_points)
-        contact_cut(solver, count, &report);
-    for (int i = 0; i < all; i++) {
+    for (int i = 0; i < count; i++) {
         const ContactRow *c = &solver->row[i];
         if (c->far) {
             set->pair[c->point].force = c->force;
@@ -137,5 +110,59 @@ ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, cons
             set->point[c->point].force = c->force;
         }
     }
+}
+
+// The rows of the set: contacts with walls and pairs first, slides after them. Returns the number of the former.
+static int fill_rows(const ContactProblem *problem, bool by_points, int all)
+{
+    ContactSolver *solver = problem->solver;
+    const ContactSet *set = problem->set;
+    int count = contact_rows_fill(set, problem->chain, !by_points, solver->row, contact_pairs_far(solver->pairs));
+    solver->banded = count - set->pair_count;
+    solver->wall_count = 0;
+    for (int i = 0; i < solver->banded; i++)
+        if (!solver->row[i].slide)
+            solver->wall[solver->wall_count++] = i;
+    for (int i = count; i < all; i++) {
+        const double *slip = set->slide[solver->row[i].point].slip;
+        bool known = isfinite(slip[0]) && isfinite(slip[1]);
+        solver->motion[i] = vec3(known && solver->row[i].mask[0] & 1 ? slip[0] : 0, known && solver->row[i].mask[0] & 2 ? slip[1] : 0, 0);
+    }
+    return count;
+}
+
+ContactReport contact_solve(const ContactProblem *problem)
+{
+    ContactSolver *solver = problem->solver;
+    ContactSet *set = problem->set;
+    const BlockChain *chain = problem->chain;
+    SEL_REQUIRE(set->count + set->slide_count <= solver->capacity, "the solver has room for all contacts and slides");
+    SEL_REQUIRE(chain->count <= solver->node_count && chain->size == solver->matrix.size, "the solver was made for such a chain");
+    SEL_ASSERT(problem->options->max_iterations > 0 && problem->options->tolerance > 0, "a solve may iterate");
+    ContactReport report = {.converged = true};
+    int all = set->count + set->slide_count + set->pair_count;
+    if (!problem->factor)
+        return (ContactReport){.singular = true};
+    if (all == 0) {
+        block_factor_solve(problem->factor, problem->b, problem->u);
+        return report;
+    }
+    const ContactOptions *options = problem->options;
+    const BlockFactor *factor = problem->factor;
+    const double *b = problem->b;
+    double *u = problem->u;
+    bool by_points = options->form == CONTACT_POINTWISE;
+    int count = fill_rows(problem, by_points, all);
+    if (!by_points)
+        block_condenser_survey(solver->condenser, chain);
+    if (by_points)
+        report = contact_pointwise(solver, chain, factor, b, count, options, u);
+    else if (count < all)
+        report = contact_slides(solver, chain, b, count, all, options, u);
+    else if (!contact_condensed(solver, chain, b, count, options, u, &report))
+        report = contact_newton(solver, chain, factor, b, count, options, u);
+    if (!by_points)
+        contact_cut(solver, count, &report);
+    take_forces(solver, all, set);
     return report;
 }

@@ -18,12 +18,21 @@ void contact_solver_destroy(ContactSolver *solver);
 // Room for so many pairs besides. False: no memory.
 bool contact_solver_reserve_pairs(ContactSolver *solver, int pairs);
 
-// `factor` is that of `chain`. b (M, n) in; u (M, n) out, and where there are slides, in: about what it will be. Rows of constrained degrees of freedom are
-// already unit rows in `chain` with their value in b, and no contact acts on a fully constrained node. While it solves, slides are in the chain's diagonal;
-// afterwards the chain is as it was.
-ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
-                            const ContactOptions *options, double *u);
-// False: it will not look at `factor`.
+// What is solved: A u = b + J^T f. Rows of constrained degrees of freedom are unit rows in the chain with their value in b, and no contact acts on a fully
+// constrained node.
+typedef struct ContactProblem {
+    ContactSolver *solver;
+    const BlockChain *chain;     // A; while it is solved, slides are in its diagonal; afterwards it is as it was
+    const BlockFactor *factor;   // of the chain; NULL: the chain is not positive definite
+    const double *b;             // (M, n)
+    ContactSet *set;             // may be empty
+    const ContactOptions *options;
+    double *u;                   // (M, n) the solution; with slides, in: an estimate of it
+} ContactProblem;
+
+// Solves for u and the forces of the set. Where the report says `singular`, nothing was solved.
+ContactReport contact_solve(const ContactProblem *problem);
+// False: contact_solve() does not read `factor`.
 bool contact_needs_factor(const ContactSet *set, const ContactOptions *options);
 ContactOptions contact_default_options(void);
 

@@ -4,8 +4,8 @@
 //   step_detect    candidates and gaps at the iterate, at first x_n, from the vessel
 //   step_assemble  (M/h^2 + D/h + K) u = M v/h + f(x) + ..., with tension and curvature terms, constraints as unit rows
 //   step_factor
-//   step_contact   u with the contacts: Newton's method on their conditions
-//   step_judge     the iterate moves to the solution; which stages are needed again? None: the step is solved
+//   contact_solve  u and the contact forces: Newton's method on the contact conditions, for the problem of step_contacts()
+//   step_judge     moves the iterate to the solution and says which stages are needed again; none: the step is solved
 //   step_correct   x_{n+1}, v_{n+1}, reactions; on non-finite or absurd motion keeps x_n, sets STEP_DIVERGED
 // A step allocates nothing, reads no clock. One thread per Stepper; several Steppers may share a vessel.
 #ifndef SELDINGER_SOLVER_STEP_H
@@ -109,11 +109,16 @@ int stepper_fitted(const Stepper *stepper, int tool);
 void step_detect(Stepper *stepper);
 void step_assemble(Stepper *stepper);
 void step_factor(Stepper *stepper);
-void step_contact(Stepper *stepper);
-enum { STEP_NEEDS_WALLS = 1, STEP_NEEDS_SYSTEM = 2, STEP_NEEDS_CONTACT = 4, STEP_NEEDS_ALL = 7 };    // step_detect; step_assemble and step_factor; step_contact
-unsigned step_judge(Stepper *stepper);
+ContactProblem step_contacts(Stepper *stepper);    // valid until the next call of a stage
+enum {
+    STEP_NEEDS_WALLS = 1,    // step_detect()
+    STEP_NEEDS_SYSTEM = 2,   // step_assemble() and step_factor()
+    STEP_NEEDS_CONTACT = 4,  // contact_solve(), always
+    STEP_NEEDS_ALL = 7
+};
+unsigned step_judge(Stepper *stepper, const ContactReport *solved);
 void step_correct(Stepper *stepper);
-void step_solve(Stepper *stepper);       // all of it after step_feed()
+void step_solve(Stepper *stepper);       // all stages after step_feed()
 const StepReport *step_report(const Stepper *stepper);
 
 // State. The pointer stays valid; write through stepper_restore only.

@@ -28,7 +28,6 @@ static const double MET_FAR = 0.2;       // [mm] from where it was met a wall ac
 static const double LACK_MAX = 0.045;    // [mm] of room between two walls that the wire may take, DEPTH_LAST of step_follow.c
 static const double TOUCH_REACH = 0.05;  // [mm] of gap: further from the wall a point may touch as it is (step_touch.c)
 static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
-// A contact between one free node and the sheath is one between nodes with no share for the second.
 
 static Vec3 tangent_at(const Stepper *s, int node)
 {
@@ -489,7 +488,7 @@ static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
     const SlotPlace *p = &s->slot_place[k];
     double w = p->weight, ahead = s->command.advance - (s->is_iterate ? s->linearised[row_of(s, s->slot[k].element)] : 0);
     c->node = s->first_free;
-    c->xi = NO_SHARE;
+    c->xi = 0;
     c->gap = (c->gap + (1 - w) * ahead * vec3_dot(p->tangent, c->normal)) / w;
     c->lever[0] = vec3_scale(p->lever[1], 1 / w);
     c->lever[1] = vec3(0, 0, 0);
@@ -539,6 +538,7 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     ContactPoint *c = &s->set.point[s->set.count];
     s->candidate[s->set.count++] = point;
     c->node = p ? s->slot[point - nodes].element : point;
+    c->is_between = p != NULL;
     c->xi = p ? p->weight : 0;
     c->lever[0] = p ? p->lever[0] : vec3(0, 0, 0);
     c->lever[1] = p ? p->lever[1] : vec3(0, 0, 0);

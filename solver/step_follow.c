@@ -226,7 +226,11 @@ double stepper_follow(Stepper *s, bool halfway)
         copy_iterate(s, true);
         part /= 2;
         if (meets) {
-            step_contact(s);
+            ContactReport solved;
+            do {
+                ContactProblem problem = step_contacts(s);
+                solved = contact_solve(&problem);
+            } while (!stepper_take_contacts(s, &solved));
             if (s->has_failed)
                 return 0;
             s->turn = stepper_largest_turn(s);

@@ -73,6 +73,7 @@ typedef struct StepProgress {
     int hand_tries;          // since the last look, of what hands and mouth do
     bool is_held_back;       // the sheath has taken a node back
     bool is_blocked;         // no part of the way to the solution could be followed
+    double firmness;         // by which the unknowns are held to the iterate, where the contacts could not be solved without
 } StepProgress;
 
 struct Stepper {
@@ -208,6 +209,8 @@ int stepper_count_held(const Stepper *s, double advance);
 void stepper_hold(Stepper *s, int node);
 // The share of its length by which the tool is squeezed between hand and mouth, where it slides freely.
 double stepper_squeeze(const Stepper *s, const Vec3 *position);
+// Takes the solution over. False where there is none: the system is firmer now, and must be solved again.
+bool stepper_take_contacts(Stepper *s, const ContactReport *solved);
 bool stepper_is_spent(const Stepper *s);         // so many contact iterations that the step looks no further
 double stepper_largest_turn(const Stepper *s);   // [rad] of an element's chord or a node against the iterate; not about the axis
 // By how much the tool's elastic energy would grow more than hands, walls and weight give, were the solution followed to its end: as a share of all that is given
@@ -238,7 +241,6 @@ void stepper_share_forces(const Stepper *s, NodeReport *node);
 double stepper_slides(const Stepper *s);
 bool stepper_is_slender(const Stepper *s);
 // The cell of the tool for which a contact point stands, and where in it the point is asked about (step_touch.c).
-static const double NO_SHARE = 1e-300;   // of a contact between two nodes that is at the first one
 typedef struct Touch {
     int element;             // between nodes `element` and the next
     double xi;               // (0, 1) of its rest length

@@ -157,8 +157,10 @@ static unsigned judge_motion(Stepper *s)
     return STEP_NEEDS_ALL;
 }
 
-unsigned step_judge(Stepper *s)
+unsigned step_judge(Stepper *s, const ContactReport *solved)
 {
+    if (!stepper_take_contacts(s, solved))
+        return STEP_NEEDS_CONTACT;
     unsigned needs = judge_hand(s);
     if (needs == 0)
         needs = judge_reach(s);
@@ -175,14 +177,16 @@ unsigned step_judge(Stepper *s)
 
 void step_solve(Stepper *s)
 {
-    for (unsigned needs = STEP_NEEDS_ALL; needs != 0; needs = step_judge(s)) {
+    for (unsigned needs = STEP_NEEDS_ALL; needs != 0;) {
         if (needs & STEP_NEEDS_WALLS)
             step_detect(s);
         if (needs & STEP_NEEDS_SYSTEM) {
             step_assemble(s);
             step_factor(s);
         }
-        step_contact(s);
+        ContactProblem problem = step_contacts(s);
+        ContactReport solved = contact_solve(&problem);
+        needs = step_judge(s, &solved);
     }
     step_correct(s);
 }

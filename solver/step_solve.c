@@ -68,33 +68,34 @@ void step_factor(Stepper *s)
         s->has_failed = !firmer(s, &share);
 }
 
-void step_contact(Stepper *s)
+ContactProblem step_contacts(Stepper *s)
 {
     SEL_ASSERT(s->set.count <= s->set.capacity, "detection found no more contacts than there is room for");
+    return (ContactProblem){
+        .solver = s->solver, .chain = &s->chain, .factor = s->has_failed ? NULL : s->factor, .b = s->b, .set = &s->set, .options = &s->contact, .u = s->u};
+}
+
+bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
+{
     if (s->has_failed)
-        return;
-    ContactReport report = {.converged = true};
-    if (s->set.count + s->set.slide_count + s->set.pair_count > 0) {
-        double share = 0;
-        do
-            report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
-        while (report.singular && firmer(s, &share));
-        s->has_failed = report.singular;
-        if (s->has_failed)
-            return;
-    } else {
-        block_factor_solve(s->factor, s->b, s->u);
+        return true;
+    if (solved->singular) {
+        if (firmer(s, &s->progress.firmness))
+            return false;
+        s->has_failed = true;
+        return true;
     }
+    s->progress.firmness = 0;
     if (s->tool_count > 1)
         tools_from_slips(s);
     hands_solved(s);
-    s->report.iterations += report.iterations;
-    s->report.residual = report.residual;
-    s->report.cone_violation = report.cone_violation;
-    s->report.active = report.active;
-    s->report.self_contacts = report.pairs;
+    s->report.iterations += solved->iterations;
+    s->report.residual = solved->residual;
+    s->report.cone_violation = solved->cone_violation;
+    s->report.active = solved->active;
+    s->report.self_contacts = solved->pairs;
     s->report.flags &= ~(unsigned)STEP_NOT_CONVERGED;
-    if (!report.converged)
+    if (!solved->converged)
         s->report.flags |= STEP_NOT_CONVERGED;
     stepper_keep_forces(s);
     self_contact_keep_forces(s);
@@ -102,6 +103,7 @@ void step_contact(Stepper *s)
     for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
         sum += s->u[i] * 0;          // 0, or not a number
     s->has_failed |= sum != 0;
+    return true;
 }
 
 bool stepper_is_spent(const Stepper *s) { return s->tool_count == 1 && s->report.iterations >= ITERATIONS_ENOUGH && s->set.pair_count == 0; }

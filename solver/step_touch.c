@@ -157,7 +157,8 @@ void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, cons
     if (!s->is_iterate)
         s->touch_next[point] = t.offset;
     c->node = t.element;
-    c->xi = fmax(t.place.weight, NO_SHARE);
+    c->is_between = true;
+    c->xi = t.place.weight;
     c->lever[0] = t.place.lever[0];
     c->lever[1] = t.place.lever[1];
     Vec3 on = vec3_add_scaled(vec3_scale(along, step), 0.5 * step * step, asked->bend);

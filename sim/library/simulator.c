@@ -128,7 +128,7 @@ SelStatus sel_simulator_step(SelSimulator *s, const SelHand *hand)
     if (trouble)
         return context_refuse(s->context, SEL_ERROR_ARGUMENT, __func__, trouble);
     const ToolCommands commands = commands_of(hand);
-    simulator_step_tools(s->simulator, &commands);
+    simulator_step(s->simulator, &commands);
     if (s->lesson)
         lesson_step(s->lesson, s->simulator, &commands, NULL);
     return record_step(s, &commands);

@@ -28,7 +28,7 @@ static void run(const Scene *scene, const Vessel *vessel, Faults *faults)
         ToolCommands commands = {.tool[0] = {20, 90}};
         if (scene->script)
             commands = script_tools_at(scene->script, simulator_time_s(simulator), &cursor);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         const WireState *state = simulator_state(simulator);
         for (int n = 0; n < state->node_count; n++)
             if (!vec3_is_finite(state->position[n]))

@@ -50,7 +50,7 @@ static RecordedRun *record(const char *name, bool is_watched)
     for (int i = 0; i < STEPS; i++) {
         ToolCommands commands = script_tools_at(scene->script, i * 0.001, &cursor);
         XrayControl xray = {.contrast_ml_s = (float)commands.contrast_ml_s, .contrast_tool = (float)commands.contrast_tool};
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         lesson_step(lesson, simulator, &commands, &xray);
         xray.field_mm = 100;
         assert_true(recording_step(recording, simulator, &commands, is_watched ? &xray : NULL));

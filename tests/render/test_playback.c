@@ -58,7 +58,7 @@ static RecordedRun *record(TrainerScene *it, int64_t steps, bool is_watched, con
         if (i == steps)
             break;
         XrayControl xray = controls_at(i);
-        simulator_step(simulator, hand_at(i));
+        simulator_step_one_tool(simulator, hand_at(i));
         lesson_step(lesson, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL);
         assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL));
     }

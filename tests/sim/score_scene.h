@@ -58,7 +58,7 @@ static Practice *practice_begin(const char *text, const VesselTree *tree)
 
 static void practice_step_tools(Practice *p, const ToolCommands *commands)
 {
-    simulator_step_tools(p->simulator, commands);
+    simulator_step(p->simulator, commands);
     score_step(p->score, p->simulator, commands, p->watched ? &p->xray : NULL);
 }
 

@@ -38,7 +38,7 @@ static unsigned run_watched(const char *name, const char *text, const Vessel *ve
     for (int i = 0; i < steps; i++) {
         Command command = scene->script ? script_at(scene->script, i * scene->dt / 1000, &cursor) : (Command){0, 0};
         heap_watch(true);
-        simulator_step(simulator, command);
+        simulator_step_one_tool(simulator, command);
         if (recording)
             assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, NULL));
         heap_watch(false);

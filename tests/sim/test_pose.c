@@ -56,7 +56,7 @@ static void one_tool_is_the_shared_line(void **state)
     Pose *pose = pose_create_for(simulator), *filled = pose_create_for(simulator);
     const XrayControl xray = xray_default_control();
     for (int i = 0; i < 40; i++)
-        simulator_step(simulator, (Command){30, 10});
+        simulator_step_one_tool(simulator, (Command){30, 10});
     pose_take(pose, simulator, &(ToolCommands){.tool = {{30, 10}}}, &xray);
     pose_copy(filled, pose);
     memset(filled->tool[0].node, 0, (size_t)filled->tool[0].node_count * sizeof(ToolNode));
@@ -91,7 +91,7 @@ static void tools_end_where_their_tips_are(void **state)
     const XrayControl xray = xray_default_control();
     for (int i = 0; i < 1750; i++) {
         ToolCommands commands = {.tool = {{i < 500 ? 0 : 20, 0}, {i < 500 ? 30 : 0, 0}}, .released = i == 1749 ? 2 : 0};
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         if (i % 125 != 124 && i != 1749)
             continue;
         pose_take(pose, simulator, &commands, &xray);

@@ -228,7 +228,7 @@ static void a_factor_is_not_known_before_a_second(void **state)
     (void)state;
     Rig rig = rig_open();
     for (int i = 0; i < 100; i++)
-        simulator_step(rig.simulator, (Command){0});
+        simulator_step_one_tool(rig.simulator, (Command){0});
     RealtimeOptions options = realtime_default_options();
     options.simulator = rig.simulator;
     Realtime *session = realtime_start(&options, &faults);

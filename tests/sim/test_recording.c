@@ -267,7 +267,7 @@ static void what_is_read_of_several_tools(void **state)
     int least = 1000, most = 0;
     for (int i = 0; i < STEPS; i++) {
         ToolCommands commands = hands_at(i);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         assert_true(recording_step(recording, simulator, &commands, NULL));
         hash[i] = simulator_hash(simulator);
         seen[i] = pose_create_for(simulator);
@@ -335,7 +335,7 @@ static void what_is_read_of_a_session(void **state)
         for (int i = 0; i < STEPS; i++) {
             ToolCommands commands = hands_at(i);
             commands.tool[1] = t ? commands.tool[1] : (Command){0};
-            simulator_step_tools(simulator, &commands);
+            simulator_step(simulator, &commands);
             assert_true(recording_step(recording, simulator, &commands, NULL));
             hash[i] = simulator_hash(simulator);
             push[i] = simulator_last(simulator)->push[0];
@@ -430,7 +430,7 @@ static void what_is_read_of_exchanged_tools(void **state)
     static Pose *seen[STEPS];
     for (int i = 0; i < STEPS; i++) {
         ToolCommands commands = exchange_at(i);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         assert_true(recording_step(recording, simulator, &commands, NULL));
         seen[i] = pose_create_for(simulator);
         pose_take(seen[i], simulator, &commands, &(XrayControl){0});
@@ -699,7 +699,7 @@ static void record_for_ever(const char *path, int64_t expected_steps)
     int cursor = 0;
     for (int64_t i = 0; recording; i++) {
         ToolCommands commands = scene->script ? script_tools_at(scene->script, (double)(i % 400) / 1000, &cursor) : hands_at(i);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         if (!recording_step(recording, simulator, &commands, NULL))
             break;
     }
@@ -911,7 +911,7 @@ static void look_at_every_state(const RecordingOptions *given)
     assert_non_null(recording);
     for (int step = 1; step <= 180; step++) {
         ToolCommands commands = hands_at(step);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         assert_true(recording_step(recording, simulator, &commands, NULL));
         if (step == 10) {
             // the file gets its name with the first chunks
@@ -1023,7 +1023,7 @@ static void a_full_index_leaves_what_was_flushed(void **state)
     if (child == 0) {
         Recording *recording = recording_create(path, simulator, &options, &faults);
         for (int step = 0; recording && step < 600; step++) {
-            simulator_step(simulator, (Command){0, 0});
+            simulator_step_one_tool(simulator, (Command){0, 0});
             recording_step(recording, simulator, &(ToolCommands){0}, NULL);
             if (step % 100 == 0)
                 nap_ms(30);
@@ -1063,7 +1063,7 @@ static void a_full_disk_leaves_what_was_flushed(void **state)
             _exit(1);
         int64_t steps = 0;
         for (; steps < 1000000; steps++) {
-            simulator_step(simulator, (Command){0, 0});
+            simulator_step_one_tool(simulator, (Command){0, 0});
             if (!recording_step(recording, simulator, &(ToolCommands){0}, NULL))
                 break;
         }

@@ -96,7 +96,7 @@ static double record(const char *path, Scene *scene, const Vessel *vessel, doubl
         ToolCommands commands = hands_at(i, scene->tool_count, pushing);
         if (i == pushing)
             before = length_of(path);
-        simulator_step_tools(simulator, &commands);
+        simulator_step(simulator, &commands);
         assert_true(recording_step(recording, simulator, &commands, &xray));
     }
     double after = length_of(path);

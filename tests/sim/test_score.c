@@ -933,7 +933,7 @@ static void a_step_allocates_nothing(void **state)
     p->xray.pedal = 1;
     long before = heap_calls();
     for (int i = 0; i < 2000; i++) {
-        simulator_step(p->simulator, (Command){20, 0});
+        simulator_step_one_tool(p->simulator, (Command){20, 0});
         heap_watch(true);
         score_step(p->score, p->simulator, &(ToolCommands){.tool = {{20, 0}}}, &p->xray);
         heap_watch(false);
@@ -946,7 +946,7 @@ static void a_step_allocates_nothing(void **state)
     before = heap_calls();
     for (int i = 0; i < 800; i++) {
         ToolCommands commands = {.tool = {{i < 400 ? 40 : 0, 0}, {i < 400 ? 60 : -60, 0}}};
-        simulator_step_tools(p->simulator, &commands);
+        simulator_step(p->simulator, &commands);
         heap_watch(true);
         score_step(p->score, p->simulator, &commands, NULL);
         heap_watch(false);

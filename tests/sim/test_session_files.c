@@ -115,7 +115,7 @@ static void the_session_file_is_of_its_recording(void **state)
     xray.pedal = 1;
     for (int i = 0; i < 200; i++) {
         Command command = {25, 40};
-        simulator_step(simulator, command);
+        simulator_step_one_tool(simulator, command);
         score_step(score, simulator, &(ToolCommands){.tool = {command}}, &xray);
         assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, &xray));
     }

@@ -42,10 +42,10 @@ static int by_value(const void *a, const void *b)
 static Vec3 displacement(const ContactPoint *p, const double *u)
 {
     Vec3 a = vec3_scale(p->normal, -p->tool_radius), d = {0, 0, 0};
-    for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++) {
+    for (int e = 0; e < (p->is_between ? 2 : 1); e++) {
         const double *v = u + 6 * (p->node + e);
         double w = e ? p->xi : 1 - p->xi;
-        Vec3 arm = vec3_add_scaled(p->xi > 0 ? p->lever[e] : vec3(0, 0, 0), w, a);
+        Vec3 arm = vec3_add_scaled(p->is_between ? p->lever[e] : vec3(0, 0, 0), w, a);
         d = vec3_add(vec3_add_scaled(d, w, vec3(v[0], v[1], v[2])), vec3_cross(vec3(v[3], v[4], v[5]), arm));
     }
     return d;
@@ -75,9 +75,9 @@ static Laws check_laws(const BlockChain *a, const double *b, const ContactSet *s
     for (int k = 0; k < set->count; k++) {
         const ContactPoint *p = &set->point[k];
         Vec3 f = p->force;
-        for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++) {
+        for (int e = 0; e < (p->is_between ? 2 : 1); e++) {
             double w = e ? p->xi : 1 - p->xi;
-            Vec3 arm = vec3_add_scaled(p->xi > 0 ? p->lever[e] : vec3(0, 0, 0), -w * p->tool_radius, p->normal), m = vec3_cross(arm, f);
+            Vec3 arm = vec3_add_scaled(p->is_between ? p->lever[e] : vec3(0, 0, 0), -w * p->tool_radius, p->normal), m = vec3_cross(arm, f);
             const double g[6] = {w * f.x, w * f.y, w * f.z, m.x, m.y, m.z};
             for (int q = 0; q < 6; q++)
                 if (contact_free_dofs(a, p->node + e) >> q & 1)
@@ -148,7 +148,7 @@ static ContactReport problem_solve(Problem *p, ContactForm form, int iterations,
     o.form = form;
     o.max_iterations = iterations;
     o.tolerance = tolerance;
-    return contact_solve(p->solver, &p->chain, p->factor, p->b, &p->set, &o, p->u);
+    return contact_solve(&(ContactProblem){p->solver, &p->chain, p->factor, p->b, &p->set, &o, p->u});
 }
 
 static Vec3 draw_unit(void)
@@ -217,6 +217,7 @@ static void problem_randomise(Problem *p, double young, double length, double fr
                                          .friction = friction,
                                          .tool_radius = 0.18};
         ContactPoint *at = &p->set.point[n];
+        at->is_between = at->xi > 0;
         double x = at->xi; // of a cubic through both nodes
         at->lever[0] = vec3_scale(t, length * x * (1 - x) * (1 - x));
         at->lever[1] = vec3_scale(t, -length * x * x * (1 - x));
@@ -257,7 +258,7 @@ static void agrees_with_enumeration(void **state)
         problem_create(&p, nodes, K);
         problem_randomise(&p, trial % 2 ? 80000 : 200, 1.5, 0, -0.002);
         for (int i = 0; i < K; i++) // a node each, or W is singular and forces are not unique
-            p.set.point[i].xi = 0, p.set.point[i].node = i;
+            p.set.point[i].is_between = false, p.set.point[i].xi = 0, p.set.point[i].node = i;
         double w[K][K], q[K], best[K];
         double *v = malloc((size_t)nodes * 6 * sizeof *v);
         block_factor_solve(p.factor, p.b, v);
@@ -354,7 +355,8 @@ static void survives_random_problems(void **state)
             if (t % 5 == 3 && i == 0)
                 p.set.point[i].force = vec3(NAN, INFINITY, 0);
             if (t % 7 == 3 && i > 0 && i % 4 == 0)
-                p.set.point[i].node = p.set.point[i - 1].node, p.set.point[i].xi = p.set.point[i - 1].xi, p.set.point[i].normal = p.set.point[i - 1].normal;
+                p.set.point[i].node = p.set.point[i - 1].node, p.set.point[i].is_between = p.set.point[i - 1].is_between,
+                p.set.point[i].xi = p.set.point[i - 1].xi, p.set.point[i].normal = p.set.point[i - 1].normal;
         }
         ContactReport r = problem_solve(&p, CONTACT_BLOCK, 800, 1e-6);
         Laws l = check_laws(&p.chain, p.b, &p.set, p.u);
@@ -435,13 +437,13 @@ static void both_forms_agree(void **state)
             chain_scene_prepare(&w, 0.05, scenes[n].twist);
             size_t bytes = (size_t)w.set.count * sizeof *start;
             memcpy(start, w.set.point, bytes);
-            ContactReport a = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &tight, w.u);
+            ContactReport a = contact_solve(&(ContactProblem){w.solver, &w.chain, w.factor, w.b, &w.set, &tight, w.u});
             assert_true(a.converged);
             if (i % 100 == 0 && w.set.count > 0) {
                 memcpy(block, w.set.point, bytes);
                 memcpy(u, w.u, (size_t)w.nodes * 6 * sizeof *u);
                 memcpy(w.set.point, start, bytes);
-                ContactReport b = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &sweeps, w.u);
+                ContactReport b = contact_solve(&(ContactProblem){w.solver, &w.chain, w.factor, w.b, &w.set, &sweeps, w.u});
                 double top = 1e-3, apart = 0, moved = 0;
                 for (int k = 0; k < w.set.count; k++) {
                     top = fmax(top, vec3_norm(block[k].force));
@@ -453,7 +455,7 @@ static void both_forms_agree(void **state)
                 ContactPoint *sweep = memcpy(calloc((size_t)w.set.count, sizeof *sweep), w.set.point, bytes);
                 double *moves = memcpy(calloc((size_t)w.nodes * 6, sizeof *moves), w.u, (size_t)w.nodes * 6 * sizeof *moves), off = 0;
                 memcpy(w.set.point, start, bytes);
-                assert_true(contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &usual, w.u).converged);
+                assert_true(contact_solve(&(ContactProblem){w.solver, &w.chain, w.factor, w.b, &w.set, &usual, w.u}).converged);
                 for (int k = 0; k < w.set.count; k++)
                     off = fmax(off, vec3_distance(block[k].force, w.set.point[k].force));
                 memcpy(w.set.point, sweep, bytes);
@@ -563,7 +565,7 @@ static void wire_in_tubes(void **state)
         for (int i = 0; i < steps; i++) {
             chain_scene_prepare(&w, i < scenes[n].push ? 0.05 : -0.05, scenes[n].twist);
             double t = now_us();
-            ContactReport r = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &o, w.u);
+            ContactReport r = contact_solve(&(ContactProblem){w.solver, &w.chain, w.factor, w.b, &w.set, &o, w.u});
             us[i] = now_us() - t;
             iterations[i] = r.iterations;
             failed += !r.converged;
@@ -599,6 +601,7 @@ static void levers(void **state)
         problem_randomise(&p, trial % 2 ? 80000 : 500, 1.5, friction, -0.002);
         for (int i = 0; i < K; i++) {
             ContactPoint *c = &p.set.point[i];
+            c->is_between = i % 4 != 0;
             c->xi = i % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0;
             for (int e = 0; e < 2; e++)
                 c->lever[e] = vec3_add_scaled(c->lever[e], 0.1, draw_unit());
@@ -638,7 +641,8 @@ static void curvature_follows_levers(void **state)
                 chain.diag[36 * i + 7 * k] = 2;
         for (int k = 0; k < 36; k++)
             chain.lower[k] = chain.lower[36 + k] = 0.1; // no unit rows
-        ContactPoint c = {.node = 1, .xi = trial % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0, .tool_radius = 0.3, .normal = draw_unit()};
+        ContactPoint c = {
+            .node = 1, .is_between = trial % 4 != 0, .xi = trial % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0, .tool_radius = 0.3, .normal = draw_unit()};
         for (int e = 0; e < 2; e++)
             c.lever[e] = vec3_scale(draw_unit(), 0.5);
         Vec3 e = vec3_normal_to(c.normal), f = vec3_cross(c.normal, e);
@@ -722,7 +726,7 @@ static void mirrored_and_repeated(void **state)
         memcpy(q.set.point, start, (size_t)contacts * sizeof *start);
         ContactOptions o = contact_default_options();
         o.tolerance = 1e-9;
-        contact_solve(q.solver, &p.chain, p.factor, p.b, &q.set, &o, q.u);
+        contact_solve(&(ContactProblem){q.solver, &p.chain, p.factor, p.b, &q.set, &o, q.u});
         assert_memory_equal(u, q.u, (size_t)nodes * 6 * sizeof *u);
         free(u);
         free(start);
@@ -741,7 +745,8 @@ static void held_nodes(void **state)
         problem_create(&p, 21, 3);
         problem_randomise(&p, 80000, 1.5, 0.2, -0.002);
         for (int k = 0; k < 3; k++)
-            p.set.point[k].xi = 0, p.set.point[k].normal = vec3(0, 1, 0), p.set.point[k].gap = -0.001, p.set.point[k].node = 5 + 5 * k;
+            p.set.point[k].is_between = false, p.set.point[k].xi = 0, p.set.point[k].normal = vec3(0, 1, 0), p.set.point[k].gap = -0.001,
+            p.set.point[k].node = 5 + 5 * k;
         for (int hold = 0; hold < 2; hold++) { // node 5: y held at +0.01; node 10: x and z held
             int node = hold ? 10 : 5;
             for (int dof = 0; dof < 3; dof++) {

@@ -63,7 +63,7 @@ static ContactReport solve(Problem *p, ContactForm form, int iterations, double 
 {
     assert_true(block_chain_factor(&p->chain, p->factor));
     ContactOptions o = {.form = form, .max_iterations = iterations, .tolerance = tolerance};
-    return contact_solve(p->solver, &p->chain, p->factor, p->b, &p->set, &o, p->u);
+    return contact_solve(&(ContactProblem){p->solver, &p->chain, p->factor, p->b, &p->set, &o, p->u});
 }
 
 static double *diagonal(Problem *p, int node, int row, int column) { return &p->chain.diag[(node * p->size + row) * p->size + column]; }
@@ -409,7 +409,7 @@ static void scene_advance(ChainScene *w, int steps)
     ContactOptions o = contact_default_options();
     for (int i = 0; i < steps; i++) {
         chain_scene_prepare(w, 0.05, 0.005);
-        assert_true(contact_solve(w->solver, &w->chain, w->factor, w->b, &w->set, &o, w->u).converged);
+        assert_true(contact_solve(&(ContactProblem){w->solver, &w->chain, w->factor, w->b, &w->set, &o, w->u}).converged);
         chain_scene_finish(w);
     }
     chain_scene_prepare(w, 0.05, 0.005);
@@ -436,7 +436,7 @@ static void more_unknowns(void **state)
                 memcpy(w.set.point, start, (size_t)w.set.count * sizeof *start);
                 embed(&w, sizes[t], 0, 0.5, 0, &p);
                 ContactReport b = solve(&p, o.form, o.max_iterations, o.tolerance);
-                ContactReport a = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &o, w.u);
+                ContactReport a = contact_solve(&(ContactProblem){w.solver, &w.chain, w.factor, w.b, &w.set, &o, w.u});
                 assert_true(a.converged && b.converged);
                 assert_int_equal(a.iterations, b.iterations);
                 assert_int_equal(a.active, b.active);
