@@ -34,7 +34,7 @@ void checkpoint_free(Checkpoint *c)
 Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
 {
     Checkpoint *c = reuse;
-    if (c && (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity || c->self_bytes != self_contact_bytes(s))) {
+    if (c && (c->memory_count != s->memory_count || c->point_capacity != s->points.capacity || c->self_bytes != self_contact_bytes(s))) {
         checkpoint_free(c);
         c = NULL;
     }
@@ -42,7 +42,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c = calloc(1, sizeof *c);
         if (!c)
             return NULL;
-        c->point_capacity = s->point_capacity;
+        c->point_capacity = s->points.capacity;
         c->memory_count = s->memory_count;
         c->place = calloc((size_t)c->point_capacity, sizeof *c->place);
         c->memory = calloc(c->memory_count, sizeof *c->memory);
@@ -58,17 +58,17 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
     c->report = s->report;
-    for (int k = 0; k < s->tool_count; k++)
-        memcpy(c->hand_force[k], s->hand[k].force, sizeof c->hand_force[k]);
-    for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
-        c->first[k] = s->tool[k].first;
-        c->fitted[k] = s->fitted[k];
-        c->inside[k] = s->tool[k].inside;
-        c->tool_inserted[k] = s->tool[k].inserted;
-        c->tool_twist[k] = s->tool[k].twist;
+    for (int k = 0; k < s->tools.count; k++)
+        memcpy(c->hand_force[k], s->hands.hand[k].force, sizeof c->hand_force[k]);
+    for (int k = 0; s->tools.count > 1 && k < s->tools.count; k++) {
+        c->first[k] = s->tools.tool[k].first;
+        c->fitted[k] = s->tools.fitted[k];
+        c->inside[k] = s->tools.tool[k].inside;
+        c->tool_inserted[k] = s->tools.tool[k].inserted;
+        c->tool_twist[k] = s->tools.tool[k].twist;
     }
-    SEL_REQUIRE(s->point_count <= c->point_capacity, "a checkpoint has room for all contact points");
-    memcpy(c->place, s->place, (size_t)c->point_capacity * sizeof *c->place);
+    SEL_REQUIRE(s->points.count <= c->point_capacity, "a checkpoint has room for all contact points");
+    memcpy(c->place, s->points.place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
     self_contact_save(s, c->self);
     return c;
@@ -77,26 +77,26 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
 void stepper_restore(Stepper *s, const Checkpoint *c)
 {
     SEL_ASSERT(c->first_free >= 0, "a checkpoint holds a state");
-    if (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity || c->self_bytes != self_contact_bytes(s))
+    if (c->memory_count != s->memory_count || c->point_capacity != s->points.capacity || c->self_bytes != self_contact_bytes(s))
         return;
     s->first_free = c->first_free;
     s->state.time = c->time;
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
-    for (int k = 0; k < s->tool_count; k++)
-        memcpy(s->hand[k].force, c->hand_force[k], sizeof c->hand_force[k]);
+    for (int k = 0; k < s->tools.count; k++)
+        memcpy(s->hands.hand[k].force, c->hand_force[k], sizeof c->hand_force[k]);
     tools_refit(s, c->fitted);
-    for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
-        s->tool[k].first = c->first[k];
-        s->tool[k].inserted = c->tool_inserted[k];
-        s->tool[k].twist = c->tool_twist[k];
+    for (int k = 0; s->tools.count > 1 && k < s->tools.count; k++) {
+        s->tools.tool[k].first = c->first[k];
+        s->tools.tool[k].inserted = c->tool_inserted[k];
+        s->tools.tool[k].twist = c->tool_twist[k];
     }
-    if (s->tool_count > 1)
+    if (s->tools.count > 1)
         tools_chain(s);
-    for (int k = 1; k < s->tool_count; k++)
-        s->tool[k].inside = c->inside[k];
-    memcpy(s->place, c->place, (size_t)c->point_capacity * sizeof *c->place);
+    for (int k = 1; k < s->tools.count; k++)
+        s->tools.tool[k].inside = c->inside[k];
+    memcpy(s->points.place, c->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
     self_contact_restore(s, c->self);
     SEL_ASSERT(s->first_free <= s->state.node_count, "the sheath holds nodes of the chain");
@@ -123,19 +123,19 @@ uint64_t stepper_hash(const Stepper *s)
     hash_double(&hash, s->state.inserted);
     hash_double(&hash, s->state.twist);
     hash_double(&hash, s->first_free);
-    for (int k = 0; k < s->tool_count && s->spare_count[k] > 0; k++)
-        hash_double(&hash, s->fitted[k]);
-    for (int k = 1; k < s->tool_count; k++) {
-        hash_double(&hash, s->tool[k].first);
-        hash_double(&hash, s->tool[k].inside);
-        hash_double(&hash, s->tool[k].inserted);
-        hash_double(&hash, s->tool[k].twist);
+    for (int k = 0; k < s->tools.count && s->tools.spare_count[k] > 0; k++)
+        hash_double(&hash, s->tools.fitted[k]);
+    for (int k = 1; k < s->tools.count; k++) {
+        hash_double(&hash, s->tools.tool[k].first);
+        hash_double(&hash, s->tools.tool[k].inside);
+        hash_double(&hash, s->tools.tool[k].inserted);
+        hash_double(&hash, s->tools.tool[k].twist);
     }
     for (size_t i = 0; i < s->memory_count; i++)
         hash_double(&hash, s->memory[i]);
     // field by field: padding holds anything
-    for (int i = 0; i < s->point_count; i++) {
-        const VesselMemory *p = &s->place[i];
+    for (int i = 0; i < s->points.count; i++) {
+        const VesselMemory *p = &s->points.place[i];
         hash_double(&hash, p->node);
         hash_double(&hash, p->has_foot);
         hash_double(&hash, p->has_foot ? p->foot.x : 0);

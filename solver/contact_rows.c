@@ -77,7 +77,7 @@ static ContactRow pair_end(const ContactPair *p, int e, int stride)
 
 static void insert(ContactRow *row, int k, const ContactRow *c)
 {
-    for (; k > 0 && (row[k - 1].node > c->node || (row[k - 1].node == c->node && row[k - 1].weight[1] > c->weight[1])); k--)
+    for (; k > 0 && (row[k - 1].node > c->node || (row[k - 1].node == c->node && contact_row_place(&row[k - 1]) > contact_row_place(c))); k--)
         row[k] = row[k - 1];
     row[k] = *c;
 }

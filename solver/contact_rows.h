@@ -45,6 +45,9 @@ struct ContactRow {
 // pairs' second ends.
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slides_apart, ContactRow *row, ContactRow *far);
 
+// The order of rows with one node along the chain: those at the node come before those between it and the next.
+static inline double contact_row_place(const ContactRow *c) { return c->nodes == 1 ? -1 : c->weight[1]; }
+
 // Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
 static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
 {

@@ -102,7 +102,7 @@ static bool comes_before(const ContactRow *a, const ContactRow *b)
         return a->far && b->far ? a->point < b->point : b->far != NULL;
     if (a->chain_node != b->chain_node)
         return a->chain_node < b->chain_node;
-    return a->weight[1] != b->weight[1] ? a->weight[1] < b->weight[1] : a->point < b->point;
+    return contact_row_place(a) != contact_row_place(b) ? contact_row_place(a) < contact_row_place(b) : a->point < b->point;
 }
 
 // The walls' contacts and the pairs [0, to), those that wait behind the others, both in the order of the chain; they were so up to `before`. Returns how many do not wait.

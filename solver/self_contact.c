@@ -77,23 +77,23 @@ bool self_contact_create(Stepper *s)
     if (!c)
         return false;
     size_t m = (size_t)s->wire.node_count;
-    if (s->tool_count > 1)
-        m = (size_t)s->capacity;
+    if (s->tools.count > 1)
+        m = (size_t)s->tools.capacity;
     c->x = calloc(2 * m, sizeof *c->x);
     c->length = calloc(5 * m, sizeof *c->length);
     c->sphere = calloc(m + LEVELS, sizeof *c->sphere);
-    c->point = calloc((size_t)s->point_capacity + 1, sizeof *c->point);
+    c->point = calloc((size_t)s->points.capacity + 1, sizeof *c->point);
     c->laid = calloc(m, sizeof *c->laid);
     c->near = calloc(NEAR_MAX, sizeof *c->near);
-    s->set.pair = calloc(PAIRS_MAX, sizeof *s->set.pair);
-    if (!c->x || !c->length || !c->sphere || !c->point || !c->laid || !c->near || !s->set.pair)
+    s->system.set.pair = calloc(PAIRS_MAX, sizeof *s->system.set.pair);
+    if (!c->x || !c->length || !c->sphere || !c->point || !c->laid || !c->near || !s->system.set.pair)
         return false;
     c->t = c->x + m;
     c->along = c->length + m;
     c->turned = c->along + m;
     c->radius = c->turned + m;
     c->bulge = c->radius + m;
-    return contact_solver_reserve_pairs(s->solver, PAIRS_MAX);
+    return contact_solver_reserve_pairs(s->system.solver, PAIRS_MAX);
 }
 
 void self_contact_destroy(SelfContact *c)
@@ -113,19 +113,19 @@ void self_contact_destroy(SelfContact *c)
 
 static Vec3 by_solution(const Stepper *s, int node, int from)
 {
-    const double *u = s->u + row_of(s, node) + from, *k = s->linearised + row_of(s, node) + from;
+    const double *u = s->system.u + row_of(s, node) + from, *k = s->iterate.moved + row_of(s, node) + from;
     return vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
 }
 
 static Vec3 since_look(const Stepper *s, int node, int from)
 {
-    const double *k = s->linearised + row_of(s, node) + from, *seen = s->seen + row_of(s, node) + from;
+    const double *k = s->iterate.moved + row_of(s, node) + from, *seen = s->iterate.seen + row_of(s, node) + from;
     return vec3(k[0] - seen[0], k[1] - seen[1], k[2] - seen[2]);
 }
 
 static Vec3 done(const Stepper *s, int node, int from)
 {
-    const double *k = s->linearised + row_of(s, node) + from;
+    const double *k = s->iterate.moved + row_of(s, node) + from;
     return vec3(k[0], k[1], k[2]);
 }
 
@@ -186,8 +186,8 @@ static void lay_curve(Stepper *s, bool would_go)
     }
     memset(c->laid, 0, (size_t)nodes * sizeof *c->laid);
     if (s->first_free > 0) {         // the element across the mouth begins there
-        c->x[c->first] = s->mouth;
-        c->t[c->first] = s->axis[0];
+        c->x[c->first] = s->entry.mouth;
+        c->t[c->first] = s->entry.axis[0];
     }
 }
 
@@ -197,7 +197,7 @@ static void measure_elements(Stepper *s)
     double along = 0, turned = 0, least = HUGE_VAL;
     for (int e = c->first; e < c->count; e++) {
         double length = s->wire.length[e];
-        if (s->tool_count > 1)
+        if (s->tools.count > 1)
             length = tools_span_length(s, e);
         if (e + 1 == s->first_free)
             length += stepper_sheath_coordinate(s, e);
@@ -293,8 +293,8 @@ static SlotPlace place_on(const SelfContact *c, int e, double xi)
     return slot_place(&slot, c->length[e], c->x[e], c->t[e], c->x[e + 1], c->t[e + 1]);
 }
 
-static int pieces_of(const Stepper *s, int e) { return s->slot_start[e + 1] - s->slot_start[e] + 1; }
-static int point_at(const Stepper *s, int e) { return e + s->slot_start[e]; }
+static int pieces_of(const Stepper *s, int e) { return s->points.slot_start[e + 1] - s->points.slot_start[e] + 1; }
+static int point_at(const Stepper *s, int e) { return e + s->points.slot_start[e]; }
 
 // Where the pieces of an element begin, and the last one ends.
 static const Vec3 *lay_pieces(const Stepper *s, int e)
@@ -303,7 +303,7 @@ static const Vec3 *lay_pieces(const Stepper *s, int e)
     Vec3 *point = c->point + point_at(s, e);
     int pieces = pieces_of(s, e);
     if (!c->laid[e]) {
-        SEL_REQUIRE(point_at(s, e) + pieces <= s->point_capacity, "there is room for the ends of all pieces");
+        SEL_REQUIRE(point_at(s, e) + pieces <= s->points.capacity, "there is room for the ends of all pieces");
         c->laid[e] = true;
         point[0] = c->x[e];
         for (int k = 1; k < pieces; k++)
@@ -548,7 +548,7 @@ static void hand_on_forces(SelfContact *c)
 static double friction_of(const Stepper *s, int e)
 {
     SEL_ASSERT(e >= 0 && e + 1 < s->state.node_count, "the element is one of the chain's");
-    bool distal = s->tool_count > 1 && s->carrier[e] != s->carrier[e + 1];
+    bool distal = s->tools.count > 1 && s->tools.carrier[e] != s->tools.carrier[e + 1];
     double friction = s->wire.friction[distal ? e + 1 : e];
     return friction >= 0 ? friction : s->wall_friction;
 }
@@ -557,7 +557,7 @@ static double friction_of(const Stepper *s, int e)
 static double expected_gap(const Stepper *s, const Near *n)
 {
     double gap = n->gap;
-    if (s->is_iterate || s->knows_motion)
+    if (s->iterate.is_moved || s->iterate.knows_motion)
         return fmin(gap, gap + vec3_dot(pair_motion(s, n->end, n->normal, by_solution), n->normal));
     return fmin(gap, gap + 2 * vec3_dot(pair_motion(s, n->end, n->normal, by_speed), n->normal));
 }
@@ -576,22 +576,22 @@ static void fill_set(Stepper *s)
         if (wanted > PAIRS_MAX)
             most = most > 1e-3 ? 0.5 * most : most - 0.005;
     }
-    s->set.pair_count = 0;
-    for (int k = 0; k < c->near_count && s->set.pair_count < PAIRS_MAX; k++) {
+    s->system.set.pair_count = 0;
+    for (int k = 0; k < c->near_count && s->system.set.pair_count < PAIRS_MAX; k++) {
         const Near *n = &c->near[k];
         Vec3 force = n->force;
         bool presses = force.x != 0 || force.y != 0 || force.z != 0;
         if (!presses && !(expected_gap(s, n) < most))
             continue;
         double gap = fmax(n->gap, -STEP_OUT_MAX);
-        if (s->is_iterate)
+        if (s->iterate.is_moved)
             gap -= vec3_dot(pair_motion(s, n->end, n->normal, done), n->normal);
-        c->near_of[s->set.pair_count] = k;
-        s->set.pair[s->set.pair_count++] = (ContactPair){.end = {n->end[0], n->end[1]},
-                                                         .normal = n->normal,
-                                                         .gap = gap,
-                                                         .force = force,
-                                                         .friction = 0.5 * (friction_of(s, n->element[0]) + friction_of(s, n->element[1]))};
+        c->near_of[s->system.set.pair_count] = k;
+        s->system.set.pair[s->system.set.pair_count++] = (ContactPair){.end = {n->end[0], n->end[1]},
+                                                                       .normal = n->normal,
+                                                                       .gap = gap,
+                                                                       .force = force,
+                                                                       .friction = 0.5 * (friction_of(s, n->element[0]) + friction_of(s, n->element[1]))};
     }
 }
 
@@ -600,7 +600,7 @@ void self_contact_detect(Stepper *s)
     SelfContact *c = s->self;
     if (!c)
         return;
-    s->set.pair_count = 0;
+    s->system.set.pair_count = 0;
     double reach = REACH + 2 * fmax(fabs(s->command.advance), s->dt * c->fastest);
     c->nearest = c->clearance;
     if (c->clearance > fmin(reach, REACH_MAX))
@@ -610,8 +610,8 @@ void self_contact_detect(Stepper *s)
     double deepest = 0;
     for (int k = 0; k < c->near_count; k++)
         deepest = fmax(deepest, -c->near[k].gap);
-    s->depth = fmax(s->depth, deepest);
-    if (!s->is_iterate)
+    s->iterate.depth = fmax(s->iterate.depth, deepest);
+    if (!s->iterate.is_moved)
         s->report.self_overlap = deepest;
 }
 
@@ -622,7 +622,7 @@ bool self_contact_misses(Stepper *s)
         return false;
     double travel = 2 * largest_travel(s, by_solution);
     bool misses = false, looks = travel > c->nearest || travel > c->safe;
-    s->knows_motion = true;
+    s->iterate.knows_motion = true;
     if (looks)
         look(s, REACH + 1.5 * travel);
     for (int k = 0; k < c->near_count && !misses; k++) {
@@ -632,7 +632,7 @@ bool self_contact_misses(Stepper *s)
     }
     if (misses || looks)
         fill_set(s);
-    s->knows_motion = false;
+    s->iterate.knows_motion = false;
     return misses;
 }
 
@@ -663,11 +663,11 @@ bool self_contact_meet(Stepper *s, double part)
 {
     SelfContact *c = s->self;
     bool any = false;
-    if (!c || s->set.pair_count == 0)
+    if (!c || s->system.set.pair_count == 0)
         return false;
     lay_curve(s, false);
-    for (int k = 0; k < s->set.pair_count; k++) {
-        ContactPair *p = &s->set.pair[k];
+    for (int k = 0; k < s->system.set.pair_count; k++) {
+        ContactPair *p = &s->system.set.pair[k];
         const Near *n = &c->near[c->near_of[k]];
         double gap = -depth_of(s, n), linear = p->gap + vec3_dot(pair_motion(s, p->end, p->normal, done), p->normal);
         if (!(gap < 0 && gap < linear))
@@ -686,11 +686,11 @@ void self_contact_keep_forces(Stepper *s)
     if (!c)
         return;
     c->kept_count = 0;
-    SEL_ASSERT(s->set.pair_count <= PAIRS_MAX, "there is room to keep the forces of all pairs");
-    for (int k = 0; k < s->set.pair_count; k++) {
+    SEL_ASSERT(s->system.set.pair_count <= PAIRS_MAX, "there is room to keep the forces of all pairs");
+    for (int k = 0; k < s->system.set.pair_count; k++) {
         const Near *n = &c->near[c->near_of[k]];
-        if (vec3_norm2(s->set.pair[k].force) > 0)
-            c->kept[c->kept_count++] = (Kept){{n->feature[0], n->feature[1]}, s->set.pair[k].force};
+        if (vec3_norm2(s->system.set.pair[k].force) > 0)
+            c->kept[c->kept_count++] = (Kept){{n->feature[0], n->feature[1]}, s->system.set.pair[k].force};
     }
 }
 
@@ -714,8 +714,8 @@ void self_contact_forget(Stepper *s)
 
 void self_contact_work(const Stepper *s, double *wall, double *friction)
 {
-    for (int k = 0; k < s->set.pair_count; k++) {
-        const ContactPair *p = &s->set.pair[k];
+    for (int k = 0; k < s->system.set.pair_count; k++) {
+        const ContactPair *p = &s->system.set.pair[k];
         Vec3 moved = pair_motion(s, p->end, p->normal, done);
         double pressure = vec3_dot(p->force, p->normal) * vec3_dot(moved, p->normal);
         *wall += pressure;

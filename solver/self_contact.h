@@ -10,7 +10,7 @@ bool self_contact_create(Stepper *s);
 void self_contact_destroy(SelfContact *self);
 
 // All of these do nothing where s->self is NULL.
-// Pairs that are near at the iterate; those that this step may close become s->set.pair.
+// Pairs that are near at the iterate; those that this step may close become s->system.set.pair.
 void self_contact_detect(Stepper *s);
 // Does the solution close pairs that are not in the set? They are looked for that far, and in it now.
 bool self_contact_misses(Stepper *s);

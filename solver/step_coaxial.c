@@ -37,14 +37,14 @@ static double soft_at(const Stepper *s, int c)
 // The tools in element c, carrier first; returns their number. tool: which they are.
 static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
 {
-    int count = 0, first = s->carrier[c + 1];
+    int count = 0, first = s->tools.carrier[c + 1];
     double soft[2] = {soft_at(s, c), soft_at(s, c + 1)};
-    for (int k = first; k < s->tool_count; k++) {
+    for (int k = first; k < s->tools.count; k++) {
         CoaxialSpan *p = &span[count];
-        bool carries = k == first, from_node = s->carrier[c] == k;
+        bool carries = k == first, from_node = s->tools.carrier[c] == k;
         if (!carries && !is_inside(s, c, k))
             continue;
-        *p = (CoaxialSpan){.tool = &s->tool[k].coaxial, .is_fixed = carries && from_node};
+        *p = (CoaxialSpan){.tool = &s->tools.tool[k].coaxial, .is_fixed = carries && from_node};
         if (!carries)
             p->soft[0] = soft[0], p->soft[1] = soft[1];
         p->s1 = from_node ? s->wire.s[c] : slide_at(s, c, k);
@@ -63,9 +63,9 @@ static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
         tool[count++] = k;
     }
     // tools that come out of the tip at node c and end before node c + 1 bend there with the one that goes on
-    for (int k = s->carrier[c] + 1; k < first; k++)
+    for (int k = s->tools.carrier[c] + 1; k < first; k++)
         if (is_inside(s, c, k)) {
-            span[count] = (CoaxialSpan){.tool = &s->tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k), .has_tip = true};
+            span[count] = (CoaxialSpan){.tool = &s->tools.tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k), .has_tip = true};
             tool[count++] = k;
         }
     return count;
@@ -88,10 +88,10 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
         bending += own[i];
     }
     Vec3 curvature = vec3_scale(total, 1 / bending);
-    s->bent[c] = vec3_norm(curvature);
+    s->tools.bent[c] = vec3_norm(curvature);
     for (int k = 1; k <= inner; k++) {
-        Vec3 *moment = &s->inner_moment[c * inner + k - 1];
-        double *tension = &s->inner_tension[c * inner + k - 1];
+        Vec3 *moment = &s->tools.moment[c * inner + k - 1];
+        double *tension = &s->tools.tension[c * inner + k - 1];
         *moment = vec3(0, 0, 0);
         *tension = 0;
         for (int i = 0; i < in->count; i++)
@@ -120,9 +120,9 @@ static CoaxialInput input_at(const Stepper *s, int c, int *tool)
 // One tool alone, between two of its own nodes.
 static bool is_plain(const Stepper *s, int c)
 {
-    if (s->carrier[c] != s->carrier[c + 1])
+    if (s->tools.carrier[c] != s->tools.carrier[c + 1])
         return false;
-    for (int k = s->carrier[c] + 1; k < s->tool_count; k++)
+    for (int k = s->tools.carrier[c] + 1; k < s->tools.count; k++)
         if (is_inside(s, c, k))
             return false;
     return true;
@@ -132,11 +132,11 @@ static void keep_plain(const Stepper *s, int c, const BeamInput *in, const BeamO
 {
     int inner = s->state.inner_count;
     Vec3 m = vec3_scale(vec3_sub(out->angle2, out->angle1), 0.5 * (in->near - in->far));
-    s->bent[c] = vec3_norm(vec3_sub(out->turn2, out->turn1)) / in->length;
+    s->tools.bent[c] = vec3_norm(vec3_sub(out->turn2, out->turn1)) / in->length;
     for (int k = 0; k < inner; k++) {
-        bool bears = k < s->carrier[c + 1];
-        s->inner_moment[c * inner + k] = bears ? m : vec3(0, 0, 0);
-        s->inner_tension[c * inner + k] = bears ? out->tension : 0;
+        bool bears = k < s->tools.carrier[c + 1];
+        s->tools.moment[c * inner + k] = bears ? m : vec3(0, 0, 0);
+        s->tools.tension[c * inner + k] = bears ? out->tension : 0;
     }
 }
 
@@ -213,7 +213,7 @@ static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, con
     coaxial_element(in, &out);
     keep_inner(s, c, in, &out, tool);
     coaxial_tangent(in, &out, scale, &t);
-    clear(local, s->chain.size);
+    clear(local, s->system.chain.size);
     add_ways(way, &t, columns, local);
     double own[NODAL + COAXIAL_COLUMNS];
     put(own, vec3_negate(out.beam.force2));
@@ -245,7 +245,7 @@ static void tip_ways(const Stepper *s, int c, const CoaxialInput *in, const int 
     int on = unknown_of(tool[0]);
     Vec3 t = quat_rotate(s->state.orientation[c], vec3(1, 0, 0));
     const double tangent[3] = {t.x, t.y, t.z};
-    far_ways(in, tool, s->chain.size, way);
+    far_ways(in, tool, s->system.chain.size, way);
     for (int i = 0; i < 3; i++) {
         way[i] = (Way){1, {i, 0}, {1, 0}};
         way[3 + i] = (Way){2, {3 + i, on + 1}, {1, tangent[i]}};
@@ -270,8 +270,8 @@ static void tip_element(const Stepper *s, int c, double scale, Local *local)
 // The tangent of an element between two nodes of the same tool.
 static void add_tangent(const Stepper *s, int c, const CoaxialTangent *t, int columns, const int *place)
 {
-    int n = s->chain.size;
-    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *l = s->chain.lower + block_of(s, c);
+    int n = s->system.chain.size;
+    double *d = s->system.chain.diag + block_of(s, c), *next = s->system.chain.diag + block_of(s, c + 1), *l = s->system.chain.lower + block_of(s, c);
     for (int r = 0; r < 6; r++)
         for (int k = 0; k < 6; k++) {
             d[n * r + k] += t->nodes.k11[6 * r + k];
@@ -329,7 +329,7 @@ static void multiply_tangent(const CoaxialTangent *t, int columns, const int *pl
 // Element c between two nodes of the same tool, as element().
 static void inner_element(const Stepper *s, int c, double scale, bool adds, double *gradient, const double *u, double *product)
 {
-    int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS], columns = 0;
+    int n = s->system.chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS], columns = 0;
     BeamOutput own;
     CoaxialInput in;
     CoaxialOutput out;
@@ -367,7 +367,7 @@ static void inner_element(const Stepper *s, int c, double scale, bool adds, doub
 static void add_to_chain(const Stepper *s, int c, const Local *local)
 {
     int n = local->n;
-    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *l = s->chain.lower + block_of(s, c);
+    double *d = s->system.chain.diag + block_of(s, c), *next = s->system.chain.diag + block_of(s, c + 1), *l = s->system.chain.lower + block_of(s, c);
     for (int r = 0; r < n; r++)
         for (int k = 0; k < n; k++) {
             d[n * r + k] += local->tangent[r][k];
@@ -422,14 +422,14 @@ static double straightening(const Tool *t, double s, double *slope)
 
 double tools_tip_straightening(const Stepper *s)
 {
-    const Tool *t = &s->tool[s->carrier[s->state.node_count - 1]];
+    const Tool *t = &s->tools.tool[s->tools.carrier[s->state.node_count - 1]];
     return density(coaxial_section_at(&t->coaxial, t->wire.s[t->wire.node_count - 2]));
 }
 
 Vec3 tools_tip_curvature(const Stepper *s)
 {
     int last = s->state.node_count - 1;
-    const Tool *t = &s->tool[s->carrier[last]];
+    const Tool *t = &s->tools.tool[s->tools.carrier[last]];
     const CoaxialSection *p = coaxial_section_at(&t->coaxial, t->wire.s[t->wire.node_count - 2]);
     return quat_rotate(s->state.orientation[last], vec3(0, -p->curve[1], p->curve[0]));
 }
@@ -449,13 +449,13 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
     CoaxialInput in = input_at(s, c, tool);
     // input_at() has turned node 1 at a tip
     double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c);
-    double psi = tools_twist(s, c) - (is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0);
+    double psi = tools_twist(s, c) - (is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0);
     *energy = 0;
     for (int k = 0; spring && k < inner; k++)
-        s->inner_moment[c * inner + k] = vec3(0, 0, 0), s->inner_tension[c * inner + k] = 0, s->bent[c] = 0;
+        s->tools.moment[c * inner + k] = vec3(0, 0, 0), s->tools.tension[c * inner + k] = 0, s->tools.bent[c] = 0;
     for (int i = 0; i < in.count; i++) {
         const CoaxialSpan *p = &in.span[i];
-        *energy += straightened(&s->tool[tool[i]], p->s1, p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2);
+        *energy += straightened(&s->tools.tool[tool[i]], p->s1, p->has_tip ? s->tools.tool[tool[i]].wire.total_length : p->s2);
         if (p->has_tip)
             continue;
         CoaxialSprings own = coaxial_springs(p);
@@ -465,7 +465,7 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
         if (!spring)
             continue;
         for (int k = 0; k < tool[i]; k++)
-            s->inner_tension[c * inner + k] += own.axial * strain;
+            s->tools.tension[c * inner + k] += own.axial * strain;
         double tension = own.axial * strain, torque = own.torsion * turn, drawn = -0.5 * (tension * tension * own.drawn[0] + torque * torque * own.drawn[1]);
         int b = p->is_fixed ? -1 : at, beyond = i == 0 ? -1 : at;     // beyond a tip the tool that goes on is the node itself
         spring[count++] = (Spring){0, {b, beyond}, 1, scale * own.axial, own.axial * strain, drawn};
@@ -499,7 +499,7 @@ static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool 
 {
     Spring spring[2 * STEP_TOOLS_MAX];
     double energy;
-    int n = s->chain.size, count = sheath_springs(s, c, scale, spring, &energy);
+    int n = s->system.chain.size, count = sheath_springs(s, c, scale, spring, &energy);
     memset(gradient, 0, 2 * (size_t)n * sizeof *gradient);
     if (product)
         memset(product, 0, 2 * (size_t)n * sizeof *product);
@@ -515,9 +515,9 @@ static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool 
         }
         if (!adds)
             continue;
-        add_products(s->chain.diag + block_of(s, c), n, p, 0, 0, p->stiffness);
-        add_products(s->chain.diag + block_of(s, c + 1), n, p, 1, 1, p->stiffness);
-        add_products(s->chain.lower + block_of(s, c), n, p, 1, 0, -p->stiffness);
+        add_products(s->system.chain.diag + block_of(s, c), n, p, 0, 0, p->stiffness);
+        add_products(s->system.chain.diag + block_of(s, c + 1), n, p, 1, 1, p->stiffness);
+        add_products(s->system.chain.lower + block_of(s, c), n, p, 1, 0, -p->stiffness);
     }
 }
 
@@ -527,7 +527,7 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
     int c = s->first_free - 1;
     CoaxialInput in = input_at(s, c, tool);
     double place = stepper_sheath_coordinate(s, c);
-    in.x1 = s->mouth;
+    in.x1 = s->entry.mouth;
     for (int i = 0; i < in.count; i++) {
         CoaxialSpan *p = &in.span[i];
         p->s1 -= place;
@@ -535,7 +535,7 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
         p->spread = s->wire.length[c];
         p->spreads_twist = true;
         p->soft[0] = 0;
-        double end = p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2;
+        double end = p->has_tip ? s->tools.tool[tool[i]].wire.total_length : p->s2;
         if (!p->has_tip)
             p->s1 = fmin(p->s1, end - SHORTEST * s->wire.length[c]);
     }
@@ -544,10 +544,10 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
 
 static void mouth_ways(const Stepper *s, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
 {
-    const double d[3] = {s->axis[0].x, s->axis[0].y, s->axis[0].z};
+    const double d[3] = {s->entry.axis[0].x, s->entry.axis[0].y, s->entry.axis[0].z};
     bool at_tip = is_at_tip(s, s->first_free - 1);       // then the tool that goes on has a place and an angle at that node too
     int on = unknown_of(tool[0]) + 1;
-    far_ways(in, tool, s->chain.size, way);
+    far_ways(in, tool, s->system.chain.size, way);
     for (int i = 0; i < 3; i++) {
         way[i] = (Way){0};
         way[3 + i] = at_tip ? (Way){2, {3, on}, {d[i], d[i]}} : (Way){1, {3, 0}, {d[i], 0}};
@@ -572,15 +572,15 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
 // What lies straight behind the mouth gets longer with S there. `scale` of the tangent as of elements; less of it where a border would push the tool on.
 static void add_straightening(const Stepper *s, double scale, double *gradient)
 {
-    int n = s->chain.size;
-    double *d = s->chain.diag + block_of(s, s->first_free - 1);
+    int n = s->system.chain.size;
+    double *d = s->system.chain.diag + block_of(s, s->first_free - 1);
     int tool[STEP_TOOLS_MAX];
     CoaxialInput in = mouth_input(s, tool);
     Way way[NODAL + COAXIAL_COLUMNS];
     mouth_ways(s, &in, tool, way);
     for (int i = 0; i < in.count; i++) {
         const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
-        double slope, force = straightening(&s->tool[tool[i]], in.span[i].s1, &slope);
+        double slope, force = straightening(&s->tools.tool[tool[i]], in.span[i].s1, &slope);
         for (int j = 0; j < w->count; j++) {
             gradient[w->at[j]] += force * w->by[j];
             for (int k = 0; k < w->count; k++)
@@ -608,8 +608,8 @@ typedef struct Lump {        // of one tool at one node
 
 static Lump lump_at(const Stepper *s, int c, int k)
 {
-    const Tool *t = &s->tool[k];
-    if (k == s->carrier[c])
+    const Tool *t = &s->tools.tool[k];
+    if (k == s->tools.carrier[c])
         return (Lump){s->wire.mass[c], s->wire.inertia_axial[c], s->wire.inertia_lateral[c]};
     double at = slide_at(s, c, k), length = fmin(tributary(s, c), fmax(0, t->wire.total_length - at));
     int section = (int)(coaxial_section_at(&t->coaxial, at) - t->section);
@@ -627,11 +627,11 @@ typedef struct Motion {
 
 static void add_along(Stepper *s, int c, double inertia, double mass, Vec3 t, bool held, const Motion *m)
 {
-    int n = s->chain.size, at = m->at;
-    double *d = s->chain.diag + block_of(s, c), *b = s->b + row_of(s, c);
-    const double *u = s->linearised + row_of(s, c) + m->first;
+    int n = s->system.chain.size, at = m->at;
+    double *d = s->system.chain.diag + block_of(s, c), *b = s->system.b + row_of(s, c);
+    const double *u = s->iterate.moved + row_of(s, c) + m->first;
     const double g[3] = {held ? 1 : t.x, held ? 0 : t.y, held ? 0 : t.z};
-    double done = g[0] * u[0] + g[1] * u[1] + g[2] * u[2] + (at > 0 ? m->own * s->linearised[row_of(s, c) + (size_t)at] : 0);
+    double done = g[0] * u[0] + g[1] * u[1] + g[2] * u[2] + (at > 0 ? m->own * s->iterate.moved[row_of(s, c) + (size_t)at] : 0);
     double force = mass * (m->speed / s->dt + m->push - inertia * done), stiff = inertia * mass;
     for (int r = 0; r < 3; r++) {
         int row = m->first + r;
@@ -652,9 +652,9 @@ static void add_along(Stepper *s, int c, double inertia, double mass, Vec3 t, bo
 // The same of all tools together across the tangent.
 static void add_across(Stepper *s, int c, double inertia, double mass, Vec3 t, int first, Vec3 speed, Vec3 push)
 {
-    int n = s->chain.size;
-    double *d = s->chain.diag + block_of(s, c) + (n + 1) * first, *b = s->b + row_of(s, c) + first;
-    const double *u = s->linearised + row_of(s, c) + first, g[3] = {t.x, t.y, t.z};
+    int n = s->system.chain.size;
+    double *d = s->system.chain.diag + block_of(s, c) + (n + 1) * first, *b = s->system.b + row_of(s, c) + first;
+    const double *u = s->iterate.moved + row_of(s, c) + first, g[3] = {t.x, t.y, t.z};
     Vec3 force = vec3_add_scaled(vec3_add_scaled(push, 1 / s->dt, speed), -inertia, vec3(u[0], u[1], u[2]));
     put(b, vec3_add_scaled(vec3(b[0], b[1], b[2]), mass, vec3_add_scaled(force, -vec3_dot(force, t), t)));
     for (int r = 0; r < 3; r++)
@@ -666,22 +666,22 @@ static void node_inertia(Stepper *s, int c, double inertia)
 {
     const WireState *w = &s->state;
     bool held = c < s->first_free;
-    Vec3 t = held ? s->axis[0] : quat_rotate(w->orientation[c], vec3(1, 0, 0)), v = w->velocity[c], spin = w->spin[c];
+    Vec3 t = held ? s->entry.axis[0] : quat_rotate(w->orientation[c], vec3(1, 0, 0)), v = w->velocity[c], spin = w->spin[c];
     Lump all = {0};
-    for (int k = s->carrier[c]; k < s->tool_count; k++) {
-        bool own = k == s->carrier[c];
+    for (int k = s->tools.carrier[c]; k < s->tools.count; k++) {
+        bool own = k == s->tools.carrier[c];
         if (!own && !is_inside(s, c, k))
             continue;
         Lump lump = lump_at(s, c, k);
         int at = own ? 0 : unknown_of(k), i = c * w->inner_count + k - 1;
-        add_along(s, c, inertia, lump.mass, t, held, &(Motion){0, at, -1, own ? vec3_dot(v, t) : w->slide_velocity[i], vec3_dot(s->gravity, t)});
+        add_along(s, c, inertia, lump.mass, t, held, &(Motion){0, at, -1, own ? vec3_dot(v, t) : w->slide_velocity[i], vec3_dot(s->rig.gravity, t)});
         add_along(s, c, inertia, lump.about, t, held, &(Motion){3, own ? 0 : at + 1, 1, own ? vec3_dot(spin, t) : w->slide_spin[i], 0});
         all.mass += lump.mass;
         all.across += lump.across;
     }
     if (held)
         return;
-    add_across(s, c, inertia, all.mass, t, 0, v, s->gravity);
+    add_across(s, c, inertia, all.mass, t, 0, v, s->rig.gravity);
     add_across(s, c, inertia, all.across, t, 3, spin, vec3(0, 0, 0));
 }
 
@@ -693,8 +693,8 @@ double tools_kinetic_energy(const Stepper *s)
         Vec3 t = quat_rotate(w->orientation[c], vec3(1, 0, 0));
         double along = vec3_dot(w->velocity[c], t), about = vec3_dot(w->spin[c], t);
         double across2 = vec3_norm2(w->velocity[c]) - along * along, turning2 = vec3_norm2(w->spin[c]) - about * about;
-        for (int k = s->carrier[c]; k < s->tool_count; k++) {
-            bool own = k == s->carrier[c];
+        for (int k = s->tools.carrier[c]; k < s->tools.count; k++) {
+            bool own = k == s->tools.carrier[c];
             if (!own && !is_inside(s, c, k))
                 continue;
             Lump lump = lump_at(s, c, k);
@@ -718,9 +718,9 @@ static CoaxialInput going_on(const Stepper *s, int c, CoaxialOutput *out)
     }
     *out = (CoaxialOutput){0};
     CoaxialInput in = {.x1 = s->state.position[c], .q1 = s->state.orientation[c]};
-    for (int k = s->carrier[c] + 1; k < s->tool_count; k++)
+    for (int k = s->tools.carrier[c] + 1; k < s->tools.count; k++)
         if (is_inside(s, c, k))
-            in.span[in.count++] = (CoaxialSpan){.tool = &s->tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k)};
+            in.span[in.count++] = (CoaxialSpan){.tool = &s->tools.tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k)};
     return in;
 }
 
@@ -763,7 +763,7 @@ ToolNode tools_further(const Stepper *s, int c, double d, bool strains)
         node.position = vec3_add_scaled(node.position, ds, vec3_add_scaled(slant, 1 + stretch, tangent));
         node.orientation = quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0)));
     }
-    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;      // input_at()
+    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;      // input_at()
     node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(-turned, 0, 0))));
     return node;
 }
@@ -802,7 +802,7 @@ static void element(const Stepper *s, int c, double scale, bool adds, double *gr
         for (int k = 0; k < 2 * local.n; k++)
             product[r] += local.tangent[r][k] * u[k];
     }
-    memcpy(gradient, local.gradient, 2 * (size_t)s->chain.size * sizeof *gradient);
+    memcpy(gradient, local.gradient, 2 * (size_t)s->system.chain.size * sizeof *gradient);
 }
 
 // How element c has turned as a whole in this step; at the mouth it is clamped.
@@ -810,7 +810,7 @@ static Quat turned_as_a_whole(const Stepper *s, int c)
 {
     if (c < s->first_free)
         return (Quat){1, 0, 0, 0};
-    const Quat *q = s->state.orientation + c, *p = s->start_orientation + c;
+    const Quat *q = s->state.orientation + c, *p = s->start.orientation + c;
     Quat turn[2] = {quat_mul(q[0], quat_conjugate(p[0])), quat_mul(q[1], quat_conjugate(p[1]))};
     double same = turn[0].w * turn[1].w + turn[0].x * turn[1].x + turn[0].y * turn[1].y + turn[0].z * turn[1].z < 0 ? -1 : 1;
     return quat_unit((Quat){turn[0].w + same * turn[1].w, turn[0].x + same * turn[1].x, turn[0].y + same * turn[1].y, turn[0].z + same * turn[1].z});
@@ -819,17 +819,17 @@ static Quat turned_as_a_whole(const Stepper *s, int c)
 // What element c's unknowns have done in this step, its turn as a whole apart: in the linearised sense what strains it, however far it has turned.
 static void strained(const Stepper *s, int c, double *u)
 {
-    int n = s->chain.size;
+    int n = s->system.chain.size;
     const WireState *w = &s->state;
-    memcpy(u, s->linearised + row_of(s, c), 2 * (size_t)n * sizeof *u);
+    memcpy(u, s->iterate.moved + row_of(s, c), 2 * (size_t)n * sizeof *u);
     if (c < s->first_free)
         return;
     Quat turn = turned_as_a_whole(s, c);
-    Vec3 was = vec3_sub(s->start_position[c + 1], s->start_position[c]), is = vec3_sub(w->position[c + 1], w->position[c]),
+    Vec3 was = vec3_sub(s->start.position[c + 1], s->start.position[c]), is = vec3_sub(w->position[c + 1], w->position[c]),
          stretch = vec3_sub(is, quat_rotate(turn, was));
     for (int node = 0; node < 2; node++) {
         put(u + node * n, vec3_scale(stretch, node ? 0.5 : -0.5));
-        Quat q = quat_mul(w->orientation[c + node], quat_conjugate(quat_mul(turn, s->start_orientation[c + node])));
+        Quat q = quat_mul(w->orientation[c + node], quat_conjugate(quat_mul(turn, s->start.orientation[c + node])));
         put(u + node * n + 3, vec3_scale(vec3(q.x, q.y, q.z), q.w < 0 ? -2 : 2));
     }
 }
@@ -841,7 +841,7 @@ static void add_damping(const Stepper *s, int c, double scale, double *force)
     strained(s, c, u);
     element(s, c, scale, false, unused, u, with);
     element(s, c, 1, false, unused, u, without);
-    for (int i = 0; i < 2 * s->chain.size; i++)
+    for (int i = 0; i < 2 * s->system.chain.size; i++)
         force[i] += with[i] - without[i];
 }
 
@@ -855,8 +855,8 @@ typedef struct Batch {       // what a tile has: which elements, and which tools
 static void add_lane(const Stepper *s, const Batch *batch, int l)
 {
     const CoaxialTile *t = &batch->tile;
-    int n = s->chain.size, c = batch->element[l];
-    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *low = s->chain.lower + block_of(s, c);
+    int n = s->system.chain.size, c = batch->element[l];
+    double *d = s->system.chain.diag + block_of(s, c), *next = s->system.chain.diag + block_of(s, c + 1), *low = s->system.chain.lower + block_of(s, c);
     for (int r = 0, at = 0; r < 6; r++) {
         for (int k = 0; k < r; k++, at++) {
             d[n * r + k] += t->k11[at][l], d[n * k + r] += t->k11[at][l];
@@ -949,9 +949,9 @@ static void keep_lane(const Stepper *s, const Batch *batch, int l)
 {
     const CoaxialTile *t = &batch->tile;
     int c = batch->element[l], inner = s->state.inner_count;
-    Vec3 *moment = s->inner_moment + c * inner;
-    double *tension = s->inner_tension + c * inner;
-    s->bent[c] = t->bent[l];
+    Vec3 *moment = s->tools.moment + c * inner;
+    double *tension = s->tools.tension + c * inner;
+    s->tools.bent[c] = t->bent[l];
     for (int k = 0; k < inner; k++)
         moment[k] = vec3(0, 0, 0), tension[k] = 0;
     for (int i = 0; i < t->count; i++)
@@ -965,8 +965,8 @@ static void keep_lane(const Stepper *s, const Batch *batch, int l)
 static void add_batch(Stepper *s, Batch *batch, double scale)
 {
     CoaxialTile *t = &batch->tile;
-    int n = s->chain.size;
-    bool damps = s->is_iterate && scale != 1;
+    int n = s->system.chain.size;
+    bool damps = s->iterate.is_moved && scale != 1;
     double u[2 * BLOCK_LARGEST], force[COAXIAL_LANES][2 * BLOCK_LARGEST];
     if (t->lanes == 0)
         return;
@@ -983,7 +983,7 @@ static void add_batch(Stepper *s, Batch *batch, double scale)
     if (damps)               // less the elastic part
         coaxial_tile_find(t, 1);
     for (int l = 0; l < t->lanes; l++) {
-        double *b = s->b + row_of(s, batch->element[l]);
+        double *b = s->system.b + row_of(s, batch->element[l]);
         if (damps) {
             strained(s, batch->element[l], u);
             multiply_lane(batch, l, n, -1, u, force[l]);
@@ -1015,22 +1015,22 @@ static bool takes_element(Stepper *s, int c, double scale, Batch *batch)
 
 static void add_element(Stepper *s, int c, double scale)
 {
-    double *b = s->b + row_of(s, c), gradient[2 * BLOCK_LARGEST];
+    double *b = s->system.b + row_of(s, c), gradient[2 * BLOCK_LARGEST];
     element(s, c, scale, true, gradient, NULL, NULL);
-    if (s->is_iterate && scale != 1)
+    if (s->iterate.is_moved && scale != 1)
         add_damping(s, c, scale, gradient);
     if (c + 1 == s->first_free)
         add_straightening(s, scale, gradient);
-    for (int i = 0; i < 2 * s->chain.size; i++)
+    for (int i = 0; i < 2 * s->system.chain.size; i++)
         b[i] -= gradient[i];
 }
 
 void tools_assemble(Stepper *s, double scale, double inertia)
 {
     int nodes = s->state.node_count;
-    memset(s->chain.diag, 0, block_of(s, nodes) * sizeof(double));
-    memset(s->chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
-    memset(s->b, 0, row_of(s, nodes) * sizeof(double));
+    memset(s->system.chain.diag, 0, block_of(s, nodes) * sizeof(double));
+    memset(s->system.chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
+    memset(s->system.b, 0, row_of(s, nodes) * sizeof(double));
     for (int c = 0; c < nodes; c++)
         node_inertia(s, c, inertia);
     Batch batch;
@@ -1039,12 +1039,12 @@ void tools_assemble(Stepper *s, double scale, double inertia)
         if (!takes_element(s, c, scale, &batch))
             add_element(s, c, scale);
     add_batch(s, &batch, scale);
-    if (!s->is_iterate)
+    if (!s->iterate.is_moved)
         tools_slides(s);
     static const int lateral[4] = {1, 2, 4, 5};      // in the sheath nothing has been added to these rows and columns
     for (int c = 0; c < s->first_free; c++)
         for (int i = 0; i < 4; i++)
-            s->chain.diag[block_of(s, c) + (size_t)((s->chain.size + 1) * lateral[i])] = 1;
+            s->system.chain.diag[block_of(s, c) + (size_t)((s->system.chain.size + 1) * lateral[i])] = 1;
 }
 
 double tools_elastic_energy(const Stepper *s)
@@ -1052,8 +1052,8 @@ double tools_elastic_energy(const Stepper *s)
     double energy = 0;
     int tool[STEP_TOOLS_MAX];
     // behind the hub all tools lie straight in the hands
-    for (int k = 1; s->first_free > 0 && k < s->tool_count; k++)
-        energy += straightened(&s->tool[k], 0, slide_at(s, 0, k));
+    for (int k = 1; s->first_free > 0 && k < s->tools.count; k++)
+        energy += straightened(&s->tools.tool[k], 0, slide_at(s, 0, k));
     for (int c = 0; c + 1 < s->state.node_count; c++) {
         if (c + 1 < s->first_free) {
             double own;
@@ -1065,8 +1065,8 @@ double tools_elastic_energy(const Stepper *s)
             coaxial_element(&in, &out);
             energy += out.energy;
             for (int i = 0; i < in.count; i++) {
-                double from = s->carrier[c] == tool[i] ? s->wire.s[c] : slide_at(s, c, tool[i]);
-                energy += straightened(&s->tool[tool[i]], from, in.span[i].s1) - straightened(&s->tool[tool[i]], in.span[i].s1, from);
+                double from = s->tools.carrier[c] == tool[i] ? s->wire.s[c] : slide_at(s, c, tool[i]);
+                energy += straightened(&s->tools.tool[tool[i]], from, in.span[i].s1) - straightened(&s->tools.tool[tool[i]], in.span[i].s1, from);
             }
         } else if (is_plain(s, c)) {
             BeamInput in = stepper_beam(s, c);
@@ -1085,10 +1085,10 @@ double tools_elastic_energy(const Stepper *s)
 
 double tools_stiffness_damping(const Stepper *s)
 {
-    int n = s->chain.size;
+    int n = s->system.chain.size;
     double work = 0, scale = 1 + s->damping_stiffness / s->dt;
     for (int c = 0; c + 1 < s->state.node_count; c++) {
-        const double *done = s->linearised + row_of(s, c);
+        const double *done = s->iterate.moved + row_of(s, c);
         double force[2 * BLOCK_LARGEST] = {0};
         add_damping(s, c, scale, force);
         for (int i = 0; i < 2 * n; i++)

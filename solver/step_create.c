@@ -17,14 +17,14 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    size_t per_node = 6 * (size_t)s->chain.size + 9 + 8 * (size_t)s->state.inner_count;
+    size_t per_node = 6 * (size_t)s->system.chain.size + 9 + 8 * (size_t)s->state.inner_count;
     size_t total = (BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + per_node * m;
     s->scratch = calloc(total, sizeof *s->scratch);
     if (!s->scratch)
         return false;
     double *at = s->scratch;
     BeamRest *r = &s->beam.rest;
-    BeamPose *p = &s->beam.pose, *q = &s->start_pose;
+    BeamPose *p = &s->beam.pose, *q = &s->start.pose;
     BeamInertia *i = &s->beam.inertia;
     double **array[] = {&r->length,    &r->extend,  &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z,
                         &r->curvature, &r->bending, &r->shear, &p->x,    &p->y,   &p->z,     &p->qw,     &p->qx,     &p->qy,
@@ -37,19 +37,19 @@ static bool allocate_scratch(Stepper *s)
         i->lateral[k] = s->wire.inertia_lateral[k];
         i->excess[k] = s->wire.inertia_axial[k] - s->wire.inertia_lateral[k];
     }
-    size_t rows = (size_t)s->chain.size * m, inner = (size_t)s->state.inner_count * m;
-    s->b = take(&at, rows);
-    s->u = take(&at, rows);
-    s->linearised = take(&at, rows);
-    s->seen = take(&at, rows);
-    s->product = take(&at, rows);
-    s->kept = take(&at, 7 * m + rows + 2 * inner);
-    s->start_slide = take(&at, inner);
-    s->start_angle = take(&at, inner);
-    s->inner_moment = (Vec3 *)take(&at, 3 * inner);
-    s->inner_tension = take(&at, inner);
-    s->middle = take(&at, m);
-    s->bent = take(&at, m);
+    size_t rows = (size_t)s->system.chain.size * m, inner = (size_t)s->state.inner_count * m;
+    s->system.b = take(&at, rows);
+    s->system.u = take(&at, rows);
+    s->iterate.moved = take(&at, rows);
+    s->iterate.seen = take(&at, rows);
+    s->system.product = take(&at, rows);
+    s->iterate.kept = take(&at, 7 * m + rows + 2 * inner);
+    s->start.slide = take(&at, inner);
+    s->start.angle = take(&at, inner);
+    s->tools.moment = (Vec3 *)take(&at, 3 * inner);
+    s->tools.tension = take(&at, inner);
+    s->tools.middle = take(&at, m);
+    s->tools.bent = take(&at, m);
     SEL_REQUIRE(at <= s->scratch + total, "the arrays of a step fit the memory that they share");
     return true;
 }
@@ -57,83 +57,84 @@ static bool allocate_scratch(Stepper *s)
 static bool make_slots(Stepper *s, const WireOptions *o)
 {
     const Wire *w = &s->wire;
-    s->slot_start = calloc((size_t)w->node_count, sizeof *s->slot_start);
-    if (!s->slot_start)
+    s->points.slot_start = calloc((size_t)w->node_count, sizeof *s->points.slot_start);
+    if (!s->points.slot_start)
         return false;
-    if (s->tool_count > 1) {         // room for all; which of them there are: tools_chain()
-        s->point_count = w->node_count + s->slot_count;
-        return (s->slot = calloc((size_t)s->slot_count + 1, sizeof *s->slot)) != NULL;
+    if (s->tools.count > 1) {         // room for all; which of them there are: tools_chain()
+        s->points.count = w->node_count + s->points.slot_count;
+        return (s->points.slot = calloc((size_t)s->points.slot_count + 1, sizeof *s->points.slot)) != NULL;
     }
     for (int i = 0; i < w->element_count; i++)
-        s->slot_start[i + 1] = s->slot_start[i] + slot_count_of(w->length[i]);
-    s->slot_count = s->slot_start[w->element_count];
-    s->point_count = w->node_count + s->slot_count;
-    s->slot = calloc((size_t)s->slot_count + 1, sizeof *s->slot);
-    if (!s->slot)
+        s->points.slot_start[i + 1] = s->points.slot_start[i] + slot_count_of(w->length[i]);
+    s->points.slot_count = s->points.slot_start[w->element_count];
+    s->points.count = w->node_count + s->points.slot_count;
+    s->points.slot = calloc((size_t)s->points.slot_count + 1, sizeof *s->points.slot);
+    if (!s->points.slot)
         return false;
     for (int i = 0; i < w->element_count; i++) {
         const WireSection *section = &o->section[w->section[i]];
-        int first = s->slot_start[i], count = s->slot_start[i + 1] - first;
+        int first = s->points.slot_start[i], count = s->points.slot_start[i + 1] - first;
         for (int k = 0; k < count; k++)
-            s->slot[first + k] = slot_make(i, w->length[i], k, count, section->diameter / 2, section->friction);
+            s->points.slot[first + k] = slot_make(i, w->length[i], k, count, section->diameter / 2, section->friction);
     }
     return true;
 }
 
 static bool allocate(Stepper *s)
 {
-    s->point_capacity = s->point_count;
-    size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count, inner = (size_t)s->state.inner_count * m;
+    s->points.capacity = s->points.count;
+    size_t m = (size_t)s->wire.node_count, points = (size_t)s->points.count, inner = (size_t)s->state.inner_count * m;
     int size = 6 + 2 * s->state.inner_count;
     s->memory_count = 13 * m + (5 + WALL_MET_DOUBLES) * points + 7 * inner;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
-    s->place = calloc(points, sizeof *s->place);
-    s->trial = calloc(points, sizeof *s->trial);
-    s->tried = calloc(points, sizeof *s->tried);
-    s->fixed = calloc(m, sizeof *s->fixed);
-    s->start_position = calloc(m, sizeof *s->start_position);
-    s->start_force = calloc(points, sizeof *s->start_force);
-    s->start_orientation = calloc(m, sizeof *s->start_orientation);
-    s->slot_place = calloc(points, sizeof *s->slot_place);
-    s->query_point = calloc(2 * points, sizeof *s->query_point);
-    s->query_place = calloc(2 * points, sizeof *s->query_place);
-    s->query_hit = calloc(2 * points, sizeof *s->query_hit);
-    s->query_which = calloc(4 * points + m, sizeof *s->query_which);
-    s->room = calloc(4 * points + m, sizeof *s->room);
-    s->set.point = calloc(2 * points, sizeof *s->set.point);
-    s->set.capacity = 2 * s->point_count;       // each with the wall across
-    s->factor = block_factor_create(s->wire.node_count, size);
-    s->set.slide = calloc(inner + 1, sizeof *s->set.slide);
-    s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity + (int)inner);
-    s->carrier = calloc(m, sizeof *s->carrier);
-    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_force || !s->start_orientation || !s->slot_place ||
-        !s->query_point || !s->query_place || !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier ||
-        !s->set.slide || !block_chain_create(&s->chain, s->wire.node_count, size) || !allocate_scratch(s))
+    s->points.place = calloc(points, sizeof *s->points.place);
+    s->points.trial = calloc(points, sizeof *s->points.trial);
+    s->points.tried = calloc(points, sizeof *s->points.tried);
+    s->rig.fixed = calloc(m, sizeof *s->rig.fixed);
+    s->start.position = calloc(m, sizeof *s->start.position);
+    s->points.start_force = calloc(points, sizeof *s->points.start_force);
+    s->start.orientation = calloc(m, sizeof *s->start.orientation);
+    s->points.slot_place = calloc(points, sizeof *s->points.slot_place);
+    s->query.point = calloc(2 * points, sizeof *s->query.point);
+    s->query.place = calloc(2 * points, sizeof *s->query.place);
+    s->query.hit = calloc(2 * points, sizeof *s->query.hit);
+    s->query.which = calloc(4 * points + m, sizeof *s->query.which);
+    s->points.room = calloc(4 * points + m, sizeof *s->points.room);
+    s->system.set.point = calloc(2 * points, sizeof *s->system.set.point);
+    s->system.set.capacity = 2 * s->points.count;       // each with the wall across
+    s->system.factor = block_factor_create(s->wire.node_count, size);
+    s->system.set.slide = calloc(inner + 1, sizeof *s->system.set.slide);
+    s->system.solver = contact_solver_create(s->wire.node_count, size, s->system.set.capacity + (int)inner);
+    s->tools.carrier = calloc(m, sizeof *s->tools.carrier);
+    if (!s->memory || !s->points.place || !s->points.trial || !s->points.tried || !s->rig.fixed || !s->start.position || !s->points.start_force ||
+        !s->start.orientation || !s->points.slot_place || !s->query.point || !s->query.place || !s->query.hit || !s->query.which || !s->points.room ||
+        !s->system.set.point || !s->system.factor || !s->system.solver || !s->tools.carrier || !s->system.set.slide ||
+        !block_chain_create(&s->system.chain, s->wire.node_count, size) || !allocate_scratch(s))
         return false;
     s->state.node_count = s->wire.node_count;
     s->state.position = (Vec3 *)s->memory;
     s->state.velocity = (Vec3 *)(s->memory + 3 * m);
     s->state.spin = (Vec3 *)(s->memory + 6 * m);
     s->state.orientation = (Quat *)(s->memory + 9 * m);
-    s->force = (Vec3 *)(s->memory + 13 * m);
-    s->clearance = s->memory + 13 * m + 3 * points;
-    s->met = (WallMet *)(s->clearance + points);
-    s->touch = (double *)(s->met + points);
-    s->state.slide = s->touch + points;
+    s->points.force = (Vec3 *)(s->memory + 13 * m);
+    s->points.clearance = s->memory + 13 * m + 3 * points;
+    s->points.met = (WallMet *)(s->points.clearance + points);
+    s->points.touch = (double *)(s->points.met + points);
+    s->state.slide = s->points.touch + points;
     s->state.angle = s->state.slide + inner;
     s->state.slide_velocity = s->state.angle + inner;
     s->state.slide_spin = s->state.slide_velocity + inner;
     s->state.slide_force = s->state.slide_spin + inner;
     SEL_REQUIRE(s->state.slide_force + inner <= s->memory + s->memory_count, "the arrays of the state fit the memory that they share");
-    s->linger = s->room + points;
-    s->lack = s->linger + points;
-    s->touch_next = s->lack + points;
-    s->range = s->touch_next + points;
-    s->query_near = s->query_which + points;
-    s->candidate = s->query_near + points;
-    s->answer_of = s->candidate + 2 * points;
+    s->points.linger = s->points.room + points;
+    s->points.lack = s->points.linger + points;
+    s->points.touch_next = s->points.lack + points;
+    s->query.range = s->points.touch_next + points;
+    s->query.near = s->query.which + points;
+    s->points.candidate = s->query.near + points;
+    s->query.answer_of = s->points.candidate + 2 * points;
     for (size_t k = 0; k < points; k++)
-        s->place[k].node = -1;
+        s->points.place[k].node = -1;
     return true;
 }
 
@@ -165,13 +166,13 @@ static int nearest_node(const Wire *wire, double at)
 static bool place_rig(Stepper *s, const WireOptions *o)
 {
     for (int i = 0; i < o->fix_count; i++)
-        s->fixed[nearest_node(&s->wire, o->fix[i].s)] |= o->fix[i].dof;
-    s->can_swing = true;
+        s->rig.fixed[nearest_node(&s->wire, o->fix[i].s)] |= o->fix[i].dof;
+    s->rig.can_swing = true;
     for (int i = 1; i < s->wire.node_count; i++)
-        s->can_swing &= (s->fixed[i] & DOF_POSITION) == 0;
-    s->load_count = o->load_count;
-    s->load = calloc((size_t)o->load_count + 1, sizeof *s->load);
-    if (!s->load)
+        s->rig.can_swing &= (s->rig.fixed[i] & DOF_POSITION) == 0;
+    s->rig.load_count = o->load_count;
+    s->rig.load = calloc((size_t)o->load_count + 1, sizeof *s->rig.load);
+    if (!s->rig.load)
         return false;
     for (int i = 0; i < o->load_count; i++) {
         int node = 0;
@@ -183,23 +184,23 @@ static bool place_rig(Stepper *s, const WireOptions *o)
             weight = 0;
         if (weight > 1 - 1e-9)
             weight = 1;
-        s->load[i] = (LoadPlace){.load = o->load[i], .node = node, .weight = weight};
+        s->rig.load[i] = (LoadPlace){.load = o->load[i], .node = node, .weight = weight};
     }
     return true;
 }
 
 static void place_wire(Stepper *s, const WireOptions *o)
 {
-    if (s->tool_count > 1) {
-        s->state.inserted = s->tool[0].inserted;
+    if (s->tools.count > 1) {
+        s->state.inserted = s->tools.tool[0].inserted;
         tools_place(s);
         return;
     }
     s->state.inserted = o->has_sheath ? fmin(o->inserted, s->wire.total_length) : s->wire.total_length;
     double behind = s->wire.total_length - s->state.inserted;
     for (int i = 0; i < s->wire.node_count; i++) {
-        s->state.position[i] = vec3_add_scaled(s->mouth, s->wire.s[i] - behind, s->axis[0]);
-        s->state.orientation[i] = s->line;
+        s->state.position[i] = vec3_add_scaled(s->entry.mouth, s->wire.s[i] - behind, s->entry.axis[0]);
+        s->state.orientation[i] = s->entry.frame;
     }
 }
 
@@ -237,11 +238,11 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         stepper_destroy(s);
         return NULL;
     }
-    s->tool_count = 1 + o.inner_count;
+    s->tools.count = 1 + o.inner_count;
     s->state.inner_count = o.inner_count;
-    if (s->tool_count > 1 && !(tools_create(s, &o, why, capacity) && wire_reserve(&s->wire, s->capacity))) {
+    if (s->tools.count > 1 && !(tools_create(s, &o, why, capacity) && wire_reserve(&s->wire, s->tools.capacity))) {
         if (!why[0])
-            snprintf(why, (size_t)capacity, "no memory for %d tools", s->tool_count);
+            snprintf(why, (size_t)capacity, "no memory for %d tools", s->tools.count);
         stepper_destroy(s);
         return NULL;
     }
@@ -255,24 +256,24 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         stepper_destroy(s);
         return NULL;
     }
-    if (s->tool_count == 1)
+    if (s->tools.count == 1)
         wire_rest(&s->wire, &o.wire, &s->beam.rest);
-    s->gravity = o.wire.gravity;
+    s->rig.gravity = o.wire.gravity;
     s->damping_mass = o.wire.damping_mass;
     s->damping_stiffness = o.wire.damping_stiffness;
     s->dt = o.dt;
-    s->has_sheath = o.wire.has_sheath;
-    for (int k = 0; k < s->tool_count; k++) {
+    s->entry.has_sheath = o.wire.has_sheath;
+    for (int k = 0; k < s->tools.count; k++) {
         const WireOptions *own = k == 0 ? &o.wire : &o.inner[k - 1];
-        s->hand[k] = (Hand){.limit = own->hand_limit, .valve = own->valve_friction};
+        s->hands.hand[k] = (Hand){.limit = own->hand_limit, .valve = own->valve_friction};
     }
-    s->mouth = o.wire.start;
-    s->line = wire_start_frame(&o.wire);
-    Mat3 frame = quat_to_mat3(s->line);
+    s->entry.mouth = o.wire.start;
+    s->entry.frame = wire_start_frame(&o.wire);
+    Mat3 frame = quat_to_mat3(s->entry.frame);
     for (int k = 0; k < 3; k++)
-        s->axis[k] = mat3_column(&frame, k);
+        s->entry.axis[k] = mat3_column(&frame, k);
     s->vessel = o.vessel;
-    if (s->vessel && s->tool_count == 1)
+    if (s->vessel && s->tools.count == 1)
         make_imperfect(&s->wire, &s->beam.rest);
     s->wall_friction = o.wall_friction;
     ContactOptions usual = contact_default_options();
@@ -294,33 +295,33 @@ void stepper_destroy(Stepper *s)
     if (!s)
         return;
     tools_destroy(s);
-    free(s->carrier);
+    free(s->tools.carrier);
     wire_destroy(&s->wire);
-    block_chain_destroy(&s->chain);
-    if (s->factor)
-        block_factor_destroy(s->factor);
-    if (s->solver)
-        contact_solver_destroy(s->solver);
+    block_chain_destroy(&s->system.chain);
+    if (s->system.factor)
+        block_factor_destroy(s->system.factor);
+    if (s->system.solver)
+        contact_solver_destroy(s->system.solver);
     free(s->memory);
-    free(s->place);
-    free(s->fixed);
-    free(s->load);
-    free(s->start_position);
-    free(s->start_force);
-    free(s->start_orientation);
-    free(s->query_point);
-    free(s->query_place);
-    free(s->trial);
-    free(s->tried);
-    free(s->query_hit);
-    free(s->query_which);
-    free(s->slot_place);
-    free(s->slot);
-    free(s->slot_start);
-    free(s->room);
-    free(s->set.slide);
-    free(s->set.point);
-    free(s->set.pair);
+    free(s->points.place);
+    free(s->rig.fixed);
+    free(s->rig.load);
+    free(s->start.position);
+    free(s->points.start_force);
+    free(s->start.orientation);
+    free(s->query.point);
+    free(s->query.place);
+    free(s->points.trial);
+    free(s->points.tried);
+    free(s->query.hit);
+    free(s->query.which);
+    free(s->points.slot_place);
+    free(s->points.slot);
+    free(s->points.slot_start);
+    free(s->points.room);
+    free(s->system.set.slide);
+    free(s->system.set.point);
+    free(s->system.set.pair);
     self_contact_destroy(s->self);
     free(s->scratch);
     free(s);

@@ -38,23 +38,24 @@ static Vec3 tangent_at(const Stepper *s, int node)
 // Where slot k is; false where it is in the sheath.
 static bool place_slot(Stepper *s, int k)
 {
-    const Slot *slot = &s->slot[k];
+    const Slot *slot = &s->points.slot[k];
     int i = slot->element;
     const Vec3 *x = s->state.position;
     double length = s->wire.length[i];
     if (i + 1 == s->first_free)
-        return i + 2 < s->state.node_count &&
-               slot_place_at_mouth(slot, length, stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x[i + 1], tangent_at(s, i + 1), &s->slot_place[k]);
-    if (s->tool_count > 1 && s->carrier[i] != s->carrier[i + 1])
-        return slot_place_beyond(slot, length, length - tools_span_length(s, i), x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1), &s->slot_place[k]);
-    s->slot_place[k] = slot_place(slot, length, x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1));
+        return i + 2 < s->state.node_count && slot_place_at_mouth(slot, length, stepper_sheath_coordinate(s, i), s->entry.mouth, s->entry.axis[0], x[i + 1],
+                                                                  tangent_at(s, i + 1), &s->points.slot_place[k]);
+    if (s->tools.count > 1 && s->tools.carrier[i] != s->tools.carrier[i + 1])
+        return slot_place_beyond(slot, length, length - tools_span_length(s, i), x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1),
+                                 &s->points.slot_place[k]);
+    s->points.slot_place[k] = slot_place(slot, length, x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1));
     return true;
 }
 
 // What the solution moves a node by from the iterate: 0 for translation, 3 for turn.
 static Vec3 change(const Stepper *s, int node, int from)
 {
-    const double *u = s->u + row_of(s, node) + from, *k = s->linearised + row_of(s, node) + from;
+    const double *u = s->system.u + row_of(s, node) + from, *k = s->iterate.moved + row_of(s, node) + from;
     return vec3_sub(vec3(u[0], u[1], u[2]), vec3(k[0], k[1], k[2]));
 }
 
@@ -63,9 +64,9 @@ static bool at_mouth(const Stepper *s, int element) { return element + 1 == s->f
 // The motion of slot k from its nodes' translations and turns.
 static Vec3 follow(const Stepper *s, int k, const Vec3 move[2], const Vec3 turn[2])
 {
-    const SlotPlace *p = &s->slot_place[k];
+    const SlotPlace *p = &s->points.slot_place[k];
     Vec3 d = vec3_add(vec3_scale(move[1], p->weight), vec3_cross(turn[1], p->lever[1]));
-    if (at_mouth(s, s->slot[k].element))
+    if (at_mouth(s, s->points.slot[k].element))
         return d;
     return vec3_add(d, vec3_add(vec3_scale(move[0], 1 - p->weight), vec3_cross(turn[0], p->lever[0])));
 }
@@ -76,7 +77,7 @@ static Vec3 motion(const Stepper *s, int point)
     int nodes = s->state.node_count;
     if (point < nodes)
         return change(s, point, 0);
-    int i = s->slot[point - nodes].element;
+    int i = s->points.slot[point - nodes].element;
     Vec3 move[2] = {change(s, i, 0), change(s, i + 1, 0)}, turn[2] = {change(s, i, 3), change(s, i + 1, 3)};
     return follow(s, point - nodes, move, turn);
 }
@@ -84,13 +85,13 @@ static Vec3 motion(const Stepper *s, int point)
 // What a node has done since the wall was last asked.
 static Vec3 since(const Stepper *s, int node, int from)
 {
-    const double *k = s->linearised + row_of(s, node) + from, *seen = s->seen + row_of(s, node) + from;
+    const double *k = s->iterate.moved + row_of(s, node) + from, *seen = s->iterate.seen + row_of(s, node) + from;
     return vec3(k[0] - seen[0], k[1] - seen[1], k[2] - seen[2]);
 }
 
 static Vec3 done(const Stepper *s, int node, int from)
 {
-    const double *k = s->linearised + row_of(s, node) + from;
+    const double *k = s->iterate.moved + row_of(s, node) + from;
     return vec3(k[0], k[1], k[2]);
 }
 
@@ -105,7 +106,7 @@ static double travel_of(const Stepper *s, int point, Vec3 (*way)(const Stepper *
 {
     if (point < s->state.node_count)
         return vec3_norm(way(s, point, 0));
-    const Slot *slot = &s->slot[point - s->state.node_count];
+    const Slot *slot = &s->points.slot[point - s->state.node_count];
     int i = slot->element;
     return slot_travel(slot, way(s, i, 0), way(s, i, 3), way(s, i + 1, 0), way(s, i + 1, 3));
 }
@@ -116,27 +117,27 @@ static double travelled(const Stepper *s, int point) { return travel_of(s, point
 static Vec3 place_of(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
-    return point < nodes ? s->state.position[point] : s->slot_place[point - nodes].position;
+    return point < nodes ? s->state.position[point] : s->points.slot_place[point - nodes].position;
 }
 
 static double radius_of(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
-    return point < nodes ? s->wire.radius[point] : s->slot[point - nodes].radius;
+    return point < nodes ? s->wire.radius[point] : s->points.slot[point - nodes].radius;
 }
 
 // The first contact point that may be free: nodes from first_free on, slots from the mouth's element on.
-static int first_slot(const Stepper *s) { return s->state.node_count + s->slot_start[s->first_free > 0 ? s->first_free - 1 : 0]; }
+static int first_slot(const Stepper *s) { return s->state.node_count + s->points.slot_start[s->first_free > 0 ? s->first_free - 1 : 0]; }
 
 bool stepper_escapes(const Stepper *s)
 {
     if (!s->vessel)
         return false;
     for (int p = s->first_free; p < s->state.node_count; p++)
-        if (s->room[p] < HUGE_VAL && travel(s, p) > s->room[p])
+        if (s->points.room[p] < HUGE_VAL && travel(s, p) > s->points.room[p])
             return true;
-    for (int p = first_slot(s); p < s->point_count; p++)
-        if (s->room[p] < HUGE_VAL && travel(s, p) > s->room[p])
+    for (int p = first_slot(s); p < s->points.count; p++)
+        if (s->points.room[p] < HUGE_VAL && travel(s, p) > s->points.room[p])
             return true;
     return false;
 }
@@ -144,14 +145,14 @@ bool stepper_escapes(const Stepper *s)
 // Asks for a point at x, where a trial has led it. One that slept may have left its part of the vessel long ago: it is looked for.
 static void ask_there(Stepper *s, int point, Vec3 x, int *count)
 {
-    int nodes = s->state.node_count, from = s->place[point].node;
-    s->query_which[*count] = point;
-    s->query_point[*count] = x;
-    s->query_place[*count] = s->tried[point] ? s->trial[point] : s->place[point];
+    int nodes = s->state.node_count, from = s->points.place[point].node;
+    s->query.which[*count] = point;
+    s->query.point[*count] = x;
+    s->query.place[*count] = s->points.tried[point] ? s->points.trial[point] : s->points.place[point];
     if (from < 0 && point >= nodes)
-        from = s->place[s->slot[point - nodes].element + 1].node;
-    if (!s->tried[point] && (s->place[point].node < 0 || s->clearance[point] > 0))
-        s->query_place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, from)};
+        from = s->points.place[s->points.slot[point - nodes].element + 1].node;
+    if (!s->points.tried[point] && (s->points.place[point].node < 0 || s->points.clearance[point] > 0))
+        s->query.place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, from)};
     ++*count;
 }
 
@@ -159,20 +160,20 @@ static void ask_there(Stepper *s, int point, Vec3 x, int *count)
 static void answer_there(Stepper *s, int count)
 {
     if (count > 0)
-        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+        vessel_query(s->vessel, count, s->query.point, 0.5, s->query.place, s->query.hit);
     for (int k = 0; k < count; k++) {
-        s->trial[s->query_which[k]] = s->query_place[k];
-        s->tried[s->query_which[k]] = true;
+        s->points.trial[s->query.which[k]] = s->query.place[k];
+        s->points.tried[s->query.which[k]] = true;
     }
 }
 
 // The iterate is where the last trial led.
 static void take_trials(Stepper *s)
 {
-    for (int p = 0; p < s->point_count; p++)
-        if (s->tried[p] && s->is_iterate)
-            s->place[p] = s->trial[p];
-    memset(s->tried, 0, (size_t)s->point_count * sizeof *s->tried);
+    for (int p = 0; p < s->points.count; p++)
+        if (s->points.tried[p] && s->iterate.is_moved)
+            s->points.place[p] = s->points.trial[p];
+    memset(s->points.tried, 0, (size_t)s->points.count * sizeof *s->points.tried);
 }
 
 // How deep outside the true wall [mm] the points are that have gone, or would go with the solution, beyond what is known of it there. Room that walls
@@ -181,23 +182,23 @@ static double deepest_there(Stepper *s, bool would_go)
 {
     int count = 0;
     double deepest = 0;
-    for (int p = s->first_free; p < s->point_count; p++) {
+    for (int p = s->first_free; p < s->points.count; p++) {
         if (p == s->state.node_count)
             p = first_slot(s);
-        if (p == s->point_count)
+        if (p == s->points.count)
             break;
         double far = would_go ? travel(s, p) : travelled(s, p);
-        if (far < (s->room[p] < HUGE_VAL ? s->room[p]
-                   : would_go            ? OVERSHOOT_TRAVEL
-                                         : 0) ||
+        if (far < (s->points.room[p] < HUGE_VAL ? s->points.room[p]
+                   : would_go                   ? OVERSHOOT_TRAVEL
+                                                : 0) ||
             (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
         ask_there(s, p, would_go ? vec3_add(place_of(s, p), motion(s, p)) : place_of(s, p), &count);
     }
     answer_there(s, count);
     for (int k = 0; k < count; k++)
-        if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap - s->lack[s->query_which[k]]);
+        if (!(s->query.hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            deepest = fmax(deepest, radius_of(s, s->query.which[k]) - s->query.hit[k].gap - s->points.lack[s->query.which[k]]);
     return deepest;
 }
 
@@ -211,15 +212,15 @@ static void estimate_ranges(Stepper *s)
     int first = s->first_free > 0 ? s->first_free - 1 : 0, nodes = s->state.node_count;
     double fastest = 0;
     for (int i = first; i < nodes; i++) {
-        Vec3 v = s->knows_motion ? change(s, i, 0) : s->state.velocity[i];
-        s->range[i] = sqrt(vec3_norm2(v));
-        fastest = s->range[i] > fastest ? s->range[i] : fastest;
+        Vec3 v = s->iterate.knows_motion ? change(s, i, 0) : s->state.velocity[i];
+        s->query.range[i] = sqrt(vec3_norm2(v));
+        fastest = s->query.range[i] > fastest ? s->query.range[i] : fastest;
     }
-    if (s->knows_motion)
+    if (s->iterate.knows_motion)
         return;
     double shared = fmin(fastest, SHARED_TRAVEL / (2 * s->dt));
     for (int i = first; i < nodes; i++)
-        s->range[i] = s->range[i] > shared ? s->range[i] : shared;
+        s->query.range[i] = s->query.range[i] > shared ? s->query.range[i] : shared;
 }
 
 // How far beyond its present gap a point is looked after.
@@ -228,49 +229,49 @@ static double reach_of(const Stepper *s, int point)
     int nodes = s->state.node_count;
     double reach = REACH, range;
     if (point < nodes) {
-        range = s->range[point];
+        range = s->query.range[point];
     } else {
-        int i = s->slot[point - nodes].element;
-        range = fmax(s->range[i], s->range[i + 1]);
+        int i = s->points.slot[point - nodes].element;
+        range = fmax(s->query.range[i], s->query.range[i + 1]);
         reach = SLOT_REACH;
     }
-    reach += s->knows_motion ? 1.5 * range : fabs(s->command.advance) + 2 * s->dt * range;
+    reach += s->iterate.knows_motion ? 1.5 * range : fabs(s->command.advance) + 2 * s->dt * range;
     return reach < REACH_MAX ? reach : REACH_MAX;
 }
 
 static void forget(Stepper *s, int point)
 {
-    s->place[point].node = -1;
-    s->place[point].has_foot = false;
-    s->clearance[point] = NOTHING_KNOWN;
-    s->force[point] = vec3(0, 0, 0);
-    s->met[point] = (WallMet){0};
-    s->touch[point] = s->touch_next[point] = 0;
+    s->points.place[point].node = -1;
+    s->points.place[point].has_foot = false;
+    s->points.clearance[point] = NOTHING_KNOWN;
+    s->points.force[point] = vec3(0, 0, 0);
+    s->points.met[point] = (WallMet){0};
+    s->points.touch[point] = s->points.touch_next[point] = 0;
 }
 
 void stepper_doubt(Stepper *s)
 {
-    for (int p = 0; p < s->point_count; p++)
-        if (s->tried[p]) {
-            s->place[p].has_foot = false;
-            s->place[p].clearance = s->clearance[p] = 0;
+    for (int p = 0; p < s->points.count; p++)
+        if (s->points.tried[p]) {
+            s->points.place[p].has_foot = false;
+            s->points.place[p].clearance = s->points.clearance[p] = 0;
         }
 }
 
 void stepper_forget(Stepper *s, int node)
 {
     forget(s, node);
-    for (int k = node > 0 ? s->slot_start[node - 1] : 0; k < s->slot_start[node]; k++)
+    for (int k = node > 0 ? s->points.slot_start[node - 1] : 0; k < s->points.slot_start[node]; k++)
         forget(s, s->state.node_count + k);
 }
 
 // A node that has not been located starts from a neighbour, a slot with what a neighbour knows of the wall.
 static void locate(Stepper *s, int point)
 {
-    VesselMemory *place = s->place;
+    VesselMemory *place = s->points.place;
     int nodes = s->state.node_count, from = -1;
     if (point >= nodes) {
-        int i = s->slot[point - nodes].element, known = s->answer_of[i + 1] >= 0 || place[i].node < 0 ? i + 1 : i;
+        int i = s->points.slot[point - nodes].element, known = s->query.answer_of[i + 1] >= 0 || place[i].node < 0 ? i + 1 : i;
         if (place[known].node >= 0) {
             place[point] = place[known];
             return;
@@ -286,25 +287,25 @@ static void locate(Stepper *s, int point)
 // Is a point known to be too far off to touch?
 static bool sleeps(Stepper *s, int point)
 {
-    s->room[point] = HUGE_VAL;
-    if (s->clearance[point] > 0 && s->knows_motion && travel(s, point) > s->clearance[point])
-        s->clearance[point] = 0;
-    if (!(s->clearance[point] > 0))
+    s->points.room[point] = HUGE_VAL;
+    if (s->points.clearance[point] > 0 && s->iterate.knows_motion && travel(s, point) > s->points.clearance[point])
+        s->points.clearance[point] = 0;
+    if (!(s->points.clearance[point] > 0))
         return false;
     // when it went to sleep it had its reach besides
-    s->room[point] = s->clearance[point] + (point < s->state.node_count ? REACH : SLOT_REACH);
+    s->points.room[point] = s->points.clearance[point] + (point < s->state.node_count ? REACH : SLOT_REACH);
     return true;
 }
 
 static void ask(Stepper *s, int point, int *count)
 {
-    if (s->place[point].node < 0)
+    if (s->points.place[point].node < 0)
         locate(s, point);
-    s->clearance[point] = 0;
-    s->query_which[*count] = point;
+    s->points.clearance[point] = 0;
+    s->query.which[*count] = point;
     Touch touch;
-    s->query_point[*count] = touch_of(s, point, &touch) ? touch.place.position : place_of(s, point);
-    s->query_place[(*count)++] = s->place[point];
+    s->query.point[*count] = touch_of(s, point, &touch) ? touch.place.position : place_of(s, point);
+    s->query.place[(*count)++] = s->points.place[point];
 }
 
 // How much two bends differ [1/mm].
@@ -325,11 +326,11 @@ static double until_used(double has, double slope, double bend)
 // On the way the wall's slope against theirs takes from what it has over them, and its bend.
 static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double *sleep)
 {
-    const Slot *slot = &s->slot[k];
-    int i = slot->element, a = s->answer_of[i], b = s->answer_of[i + 1];
-    if (i + 1 == s->first_free || a < 0 || b < 0 || (s->query_hit[a].flags | s->query_hit[b].flags | hit->flags) != 0)
+    const Slot *slot = &s->points.slot[k];
+    int i = slot->element, a = s->query.answer_of[i], b = s->query.answer_of[i + 1];
+    if (i + 1 == s->first_free || a < 0 || b < 0 || (s->query.hit[a].flags | s->query.hit[b].flags | hit->flags) != 0)
         return -1;
-    VesselHit first = touch_back(s, i, &s->query_hit[a]), second = touch_back(s, i + 1, &s->query_hit[b]);
+    VesselHit first = touch_back(s, i, &s->query.hit[a]), second = touch_back(s, i + 1, &s->query.hit[b]);
     const VesselHit *near = &first, *far = &second;
     double w = slot->weight, over = hit->gap - near->gap - w * (far->gap - near->gap);
     if (!(over > -DIP_MIN))
@@ -343,7 +344,7 @@ static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double 
 // [mm] of room that a point lacks between the wall that it sees and one across that it saw before, which is forgotten where it faces this one no more.
 static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
 {
-    WallMet *met = &s->met[point];
+    WallMet *met = &s->points.met[point];
     double radius = radius_of(s, point), gap = hit->gap - radius;
     if (vec3_dot(met->normal, hit->normal) < 0) {
         met->across = met->normal;
@@ -357,14 +358,14 @@ static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
     bool faces = vec3_dot(met->across, hit->normal) < 0 && other > -radius && vec3_distance(x, met->where) < MET_FAR;
     if (!faces)
         met->across = vec3(0, 0, 0);
-    return s->lack[point] = faces ? fmin(LACK_MAX, fmax(0, -other - gap)) : 0;
+    return s->points.lack[point] = faces ? fmin(LACK_MAX, fmax(0, -other - gap)) : 0;
 }
 
 // A point that is no candidate is asked at its own place again, from which it may be as far as it was from where it touched.
 static void leave_touch(Stepper *s, int point)
 {
-    s->clearance[point] = fmax(0, s->clearance[point] - fabs(s->touch_next[point]));
-    s->touch_next[point] = 0;
+    s->points.clearance[point] = fmax(0, s->points.clearance[point] - fabs(s->points.touch_next[point]));
+    s->points.touch_next[point] = 0;
 }
 
 // Has a projection that began at a foot known from elsewhere ended at a wall much further off than that foot? The wall is no further than that.
@@ -379,27 +380,27 @@ static int answer(Stepper *s, int first, int count, int *candidate)
     double reach = 0;
     int candidates = 0, nodes = s->state.node_count;
     for (int k = first; k < count; k++) {
-        double own = reach_of(s, s->query_which[k]) + radius_of(s, s->query_which[k]);
+        double own = reach_of(s, s->query.which[k]) + radius_of(s, s->query.which[k]);
         reach = own > reach ? own : reach;
     }
     // distances grow with what is asked for: twice the reach lets most far points sleep for a while
     if (count > first)
-        vessel_query(s->vessel, count - first, s->query_point + first, 2 * reach, s->query_place + first, s->query_hit + first);
+        vessel_query(s->vessel, count - first, s->query.point + first, 2 * reach, s->query.place + first, s->query.hit + first);
     for (int k = first; k < count; k++) {
-        int point = s->query_which[k];
-        const VesselHit *hit = &s->query_hit[k];
-        if (has_strayed(&s->place[point], s->query_point[k], hit)) {
-            s->query_place[k] = (VesselMemory){.node = s->vessel->locate(s->vessel, s->query_point[k], s->place[point].node)};
-            vessel_query(s->vessel, 1, &s->query_point[k], 2 * reach, &s->query_place[k], &s->query_hit[k]);
+        int point = s->query.which[k];
+        const VesselHit *hit = &s->query.hit[k];
+        if (has_strayed(&s->points.place[point], s->query.point[k], hit)) {
+            s->query.place[k] = (VesselMemory){.node = s->vessel->locate(s->vessel, s->query.point[k], s->points.place[point].node)};
+            vessel_query(s->vessel, 1, &s->query.point[k], 2 * reach, &s->query.place[k], &s->query.hit[k]);
         }
         double gap = hit->gap - radius_of(s, point), own_reach = reach_of(s, point);
-        s->place[point] = s->query_place[k];
+        s->points.place[point] = s->query.place[k];
         if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            s->depth = fmax(s->depth, -gap - meet_across(s, point, s->query_point[k], hit));
+            s->iterate.depth = fmax(s->iterate.depth, -gap - meet_across(s, point, s->query.point[k], hit));
         double sleep = 0, guarded = point < nodes || stepper_presses(s, point) ? -1 : guarded_for(s, point - nodes, hit, &sleep);
         if (guarded > own_reach - SLOT_REACH) {
-            s->room[point] = guarded;
-            s->clearance[point] = sleep;
+            s->points.room[point] = guarded;
+            s->points.clearance[point] = sleep;
             leave_touch(s, point);
             continue;
         }
@@ -407,14 +408,14 @@ static int answer(Stepper *s, int first, int count, int *candidate)
             candidate[candidates++] = k;
             continue;
         }
-        s->force[point] = vec3(0, 0, 0);
+        s->points.force[point] = vec3(0, 0, 0);
         if (hit->flags & VESSEL_OPEN_END) {
             leave_touch(s, point);
             continue;
         }
-        s->room[point] = gap;
+        s->points.room[point] = gap;
         if (gap > own_reach)
-            s->clearance[point] = fmin(gap - own_reach, SLEEP_MAX);
+            s->points.clearance[point] = fmin(gap - own_reach, SLEEP_MAX);
         leave_touch(s, point);
     }
     return candidates;
@@ -424,10 +425,10 @@ static int ask_nodes(Stepper *s)
 {
     int count = 0;
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        s->answer_of[i] = -1;
-        if (sleeps(s, i) || (s->fixed[i] & DOF_POSITION) == DOF_POSITION)
+        s->query.answer_of[i] = -1;
+        if (sleeps(s, i) || (s->rig.fixed[i] & DOF_POSITION) == DOF_POSITION)
             continue;
-        s->answer_of[i] = count;
+        s->query.answer_of[i] = count;
         ask(s, i, &count);
     }
     return count;
@@ -437,25 +438,25 @@ static int ask_nodes(Stepper *s)
 static double clearance_by_nodes(const Stepper *s, const Slot *slot)
 {
     int i = slot->element;
-    double length = 1.05 * s->wire.length[i], near = s->clearance[i] - slot->xi * length, far = s->clearance[i + 1] - (1 - slot->xi) * length;
+    double length = 1.05 * s->wire.length[i], near = s->points.clearance[i] - slot->xi * length, far = s->points.clearance[i + 1] - (1 - slot->xi) * length;
     return near > far ? near : far;
 }
 
 static int ask_slots(Stepper *s, int count)
 {
     int nodes = s->state.node_count;
-    for (int p = first_slot(s); p < s->point_count; p++) {
+    for (int p = first_slot(s); p < s->points.count; p++) {
         int k = p - nodes;
         if (sleeps(s, p))
             continue;
-        double bound = clearance_by_nodes(s, &s->slot[k]);
+        double bound = clearance_by_nodes(s, &s->points.slot[k]);
         if (bound > 0) {
-            s->room[p] = bound + REACH;
-            s->place[p].node = -1;      // may come far before it is asked again
+            s->points.room[p] = bound + REACH;
+            s->points.place[p].node = -1;      // may come far before it is asked again
         }
         if (bound <= 0 && place_slot(s, k))
             ask(s, p, &count);
-        else if (s->clearance[p] != NOTHING_KNOWN)
+        else if (s->points.clearance[p] != NOTHING_KNOWN)
             forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
     }
     return count;
@@ -468,13 +469,13 @@ static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
 {
     int nodes = s->state.node_count;
     Touch touch;
-    if (s->touch_next[point] != 0 && touch_at(s, point, s->touch_next[point], &touch))
+    if (s->points.touch_next[point] != 0 && touch_at(s, point, s->points.touch_next[point], &touch))
         return touch_done(s, &touch, arm);
     if (point < nodes)
         return vec3_add(done(s, point, 0), vec3_cross(done(s, point, 3), arm));
-    int k = point - nodes, i = s->slot[k].element;
+    int k = point - nodes, i = s->points.slot[k].element;
     Vec3 move[2] = {done(s, i, 0), done(s, i + 1, 0)}, turn[2] = {done(s, i, 3), done(s, i + 1, 3)};
-    double w = s->slot_place[k].weight;
+    double w = s->points.slot_place[k].weight;
     Vec3 spin = vec3_scale(turn[1], w);
     if (!at_mouth(s, i))
         spin = vec3_add_scaled(spin, 1 - w, turn[0]);
@@ -485,8 +486,8 @@ static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
 // gap and of its curvature make it one of the node alone, whose force is w times the real one.
 static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
 {
-    const SlotPlace *p = &s->slot_place[k];
-    double w = p->weight, ahead = s->command.advance - (s->is_iterate ? s->linearised[row_of(s, s->slot[k].element)] : 0);
+    const SlotPlace *p = &s->points.slot_place[k];
+    double w = p->weight, ahead = s->command.advance - (s->iterate.is_moved ? s->iterate.moved[row_of(s, s->points.slot[k].element)] : 0);
     c->node = s->first_free;
     c->xi = 0;
     c->gap = (c->gap + (1 - w) * ahead * vec3_dot(p->tangent, c->normal)) / w;
@@ -518,26 +519,26 @@ static void look_ahead(double dt, Vec3 axis, Vec3 velocity, ContactPoint *c)
 // um, and a wire that followed at once would kick the hand. A point that pressed in the last step goes after it by a part of the gap a step instead.
 static double linger(Stepper *s, int point, double gap)
 {
-    if (!s->is_iterate && !s->knows_motion && stepper_presses(s, point) && gap > 0)
-        s->linger[point] = LINGER * fmin(gap, LINGER_MAX);
-    return s->linger[point];
+    if (!s->iterate.is_moved && !s->iterate.knows_motion && stepper_presses(s, point) && gap > 0)
+        s->points.linger[point] = LINGER * fmin(gap, LINGER_MAX);
+    return s->points.linger[point];
 }
 
 // Where the contact of a point is now.
 static Vec3 touched(const Stepper *s, int point)
 {
     Touch touch;
-    return s->touch_next[point] != 0 && touch_at(s, point, s->touch_next[point], &touch) ? touch.place.position : place_of(s, point);
+    return s->points.touch_next[point] != 0 && touch_at(s, point, s->points.touch_next[point], &touch) ? touch.place.position : place_of(s, point);
 }
 
 static void add_candidate(Stepper *s, int point, const VesselHit *hit)
 {
     int nodes = s->state.node_count;
-    const SlotPlace *p = point < nodes ? NULL : &s->slot_place[point - nodes];
-    double radius = radius_of(s, point), friction = p ? s->slot[point - nodes].friction : s->wire.friction[point], gap = hit->gap - radius;
-    ContactPoint *c = &s->set.point[s->set.count];
-    s->candidate[s->set.count++] = point;
-    c->node = p ? s->slot[point - nodes].element : point;
+    const SlotPlace *p = point < nodes ? NULL : &s->points.slot_place[point - nodes];
+    double radius = radius_of(s, point), friction = p ? s->points.slot[point - nodes].friction : s->wire.friction[point], gap = hit->gap - radius;
+    ContactPoint *c = &s->system.set.point[s->system.set.count];
+    s->points.candidate[s->system.set.count++] = point;
+    c->node = p ? s->points.slot[point - nodes].element : point;
     c->is_between = p != NULL;
     c->xi = p ? p->weight : 0;
     c->lever[0] = p ? p->lever[0] : vec3(0, 0, 0);
@@ -548,18 +549,18 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     c->hessian = hit->hessian;
     c->friction = friction >= 0 ? friction : s->wall_friction;
     c->tool_radius = radius;
-    c->force = s->force[point];
+    c->force = s->points.force[point];
     c->roll = 0;
     c->slid = vec3(0, 0, 0);
     Touch touch;
-    const WallMet *met = &s->met[point];
-    double offset = s->is_iterate ? s->touch_next[point] : s->touch[point];
-    bool touches = (offset != 0 || (gap < TOUCH_REACH && !s->is_iterate && s->slides != 0)) && touch_at(s, point, offset, &touch);
+    const WallMet *met = &s->points.met[point];
+    double offset = s->iterate.is_moved ? s->points.touch_next[point] : s->points.touch[point];
+    bool touches = (offset != 0 || (gap < TOUCH_REACH && !s->iterate.is_moved && s->iterate.slides != 0)) && touch_at(s, point, offset, &touch);
     if (touches)
         touch_contact(s, point, hit, c->gap, &touch, c);
-    else if (s->is_iterate)
+    else if (s->iterate.is_moved)
         c->gap -= vec3_dot(done_at(s, point, vec3_scale(hit->normal, -radius)), hit->normal);
-    if (!s->is_iterate && !touches) {
+    if (!s->iterate.is_moved && !touches) {
         int node = c->node;
         bool is_between = p || touches;
         look_ahead(
@@ -576,16 +577,16 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     if (vec3_norm2(met->across) == 0)
         return;
     // between two walls: what room is lacking they give way by in equal parts
-    ContactPoint *across = &s->set.point[s->set.count];
-    s->candidate[s->set.count++] = point;
+    ContactPoint *across = &s->system.set.point[s->system.set.count];
+    s->points.candidate[s->system.set.count++] = point;
     *across = *c;
-    c->gap += 0.5 * s->lack[point];
+    c->gap += 0.5 * s->points.lack[point];
     across->normal = met->across;
     across->hessian = (Sym3){0};
-    across->gap = vec3_dot(met->across, touched(s, point)) - met->beyond + 0.5 * s->lack[point];
+    across->gap = vec3_dot(met->across, touched(s, point)) - met->beyond + 0.5 * s->points.lack[point];
     across->roll = 0;
     across->slid = vec3(0, 0, 0);
-    if (s->is_iterate)
+    if (s->iterate.is_moved)
         across->gap -= vec3_dot(done_at(s, point, vec3_scale(met->across, -radius)), met->across);
 }
 
@@ -593,15 +594,15 @@ bool stepper_meet_walls(Stepper *s, double part)
 {
     int count = 0;
     bool any = false;
-    for (int k = 0; k < s->set.count; k++)
-        ask_there(s, s->candidate[k], touched(s, s->candidate[k]), &count);
+    for (int k = 0; k < s->system.set.count; k++)
+        ask_there(s, s->points.candidate[k], touched(s, s->points.candidate[k]), &count);
     answer_there(s, count);
     for (int k = 0; k < count; k++) {
-        ContactPoint *c = &s->set.point[k];
-        double radius = radius_of(s, s->candidate[k]), gap = s->query_hit[k].gap - radius;
-        double linear = c->gap + vec3_dot(done_at(s, s->candidate[k], vec3_scale(c->normal, -radius)), c->normal);
+        ContactPoint *c = &s->system.set.point[k];
+        double radius = radius_of(s, s->points.candidate[k]), gap = s->query.hit[k].gap - radius;
+        double linear = c->gap + vec3_dot(done_at(s, s->points.candidate[k], vec3_scale(c->normal, -radius)), c->normal);
         // not where another wall is met: moving this one would drive the point into that
-        if ((s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !(gap < 0 && gap < linear) || vec3_dot(s->query_hit[k].normal, c->normal) < 0)
+        if ((s->query.hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !(gap < 0 && gap < linear) || vec3_dot(s->query.hit[k].normal, c->normal) < 0)
             continue;
         c->gap += fmax((gap - linear) / part, -STEP_OUT_MAX);
         any = true;
@@ -612,12 +613,13 @@ bool stepper_meet_walls(Stepper *s, double part)
 void stepper_keep_forces(Stepper *s)
 {
     int nodes = s->state.node_count;
-    for (int k = 0; k < s->set.count; k++)
-        s->force[s->candidate[k]] = vec3(0, 0, 0);
-    for (int k = 0; k < s->set.count; k++) {
-        int point = s->candidate[k];
-        bool leans = point >= nodes && at_mouth(s, s->slot[point - nodes].element);
-        s->force[point] = vec3_add_scaled(s->force[point], leans ? 1 / s->slot_place[point - nodes].weight : 1, s->set.point[k].force);
+    for (int k = 0; k < s->system.set.count; k++)
+        s->points.force[s->points.candidate[k]] = vec3(0, 0, 0);
+    for (int k = 0; k < s->system.set.count; k++) {
+        int point = s->points.candidate[k];
+        bool leans = point >= nodes && at_mouth(s, s->points.slot[point - nodes].element);
+        s->points.force[point] =
+            vec3_add_scaled(s->points.force[point], leans ? 1 / s->points.slot_place[point - nodes].weight : 1, s->system.set.point[k].force);
     }
 }
 
@@ -625,15 +627,15 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction)
 {
     *wall = *friction = 0;
     int nodes = s->state.node_count;
-    for (int k = 0; k < s->set.count; k++) {
-        const ContactPoint *c = &s->set.point[k];
-        int point = s->candidate[k];
-        bool leans = point >= nodes && at_mouth(s, s->slot[point - nodes].element);
+    for (int k = 0; k < s->system.set.count; k++) {
+        const ContactPoint *c = &s->system.set.point[k];
+        int point = s->points.candidate[k];
+        bool leans = point >= nodes && at_mouth(s, s->points.slot[point - nodes].element);
         Vec3 force = c->force, moved = done_at(s, point, vec3_scale(c->normal, -radius_of(s, point)));
         if (leans) {
-            const SlotPlace *p = &s->slot_place[point - nodes];
+            const SlotPlace *p = &s->points.slot_place[point - nodes];
             force = vec3_scale(force, 1 / p->weight);
-            moved = vec3_add_scaled(moved, (1 - p->weight) * s->linearised[row_of(s, s->slot[point - nodes].element)], p->tangent);
+            moved = vec3_add_scaled(moved, (1 - p->weight) * s->iterate.moved[row_of(s, s->points.slot[point - nodes].element)], p->tangent);
         }
         double pressure = vec3_dot(force, c->normal) * vec3_dot(moved, c->normal);
         *wall += pressure;
@@ -646,20 +648,20 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction)
 double stepper_start_work(const Stepper *s)
 {
     double work = 0;
-    for (int p = s->first_free; p < s->point_count; p++) {
+    for (int p = s->first_free; p < s->points.count; p++) {
         if (p == s->state.node_count)
             p = first_slot(s);
-        if (p == s->point_count)
+        if (p == s->points.count)
             break;
-        Vec3 force = s->start_force[p], normal = s->met[p].normal;
+        Vec3 force = s->points.start_force[p], normal = s->points.met[p].normal;
         if (vec3_norm2(force) == 0)
             continue;
         if (vec3_norm2(normal) == 0)
             normal = vec3_unit(force);
         Vec3 moved = done_at(s, p, vec3_scale(normal, -radius_of(s, p)));
-        if (p >= s->state.node_count && at_mouth(s, s->slot[p - s->state.node_count].element)) {
-            const SlotPlace *place = &s->slot_place[p - s->state.node_count];
-            moved = vec3_add_scaled(moved, (1 - place->weight) * s->linearised[row_of(s, s->slot[p - s->state.node_count].element)], place->tangent);
+        if (p >= s->state.node_count && at_mouth(s, s->points.slot[p - s->state.node_count].element)) {
+            const SlotPlace *place = &s->points.slot_place[p - s->state.node_count];
+            moved = vec3_add_scaled(moved, (1 - place->weight) * s->iterate.moved[row_of(s, s->points.slot[p - s->state.node_count].element)], place->tangent);
         }
         work += vec3_dot(force, moved);
     }
@@ -671,13 +673,13 @@ static void collect(Stepper *s, const int *candidate, int node_count, int slot_c
 {
     const int *slot = candidate + node_count, *end = slot + slot_count;
     for (const int *node = candidate; node < candidate + node_count || slot < end;) {
-        int next = node < candidate + node_count ? s->query_which[*node] : s->state.node_count;
-        while (slot < end && s->slot[s->query_which[*slot] - s->state.node_count].element < next) {
-            add_candidate(s, s->query_which[*slot], &s->query_hit[*slot]);
+        int next = node < candidate + node_count ? s->query.which[*node] : s->state.node_count;
+        while (slot < end && s->points.slot[s->query.which[*slot] - s->state.node_count].element < next) {
+            add_candidate(s, s->query.which[*slot], &s->query.hit[*slot]);
             slot++;
         }
         if (node < candidate + node_count) {
-            add_candidate(s, next, &s->query_hit[*node]);
+            add_candidate(s, next, &s->query.hit[*node]);
             node++;
         }
     }
@@ -691,10 +693,10 @@ static void report_wall(Stepper *s, int nodes, int count)
     unsigned flags = 0;
     double deepest = s->report.penetration;
     for (int k = 0; k < count; k++) {
-        const VesselHit *hit = &s->query_hit[k];
+        const VesselHit *hit = &s->query.hit[k];
         if (k < nodes) {
-            was_inside |= next < s->query_which[k];
-            next = s->query_which[k] + 1;
+            was_inside |= next < s->query.which[k];
+            next = s->query.which[k] + 1;
         }
         if (hit->flags & VESSEL_OPEN_END) {
             flags |= k < nodes && was_inside ? STEP_OUT_OF_VESSEL : 0;
@@ -704,7 +706,7 @@ static void report_wall(Stepper *s, int nodes, int count)
         flags |= hit->flags & VESSEL_UNSURE ? STEP_DETECTION_UNSURE : 0;
         flags |= hit->flags & VESSEL_DISAGREE ? STEP_MODEL_DISAGREES : 0;
         s->report.disagreements += (hit->flags & VESSEL_DISAGREE) != 0;
-        double outside = radius_of(s, s->query_which[k]) - hit->gap;
+        double outside = radius_of(s, s->query.which[k]) - hit->gap;
         deepest = outside > deepest ? outside : deepest;
     }
     s->report.penetration = deepest;
@@ -713,24 +715,24 @@ static void report_wall(Stepper *s, int nodes, int count)
 
 void stepper_detect(Stepper *s)
 {
-    s->set.count = 0;
-    s->depth = 0;
+    s->system.set.count = 0;
+    s->iterate.depth = 0;
     if (!s->vessel)
         return;
-    if (!s->is_iterate && !s->knows_motion)
-        memset(s->linger, 0, (size_t)s->point_count * sizeof *s->linger);
-    memset(s->lack, 0, (size_t)s->point_count * sizeof *s->lack);
-    if (!s->is_iterate)
-        memcpy(s->touch_next, s->touch, (size_t)s->point_count * sizeof *s->touch);
+    if (!s->iterate.is_moved && !s->iterate.knows_motion)
+        memset(s->points.linger, 0, (size_t)s->points.count * sizeof *s->points.linger);
+    memset(s->points.lack, 0, (size_t)s->points.count * sizeof *s->points.lack);
+    if (!s->iterate.is_moved)
+        memcpy(s->points.touch_next, s->points.touch, (size_t)s->points.count * sizeof *s->points.touch);
     take_trials(s);
     estimate_ranges(s);
-    int *candidate = s->query_near, nodes = ask_nodes(s);
+    int *candidate = s->query.near, nodes = ask_nodes(s);
     int node_candidates = answer(s, 0, nodes, candidate);
     int count = ask_slots(s, nodes);
     int slot_candidates = answer(s, nodes, count, candidate + node_candidates);
     collect(s, candidate, node_candidates, slot_candidates);
-    s->report.candidates = s->set.count;
-    if (!s->is_iterate)      // an iterate may be anywhere
+    s->report.candidates = s->system.set.count;
+    if (!s->iterate.is_moved)      // an iterate may be anywhere
         report_wall(s, nodes, count);
 }
 
@@ -741,12 +743,12 @@ void stepper_use_clearance(Stepper *s)
     int nodes = s->state.node_count;
     self_contact_use_clearance(s);
     for (int i = s->first_free; i < nodes; i++)
-        if (s->clearance[i] > 0)
-            s->clearance[i] = fmax(0, s->clearance[i] - travelled(s, i));
-    for (int p = first_slot(s); p < s->point_count; p++)
-        if (s->clearance[p] > 0)
-            s->clearance[p] = fmax(0, s->clearance[p] - travelled(s, p));
-    memcpy(s->seen, s->linearised, row_of(s, nodes) * sizeof *s->seen);
+        if (s->points.clearance[i] > 0)
+            s->points.clearance[i] = fmax(0, s->points.clearance[i] - travelled(s, i));
+    for (int p = first_slot(s); p < s->points.count; p++)
+        if (s->points.clearance[p] > 0)
+            s->points.clearance[p] = fmax(0, s->points.clearance[p] - travelled(s, p));
+    memcpy(s->iterate.seen, s->iterate.moved, row_of(s, nodes) * sizeof *s->iterate.seen);
 }
 
 // Forces at nodes that touch beside them.
@@ -754,11 +756,11 @@ static void share_touches(const Stepper *s, NodeReport *node)
 {
     Touch t;
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        if (s->touch[i] == 0 || !touch_at(s, i, s->touch[i], &t))
+        if (s->points.touch[i] == 0 || !touch_at(s, i, s->points.touch[i], &t))
             continue;
-        node[i].force = vec3_sub(node[i].force, s->force[i]);
-        node[t.element].force = vec3_add_scaled(node[t.element].force, 1 - t.xi, s->force[i]);
-        node[t.element + 1].force = vec3_add_scaled(node[t.element + 1].force, t.xi, s->force[i]);
+        node[i].force = vec3_sub(node[i].force, s->points.force[i]);
+        node[t.element].force = vec3_add_scaled(node[t.element].force, 1 - t.xi, s->points.force[i]);
+        node[t.element + 1].force = vec3_add_scaled(node[t.element + 1].force, t.xi, s->points.force[i]);
     }
 }
 
@@ -766,15 +768,15 @@ void stepper_share_forces(const Stepper *s, NodeReport *node)
 {
     Touch touch;
     share_touches(s, node);
-    for (int k = 0; k < s->slot_count; k++) {
-        Vec3 force = s->force[s->state.node_count + k], x2 = s->state.position[s->slot[k].element + 1];
-        int i = s->slot[k].element;
-        double w = s->slot[k].weight;
+    for (int k = 0; k < s->points.slot_count; k++) {
+        Vec3 force = s->points.force[s->state.node_count + k], x2 = s->state.position[s->points.slot[k].element + 1];
+        int i = s->points.slot[k].element;
+        double w = s->points.slot[k].weight;
         SlotPlace place;
-        if (at_mouth(s, i) &&
-            slot_place_at_mouth(&s->slot[k], s->wire.length[i], stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x2, s->axis[0], &place))
+        if (at_mouth(s, i) && slot_place_at_mouth(&s->points.slot[k], s->wire.length[i], stepper_sheath_coordinate(s, i), s->entry.mouth, s->entry.axis[0], x2,
+                                                  s->entry.axis[0], &place))
             w = place.weight;
-        if (s->touch[s->state.node_count + k] != 0 && touch_at(s, s->state.node_count + k, s->touch[s->state.node_count + k], &touch))
+        if (s->points.touch[s->state.node_count + k] != 0 && touch_at(s, s->state.node_count + k, s->points.touch[s->state.node_count + k], &touch))
             i = touch.element, w = touch.xi;
         node[i].force = vec3_add_scaled(node[i].force, 1 - w, force);
         node[i + 1].force = vec3_add_scaled(node[i + 1].force, w, force);

@@ -16,7 +16,8 @@ static double element_energy(const Stepper *s, int i, int held)
     }
     if (i + 1 == held) {
         SheathElement e;
-        sheath_element(r, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), w->orientation[i], w->position[i + 1], w->orientation[i + 1], 0, &e);
+        sheath_element(r, i, s->entry.mouth, s->entry.axis[0], stepper_sheath_coordinate(s, i), w->orientation[i], w->position[i + 1], w->orientation[i + 1], 0,
+                       &e);
         return e.energy;
     }
     BeamInput in = stepper_beam(s, i);
@@ -27,8 +28,8 @@ static double element_energy(const Stepper *s, int i, int held)
 
 double stepper_elastic_energy(const Stepper *s)
 {
-    double energy = s->tool_count > 1 ? tools_elastic_energy(s) : 0;
-    for (int i = 0; s->tool_count == 1 && i < s->wire.element_count; i++)
+    double energy = s->tools.count > 1 ? tools_elastic_energy(s) : 0;
+    for (int i = 0; s->tools.count == 1 && i < s->wire.element_count; i++)
         energy += element_energy(s, i, s->first_free);
     if (s->first_free == s->state.node_count)
         energy -= stepper_tip_straightening(s) * fmax(stepper_sheath_coordinate(s, s->first_free - 1), 0);
@@ -37,7 +38,7 @@ double stepper_elastic_energy(const Stepper *s)
 
 double stepper_kinetic_energy(const Stepper *s)
 {
-    if (s->tool_count > 1)
+    if (s->tools.count > 1)
         return tools_kinetic_energy(s);
     double twice = 0;
     for (int i = 0; i < s->state.node_count; i++) {
@@ -53,20 +54,20 @@ double stepper_kinetic_energy(const Stepper *s)
 static Vec3 done_in_space(const Stepper *s, int node, int from)
 {
     SEL_ASSERT(from == 0 || from == 3, "a node moves and turns");
-    const double *u = s->linearised + row_of(s, node) + from;
-    return node < s->first_free ? vec3_scale(s->axis[0], u[0]) : vec3(u[0], u[1], u[2]);
+    const double *u = s->iterate.moved + row_of(s, node) + from;
+    return node < s->first_free ? vec3_scale(s->entry.axis[0], u[0]) : vec3(u[0], u[1], u[2]);
 }
 
 double stepper_load_work(const Stepper *s)
 {
     double work = 0;
     for (int i = 0; i < s->state.node_count; i++)
-        work += s->wire.mass[i] * vec3_dot(s->gravity, done_in_space(s, i, 0));
-    for (int k = 0; k < s->load_count; k++)
+        work += s->wire.mass[i] * vec3_dot(s->rig.gravity, done_in_space(s, i, 0));
+    for (int k = 0; k < s->rig.load_count; k++)
         for (int e = 0; e < 2; e++) {
             Vec3 force, moment;
-            int node = s->load[k].node + e;
-            if (stepper_load(s, &s->load[k], e, s->state.time, &force, &moment))
+            int node = s->rig.load[k].node + e;
+            if (stepper_load(s, &s->rig.load[k], e, s->state.time, &force, &moment))
                 work += vec3_dot(force, done_in_space(s, node, 0)) + vec3_dot(moment, done_in_space(s, node, 3));
         }
     return work;
@@ -87,7 +88,7 @@ static double of_mass_damping(const Stepper *s)
 StepEnergy stepper_energy(Stepper *s)
 {
     StepEnergy e = {.elastic = stepper_elastic_energy(s), .kinetic = stepper_kinetic_energy(s)};
-    if (s->has_failed)
+    if (s->progress.has_failed)
         return e;
     e.hand = hands_work(s);
     e.load = stepper_load_work(s);

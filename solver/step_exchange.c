@@ -20,32 +20,32 @@ const char *step_exchange_refusal(StepExchange outcome)
     return "";
 }
 
-int stepper_fitted(const Stepper *s, int k) { return s->fitted[k]; }
+int stepper_fitted(const Stepper *s, int k) { return s->tools.fitted[k]; }
 
 static void fit(Stepper *s, int k, int which)
 {
-    SEL_REQUIRE(k >= 0 && k < s->tool_count && which >= 0 && which <= s->spare_count[k], "the tool and its spare exist");
-    Tool *t = &s->tool[k];
+    SEL_REQUIRE(k >= 0 && k < s->tools.count && which >= 0 && which <= s->tools.spare_count[k], "the tool and its spare exist");
+    Tool *t = &s->tools.tool[k];
     Tool was = *t;
-    *t = *s->device[k][which];
+    *t = *s->tools.device[k][which];
     t->first = k == 0 ? 0 : t->wire.node_count;      // carries nothing of the chain yet
     t->start = was.start;
     t->inside = was.inside;
     t->inserted = was.inserted;
     t->twist = was.twist;
-    s->fitted[k] = which;
-    s->hand[k].limit = t->hand_limit;
-    s->hand[k].valve = t->valve_friction;
-    for (int m = 1; m < s->tool_count; m++) {
-        s->tool[m].friction = s->tool[m - 1].friction_inside;
-        s->tool[m].clearance = tools_clearance(&s->tool[m - 1], &s->tool[m]);
+    s->tools.fitted[k] = which;
+    s->hands.hand[k].limit = t->hand_limit;
+    s->hands.hand[k].valve = t->valve_friction;
+    for (int m = 1; m < s->tools.count; m++) {
+        s->tools.tool[m].friction = s->tools.tool[m - 1].friction_inside;
+        s->tools.tool[m].clearance = tools_clearance(&s->tools.tool[m - 1], &s->tools.tool[m]);
     }
 }
 
 void tools_refit(Stepper *s, const int *fitted)
 {
-    for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++)
-        if (s->fitted[k] != fitted[k])
+    for (int k = 0; s->tools.count > 1 && k < s->tools.count; k++)
+        if (s->tools.fitted[k] != fitted[k])
             fit(s, k, fitted[k]);
 }
 
@@ -54,18 +54,18 @@ static double behind_hub(const Stepper *s, int m) { return is_inside(s, 0, m) ? 
 
 StepExchange stepper_exchange(Stepper *s, int k, int which)
 {
-    if (k < 0 || k >= s->tool_count || s->tool_count == 1 || which < 0 || which > s->spare_count[k])
+    if (k < 0 || k >= s->tools.count || s->tools.count == 1 || which < 0 || which > s->tools.spare_count[k])
         return EXCHANGE_NO_SUCH_TOOL;
-    if (which == s->fitted[k])
+    if (which == s->tools.fitted[k])
         return EXCHANGE_DONE;
-    const Tool *t = &s->tool[k], *next = s->device[k][which];
-    bool is_out = k == 0 ? s->has_sheath && s->first_free >= t->wire.node_count
+    const Tool *t = &s->tools.tool[k], *next = s->tools.device[k][which];
+    bool is_out = k == 0 ? s->entry.has_sheath && s->first_free >= t->wire.node_count
                          : is_inside(s, 0, k) && t->inside == 1 && slide_at(s, 0, k) > t->wire.total_length - AT_HUB;
     if (!is_out)
         return EXCHANGE_INSERTED;
     // the proximal ends of the tools within stay behind the new hub
     double tip = k == 0 ? t->wire.total_length : 0;
-    for (int m = k + 1; m < s->tool_count; m++)
+    for (int m = k + 1; m < s->tools.count; m++)
         if (behind_hub(s, m) + tip < next->wire.total_length)
             return EXCHANGE_TOO_SHORT;
     for (int m = k - 1; m > 0; m--)      // nor may it be shorter than what it goes through, to its hub
@@ -75,13 +75,13 @@ StepExchange stepper_exchange(Stepper *s, int k, int which)
         tools_exchange_outermost(s, next);
         fit(s, 0, which);
         tools_chain(s);
-        for (int c = 0; c < s->tool[0].wire.node_count; c++)
+        for (int c = 0; c < s->tools.tool[0].wire.node_count; c++)
             stepper_forget(s, c);
-        for (int m = 1; m < s->tool_count; m++) {        // the hands hold where the new hub is
+        for (int m = 1; m < s->tools.count; m++) {        // the hands hold where the new hub is
             if (!is_inside(s, 0, m))
                 continue;
-            s->tool[m].inserted = s->tool[m].wire.total_length + stepper_sheath_coordinate(s, 0) - slide_at(s, 0, m);
-            s->tool[m].twist = s->state.twist + angle_at(s, 0, m);
+            s->tools.tool[m].inserted = s->tools.tool[m].wire.total_length + stepper_sheath_coordinate(s, 0) - slide_at(s, 0, m);
+            s->tools.tool[m].twist = s->state.twist + angle_at(s, 0, m);
         }
     } else {
         int i = k - 1;
@@ -90,8 +90,8 @@ StepExchange stepper_exchange(Stepper *s, int k, int which)
         s->state.slide[i] = t->wire.total_length - ahead;        // tip where tip was
         s->state.angle[i] = s->state.slide_velocity[i] = s->state.slide_spin[i] = 0;
         memset(s->state.slide_force + 3 * i, 0, 3 * sizeof(double));
-        s->tool[k].inserted = (s->has_sheath ? stepper_sheath_coordinate(s, 0) : 0) + ahead;
-        s->tool[k].twist = s->state.twist;
+        s->tools.tool[k].inserted = (s->entry.has_sheath ? stepper_sheath_coordinate(s, 0) : 0) + ahead;
+        s->tools.tool[k].twist = s->state.twist;
     }
     return EXCHANGE_DONE;
 }

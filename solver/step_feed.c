@@ -11,8 +11,8 @@ static const double SPRUNG = 0.1;                // of an element's length past 
 // The frame turned the short way until e1 is the line's direction.
 static Quat on_line(const Stepper *s, Quat q)
 {
-    Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->axis[0]);
-    return quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
+    Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->entry.axis[0]);
+    return quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->entry.axis[0]), axis.x, axis.y, axis.z}, q));
 }
 
 // A node that comes back is put on the line. One that is let go, a fiftieth of an element from the mouth, takes the place that the short piece behind it,
@@ -20,10 +20,10 @@ static Quat on_line(const Stepper *s, Quat q)
 // soft, the piece would spring.
 void stepper_hold(Stepper *s, int node)
 {
-    SEL_ASSERT(s->has_sheath && node >= 0 && node < s->state.node_count, "the sheath holds a node of the chain");
+    SEL_ASSERT(s->entry.has_sheath && node >= 0 && node < s->state.node_count, "the sheath holds a node of the chain");
     WireState *w = &s->state;
     double along = stepper_sheath_coordinate(s, node);
-    w->position[node] = vec3_add_scaled(s->mouth, along, s->axis[0]);
+    w->position[node] = vec3_add_scaled(s->entry.mouth, along, s->entry.axis[0]);
     w->orientation[node] = on_line(s, w->orientation[node]);
 }
 
@@ -33,9 +33,9 @@ static Vec3 mouth_curvature(const Stepper *s, int node)
     const WireState *w = &s->state;
     const BeamRest *r = &s->beam.rest;
     SheathElement e;
-    sheath_element(r, node, s->mouth, s->axis[0], stepper_sheath_coordinate(s, node), w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0,
-                   &e);
-    Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
+    sheath_element(r, node, s->entry.mouth, s->entry.axis[0], stepper_sheath_coordinate(s, node), w->orientation[node], w->position[node + 1],
+                   w->orientation[node + 1], 0, &e);
+    Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->entry.axis[0]), s->entry.axis[0]);
     return vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
 }
 
@@ -44,7 +44,7 @@ static void let_go(Stepper *s, int node)
     WireState *w = &s->state;
     bool is_tip = node + 1 >= s->state.node_count;
     double along = stepper_sheath_coordinate(s, node);
-    if (s->tool_count > 1 && !is_tip) {
+    if (s->tools.count > 1 && !is_tip) {
         if (along > SPRUNG * s->wire.length[node - 1])
             return;
         ToolNode further = tools_further(s, node, along, false);
@@ -56,14 +56,14 @@ static void let_go(Stepper *s, int node)
     double bend = vec3_norm(curvature) * along;
     if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far
         curvature = vec3_scale(curvature, LET_GO_TURN / bend);
-    w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->axis[0]));
+    w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->entry.axis[0]));
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
 }
 
 // Nodes up to the mouth are held, and a little further (sheath_border_share); one that the hand brings back in this step is held from now on.
 int stepper_count_held(const Stepper *s, double advance)
 {
-    if (!s->has_sheath)
+    if (!s->entry.has_sheath)
         return 0;
     int k = 1;
     while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= sheath_border_share * s->wire.length[k - 1])
@@ -77,7 +77,7 @@ double stepper_squeeze(const Stepper *s, const Vec3 *position) { return 1 - vec3
 // The command with what is owed from before; no advance into a tool that is squeezed too much.
 static StepCommand stalled(Stepper *s, StepCommand command)
 {
-    if (!s->has_sheath)
+    if (!s->entry.has_sheath)
         return command;
     double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0), owed = s->state.inserted - actual;
     if (fabs(owed) > 1e-9) {
@@ -94,9 +94,9 @@ static StepCommand stalled(Stepper *s, StepCommand command)
 // A contact solve with coaxial tools begins with what it expects the motion to be: that of the step before.
 static void expect_last_motion(Stepper *s)
 {
-    memset(s->u, 0, row_of(s, s->state.node_count) * sizeof *s->u);
+    memset(s->system.u, 0, row_of(s, s->state.node_count) * sizeof *s->system.u);
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        double *u = s->u + row_of(s, i);
+        double *u = s->system.u + row_of(s, i);
         Vec3 moves = vec3_scale(s->state.velocity[i], s->dt), turns = vec3_scale(s->state.spin[i], s->dt);
         u[0] = moves.x, u[1] = moves.y, u[2] = moves.z;
         u[3] = turns.x, u[4] = turns.y, u[5] = turns.z;
@@ -107,32 +107,32 @@ static void expect_last_motion(Stepper *s)
 void stepper_begin(Stepper *s)
 {
     size_t nodes = (size_t)s->state.node_count;
-    memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
-    memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
+    memcpy(s->start.position, s->state.position, nodes * sizeof *s->start.position);
+    memcpy(s->start.orientation, s->state.orientation, nodes * sizeof *s->start.orientation);
     size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
-    memcpy(s->start_slide, s->state.slide, inner);
-    memcpy(s->start_angle, s->state.angle, inner);
-    memset(s->linearised, 0, row_of(s, s->state.node_count) * sizeof *s->linearised);
-    memset(s->seen, 0, row_of(s, s->state.node_count) * sizeof *s->seen);
-    s->is_iterate = s->overshoots = s->makes_energy = s->progress.is_blocked = false;
+    memcpy(s->start.slide, s->state.slide, inner);
+    memcpy(s->start.angle, s->state.angle, inner);
+    memset(s->iterate.moved, 0, row_of(s, s->state.node_count) * sizeof *s->iterate.moved);
+    memset(s->iterate.seen, 0, row_of(s, s->state.node_count) * sizeof *s->iterate.seen);
+    s->iterate.is_moved = s->progress.overshoots = s->progress.makes_energy = s->progress.is_blocked = false;
     s->progress.hand_tries = s->progress.looks = 0;
-    s->knows_energy = false;
-    s->mouth_ahead = s->command.advance;
-    s->slides = stepper_slides(s);
-    if (s->tool_count > 1)
+    s->start.knows_energy = false;
+    s->iterate.mouth_ahead = s->command.advance;
+    s->iterate.slides = stepper_slides(s);
+    if (s->tools.count > 1)
         expect_last_motion(s);
 }
 
 static void feed(Stepper *s, unsigned released)
 {
     hands_feed(s, released);
-    StepCommand command = s->tool_command[0];
-    s->wall_force_max = s->report.wall_force_max;
-    s->wall_force_sum = s->report.wall_force_sum;
+    StepCommand command = s->hands.command[0];
+    s->start.wall_force_max = s->report.wall_force_max;
+    s->start.wall_force_sum = s->report.wall_force_sum;
     s->report = (StepReport){0};
-    s->has_failed = s->was_held = s->knows_motion = false;
+    s->iterate.knows_motion = false;
     s->progress = (StepProgress){0};
-    if (!s->has_sheath)
+    if (!s->entry.has_sheath)
         command = (StepCommand){0};
     double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
     if (inserted > total) {
@@ -144,8 +144,8 @@ static void feed(Stepper *s, unsigned released)
     }
     s->command = stalled(s, command);
     command = s->command;
-    s->tool_command[0] = command;
-    if (s->tool_count > 1)
+    s->hands.command[0] = command;
+    if (s->tools.count > 1)
         tools_feed(s);
     int held = stepper_count_held(s, command.advance);
     SEL_ASSERT(held >= 0 && held <= s->state.node_count, "the sheath holds nodes of the chain");
@@ -156,13 +156,13 @@ static void feed(Stepper *s, unsigned released)
     for (int i = s->first_free - 1; i >= held; i--)
         let_go(s, i);
     s->first_free = held;
-    memcpy(s->start_force, s->force, (size_t)s->point_count * sizeof *s->force);
+    memcpy(s->points.start_force, s->points.force, (size_t)s->points.count * sizeof *s->points.force);
     stepper_begin(s);
 }
 
 void step_feed_tools(Stepper *s, const StepCommand *command, unsigned released)
 {
-    memcpy(s->tool_command, command, (size_t)s->tool_count * sizeof *command);
+    memcpy(s->hands.command, command, (size_t)s->tools.count * sizeof *command);
     feed(s, released);
 }
 

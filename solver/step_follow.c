@@ -22,7 +22,7 @@ double stepper_largest_turn(const Stepper *s)
     double largest = 0;
     Vec3 before = vec3(0, 0, 0);         // what the node before moves by
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        const double *u = s->system.u + row_of(s, i), *k = s->iterate.moved + row_of(s, i);
         Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
         Quat q = s->state.orientation[i];
         Vec3 axis = vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
@@ -30,7 +30,7 @@ double stepper_largest_turn(const Stepper *s)
         if (i > 0) {
             // from the mouth: over the whole element, however little of it is outside
             bool from_mouth = i == s->first_free;
-            Vec3 c = vec3_sub(s->state.position[i], from_mouth ? s->mouth : s->state.position[i - 1]);
+            Vec3 c = vec3_sub(s->state.position[i], from_mouth ? s->entry.mouth : s->state.position[i - 1]);
             double length2 = vec3_norm2(c), over = from_mouth ? s->wire.length[i - 1] * s->wire.length[i - 1] : length2;
             chord = vec3_norm2(vec3_cross(c, vec3_sub(moves, before))) / (length2 * over);
         }
@@ -47,9 +47,9 @@ static void keep_mass_centre(Stepper *s, double part)
     Vec3 away = vec3(0, 0, 0);
     double mass = 0;
     for (int i = 0; i < s->state.node_count; i++) {
-        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        const double *u = s->system.u + row_of(s, i), *k = s->iterate.moved + row_of(s, i);
         Vec3 linear = vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2]));
-        Vec3 real = vec3_sub(s->state.position[i], s->start_position[i]);
+        Vec3 real = vec3_sub(s->state.position[i], s->start.position[i]);
         away = vec3_add_scaled(away, s->wire.mass[i], vec3_sub(linear, real));
         mass += s->wire.mass[i];
     }
@@ -62,9 +62,9 @@ static void keep_mass_centre(Stepper *s, double part)
 // steel is 0.1 N. Not where the rig holds a node further along.
 static void swing(Stepper *s, double part)
 {
-    Vec3 from = s->mouth, moved = s->mouth, shift = vec3(0, 0, 0);
+    Vec3 from = s->entry.mouth, moved = s->entry.mouth, shift = vec3(0, 0, 0);
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        const double *u = s->system.u + row_of(s, i), *k = s->iterate.moved + row_of(s, i);
         Vec3 own = vec3_scale(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), part), here = s->state.position[i];
         if (i == 0) {
             moved = vec3_add(here, own);
@@ -77,16 +77,16 @@ static void swing(Stepper *s, double part)
         shift = own;
         s->state.position[i] = moved;
     }
-    if (s->first_free == 0 && (s->fixed[0] & DOF_POSITION) == 0)
+    if (s->first_free == 0 && (s->rig.fixed[0] & DOF_POSITION) == 0)
         keep_mass_centre(s, part);
 }
 
 static void displace(Stepper *s, double part)
 {
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        const double *u = s->system.u + row_of(s, i), *k = s->iterate.moved + row_of(s, i);
         Vec3 d = part < 1 ? vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2])) : vec3(u[0], u[1], u[2]);
-        s->state.position[i] = vec3_add(s->start_position[i], d);
+        s->state.position[i] = vec3_add(s->start.position[i], d);
     }
 }
 
@@ -95,27 +95,27 @@ static void move(Stepper *s, double part)
 {
     WireState *w = &s->state;
     int nodes = w->node_count, held = s->first_free;
-    double *rx = s->product, *ry = rx + nodes, *rz = ry + nodes;     // how far a node turns, an assembly's scratch
-    if (s->turn > SWING_MOTION && s->can_swing)
+    double *rx = s->system.product, *ry = rx + nodes, *rz = ry + nodes;     // how far a node turns, an assembly's scratch
+    if (s->progress.turn > SWING_MOTION && s->rig.can_swing)
         swing(s, part);
     else
         displace(s, part);
     for (int i = 0; i < held; i++) {
         // on the line exactly, whatever rounding does
-        const double *u = s->u + row_of(s, i);
-        double *k = s->linearised + row_of(s, i), turn = part * (u[3] - k[3]);
+        const double *u = s->system.u + row_of(s, i);
+        double *k = s->iterate.moved + row_of(s, i), turn = part * (u[3] - k[3]);
         k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
         k[3] += turn;
-        double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + k[0];
-        w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
-        rx[i] = turn * s->axis[0].x, ry[i] = turn * s->axis[0].y, rz[i] = turn * s->axis[0].z;
+        double along = vec3_dot(vec3_sub(s->start.position[i], s->entry.mouth), s->entry.axis[0]) + k[0];
+        w->position[i] = vec3_add_scaled(s->entry.mouth, along, s->entry.axis[0]);
+        rx[i] = turn * s->entry.axis[0].x, ry[i] = turn * s->entry.axis[0].y, rz[i] = turn * s->entry.axis[0].z;
     }
     for (int i = held; i < nodes; i++) {
-        const double *u = s->u + row_of(s, i);
-        double *k = s->linearised + row_of(s, i);
-        k[0] = w->position[i].x - s->start_position[i].x;
-        k[1] = w->position[i].y - s->start_position[i].y;
-        k[2] = w->position[i].z - s->start_position[i].z;
+        const double *u = s->system.u + row_of(s, i);
+        double *k = s->iterate.moved + row_of(s, i);
+        k[0] = w->position[i].x - s->start.position[i].x;
+        k[1] = w->position[i].y - s->start.position[i].y;
+        k[2] = w->position[i].z - s->start.position[i].z;
         Vec3 turn = vec3_scale(vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), part);
         double angle2 = vec3_norm2(turn);
         if (angle2 > NODE_TURN_MAX * NODE_TURN_MAX)
@@ -124,20 +124,20 @@ static void move(Stepper *s, double part)
         rx[i] = turn.x, ry[i] = turn.y, rz[i] = turn.z;
     }
     node_turn(nodes, rx, ry, rz, w->orientation);
-    if (s->tool_count > 1)
+    if (s->tools.count > 1)
         tools_move(s, part);
 }
 
 static double energy_bound(const Stepper *s)
 {
     const Wire *w = &s->wire;
-    double work = 0, bound = s->elastic_before + stepper_kinetic_energy(s);
+    double work = 0, bound = s->start.elastic + stepper_kinetic_energy(s);
     for (int i = s->first_free; i < w->node_count; i++)
-        work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[row_of(s, i)], s->u[row_of(s, i) + 1], s->u[row_of(s, i) + 2])));
-    for (int k = 0; k < s->set.count; k++)
-        work += fmax(0, -s->set.point[k].gap) * vec3_norm(s->set.point[k].force);
-    for (int k = 0; k < s->set.pair_count; k++)
-        work += fmax(0, -s->set.pair[k].gap) * vec3_norm(s->set.pair[k].force);
+        work += w->mass[i] * fabs(vec3_dot(s->rig.gravity, vec3(s->system.u[row_of(s, i)], s->system.u[row_of(s, i) + 1], s->system.u[row_of(s, i) + 2])));
+    for (int k = 0; k < s->system.set.count; k++)
+        work += fmax(0, -s->system.set.point[k].gap) * vec3_norm(s->system.set.point[k].force);
+    for (int k = 0; k < s->system.set.pair_count; k++)
+        work += fmax(0, -s->system.set.pair[k].gap) * vec3_norm(s->system.set.pair[k].force);
     work += hands_work_bound(s);
     return bound + 2 * work + 1e-6;
 }
@@ -146,8 +146,8 @@ static void copy_iterate(Stepper *s, bool back)
 {
     size_t m = (size_t)s->state.node_count, rows = row_of(s, (int)m), inner = m * (size_t)s->state.inner_count;
     size_t size[5] = {m * sizeof(Vec3), m * sizeof(Quat), rows * sizeof(double), inner * sizeof(double), inner * sizeof(double)};
-    void *live[5] = {s->state.position, s->state.orientation, s->linearised, s->state.slide, s->state.angle};
-    void *kept[5] = {s->kept, s->kept + 3 * m, s->kept + 7 * m, s->kept + 7 * m + rows, s->kept + 7 * m + rows + inner};
+    void *live[5] = {s->state.position, s->state.orientation, s->iterate.moved, s->state.slide, s->state.angle};
+    void *kept[5] = {s->iterate.kept, s->iterate.kept + 3 * m, s->iterate.kept + 7 * m, s->iterate.kept + 7 * m + rows, s->iterate.kept + 7 * m + rows + inner};
     for (int i = 0; i < 5; i++)
         memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
 }
@@ -163,23 +163,23 @@ static double part_until(double from, double to, double most)
 // No element turns by more than TURN_MAX, and no more of the tool springs through the mouth than one element describes.
 static double largest_part(const Stepper *s)
 {
-    double part = s->turn > TURN_MAX ? TURN_MAX / s->turn : 1;
-    if (s->tool_count > 1)
+    double part = s->progress.turn > TURN_MAX ? TURN_MAX / s->progress.turn : 1;
+    if (s->tools.count > 1)
         part = fmin(part, tools_largest_part(s));
     int i = s->first_free - 1;
     if (i < 0 || i + 1 >= s->state.node_count)
         return part;
     size_t k = row_of(s, i);
-    return fmin(part, part_until(s->linearised[k], s->u[k], fabs(s->command.advance) + MOUTH_TRAVEL * s->wire.length[i]));
+    return fmin(part, part_until(s->iterate.moved[k], s->system.u[k], fabs(s->command.advance) + MOUTH_TRAVEL * s->wire.length[i]));
 }
 
 static double elastic_at_start(Stepper *s)
 {
-    if (!s->knows_energy) {           // of x_n, or of an iterate beside it
-        s->elastic_before = stepper_elastic_energy(s);
-        s->knows_energy = true;
+    if (!s->start.knows_energy) {           // of x_n, or of an iterate beside it
+        s->start.elastic = stepper_elastic_energy(s);
+        s->start.knows_energy = true;
     }
-    return s->elastic_before;
+    return s->start.elastic;
 }
 
 double stepper_energy_made(Stepper *s)
@@ -202,17 +202,17 @@ double stepper_energy_made(Stepper *s)
 double stepper_follow(Stepper *s, bool halfway)
 {
     double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
-    bool is_trusted = !s->was_held && s->report.residual < LOST;
-    bool is_quiet = s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted;
-    if ((!s->vessel && !self_contact_is_near(s)) || (is_quiet && !s->makes_energy)) {
+    bool is_trusted = !s->progress.was_held && s->report.residual < LOST;
+    bool is_quiet = s->progress.turn <= NEWTON_MOTION_IN_CONTACT && !s->progress.overshoots && is_trusted;
+    if ((!s->vessel && !self_contact_is_near(s)) || (is_quiet && !s->progress.makes_energy)) {
         move(s, part);
         return part;
     }
     elastic_at_start(s);
-    double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
+    double bound = s->entry.has_sheath && s->rig.load_count == 0 ? energy_bound(s) : HUGE_VAL;
     copy_iterate(s, false);
-    double most = fmax(DEPTH_MAX, s->depth);
-    int tries = stepper_squeeze(s, s->start_position) < JAMMED ? 2 * HALVES_MAX : HALVES_MAX;
+    double most = fmax(DEPTH_MAX, s->iterate.depth);
+    int tries = stepper_squeeze(s, s->start.position) < JAMMED ? 2 * HALVES_MAX : HALVES_MAX;
     for (int k = 0; k < tries; k++) {
         if (k == HALVES_MAX) {        // no jam: rather a little deeper than stuck for ever where neighbouring models disagree about the wall
             part = largest_part(s);
@@ -231,9 +231,9 @@ double stepper_follow(Stepper *s, bool halfway)
                 ContactProblem problem = step_contacts(s);
                 solved = contact_solve(&problem);
             } while (!stepper_take_contacts(s, &solved));
-            if (s->has_failed)
+            if (s->progress.has_failed)
                 return 0;
-            s->turn = stepper_largest_turn(s);
+            s->progress.turn = stepper_largest_turn(s);
             part = largest_part(s);
         }
     }

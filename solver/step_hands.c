@@ -8,15 +8,15 @@
 
 #include <string.h>
 
-static bool has_hand(const Stepper *s, int k) { return k == 0 ? s->has_sheath : is_inside(s, 0, k); }
+static bool has_hand(const Stepper *s, int k) { return k == 0 ? s->entry.has_sheath : is_inside(s, 0, k); }
 static int row_of_hand(int k, int about) { return k == 0 ? 3 * about : unknown_of(k) + about; }
-static bool rides(const Stepper *s, int k) { return k > 0 && s->hand[k].is_released; }
+static bool rides(const Stepper *s, int k) { return k > 0 && s->hands.hand[k].is_released; }
 
 // What a hand, or a valve, holds at most [N] or [N mm].
 static double holds(const Stepper *s, int k, int about)
 {
-    const Hand *hand = &s->hand[k];
-    double radius = s->tool_count > 1 ? s->tool[k].wire.radius[0] : s->wire.radius[0];
+    const Hand *hand = &s->hands.hand[k];
+    double radius = s->tools.count > 1 ? s->tools.tool[k].wire.radius[0] : s->wire.radius[0];
     if (hand->is_released)
         return about ? hand->valve * radius : hand->valve;
     return about || hand->limit == 0 ? HUGE_VAL : hand->limit;
@@ -25,26 +25,26 @@ static double holds(const Stepper *s, int k, int about)
 // What a tool moves by at the hub, from node 0's unknowns. The hub of a rig does not move.
 static double tool_moves(const Stepper *s, int k, int about, const double *u)
 {
-    double hub = s->has_sheath ? u[3 * about] : 0;
+    double hub = s->entry.has_sheath ? u[3 * about] : 0;
     return k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
 }
 
 // [mm] by which the hub around a tool's moves; the sheath does not.
-static double around_moves(const Stepper *s, int k) { return k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0; }
+static double around_moves(const Stepper *s, int k) { return k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->system.u) : 0; }
 
 // [mm] that a tool's hub can go before it meets the hub around it, or the sheath.
 static double hub_room(const Stepper *s, int k)
 {
     if (k == 0)
-        return s->has_sheath ? vec3_dot(vec3_sub(s->mouth, s->start_position[0]), s->axis[0]) : HUGE_VAL;
+        return s->entry.has_sheath ? vec3_dot(vec3_sub(s->entry.mouth, s->start.position[0]), s->entry.axis[0]) : HUGE_VAL;
     int around = tools_around(s, 0, k);
-    return s->start_slide[k - 1] - (around > 0 ? s->start_slide[around - 1] : 0);
+    return s->start.slide[k - 1] - (around > 0 ? s->start.slide[around - 1] : 0);
 }
 
 // What the hand's unknown moves by in this step where the hand holds.
 static double wanted(const Stepper *s, int k, int about)
 {
-    const Hand *hand = &s->hand[k];
+    const Hand *hand = &s->hands.hand[k];
     if (!about && hand->is_stopped)
         return hub_room(s, k) + (rides(s, k) ? 0 : around_moves(s, k));
     if (hand->is_released)
@@ -52,11 +52,11 @@ static double wanted(const Stepper *s, int k, int about)
     if (k == 0)
         return about ? s->command.twist : stepper_wanted(s);
     // to where the commands say, whatever has been lost to rounding before
-    const Tool *t = &s->tool[k];
+    const Tool *t = &s->tools.tool[k];
     if (about)
-        return t->twist + s->tool_command[k].twist - s->state.twist - s->start_angle[k - 1];
-    double hub = s->has_sheath ? vec3_dot(vec3_sub(s->start_position[0], s->mouth), s->axis[0]) : 0;
-    return t->inserted + s->tool_command[k].advance - (t->wire.total_length + hub - s->start_slide[k - 1]);
+        return t->twist + s->hands.command[k].twist - s->state.twist - s->start.angle[k - 1];
+    double hub = s->entry.has_sheath ? vec3_dot(vec3_sub(s->start.position[0], s->entry.mouth), s->entry.axis[0]) : 0;
+    return t->inserted + s->hands.command[k].advance - (t->wire.total_length + hub - s->start.slide[k - 1]);
 }
 
 // The hand's unknown.
@@ -66,24 +66,24 @@ static double hand_moves(const Stepper *s, int k, int about, const double *u)
     return rides(s, k) ? own - tool_moves(s, tools_around(s, 0, k), about, u) : own;
 }
 
-double hand_moved(const Stepper *s, int k, int about) { return hand_moves(s, k, about, s->linearised); }
+double hand_moved(const Stepper *s, int k, int about) { return hand_moves(s, k, about, s->iterate.moved); }
 
 // Node 0's unknowns are `basis` times the hands'.
 static void make_basis(Stepper *s)
 {
-    int n = s->chain.size;
+    int n = s->system.chain.size;
     double motion[STEP_TOOLS_MAX][2][BLOCK_LARGEST] = {{{0}}};       // of each tool in its hand's and the others' unknowns
-    memset(s->hand_basis, 0, sizeof s->hand_basis);
+    memset(s->hands.basis, 0, sizeof s->hands.basis);
     for (int i = 0; i < n; i++)
-        s->hand_basis[n * i + i] = 1;
+        s->hands.basis[n * i + i] = 1;
     for (int about = 0; about < 2; about++) {
-        if (s->has_sheath)
+        if (s->entry.has_sheath)
             motion[0][about][3 * about] = 1;
-        for (int k = 1; k < s->tool_count; k++) {
+        for (int k = 1; k < s->tools.count; k++) {
             if (!has_hand(s, k))
                 continue;
             int at = row_of_hand(k, about), out = tools_around(s, 0, k);
-            double *own = motion[k][about], *slide = s->hand_basis + n * at;
+            double *own = motion[k][about], *slide = s->hands.basis + n * at;
             for (int i = 0; i < n; i++)
                 own[i] = (i == at) + (rides(s, k) ? motion[out][about][i] : 0);
             for (int i = 0; i < n; i++)
@@ -95,14 +95,14 @@ static void make_basis(Stepper *s)
 // rows (n, n) times the basis.
 static void columns_to_hands(const Stepper *s, double *rows)
 {
-    int n = s->chain.size;
+    int n = s->system.chain.size;
     for (int r = 0; r < n; r++) {
         double old[BLOCK_LARGEST];
         memcpy(old, rows + n * r, (size_t)n * sizeof *old);
         for (int c = 0; c < n; c++) {
             double sum = 0;
             for (int k = 0; k < n; k++)
-                sum += old[k] * s->hand_basis[n * k + c];
+                sum += old[k] * s->hands.basis[n * k + c];
             rows[n * r + c] = sum;
         }
     }
@@ -120,45 +120,45 @@ static void transpose(double *a, int n)
 
 static void to_hands(Stepper *s)
 {
-    int n = s->chain.size;
+    int n = s->system.chain.size;
     double old[BLOCK_LARGEST];
     make_basis(s);
-    columns_to_hands(s, s->chain.diag);
-    transpose(s->chain.diag, n);
-    columns_to_hands(s, s->chain.diag);
-    if (s->chain.count > 1)
-        columns_to_hands(s, s->chain.lower);
-    memcpy(old, s->b, (size_t)n * sizeof *old);
+    columns_to_hands(s, s->system.chain.diag);
+    transpose(s->system.chain.diag, n);
+    columns_to_hands(s, s->system.chain.diag);
+    if (s->system.chain.count > 1)
+        columns_to_hands(s, s->system.chain.lower);
+    memcpy(old, s->system.b, (size_t)n * sizeof *old);
     for (int c = 0; c < n; c++) {
-        s->b[c] = 0;
+        s->system.b[c] = 0;
         for (int k = 0; k < n; k++)
-            s->b[c] += s->hand_basis[n * k + c] * old[k];
+            s->system.b[c] += s->hands.basis[n * k + c] * old[k];
     }
 }
 
 void hands_solved(Stepper *s)
 {
-    int n = s->chain.size;
+    int n = s->system.chain.size;
     double moved[BLOCK_LARGEST];
-    if (s->tool_count == 1)
+    if (s->tools.count == 1)
         return;
-    memcpy(moved, s->u, (size_t)n * sizeof *moved);
+    memcpy(moved, s->system.u, (size_t)n * sizeof *moved);
     for (int r = 0; r < n; r++) {
-        s->u[r] = 0;
+        s->system.u[r] = 0;
         for (int c = 0; c < n; c++)
-            s->u[r] += s->hand_basis[n * r + c] * moved[c];
+            s->system.u[r] += s->hands.basis[n * r + c] * moved[c];
     }
 }
 
 void hands_constrain(Stepper *s)
 {
-    if (s->tool_count > 1)
+    if (s->tools.count > 1)
         to_hands(s);
-    for (int k = 0; k < s->tool_count; k++)
+    for (int k = 0; k < s->tools.count; k++)
         for (int about = 0; has_hand(s, k) && about < 2; about++) {
-            int slips = s->hand[k].slips[about], at = row_of_hand(k, about);
+            int slips = s->hands.hand[k].slips[about], at = row_of_hand(k, about);
             if (slips)
-                s->b[at] += slips * holds(s, k, about);
+                s->system.b[at] += slips * holds(s, k, about);
             else
                 stepper_prescribe(s, 0, at, wanted(s, k, about));
         }
@@ -167,13 +167,13 @@ void hands_constrain(Stepper *s)
 // [N] or [N mm] that tool k's hand, or the valve that holds it, pushes along or turns about the line with.
 static double hand_force(const Stepper *s, int k, int about)
 {
-    int n = s->chain.size, at = row_of_hand(k, about);
+    int n = s->system.chain.size, at = row_of_hand(k, about);
     double force = 0;
-    if (s->tool_count == 1)
+    if (s->tools.count == 1)
         return stepper_reaction(s, at);
     for (int r = 0; r < n; r++)
-        if (s->hand_basis[n * r + at] != 0)
-            force += s->hand_basis[n * r + at] * stepper_reaction(s, r);
+        if (s->hands.basis[n * r + at] != 0)
+            force += s->hands.basis[n * r + at] * stepper_reaction(s, r);
     return force;
 }
 
@@ -181,12 +181,12 @@ static double hand_force(const Stepper *s, int k, int about)
 static bool reaches_hub(const Stepper *s, int k)
 {
     double room = hub_room(s, k);
-    return room < s->wire.length[0] && tool_moves(s, k, 0, s->u) - around_moves(s, k) > room;
+    return room < s->wire.length[0] && tool_moves(s, k, 0, s->system.u) - around_moves(s, k) > room;
 }
 
 static bool misjudges(Stepper *s, int k, int about)
 {
-    Hand *hand = &s->hand[k];
+    Hand *hand = &s->hands.hand[k];
     int *slips = &hand->slips[about], was = *slips;
     if (!about && hand->is_stopped)
         return false;
@@ -200,7 +200,7 @@ static bool misjudges(Stepper *s, int k, int about)
         *slips = 0;
     else if (was == 0 && fabs(force) > most)
         *slips = force > 0 ? 1 : -1;
-    else if (was != 0 && most > 0 && was * (hand_moves(s, k, about, s->u) - wanted(s, k, about)) > 0)
+    else if (was != 0 && most > 0 && was * (hand_moves(s, k, about, s->system.u) - wanted(s, k, about)) > 0)
         *slips = 0;
     return *slips != was;
 }
@@ -208,7 +208,7 @@ static bool misjudges(Stepper *s, int k, int about)
 bool hands_misjudge(Stepper *s)
 {
     bool changes = false;
-    for (int k = 0; k < s->tool_count && !s->has_failed; k++)
+    for (int k = 0; k < s->tools.count && !s->progress.has_failed; k++)
         for (int about = 0; has_hand(s, k) && about < 2; about++)
             changes |= misjudges(s, k, about);
     return changes;
@@ -216,15 +216,15 @@ bool hands_misjudge(Stepper *s)
 
 void hands_feed(Stepper *s, unsigned released)
 {
-    for (int k = 0; k < s->tool_count; k++) {
-        Hand *hand = &s->hand[k];
-        StepCommand *command = &s->tool_command[k];
+    for (int k = 0; k < s->tools.count; k++) {
+        Hand *hand = &s->hands.hand[k];
+        StepCommand *command = &s->hands.command[k];
         hand->is_released = released >> k & 1;
         hand->slips[0] = hand->slips[1] = 0;
         hand->is_stopped = false;
         memcpy(hand->start, hand->force, sizeof hand->start);
         if (hand->is_released && k > 0)  // goes where its valve goes, or nearly
-            *command = s->tool_command[tools_around(s, 0, k)];
+            *command = s->hands.command[tools_around(s, 0, k)];
         else if (hand->is_released || !isfinite(command->advance) || !isfinite(command->twist))
             command->advance = command->twist = 0;
     }
@@ -233,18 +233,18 @@ void hands_feed(Stepper *s, unsigned released)
 void hands_report(Stepper *s)
 {
     StepReport *r = &s->report;
-    for (int k = 0; k < s->tool_count; k++) {
-        Hand *hand = &s->hand[k];
+    for (int k = 0; k < s->tools.count; k++) {
+        Hand *hand = &s->hands.hand[k];
         bool feels = has_hand(s, k) && !hand->is_released;
         for (int about = 0; about < 2; about++)
             hand->force[about] = has_hand(s, k) ? hand_force(s, k, about) : 0;
         r->push[k] = feels ? hand->force[0] : 0;
         r->torque[k] = feels ? hand->force[1] : 0;
     }
-    if (!s->has_sheath) {        // the rig holds the hub: what it bears, less what the hands do
+    if (!s->entry.has_sheath) {        // the rig holds the hub: what it bears, less what the hands do
         r->push[0] = r->proximal_force;
         r->torque[0] = r->proximal_torque;
-        for (int k = 1; k < s->tool_count; k++)
+        for (int k = 1; k < s->tools.count; k++)
             r->push[0] -= r->push[k], r->torque[0] -= r->torque[k];
     }
     r->proximal_force = r->push[0];
@@ -253,19 +253,19 @@ void hands_report(Stepper *s)
 
 double hands_work_bound(const Stepper *s)
 {
-    double work = 0, length = vec3_distance(s->start_position[1], s->start_position[0]);
-    for (int k = 0; k < s->tool_count; k++) {
+    double work = 0, length = vec3_distance(s->start.position[1], s->start.position[0]);
+    for (int k = 0; k < s->tools.count; k++) {
         if (!has_hand(s, k))
             continue;
-        double rest = s->beam.rest.length[0], stiffness = s->beam.rest.axial[0], total = s->wire.total_length, advance = fabs(hand_moves(s, k, 0, s->u));
+        double rest = s->beam.rest.length[0], stiffness = s->beam.rest.axial[0], total = s->wire.total_length, advance = fabs(hand_moves(s, k, 0, s->system.u));
         if (k > 0) {
-            const Tool *t = &s->tool[k];
-            const double *slide = s->start_slide + k - 1;
+            const Tool *t = &s->tools.tool[k];
+            const double *slide = s->start.slide + k - 1;
             rest = is_inside(s, 1, k) ? slide[s->state.inner_count] - slide[0] : length;
             stiffness = t->section[0].axial / fmax(rest, 1e-3 * length);
             total = t->wire.total_length;
         }
-        work += stiffness * advance * (fabs(length - rest) + advance * rest / total) + fabs(hand_moves(s, k, 1, s->u) * hand_force(s, k, 1));
+        work += stiffness * advance * (fabs(length - rest) + advance * rest / total) + fabs(hand_moves(s, k, 1, s->system.u) * hand_force(s, k, 1));
     }
     return work;
 }
@@ -273,8 +273,8 @@ double hands_work_bound(const Stepper *s)
 double hands_work(const Stepper *s)
 {
     double work = 0;
-    for (int k = 0; k < s->tool_count; k++)
-        if (has_hand(s, k) && !s->hand[k].is_released)
+    for (int k = 0; k < s->tools.count; k++)
+        if (has_hand(s, k) && !s->hands.hand[k].is_released)
             work += s->report.push[k] * hand_moved(s, k, 0) + s->report.torque[k] * hand_moved(s, k, 1);
     return work;
 }
@@ -282,8 +282,8 @@ double hands_work(const Stepper *s)
 double hands_valve_work(const Stepper *s)
 {
     double work = 0;
-    for (int k = 0; k < s->tool_count; k++)
-        for (int about = 0; has_hand(s, k) && s->hand[k].is_released && about < 2; about++)
+    for (int k = 0; k < s->tools.count; k++)
+        for (int about = 0; has_hand(s, k) && s->hands.hand[k].is_released && about < 2; about++)
             work -= hand_force(s, k, about) * hand_moved(s, k, about);
     return work;
 }
@@ -291,29 +291,29 @@ double hands_valve_work(const Stepper *s)
 double hands_start_work(const Stepper *s, bool valves)
 {
     double work = 0;
-    for (int k = 0; k < s->tool_count; k++)
-        for (int about = 0; has_hand(s, k) && s->hand[k].is_released == valves && about < 2; about++)
-            work += s->hand[k].start[about] * hand_moved(s, k, about);
+    for (int k = 0; k < s->tools.count; k++)
+        for (int about = 0; has_hand(s, k) && s->hands.hand[k].is_released == valves && about < 2; about++)
+            work += s->hands.hand[k].start[about] * hand_moved(s, k, about);
     return work;
 }
 
 // Where tool k is in fact: [mm] beyond the mouth.
 static double actual_inserted(const Stepper *s, int k)
 {
-    double hub = s->has_sheath ? stepper_sheath_coordinate(s, 0) : 0;
-    return k == 0 ? s->wire.total_length + hub : s->tool[k].wire.total_length + hub - slide_at(s, 0, k);
+    double hub = s->entry.has_sheath ? stepper_sheath_coordinate(s, 0) : 0;
+    return k == 0 ? s->wire.total_length + hub : s->tools.tool[k].wire.total_length + hub - slide_at(s, 0, k);
 }
 
 void hands_count(Stepper *s)
 {
     bool was_cut = (s->report.flags & STEP_LIMITED) != 0;
-    for (int k = 0; k < s->tool_count; k++) {
-        double *inserted = k == 0 ? &s->state.inserted : &s->tool[k].inserted, *twist = k == 0 ? &s->state.twist : &s->tool[k].twist;
-        const Hand *hand = &s->hand[k];
+    for (int k = 0; k < s->tools.count; k++) {
+        double *inserted = k == 0 ? &s->state.inserted : &s->tools.tool[k].inserted, *twist = k == 0 ? &s->state.twist : &s->tools.tool[k].twist;
+        const Hand *hand = &s->hands.hand[k];
         if (!has_hand(s, k))
             continue;
-        *inserted += s->tool_command[k].advance;
-        *twist += s->tool_command[k].twist;
+        *inserted += s->hands.command[k].advance;
+        *twist += s->hands.command[k].twist;
         double actual = actual_inserted(s, k);
         if (hand->slips[0] && !hand->is_released) {
             s->report.flags |= STEP_HAND_SLIPS;
@@ -326,7 +326,7 @@ void hands_count(Stepper *s)
         if (!was_cut && !hand->is_released)
             continue;
         if (k == 0)
-            *twist += s->linearised[3] - s->tool_command[0].twist;
+            *twist += s->iterate.moved[3] - s->hands.command[0].twist;
         else
             *twist = s->state.twist + angle_at(s, 0, k);
     }

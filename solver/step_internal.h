@@ -65,135 +65,180 @@ typedef struct Inside {      // what lies inside at a node in the sheath
 
 typedef struct SelfContact SelfContact;
 
-// How far a step has come (step_judge.c).
+// Where the tool enters: the line along which the sheath holds it, or that of a rig without a sheath.
+typedef struct Entry {
+    bool has_sheath;
+    Vec3 mouth;              // of the sheath, or where the rig's wire starts
+    Quat frame;              // there …
+    Vec3 axis[3];            // … and its columns: direction, e2, e3
+} Entry;
+
+// Test bench: what fixes and loads the wire.
+typedef struct Rig {
+    uint8_t *fixed;          // (M) DOF_ mask
+    bool can_swing;          // no node but the first is held in place
+    int load_count;
+    LoadPlace *load;
+    Vec3 gravity;            // [mm/ms^2]
+} Rig;
+
+// The hands, that of the outermost tool first (step_hands.c).
+typedef struct Hands {
+    Hand hand[STEP_TOOLS_MAX];
+    StepCommand command[STEP_TOOLS_MAX];                 // of this step
+    double basis[BLOCK_LARGEST * BLOCK_LARGEST];         // node 0's unknowns in those of the hands
+} Hands;
+
+// Coaxial tools (step_tools.c, step_coaxial.c). With one tool only `count` is used.
+typedef struct Tools {
+    int count;
+    int capacity;            // of nodes
+    Tool tool[STEP_TOOLS_MAX];
+    Tool *device[STEP_TOOLS_MAX][1 + STEP_SPARES_MAX];   // what may be tool k; these own the arrays, which `tool` borrows
+    int spare_count[STEP_TOOLS_MAX], fitted[STEP_TOOLS_MAX];
+    Inside *inside;          // (M) of an exchange
+    int *carrier;            // (M) the tool that carries a node
+    Vec3 *moment;            // (E, I) [N mm] of tool 1 + i and all inside it at the middle of an element …
+    double *tension;         // (E, I) [N] … and their tension
+    double *middle;          // (E) [mm] of an element along the line
+    double *bent;            // (E) [1/mm] size of its curvature
+} Tools;
+
+// Contact points: the nodes, then the slots. P = M + K (step_detect.c, step_touch.c).
+typedef struct Points {
+    int slot_count, count;   // K, P
+    int capacity;            // of coaxial tools there may be more
+    Slot *slot;              // (K) by element
+    int *slot_start;         // (M) first slot of element i; of the last node K
+    SlotPlace *slot_place;   // (K) where the iterate has them
+    // what the next step depends on
+    Vec3 *force;             // (P) [N] of the wall on the point: warm start
+    double *touch;           // (P) [mm] along the tool from the point to where it touches, or may next
+    double *clearance;       // (P) [mm] how far the point may travel before it could touch: not queried until then
+    WallMet *met;            // (P)
+    VesselMemory *place;     // (P)
+    // of this step
+    int *candidate;          // (P) the points of the contact set
+    double *touch_next;      // (P) [mm] `touch` at this step's end
+    double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
+    double *lack;            // (P) [mm] of room between walls that face each other
+    double *linger;          // (P) [mm] by which the wall is taken to be nearer in this step
+    VesselMemory *trial;     // (P) what was found of the wall where trials have led since the last detection …
+    bool *tried;             // (P) … of these points
+    Vec3 *start_force;       // (P) [N] of the wall at x_n
+} Points;
+
+// Queries of the wall, made for many points at once: scratch of a detection.
+typedef struct WallQueries {
+    Vec3 *point;             // (P) [mm]
+    VesselMemory *place;
+    VesselHit *hit;
+    int *which;              // (P) the contact point that is queried
+    int *near;               // (P) queries whose points are candidates
+    int *answer_of;          // (M) the query of a node, -1: none
+    double *range;           // (M) [mm] or [mm/ms] that a node moves, or is likely to
+} WallQueries;
+
+// The linear system and its contacts (step_assemble.c, step_solve.c).
+typedef struct StepSystem {
+    BlockChain chain;
+    BlockFactor *factor;
+    ContactSolver *solver;
+    ContactSet set;
+    double *b, *u;           // (M, 6)
+    double *product;         // (M, 6) scratch
+    SheathElement mouth_element;
+    double grip_diag[BLOCK_LARGEST * BLOCK_LARGEST], grip_lower[BLOCK_LARGEST * BLOCK_LARGEST], grip_b[BLOCK_LARGEST];    // rows of node 0 before its constraints
+} StepSystem;
+
+// x_n, where the step begins.
+typedef struct StepStart {
+    Vec3 *position;          // (M)
+    Quat *orientation;
+    double *slide, *angle;   // (M, I)
+    BeamPose pose;           // scratch, for the damping of an iterate
+    bool knows_energy;
+    double elastic;          // [mJ] where `knows_energy`
+    double wall_force_max, wall_force_sum;   // [N] of the step before
+} StepStart;
+
+// What the system is linear about: x_n at first, then what the step has come to. Its pose is the stepper's state.
+typedef struct Iterate {
+    bool is_moved;           // not x_n
+    double *moved;           // (M, 6) displacement from x_n …
+    double *seen;            // (M, 6) … at which the wall was last queried
+    double *kept;            // (M, 13) an iterate to go back to: position, orientation, displacement
+    bool knows_motion;       // u is a solution for this iterate: detection looks as far as it goes
+    double depth;            // [mm] outside the wall
+    double slides;           // [mm] by which the tool is expected to slide along itself
+    double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
+} Iterate;
+
+// How far a step has come, and what its last solution is like (step_judge.c).
 typedef struct StepProgress {
     int linearisations;      // that have been judged
-    // of this one
+    bool has_failed;         // the system has no solution
+    bool was_held;           // some solve of the step was held to its iterate
+    unsigned tips_changed;   // bit k: the node at the tip around tool k has come or gone since the step was fed
+    // of this linearisation
     int looks;               // for walls that the solution goes beyond
     int hand_tries;          // since the last look, of what hands and mouth do
     bool is_held_back;       // the sheath has taken a node back
-    bool is_blocked;         // no part of the way to the solution could be followed
+    bool is_blocked;         // no part of the path to the solution could be followed
     double firmness;         // by which the unknowns are held to the iterate, where the contacts could not be solved without
+    // of its solution
+    double turn;             // [rad] largest against the iterate
+    bool overshoots;         // it goes through the wall, or may
+    bool makes_energy;       // though it turns little
 } StepProgress;
 
 struct Stepper {
     // given once
     Wire wire;
     BeamChain beam;          // its pose and right-hand side: scratch of an assembly
-    int load_count;
-    LoadPlace *load;
-    uint8_t *fixed;          // (M) DOF_ mask of the rig
-    bool can_swing;          // no node but the first is held in place by the rig
-    Vec3 gravity;
+    bool is_slender;         // of one tool: elements bend more than they shear
     double damping_mass, damping_stiffness, dt;
-    bool has_sheath;
-    Vec3 mouth;              // sheath's mouth, or the rig's start
-    Quat line;               // the frame there
-    Vec3 axis[3];            // its columns: direction, e2, e3
     const Vessel *vessel;
     double wall_friction;
     ContactOptions contact;
     int newton_max;
-    // contact points: the nodes, then the slots
-    int slot_count, point_count;     // K, P = M + K
-    int point_capacity;              // of coaxial tools there may be more
-    Slot *slot;              // (K) by element
-    int *slot_start;         // (M) first slot of element i; of the last node K
+    Entry entry;
+    Rig rig;
+    Hands hands;
+    Tools tools;
 
-    Hand hand[STEP_TOOLS_MAX];
-    StepCommand tool_command[STEP_TOOLS_MAX];
-    double hand_basis[BLOCK_LARGEST * BLOCK_LARGEST];    // node 0's unknowns in those of the hands
-    int tool_count;          // 1: what follows is not used
-    Tool tool[STEP_TOOLS_MAX];
-    Tool *device[STEP_TOOLS_MAX][1 + STEP_SPARES_MAX];   // what may be tool k; own their arrays, which `tool` borrows
-    int spare_count[STEP_TOOLS_MAX], fitted[STEP_TOOLS_MAX];
-    Inside *inside;          // (M) of an exchange
-    int *carrier;            // (M) the tool that carries a node
-    double *start_slide, *start_angle; // (M, I) at x_n
-    Vec3 *inner_moment;      // (E, I) [N mm] of tool 1 + i and all inside it at the middle of an element …
-    double *inner_tension;   // (E, I) [N] … and their tension
-    double *middle;          // (E) [mm] of an element along the line
-    double *bent;            // (E) [1/mm] size of its curvature
-    int capacity;            // of nodes
-
-    // what the next step depends on: see checkpoint.c
+    // what the next step depends on, with parts of `points` (checkpoint.c)
     WireState state;         // arrays in `memory`; within a step the iterate
     size_t memory_count;
     double *memory;          // position, orientation, velocity, spin, force, clearance, met, touch
-    Vec3 *force;             // (P) [N] of the wall on the point: warm start
-    double *touch;           // (P) [mm] along the tool from the point to where it touches, or may next (step_touch.c)
-    double *clearance;       // (P) [mm] how far the point may travel before it could touch: not queried until then
-    WallMet *met;            // (P)
-    VesselMemory *place;     // (P)
     int first_free;          // nodes before it are held by the sheath
 
-    // scratch of a step
-    BlockChain chain;
-    BlockFactor *factor;
-    ContactSolver *solver;
-    ContactSet set;
-    BeamPose start_pose;     // x_n, for the damping of an iterate
+    Points points;
+    WallQueries query;
+    StepSystem system;
     SelfContact *self;       // NULL: the tool passes through itself (self_contact.h)
-    SheathElement mouth_element;
-    double *b, *u;           // (M, 6)
-    double *linearised;      // (M, 6) displacement from x_n to the iterate about which the system is linear
-    double *seen;            // (M, 6) … at which the wall was last asked
-    double *product;         // (M, 6)
-    double *kept;            // (M, 13) an iterate to go back to: position, orientation, displacement
-    double grip_diag[BLOCK_LARGEST * BLOCK_LARGEST], grip_lower[BLOCK_LARGEST * BLOCK_LARGEST], grip_b[BLOCK_LARGEST];    // rows of node 0 before its constraints
-    Vec3 *start_position;    // (M) x_n
-    Vec3 *start_force;       // (P) [N] of the wall there
-    Quat *start_orientation;
-    SlotPlace *slot_place;   // (K) where the iterate has them
-    Vec3 *query_point;       // (P)
-    VesselMemory *query_place;
-    VesselHit *query_hit;
-    int *query_which;        // (P) the point that is asked about
-    int *query_near;         // (P) questions whose points are candidates
-    int *answer_of;          // (M) the question about a node, -1: none
-    int *candidate;          // (P) the points of `set`
-    double *range;           // (M) [mm] or [mm/ms] that a node moves, or is likely to
-    VesselMemory *trial;     // (P) what was found of the wall where trials have led since the last detection …
-    bool *tried;             // (P) … of these points
-    double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
-    double *lack;            // (P) [mm] of room between walls that face each other
-    double *touch_next;      // (P) [mm] `touch` at this step's end
-    double *linger;          // (P) [mm] by which the wall is taken to be nearer in this step
     double *scratch;         // owns the arrays of doubles
 
     // of this step
     StepCommand command;
-    StepReport report;
-    bool is_slender;         // of one tool: elements bend more than they shear
-    double slides;           // [mm] by which the tool is expected to slide along itself
-    double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
-    double turn;             // [rad] largest of the solution against the iterate
-    bool overshoots;         // the solution goes through the wall, or may
-    bool makes_energy;       // the solution, though it turns little
-    unsigned tips_changed;   // bit k: the node at the tip around tool k has come or gone since the step was fed
-    bool knows_energy;       // it has been asked for …
-    double elastic_before;   // [mJ] … at x_n
-    double depth;            // [mm] outside the wall at the iterate
-    bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
-    double wall_force_max, wall_force_sum;   // [N] of the step before
-    bool has_failed;
-    bool was_held;           // some solve of the step was held to its iterate
+    StepStart start;
+    Iterate iterate;
     StepProgress progress;
-    bool is_iterate;         // linearised about something else than x_n
+    StepReport report;
 };
 
 // Where a node's unknowns begin in a vector, and its block in the matrix.
 static inline size_t row_of(const Stepper *s, int node)
 {
-    SEL_ASSERT(node >= 0 && node <= s->chain.count, "a node of the chain, or its end");
-    return (size_t)s->chain.size * (size_t)node;
+    SEL_ASSERT(node >= 0 && node <= s->system.chain.count, "a node of the chain, or its end");
+    return (size_t)s->system.chain.size * (size_t)node;
 }
-static inline size_t block_of(const Stepper *s, int node) { return (size_t)s->chain.size * row_of(s, node); }
+static inline size_t block_of(const Stepper *s, int node) { return (size_t)s->system.chain.size * row_of(s, node); }
 
 static inline bool stepper_presses(const Stepper *s, int point)
 {
-    SEL_ASSERT(point >= 0 && point < s->point_count, "the point is a node or a slot of the tool");
-    Vec3 f = s->force[point];
+    SEL_ASSERT(point >= 0 && point < s->points.count, "the point is a node or a slot of the tool");
+    Vec3 f = s->points.force[point];
     return f.x != 0 || f.y != 0 || f.z != 0;
 }
 

@@ -32,11 +32,11 @@ enum { HAND_TRIES = 6, LOOKS_MAX = 2 };
 static double turn_at_mouth(const Stepper *s)
 {
     int i = s->first_free;
-    if (!s->has_sheath || i >= s->state.node_count || s->hand[0].is_released || s->hand[0].slips[0])
+    if (!s->entry.has_sheath || i >= s->state.node_count || s->hands.hand[0].is_released || s->hands.hand[0].slips[0])
         return 0;
-    const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
-    Vec3 moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), ends = vec3_add(vec3_sub(s->state.position[i], s->mouth), moves);
-    return vec3_norm(vec3_cross(moves, s->axis[0])) / fmax(vec3_dot(ends, s->axis[0]), sheath_border_share * s->wire.length[i - 1]);
+    const double *u = s->system.u + row_of(s, i), *k = s->iterate.moved + row_of(s, i);
+    Vec3 moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), ends = vec3_add(vec3_sub(s->state.position[i], s->entry.mouth), moves);
+    return vec3_norm(vec3_cross(moves, s->entry.axis[0])) / fmax(vec3_dot(ends, s->entry.axis[0]), sheath_border_share * s->wire.length[i - 1]);
 }
 
 // Where a border of the rest shape is at the mouth, straightening takes more on one side of it than on the other, and the wire may come to rest with the border
@@ -44,22 +44,22 @@ static double turn_at_mouth(const Stepper *s)
 static bool misjudges_border(Stepper *s)
 {
     int i = s->first_free - 1;
-    if (s->tool_count > 1 || i < 0 || i + 1 >= s->state.node_count || s->has_failed)
+    if (s->tools.count > 1 || i < 0 || i + 1 >= s->state.node_count || s->progress.has_failed)
         return false;
     const BeamRest *rest = &s->beam.rest;
-    double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
-    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)];
+    double start = vec3_dot(vec3_sub(s->start.position[i], s->entry.mouth), s->entry.axis[0]), width = sheath_border_share * rest->length[i];
+    double taken = start + s->iterate.mouth_ahead, ends = start + s->system.u[row_of(s, i)];
     // the tool has not gone as the hand was told to: the element's stiffness was that of another length
     double length = sheath_outside(rest->length[i], taken), real = sheath_outside(rest->length[i], ends);
-    if (s->hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
-        s->mouth_ahead = ends - start;
+    if (s->hands.hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
+        s->iterate.mouth_ahead = ends - start;
         return true;
     }
-    double there = sheath_straightening(rest, i, ends), linear = sheath_straightening(rest, i, taken) - s->mouth_element.border * (ends - taken);
+    double there = sheath_straightening(rest, i, ends), linear = sheath_straightening(rest, i, taken) - s->system.mouth_element.border * (ends - taken);
     if (fabs(there - linear) < BORDER_FORCE * fmax(there, sheath_straightening(rest, i, taken)) + 1e-9)
         return false;
     bool crosses = fmin(taken, ends) < 0 && fmax(taken, ends) > 0, is_within = fabs(ends) <= 0.5 * width;
-    s->mouth_ahead = (crosses && !is_within ? 0 : ends) - start;
+    s->iterate.mouth_ahead = (crosses && !is_within ? 0 : ends) - start;
     return true;
 }
 
@@ -67,12 +67,12 @@ static bool misjudges_border(Stepper *s)
 // the answer lies between.
 static bool goes_back(const Stepper *s)
 {
-    const double *before = s->kept + 7 * (size_t)s->state.node_count;
+    const double *before = s->iterate.kept + 7 * (size_t)s->state.node_count;
     double along = 0, came = 0;
     for (int i = s->first_free; i < s->state.node_count; i++)
         for (size_t k = row_of(s, i); k < row_of(s, i) + 3; k++) {
-            double d = s->linearised[k] - before[k];
-            along += d * (s->u[k] - s->linearised[k]);
+            double d = s->iterate.moved[k] - before[k];
+            along += d * (s->system.u[k] - s->iterate.moved[k]);
             came += d * d;
         }
     return along < -0.5 * came;
@@ -90,14 +90,14 @@ static unsigned judge_hand(Stepper *s)
 // A wire that springs goes further than anybody looked: look that far, and solve again.
 static unsigned judge_reach(Stepper *s)
 {
-    if (s->progress.looks >= LOOKS_MAX || s->has_failed || stepper_is_spent(s))
+    if (s->progress.looks >= LOOKS_MAX || s->progress.has_failed || stepper_is_spent(s))
         return 0;
     bool escapes = stepper_escapes(s), misses = self_contact_misses(s);
     if (!misses && !escapes)
         return 0;
     s->progress.looks++;
     s->progress.hand_tries = 0;
-    s->knows_motion = escapes;
+    s->iterate.knows_motion = escapes;
     return (escapes ? STEP_NEEDS_WALLS : 0) | STEP_NEEDS_CONTACT;
 }
 
@@ -105,16 +105,16 @@ static unsigned judge_reach(Stepper *s)
 // the step's start on.
 static unsigned judge_mouth(Stepper *s)
 {
-    if (s->tool_count > 1 && !s->progress.is_held_back && (tools_leave_back(s) || tools_come_out(s))) {
+    if (s->tools.count > 1 && !s->progress.is_held_back && (tools_leave_back(s) || tools_come_out(s))) {
         stepper_begin(s);
         return STEP_NEEDS_ALL;
     }
     int node = s->first_free;
-    if (!s->has_sheath || s->has_failed || node >= s->state.node_count)
+    if (!s->entry.has_sheath || s->progress.has_failed || node >= s->state.node_count)
         return 0;
-    const double *u = s->u + row_of(s, node);
-    double ends = vec3_dot(vec3_sub(vec3_add(s->start_position[node], vec3(u[0], u[1], u[2])), s->mouth), s->axis[0]);
-    double began = vec3_dot(vec3_sub(s->start_position[node], s->mouth), s->axis[0]);
+    const double *u = s->system.u + row_of(s, node);
+    double ends = vec3_dot(vec3_sub(vec3_add(s->start.position[node], vec3(u[0], u[1], u[2])), s->entry.mouth), s->entry.axis[0]);
+    double began = vec3_dot(vec3_sub(s->start.position[node], s->entry.mouth), s->entry.axis[0]);
     if (ends >= TAKE_BACK * s->wire.length[node - 1] || began > s->wire.length[node - 1] + fabs(s->command.advance))
         return 0;
     stepper_go_back(s);
@@ -127,23 +127,26 @@ static unsigned judge_mouth(Stepper *s)
 }
 
 // Does the solution give the tool energy that nobody pays for? Among contacts a small turn may, where the tool is stiff or its elements are short.
-static bool makes_energy(Stepper *s) { return s->has_sheath && s->load_count == 0 && s->turn > QUIET_MOTION && stepper_energy_made(s) > ENERGY_MADE; }
+static bool makes_energy(Stepper *s)
+{
+    return s->entry.has_sheath && s->rig.load_count == 0 && s->progress.turn > QUIET_MOTION && stepper_energy_made(s) > ENERGY_MADE;
+}
 
 // Newton's method: the solution is the next place to linearise about, where it turns or goes further than a linear step may.
 static unsigned judge_motion(Stepper *s)
 {
     if (s->progress.linearisations > 0) {
         s->report.newton = s->progress.linearisations;
-        s->overshoots = true;
+        s->progress.overshoots = true;
     }
     int next = ++s->progress.linearisations;
-    if (next >= 2 * s->newton_max || s->has_failed || stepper_is_spent(s))
+    if (next >= 2 * s->newton_max || s->progress.has_failed || stepper_is_spent(s))
         return 0;
     bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && goes_back(s);     // before another iterate is kept
-    bool turns = s->turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
-    s->makes_energy = makes_energy(s);
-    s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
-    if (!((turns || s->makes_energy) && next < s->newton_max) && !s->overshoots)
+    bool turns = s->progress.turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
+    s->progress.makes_energy = makes_energy(s);
+    s->progress.overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
+    if (!((turns || s->progress.makes_energy) && next < s->newton_max) && !s->progress.overshoots)
         return 0;
     if (stepper_follow(s, is_back) == 0) {
         s->progress.is_blocked = true;
@@ -151,7 +154,7 @@ static unsigned judge_motion(Stepper *s)
         return 0;
     }
     stepper_use_clearance(s);
-    s->is_iterate = true;
+    s->iterate.is_moved = true;
     s->progress.is_held_back = false;
     s->progress.hand_tries = s->progress.looks = 0;
     return STEP_NEEDS_ALL;
@@ -166,12 +169,12 @@ unsigned step_judge(Stepper *s, const ContactReport *solved)
         needs = judge_reach(s);
     if (needs != 0)
         return needs;
-    s->turn = s->has_failed ? 0 : stepper_largest_turn(s);
+    s->progress.turn = s->progress.has_failed ? 0 : stepper_largest_turn(s);
     needs = judge_mouth(s);
     if (needs == 0)
         needs = judge_motion(s);
     if (needs == 0)
-        s->overshoots |= stepper_is_spent(s);        // nobody has looked
+        s->progress.overshoots |= stepper_is_spent(s);        // nobody has looked
     return needs;
 }
 
@@ -199,9 +202,9 @@ static void keep_last_state(Stepper *s)
     stepper_go_back(s);
     memset(s->state.velocity, 0, nodes * sizeof *s->state.velocity);
     memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
-    memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
-    memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
-    memset(s->touch, 0, (size_t)s->point_count * sizeof *s->touch);
+    memset(s->points.force, 0, (size_t)s->points.count * sizeof *s->points.force);
+    memset(s->points.clearance, 0, (size_t)s->points.count * sizeof *s->points.clearance);
+    memset(s->points.touch, 0, (size_t)s->points.count * sizeof *s->points.touch);
     self_contact_forget(s);
     memset(s->state.slide_velocity, 0, inner);
     memset(s->state.slide_spin, 0, inner);
@@ -213,16 +216,16 @@ static void set_velocities(Stepper *s)
     WireState *w = &s->state;
     double rate = 1 / s->dt;
     for (int i = 0; i < w->node_count; i++) {
-        const double *u = s->linearised + row_of(s, i);      // what has been done, cut or not
+        const double *u = s->iterate.moved + row_of(s, i);      // what has been done, cut or not
         if (i < s->first_free) {
-            w->velocity[i] = vec3_scale(s->axis[0], u[0] * rate);
-            w->spin[i] = vec3_scale(s->axis[0], u[3] * rate);
+            w->velocity[i] = vec3_scale(s->entry.axis[0], u[0] * rate);
+            w->spin[i] = vec3_scale(s->entry.axis[0], u[3] * rate);
             continue;
         }
         w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
         w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
     }
-    if (s->tool_count > 1) {
+    if (s->tools.count > 1) {
         tools_set_velocities(s);
         tools_keep_slides(s);
     }
@@ -232,18 +235,18 @@ static void set_velocities(Stepper *s)
 
 static void report_forces(Stepper *s)
 {
-    if (!s->has_sheath) {
+    if (!s->entry.has_sheath) {
         Vec3 force = vec3(0, 0, 0), torque = vec3(0, 0, 0);
         double *f[] = {&force.x, &force.y, &force.z, &torque.x, &torque.y, &torque.z};
         for (int k = 0; k < 6; k++)
-            if (s->fixed[0] >> k & 1)
+            if (s->rig.fixed[0] >> k & 1)
                 *f[k] = stepper_reaction(s, k);
-        s->report.proximal_force = vec3_dot(force, s->axis[0]);
-        s->report.proximal_torque = vec3_dot(torque, s->axis[0]);
+        s->report.proximal_force = vec3_dot(force, s->entry.axis[0]);
+        s->report.proximal_torque = vec3_dot(torque, s->entry.axis[0]);
     }
     hands_report(s);
-    for (int k = 0; k < s->set.count; k++) {
-        double force = vec3_norm(s->force[s->candidate[k]]);
+    for (int k = 0; k < s->system.set.count; k++) {
+        double force = vec3_norm(s->points.force[s->points.candidate[k]]);
         s->report.wall_force_max = fmax(s->report.wall_force_max, force);
         s->report.wall_force_sum += force;
     }
@@ -253,20 +256,20 @@ static void report_forces(Stepper *s)
 static void report_cut_forces(Stepper *s, double part)
 {
     s->report.flags |= STEP_LIMITED;
-    s->report.wall_force_max = s->wall_force_max + part * (s->report.wall_force_max - s->wall_force_max);
-    s->report.wall_force_sum = s->wall_force_sum + part * (s->report.wall_force_sum - s->wall_force_sum);
-    if (!s->has_sheath)
+    s->report.wall_force_max = s->start.wall_force_max + part * (s->report.wall_force_max - s->start.wall_force_max);
+    s->report.wall_force_sum = s->start.wall_force_sum + part * (s->report.wall_force_sum - s->start.wall_force_sum);
+    if (!s->entry.has_sheath)
         return;
-    double force = stepper_strain_force(s), most = s->hand[0].limit > 0 ? s->hand[0].limit : HUGE_VAL;
+    double force = stepper_strain_force(s), most = s->hands.hand[0].limit > 0 ? s->hands.hand[0].limit : HUGE_VAL;
     s->report.proximal_force = fmax(-most, fmin(most, force));
 }
 
 void step_correct(Stepper *s)
 {
     s->state.time += s->dt;
-    if (!s->has_failed) {
+    if (!s->progress.has_failed) {
         report_forces(s);
-        if (s->was_held)
+        if (s->progress.was_held)
             s->report.flags |= STEP_NOT_CONVERGED;
         double part = s->progress.is_blocked ? 0 : stepper_follow(s, false);
         if (part < 1)
@@ -274,7 +277,7 @@ void step_correct(Stepper *s)
         set_velocities(s);
         hands_count(s);
     }
-    if (s->has_failed)
+    if (s->progress.has_failed)
         keep_last_state(s);
 }
 
@@ -291,12 +294,12 @@ void stepper_node_report(Stepper *s, NodeReport *node)
         if (i < held || !s->vessel)
             continue;
         // a copy of the memory: a question must not change the next step
-        VesselMemory place = s->place[i];
+        VesselMemory place = s->points.place[i];
         if (place.node < 0)
             place = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[i], i > held ? node[i - 1].vessel_node : -1)};
         VesselHit hit;
         vessel_query(s->vessel, 1, &s->state.position[i], HUGE_VAL, &place, &hit);   // no bound will do: the gap itself is asked for
-        node[i].force = s->force[i];
+        node[i].force = s->points.force[i];
         node[i].vessel_node = hit.node;
         if (!(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)))
             node[i].gap = hit.gap - s->wire.radius[i];

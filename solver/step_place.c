@@ -3,14 +3,14 @@
 
 #include "base/base.h"
 
-static bool is_carrier(const Stepper *s, int c, int k) { return s->tool_count == 1 || s->carrier[c] == k; }
+static bool is_carrier(const Stepper *s, int c, int k) { return s->tools.count == 1 || s->tools.carrier[c] == k; }
 static double material_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) ? s->wire.s[c] : slide_at(s, c, k); }
-static bool lies_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) || c < s->tool[k].inside; }
+static bool lies_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) || c < s->tools.tool[k].inside; }
 
 // The first element whose far node lies at `at` of tool k or beyond; the last one that the tool reaches into.
 static int element_of(const Stepper *s, int k, double at)
 {
-    SEL_ASSERT(k >= 0 && k < s->tool_count && s->state.node_count > 1, "a tool of the chain is asked about");
+    SEL_ASSERT(k >= 0 && k < s->tools.count && s->state.node_count > 1, "a tool of the chain is asked about");
     int c = 0;
     while (c + 2 < s->state.node_count && lies_at(s, c + 1, k) && material_at(s, c + 1, k) <= at)
         c++;
@@ -51,24 +51,24 @@ ToolPlace stepper_tool_place(const Stepper *s, int k, double at)
 
 double stepper_tool_length(const Stepper *s, int k)
 {
-    SEL_ASSERT(k >= 0 && k < s->tool_count, "a tool of the chain is asked about");
-    const Wire *own = s->tool_count > 1 ? &s->tool[k].wire : &s->wire;
+    SEL_ASSERT(k >= 0 && k < s->tools.count, "a tool of the chain is asked about");
+    const Wire *own = s->tools.count > 1 ? &s->tools.tool[k].wire : &s->wire;
     return own->s[own->node_count - 1];
 }
 
 Vec3 stepper_tool_wall_force(const Stepper *s, int k, double from)
 {
-    SEL_ASSERT(k >= 0 && k < s->tool_count, "a tool of the chain is asked about");
+    SEL_ASSERT(k >= 0 && k < s->tools.count, "a tool of the chain is asked about");
     Vec3 sum = {0, 0, 0};
     int count = s->state.node_count;
     for (int c = 0; c < count; c++) {
         if (!is_carrier(s, c, k))
             continue;
         if (s->wire.s[c] >= from)
-            sum = vec3_add(sum, s->force[c]);
-        for (int i = c > 0 ? s->slot_start[c - 1] : 0; c > 0 && i < s->slot_start[c]; i++)
-            if (s->wire.s[c] - (1 - s->slot[i].xi) * s->wire.length[c - 1] >= from)
-                sum = vec3_add(sum, s->force[count + i]);
+            sum = vec3_add(sum, s->points.force[c]);
+        for (int i = c > 0 ? s->points.slot_start[c - 1] : 0; c > 0 && i < s->points.slot_start[c]; i++)
+            if (s->wire.s[c] - (1 - s->points.slot[i].xi) * s->wire.length[c - 1] >= from)
+                sum = vec3_add(sum, s->points.force[count + i]);
     }
     return sum;
 }

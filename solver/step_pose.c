@@ -8,16 +8,16 @@
 double stepper_sheath_coordinate(const Stepper *s, int node)
 {
     SEL_ASSERT(node >= 0 && node < s->state.node_count, "the node is one of the chain's");
-    return vec3_dot(vec3_sub(s->state.position[node], s->mouth), s->axis[0]);
+    return vec3_dot(vec3_sub(s->state.position[node], s->entry.mouth), s->entry.axis[0]);
 }
 
 void stepper_go_back(Stepper *s)
 {
     size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
-    memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
-    memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
-    memcpy(s->state.slide, s->start_slide, inner);
-    memcpy(s->state.angle, s->start_angle, inner);
+    memcpy(s->state.position, s->start.position, nodes * sizeof *s->start.position);
+    memcpy(s->state.orientation, s->start.orientation, nodes * sizeof *s->start.orientation);
+    memcpy(s->state.slide, s->start.slide, inner);
+    memcpy(s->state.angle, s->start.angle, inner);
 }
 
 BeamInput stepper_beam(const Stepper *s, int i)
@@ -43,15 +43,15 @@ BeamInput stepper_beam(const Stepper *s, int i)
 double tools_span_length(const Stepper *s, int c)
 {
     SEL_ASSERT(c >= 0 && c + 1 < s->state.node_count, "the element is one of the chain's");
-    int k = s->carrier[c + 1];
-    return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
+    int k = s->tools.carrier[c + 1];
+    return s->wire.s[c + 1] - (s->tools.carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
 }
 
 double tools_twist(const Stepper *s, int c)
 {
     SEL_ASSERT(c >= 0 && c + 1 < s->state.node_count, "the element is one of the chain's");
     // whole turns of the tool that goes on at a tip count
-    double turned = is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;
+    double turned = is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;
     Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));
     Quat p = quat_mul(quat_conjugate(q), s->state.orientation[c + 1]);
     return turned + 2 * same_atan(p.x / p.w);

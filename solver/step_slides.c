@@ -14,31 +14,31 @@ static const double GIVE = 1e-4;         // [mm] by which tools that stick on ea
 static Vec3 moment_at(const Stepper *s, int k, double place, int *c)
 {
     int last = s->state.node_count - 2;
-    while (*c < last && 0.5 * (s->middle[*c] + s->middle[*c + 1]) <= place)
+    while (*c < last && 0.5 * (s->tools.middle[*c] + s->tools.middle[*c + 1]) <= place)
         ++*c;
-    while (*c > 0 && 0.5 * (s->middle[*c - 1] + s->middle[*c]) > place)
+    while (*c > 0 && 0.5 * (s->tools.middle[*c - 1] + s->tools.middle[*c]) > place)
         --*c;
-    double end = s->middle[last] + 0.5 * tools_span_length(s, last);
-    return place > end || place < 0 ? vec3(0, 0, 0) : s->inner_moment[*c * s->state.inner_count + k - 1];
+    double end = s->tools.middle[last] + 0.5 * tools_span_length(s, last);
+    return place > end || place < 0 ? vec3(0, 0, 0) : s->tools.moment[*c * s->state.inner_count + k - 1];
 }
 
 // `turn`: of the line at node c, before x after.
 static double pressure_at(const Stepper *s, int c, int k, double window, Vec3 turn, int at[2])
 {
     SEL_ASSERT(c > 0 && c + 1 < s->state.node_count, "tools press on each other between two elements");
-    double h = s->middle[c] - s->middle[c - 1], l = fmax(window, h), half = 0.5 * l;
-    Vec3 right = vec3_sub(moment_at(s, k, s->middle[c] + half, &at[1]), moment_at(s, k, s->middle[c] - half, &at[0]));
-    Vec3 left = vec3_sub(moment_at(s, k, s->middle[c - 1] + half, &at[1]), moment_at(s, k, s->middle[c - 1] - half, &at[0]));
+    double h = s->tools.middle[c] - s->tools.middle[c - 1], l = fmax(window, h), half = 0.5 * l;
+    Vec3 right = vec3_sub(moment_at(s, k, s->tools.middle[c] + half, &at[1]), moment_at(s, k, s->tools.middle[c] - half, &at[0]));
+    Vec3 left = vec3_sub(moment_at(s, k, s->tools.middle[c - 1] + half, &at[1]), moment_at(s, k, s->tools.middle[c - 1] - half, &at[0]));
     Vec3 jump = vec3_scale(vec3_sub(right, left), 1 / l);
     int inner = s->state.inner_count;
-    double tension = 0.5 * (s->inner_tension[(c - 1) * inner + k - 1] + s->inner_tension[c * inner + k - 1]);
+    double tension = 0.5 * (s->tools.tension[(c - 1) * inner + k - 1] + s->tools.tension[c * inner + k - 1]);
     return vec3_norm(vec3_add_scaled(jump, -tension, turn));
 }
 
 // The tool that is next around tool k at node c and is an unknown there too; 0: none.
 int tools_around(const Stepper *s, int c, int k)
 {
-    SEL_ASSERT(k > 0 && k < s->tool_count, "an inner tool has one around it");
+    SEL_ASSERT(k > 0 && k < s->tools.count, "an inner tool has one around it");
     for (k--; k > 0 && !is_inside(s, c, k); k--)
         ;
     return k;
@@ -56,27 +56,27 @@ static void last_slip(const Stepper *s, int c, int k, Vec3 t, double slip[2])
 
 void tools_slides(Stepper *s)
 {
-    s->set.slide_count = 0;
+    s->system.set.slide_count = 0;
     int nodes = s->state.node_count, inner = s->state.inner_count;
     double at = 0, most = 0;
     int near[2] = {0, 0};     // the elements where the last averages began and ended
     for (int c = 0; c + 1 < nodes; c++) {
         double length = tools_span_length(s, c);
-        s->middle[c] = at + 0.5 * length;
+        s->tools.middle[c] = at + 0.5 * length;
         at += length;
-        most = fmax(most, s->bent[c]);
+        most = fmax(most, s->tools.bent[c]);
     }
     double window[STEP_TOOLS_MAX];
-    for (int k = 1; k < s->tool_count; k++)
-        window[k] = most > 0 ? FOLLOWS * sqrt(s->tool[k].clearance / most) : 0;
+    for (int k = 1; k < s->tools.count; k++)
+        window[k] = most > 0 ? FOLLOWS * sqrt(s->tools.tool[k].clearance / most) : 0;
     const Vec3 *x = s->state.position;
-    Vec3 before, after = vec3_unit_or(vec3_sub(x[1], x[0]), s->axis[0]);
+    Vec3 before, after = vec3_unit_or(vec3_sub(x[1], x[0]), s->entry.axis[0]);
     for (int c = 1; c + 1 < nodes; c++) {
         before = after;
         after = vec3_unit_or(vec3_sub(x[c + 1], x[c]), before);
         Vec3 turn = vec3_cross(before, after), tangent = quat_rotate(s->state.orientation[c], vec3(1, 0, 0));
-        for (int k = 1; k < s->tool_count; k++) {
-            const Tool *t = &s->tool[k];
+        for (int k = 1; k < s->tools.count; k++) {
+            const Tool *t = &s->tools.tool[k];
             if (!is_inside(s, c, k) || !(t->friction > 0))
                 continue;
             const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window[k], turn, near);
@@ -86,16 +86,16 @@ void tools_slides(Stepper *s)
             double slip[2], radius = t->wire.radius[0];
             last_slip(s, c, k, tangent, slip);
             double force[2] = {change * last[0], change * last[1]};
-            SEL_REQUIRE(s->set.slide_count < s->capacity * s->state.inner_count, "there is room for a slide of each inner tool at each node");
+            SEL_REQUIRE(s->system.set.slide_count < s->tools.capacity * s->state.inner_count, "there is room for a slide of each inner tool at each node");
             SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a bound, and a radius at which tools touch");
-            s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c,
-                                                                .unknown = unknown_of(k),
-                                                                .radius = radius,
-                                                                .bound = bound,
-                                                                .give = GIVE,
-                                                                .slip = {slip[0], radius * slip[1]},
-                                                                .held = {force[0], force[1]},
-                                                                .force = {force[0], force[1]}};
+            s->system.set.slide[s->system.set.slide_count++] = (ContactSlide){.node = c,
+                                                                              .unknown = unknown_of(k),
+                                                                              .radius = radius,
+                                                                              .bound = bound,
+                                                                              .give = GIVE,
+                                                                              .slip = {slip[0], radius * slip[1]},
+                                                                              .held = {force[0], force[1]},
+                                                                              .force = {force[0], force[1]}};
         }
     }
 }
@@ -103,40 +103,40 @@ void tools_slides(Stepper *s)
 // S of tool k is its slip plus the S of the one around it: the rows and columns of tool k are added to that one's, from the innermost outwards.
 void tools_to_slips(Stepper *s)
 {
-    int n = s->chain.size;
-    for (int c = 1; c < s->chain.count && s->tool_count > 2; c++)
-        for (int k = s->tool_count - 1; k > 1; k--) {
+    int n = s->system.chain.size;
+    for (int c = 1; c < s->system.chain.count && s->tools.count > 2; c++)
+        for (int k = s->tools.count - 1; k > 1; k--) {
             int out = is_inside(s, c, k) ? tools_around(s, c, k) : 0;
             for (int i = 0; out > 0 && i < 2; i++) {
                 int from = unknown_of(k) + i, to = unknown_of(out) + i;
-                double *d = s->chain.diag + block_of(s, c), *l = s->chain.lower + block_of(s, c), *before = l - n * n;
+                double *d = s->system.chain.diag + block_of(s, c), *l = s->system.chain.lower + block_of(s, c), *before = l - n * n;
                 for (int j = 0; j < n; j++)
                     d[n * to + j] += d[n * from + j];
                 for (int j = 0; j < n; j++)
                     d[n * j + to] += d[n * j + from];
-                for (int j = 0; c + 1 < s->chain.count && j < n; j++)
+                for (int j = 0; c + 1 < s->system.chain.count && j < n; j++)
                     l[n * j + to] += l[n * j + from];
                 for (int j = 0; j < n; j++)
                     before[n * to + j] += before[n * from + j];
-                s->b[row_of(s, c) + (size_t)to] += s->b[row_of(s, c) + (size_t)from];
+                s->system.b[row_of(s, c) + (size_t)to] += s->system.b[row_of(s, c) + (size_t)from];
             }
         }
 }
 
 void tools_from_slips(Stepper *s)
 {
-    for (int c = 1; c < s->chain.count; c++)
-        for (int k = 2; k < s->tool_count; k++) {
+    for (int c = 1; c < s->system.chain.count; c++)
+        for (int k = 2; k < s->tools.count; k++) {
             int out = is_inside(s, c, k) ? tools_around(s, c, k) : 0;
             for (int i = 0; out > 0 && i < 2; i++)
-                s->u[row_of(s, c) + (size_t)(unknown_of(k) + i)] += s->u[row_of(s, c) + (size_t)(unknown_of(out) + i)];
+                s->system.u[row_of(s, c) + (size_t)(unknown_of(k) + i)] += s->system.u[row_of(s, c) + (size_t)(unknown_of(out) + i)];
         }
 }
 
 void tools_keep_slides(Stepper *s)
 {
-    for (int i = 0; i < s->set.slide_count; i++) {
-        const ContactSlide *slide = &s->set.slide[i];
+    for (int i = 0; i < s->system.set.slide_count; i++) {
+        const ContactSlide *slide = &s->system.set.slide[i];
         SEL_ASSERT(slide->node >= 0 && slide->node < s->state.node_count && slide->unknown >= 6, "a slide belongs to an inner tool at a node");
         double *force = s->state.slide_force + 3 * (slide->node * s->state.inner_count + (slide->unknown - 6) / 2);
         force[0] = slide->force[0], force[1] = slide->force[1], force[2] = slide->bound;
@@ -145,7 +145,7 @@ void tools_keep_slides(Stepper *s)
 
 double tools_slipped(const Stepper *s, int c, int k, int about)
 {
-    const double *u = s->linearised + row_of(s, c);
+    const double *u = s->iterate.moved + row_of(s, c);
     int out = tools_around(s, c, k);
     return u[unknown_of(k) + about] - (out > 0 ? u[unknown_of(out) + about] : 0);
 }
@@ -153,8 +153,8 @@ double tools_slipped(const Stepper *s, int c, int k, int about)
 static double friction_work(const Stepper *s, bool at_start)
 {
     double work = 0;
-    for (int i = 0; s->tool_count > 1 && i < s->set.slide_count; i++) {
-        const ContactSlide *slide = &s->set.slide[i];
+    for (int i = 0; s->tools.count > 1 && i < s->system.set.slide_count; i++) {
+        const ContactSlide *slide = &s->system.set.slide[i];
         const double *force = at_start ? slide->held : slide->force;
         for (int j = 0; j < 2; j++)
             work -= force[j] * (j ? slide->radius : 1) * tools_slipped(s, slide->node, 1 + (slide->unknown - 6) / 2, j);

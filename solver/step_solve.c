@@ -11,18 +11,18 @@ enum { ITERATIONS_ENOUGH = 60 };
 void step_detect(Stepper *s)
 {
     stepper_detect(s);
-    if (!s->knows_motion)
+    if (!s->iterate.knows_motion)
         self_contact_detect(s);
-    s->knows_motion = false;
+    s->iterate.knows_motion = false;
 }
 
 // The iterate in the unknowns that are solved for: hands at node 0, slips elsewhere.
 static double solved_for(const Stepper *s, int c, int unknown)
 {
-    SEL_ASSERT(unknown >= 0 && unknown < s->chain.size, "an unknown is one of its node's");
+    SEL_ASSERT(unknown >= 0 && unknown < s->system.chain.size, "an unknown is one of its node's");
     int k = unknown < 6 ? 0 : 1 + (unknown - 6) / 2;
     if (k == 0 || !is_inside(s, c, k))
-        return s->linearised[row_of(s, c) + (size_t)unknown];
+        return s->iterate.moved[row_of(s, c) + (size_t)unknown];
     return c == 0 ? hand_moved(s, k, unknown % 2) : tools_slipped(s, c, k, unknown % 2);
 }
 
@@ -38,14 +38,14 @@ static bool is_unit_row(const double *row, int n, int unknown)
 static void hold_to_iterate(Stepper *s, double share)
 {
     SEL_ASSERT(share > 0, "what holds is stiff");
-    int n = s->chain.size;
-    for (int c = 0; c < s->chain.count; c++)
+    int n = s->system.chain.size;
+    for (int c = 0; c < s->system.chain.count; c++)
         for (int i = 0; i < n; i++) {
-            double *row = s->chain.diag + block_of(s, c) + n * i, more = share * fabs(row[i]);
+            double *row = s->system.chain.diag + block_of(s, c) + n * i, more = share * fabs(row[i]);
             if (is_unit_row(row, n, i))
                 continue;
             row[i] += more;
-            s->b[row_of(s, c) + (size_t)i] += more * solved_for(s, c, i);
+            s->system.b[row_of(s, c) + (size_t)i] += more * solved_for(s, c, i);
         }
 }
 
@@ -56,37 +56,42 @@ static bool firmer(Stepper *s, double *share)
     if (!(*share < FIRMEST))
         return false;
     hold_to_iterate(s, *share);
-    return s->was_held = true;
+    return s->progress.was_held = true;
 }
 
 void step_factor(Stepper *s)
 {
-    if (!contact_needs_factor(&s->set, &s->contact))
+    if (!contact_needs_factor(&s->system.set, &s->contact))
         return;
     double share = 0;
-    while (!s->has_failed && !block_chain_factor(&s->chain, s->factor))
-        s->has_failed = !firmer(s, &share);
+    while (!s->progress.has_failed && !block_chain_factor(&s->system.chain, s->system.factor))
+        s->progress.has_failed = !firmer(s, &share);
 }
 
 ContactProblem step_contacts(Stepper *s)
 {
-    SEL_ASSERT(s->set.count <= s->set.capacity, "detection found no more contacts than there is room for");
-    return (ContactProblem){
-        .solver = s->solver, .chain = &s->chain, .factor = s->has_failed ? NULL : s->factor, .b = s->b, .set = &s->set, .options = &s->contact, .u = s->u};
+    SEL_ASSERT(s->system.set.count <= s->system.set.capacity, "detection found no more contacts than there is room for");
+    return (ContactProblem){.solver = s->system.solver,
+                            .chain = &s->system.chain,
+                            .factor = s->progress.has_failed ? NULL : s->system.factor,
+                            .b = s->system.b,
+                            .set = &s->system.set,
+                            .options = &s->contact,
+                            .u = s->system.u};
 }
 
 bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
 {
-    if (s->has_failed)
+    if (s->progress.has_failed)
         return true;
     if (solved->singular) {
         if (firmer(s, &s->progress.firmness))
             return false;
-        s->has_failed = true;
+        s->progress.has_failed = true;
         return true;
     }
     s->progress.firmness = 0;
-    if (s->tool_count > 1)
+    if (s->tools.count > 1)
         tools_from_slips(s);
     hands_solved(s);
     s->report.iterations += solved->iterations;
@@ -101,9 +106,9 @@ bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
     self_contact_keep_forces(s);
     double sum = 0;
     for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
-        sum += s->u[i] * 0;          // 0, or not a number
-    s->has_failed |= sum != 0;
+        sum += s->system.u[i] * 0;          // 0, or not a number
+    s->progress.has_failed |= sum != 0;
     return true;
 }
 
-bool stepper_is_spent(const Stepper *s) { return s->tool_count == 1 && s->report.iterations >= ITERATIONS_ENOUGH && s->set.pair_count == 0; }
+bool stepper_is_spent(const Stepper *s) { return s->tools.count == 1 && s->report.iterations >= ITERATIONS_ENOUGH && s->system.set.pair_count == 0; }

@@ -88,7 +88,7 @@ static Tool *make_device(Stepper *s, int k, const WireOptions *options, char *wh
     if (k == 0 && !own.has_sheath)
         own.inserted = wire_length(&own);
     Tool *t = calloc(1, sizeof *t);
-    s->device[k][s->spare_count[k]] = t;
+    s->tools.device[k][s->tools.spare_count[k]] = t;
     return t && make_tool(t, &own, why, capacity) ? t : NULL;
 }
 
@@ -97,11 +97,11 @@ static bool make_spares(Stepper *s, const StepperOptions *o, char *why, int capa
     for (int i = 0; i < o->spare_count; i++) {
         const StepperSpare *spare = &o->spare[i];
         int k = spare->tool;
-        if (k < 0 || k >= s->tool_count || s->spare_count[k] == STEP_SPARES_MAX) {
-            snprintf(why, (size_t)capacity, "spare %d is for tool %d; 0 to %d, at most %d for each", i + 1, k, s->tool_count - 1, STEP_SPARES_MAX);
+        if (k < 0 || k >= s->tools.count || s->tools.spare_count[k] == STEP_SPARES_MAX) {
+            snprintf(why, (size_t)capacity, "spare %d is for tool %d; 0 to %d, at most %d for each", i + 1, k, s->tools.count - 1, STEP_SPARES_MAX);
             return false;
         }
-        s->spare_count[k]++;
+        s->tools.spare_count[k]++;
         Tool *t = make_device(s, k, &spare->wire, why, capacity);
         if (!t)
             return false;
@@ -113,38 +113,38 @@ static bool make_spares(Stepper *s, const StepperOptions *o, char *why, int capa
 // Room for the longest chain that the tools and their spares make.
 static void measure_chain(Stepper *s)
 {
-    for (int k = 0; k < s->tool_count; k++) {
+    for (int k = 0; k < s->tools.count; k++) {
         int nodes = 0, slots = 0;
-        for (int i = 0; i <= s->spare_count[k]; i++) {
-            const Tool *t = s->device[k][i];
+        for (int i = 0; i <= s->tools.spare_count[k]; i++) {
+            const Tool *t = s->tools.device[k][i];
             int own = t->slot_start[t->wire.element_count];
             nodes = t->wire.node_count > nodes ? t->wire.node_count : nodes;
             slots = own > slots ? own : slots;
         }
-        s->capacity += nodes;
-        s->slot_count += slots;
+        s->tools.capacity += nodes;
+        s->points.slot_count += slots;
     }
 }
 
 bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
 {
     why[0] = '\0';
-    for (int k = 0; k < s->tool_count; k++) {
+    for (int k = 0; k < s->tools.count; k++) {
         Tool *t = make_device(s, k, k == 0 ? &o->wire : &o->inner[k - 1], why, capacity);
         if (!t)
             return false;
-        t->friction_inside = k + 1 < s->tool_count ? o->inner_friction[k] : 0;
-        s->tool[k] = *t;
+        t->friction_inside = k + 1 < s->tools.count ? o->inner_friction[k] : 0;
+        s->tools.tool[k] = *t;
     }
     if (!make_spares(s, o, why, capacity))
         return false;
     measure_chain(s);
-    s->inside = calloc((size_t)s->capacity, sizeof *s->inside);
-    if (!s->inside)
+    s->tools.inside = calloc((size_t)s->tools.capacity, sizeof *s->tools.inside);
+    if (!s->tools.inside)
         return false;
-    for (int k = 1; k < s->tool_count; k++) {
-        const Tool *around = &s->tool[k - 1];
-        Tool *t = &s->tool[k];
+    for (int k = 1; k < s->tools.count; k++) {
+        const Tool *around = &s->tools.tool[k - 1];
+        Tool *t = &s->tools.tool[k];
         t->friction = around->friction_inside;
         t->clearance = tools_clearance(around, t);
         if (t->wire.total_length - t->inserted < around->wire.total_length - around->inserted - 1e-9) {
@@ -158,10 +158,10 @@ bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
 
 void tools_destroy(Stepper *s)
 {
-    free(s->inside);
+    free(s->tools.inside);
     for (int k = 0; k < STEP_TOOLS_MAX; k++)
-        for (int i = 0; i <= STEP_SPARES_MAX && s->device[k][i]; i++) {
-            Tool *t = s->device[k][i];
+        for (int i = 0; i <= STEP_SPARES_MAX && s->tools.device[k][i]; i++) {
+            Tool *t = s->tools.device[k][i];
             wire_destroy(&t->wire);
             free(t->rest_memory);
             free(t->section);
@@ -176,9 +176,9 @@ void tools_destroy(Stepper *s)
 
 static void chain_node(Stepper *s, int c, int k, int j)
 {
-    const Tool *t = &s->tool[k];
+    const Tool *t = &s->tools.tool[k];
     Wire *w = &s->wire;
-    s->carrier[c] = k;
+    s->tools.carrier[c] = k;
     w->s[c] = t->wire.s[j];
     w->mass[c] = t->wire.mass[j];
     w->inertia_axial[c] = t->wire.inertia_axial[j];
@@ -190,7 +190,7 @@ static void chain_node(Stepper *s, int c, int k, int j)
 // The element before chain node c.
 static void chain_element(Stepper *s, int c, int k, int j)
 {
-    const Tool *t = &s->tool[k];
+    const Tool *t = &s->tools.tool[k];
     s->wire.length[c] = t->wire.length[j];
     s->wire.section[c] = t->wire.section[j];
     const BeamRest *from = &t->rest;
@@ -198,21 +198,21 @@ static void chain_element(Stepper *s, int c, int k, int j)
     to->length[c] = from->length[j], to->extend[c] = from->extend[j], to->axial[c] = from->axial[j], to->near[c] = from->near[j], to->far[c] = from->far[j];
     to->twist[c] = from->twist[j], to->half_w[c] = from->half_w[j], to->half_y[c] = from->half_y[j], to->half_z[c] = from->half_z[j];
     to->curvature[c] = from->curvature[j], to->bending[c] = from->bending[j], to->shear[c] = from->shear[j];
-    int first = s->slot_start[c], count = t->slot_start[j + 1] - t->slot_start[j];
+    int first = s->points.slot_start[c], count = t->slot_start[j + 1] - t->slot_start[j];
     for (int i = 0; i < count; i++) {
-        s->slot[first + i] = t->slot[t->slot_start[j] + i];
-        s->slot[first + i].element = c;
+        s->points.slot[first + i] = t->slot[t->slot_start[j] + i];
+        s->points.slot[first + i].element = c;
     }
-    s->slot_start[c + 1] = first + count;
+    s->points.slot_start[c + 1] = first + count;
 }
 
 // What the chain is made of, from where each tool begins to carry it.
 void tools_chain(Stepper *s)
 {
     int c = 0;
-    s->slot_start[0] = 0;
-    for (int k = 0; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
+    s->points.slot_start[0] = 0;
+    for (int k = 0; k < s->tools.count; k++) {
+        Tool *t = &s->tools.tool[k];
         t->start = c;
         for (int j = t->first; j < t->wire.node_count; j++, c++) {
             chain_node(s, c, k, j);
@@ -220,22 +220,22 @@ void tools_chain(Stepper *s)
                 chain_element(s, c - 1, k, j - 1);
         }
     }
-    s->wire.node_count = s->state.node_count = s->chain.count = c;
+    s->wire.node_count = s->state.node_count = s->system.chain.count = c;
     s->wire.element_count = c - 1;
-    s->wire.total_length = s->tool[0].wire.total_length;
-    s->slot_count = s->slot_start[c - 1];
-    s->point_count = c + s->slot_count;
-    for (int k = 1; k < s->tool_count; k++)
-        if (tools_carries(&s->tool[k]))
-            s->tool[k].inside = s->tool[k].start;
+    s->wire.total_length = s->tools.tool[0].wire.total_length;
+    s->points.slot_count = s->points.slot_start[c - 1];
+    s->points.count = c + s->points.slot_count;
+    for (int k = 1; k < s->tools.count; k++)
+        if (tools_carries(&s->tools.tool[k]))
+            s->tools.tool[k].inside = s->tools.tool[k].start;
 }
 
 void tools_place(Stepper *s)
 {
-    double tip = s->tool[0].inserted;
-    s->tool[0].first = 0;
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
+    double tip = s->tools.tool[0].inserted;
+    s->tools.tool[0].first = 0;
+    for (int k = 1; k < s->tools.count; k++) {
+        Tool *t = &s->tools.tool[k];
         double behind = t->wire.total_length - t->inserted;
         t->first = t->wire.node_count;
         if (!(t->inserted > tip))
@@ -246,15 +246,15 @@ void tools_place(Stepper *s)
     }
     tools_chain(s);
     for (int c = 0; c < s->state.node_count; c++) {
-        const Tool *own = &s->tool[s->carrier[c]];
+        const Tool *own = &s->tools.tool[s->tools.carrier[c]];
         double x = s->wire.s[c] - own->wire.total_length + own->inserted;
-        s->state.position[c] = vec3_add_scaled(s->mouth, x, s->axis[0]);
-        s->state.orientation[c] = s->line;
-        for (int k = 1; k < s->tool_count; k++)
-            s->state.slide[c * s->state.inner_count + k - 1] = s->tool[k].wire.total_length - s->tool[k].inserted + x;
+        s->state.position[c] = vec3_add_scaled(s->entry.mouth, x, s->entry.axis[0]);
+        s->state.orientation[c] = s->entry.frame;
+        for (int k = 1; k < s->tools.count; k++)
+            s->state.slide[c * s->state.inner_count + k - 1] = s->tools.tool[k].wire.total_length - s->tools.tool[k].inserted + x;
     }
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
+    for (int k = 1; k < s->tools.count; k++) {
+        Tool *t = &s->tools.tool[k];
         for (t->inside = 0; t->inside < (tools_carries(t) ? t->start : s->state.node_count); t->inside++)
             if (slide_at(s, t->inside, k) >= t->wire.total_length)
                 break;
@@ -279,18 +279,18 @@ static void change_gap(void *base, size_t size, int count, int at, int gap)
 static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
 {
     WireState *w = &s->state;
-    int count = w->node_count, points = s->point_count, first = count + slot;
+    int count = w->node_count, points = s->points.count, first = count + slot;
     size_t inner = (size_t)w->inner_count * sizeof(double);
     struct {
         void *base;
         size_t size;
     } by_node[] = {{w->position, sizeof(Vec3)}, {w->orientation, sizeof(Quat)}, {w->velocity, sizeof(Vec3)}, {w->spin, sizeof(Vec3)},    {w->slide, inner},
                    {w->angle, inner},           {w->slide_velocity, inner},     {w->slide_spin, inner},      {w->slide_force, 3 * inner}},
-      by_point[] = {{s->force, sizeof(Vec3)},
-                    {s->start_force, sizeof(Vec3)},
-                    {s->clearance, sizeof(double)},
-                    {s->met, sizeof(WallMet)},
-                    {s->place, sizeof(VesselMemory)}};
+      by_point[] = {{s->points.force, sizeof(Vec3)},
+                    {s->points.start_force, sizeof(Vec3)},
+                    {s->points.clearance, sizeof(double)},
+                    {s->points.met, sizeof(WallMet)},
+                    {s->points.place, sizeof(VesselMemory)}};
     for (size_t i = 0; i < sizeof by_node / sizeof *by_node; i++)
         change_gap(by_node[i].base, by_node[i].size, count, node, nodes);
     for (size_t i = 0; i < sizeof by_point / sizeof *by_point; i++) {
@@ -300,7 +300,7 @@ static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
 }
 
 // Makes room for chain node c, or takes it out; its element is the one before it.
-static void shift(Stepper *s, int c, int slots, bool opens) { shift_at(s, c, opens ? 1 : -1, s->slot_start[c - 1], opens ? slots : -slots); }
+static void shift(Stepper *s, int c, int slots, bool opens) { shift_at(s, c, opens ? 1 : -1, s->points.slot_start[c - 1], opens ? slots : -slots); }
 
 // --- the outermost tool's exchange ---
 
@@ -333,10 +333,10 @@ static Inside inside_between(const Inside *a, const Inside *b, double x, int inn
 void tools_exchange_outermost(Stepper *s, const Tool *next)
 {
     WireState *w = &s->state;
-    int old_nodes = s->tool[0].wire.node_count, nodes = next->wire.node_count, more = nodes - old_nodes;
-    int old_slots = s->slot_start[old_nodes - 1], slots = next->slot_start[next->wire.element_count], more_slots = slots - old_slots;
+    int old_nodes = s->tools.tool[0].wire.node_count, nodes = next->wire.node_count, more = nodes - old_nodes;
+    int old_slots = s->points.slot_start[old_nodes - 1], slots = next->slot_start[next->wire.element_count], more_slots = slots - old_slots;
     double tip = stepper_sheath_coordinate(s, old_nodes - 1), turn = 0;
-    Inside *old = s->inside;
+    Inside *old = s->tools.inside;
     for (int c = 0; c < old_nodes; c++) {
         Quat p = c > 0 ? quat_mul(quat_conjugate(w->orientation[c - 1]), w->orientation[c]) : (Quat){1, 0, 0, 0};
         old[c] = inside_at_node(s, c, turn += 2 * same_atan2(p.x, p.w));
@@ -349,7 +349,7 @@ void tools_exchange_outermost(Stepper *s, const Tool *next)
         while (i + 2 < old_nodes && old[i + 1].x < x)
             i++;
         Inside at = inside_between(&old[i], &old[i + 1], x, w->inner_count);
-        w->position[c] = vec3_add_scaled(s->mouth, x, s->axis[0]);
+        w->position[c] = vec3_add_scaled(s->entry.mouth, x, s->entry.axis[0]);
         w->orientation[c] = hub;
         w->velocity[c] = velocity;
         w->spin[c] = spin;
@@ -359,8 +359,8 @@ void tools_exchange_outermost(Stepper *s, const Tool *next)
             memset(w->slide_force + 3 * j, 0, 3 * sizeof(double));
         }
     }
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
+    for (int k = 1; k < s->tools.count; k++) {
+        Tool *t = &s->tools.tool[k];
         if (tools_carries(t))
             continue;
         if (t->inside > old_nodes) {
@@ -378,9 +378,9 @@ static int slots_of(const Tool *t, int element) { return t->slot_start[element +
 static double *slide_of(const Stepper *s, int c, int k) { return &s->state.slide[c * s->state.inner_count + k - 1]; }
 static double *angle_of(const Stepper *s, int c, int k) { return &s->state.angle[c * s->state.inner_count + k - 1]; }
 
-static bool lies_at(const Stepper *s, int c, int k) { return s->carrier[c] == k || c < s->tool[k].inside; }
-static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k); }
-static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : angle_at(s, c, k); }
+static bool lies_at(const Stepper *s, int c, int k) { return s->tools.carrier[c] == k || c < s->tools.tool[k].inside; }
+static double material_at(const Stepper *s, int c, int k) { return s->tools.carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k); }
+static double turned_at(const Stepper *s, int c, int k) { return s->tools.carrier[c] == k ? 0 : angle_at(s, c, k); }
 
 static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *node)
 {
@@ -396,18 +396,18 @@ static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *n
     double same = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -1 : 1;
     node->orientation =
         quat_unit((Quat){a.w + xi * (same * b.w - a.w), a.x + xi * (same * b.x - a.x), a.y + xi * (same * b.y - a.y), a.z + xi * (same * b.z - a.z)});
-    node->carrier = c + 1 < s->first_free ? -1 : s->carrier[c + 1];
+    node->carrier = c + 1 < s->first_free ? -1 : s->tools.carrier[c + 1];
 }
 
 // Node c joins the chain behind node c - 1, which is the tip around it, at a distance d [mm] along the curve there.
 static void join(Stepper *s, int k, double d)
 {
-    Tool *t = &s->tool[k];
+    Tool *t = &s->tools.tool[k];
     WireState *w = &s->state;
     bool carries = tools_carries(t);
     int c = carries ? t->start : 0, j = carries ? t->first - 1 : t->wire.node_count - 1;
     if (!carries)       // behind all that carry before it
-        for (c = w->node_count; c > 0 && s->carrier[c - 1] > k; c--)
+        for (c = w->node_count; c > 0 && s->tools.carrier[c - 1] > k; c--)
             ;
     int before = c - 1;
     double phi = *angle_of(s, before, k);
@@ -421,13 +421,13 @@ static void join(Stepper *s, int k, double d)
     int i = before * w->inner_count + k - 1;
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);
     w->spin[c] = vec3_add_scaled(w->spin[before], w->slide_spin[i] - vec3_dot(w->spin[before], tangent), tangent);
-    for (int m = k + 1; m < s->tool_count; m++) {
+    for (int m = k + 1; m < s->tools.count; m++) {
         *slide_of(s, c, m) = *slide_of(s, before, m) + d;
         *angle_of(s, c, m) = *angle_of(s, before, m) - phi;
         w->slide_velocity[c * w->inner_count + m - 1] = w->slide_velocity[before * w->inner_count + m - 1];
         w->slide_spin[c * w->inner_count + m - 1] = w->slide_spin[before * w->inner_count + m - 1];
-        if (!tools_carries(&s->tool[m]) && s->tool[m].inside > before)
-            s->tool[m].inside++;
+        if (!tools_carries(&s->tools.tool[m]) && s->tools.tool[m].inside > before)
+            s->tools.tool[m].inside++;
     }
     t->first = j;
     tools_chain(s);
@@ -436,12 +436,12 @@ static void join(Stepper *s, int k, double d)
 
 static void leave(Stepper *s, int k)
 {
-    Tool *t = &s->tool[k];
+    Tool *t = &s->tools.tool[k];
     int c = t->start;
     shift(s, c, slots_of(t, t->first - 1), false);
-    for (int m = k + 1; m < s->tool_count; m++)
-        if (!tools_carries(&s->tool[m]) && s->tool[m].inside > c)
-            s->tool[m].inside--;
+    for (int m = k + 1; m < s->tools.count; m++)
+        if (!tools_carries(&s->tools.tool[m]) && s->tools.tool[m].inside > c)
+            s->tools.tool[m].inside--;
     t->first++;
     t->inside = c;
     tools_chain(s);
@@ -455,15 +455,15 @@ static double slide_rate(const Stepper *s, int c, int k)
 
 bool tools_leave_back(Stepper *s)
 {
-    for (int k = 1; k < s->tool_count && !s->has_failed; k++) {
-        const Tool *t = &s->tool[k];
+    for (int k = 1; k < s->tools.count && !s->progress.has_failed; k++) {
+        const Tool *t = &s->tools.tool[k];
         int tip = t->start - 1;
         if (!tools_carries(t))
             continue;
-        double ends = s->start_slide[tip * s->state.inner_count + k - 1] + s->u[row_of(s, tip) + (size_t)unknown_of(k)];
+        double ends = s->start.slide[tip * s->state.inner_count + k - 1] + s->system.u[row_of(s, tip) + (size_t)unknown_of(k)];
         if (t->wire.s[t->first] - ends > TAKE_BACK * t->wire.length[t->first - 1])
             continue;
-        s->tips_changed |= 1u << k;
+        s->progress.tips_changed |= 1u << k;
         stepper_go_back(s);
         s->first_free -= t->start < s->first_free;
         leave(s, k);
@@ -475,29 +475,29 @@ bool tools_leave_back(Stepper *s)
 // The node of tool k that would come out next: the chain's node that is the tip around it (-1: the tool ends before that), and its own number.
 static int next_out(const Stepper *s, int k, int *own)
 {
-    const Tool *t = &s->tool[k];
+    const Tool *t = &s->tools.tool[k];
     bool carries = tools_carries(t);
     *own = carries ? t->first - 1 : t->wire.node_count - 1;
     if (carries)
         return t->start - 1;
     int tip = s->state.node_count - 1;
-    while (tip > 0 && s->carrier[tip] > k)
+    while (tip > 0 && s->tools.carrier[tip] > k)
         tip--;
     return t->inside > tip ? tip : -1;
 }
 
 bool tools_come_out(Stepper *s)
 {
-    for (int k = 1; k < s->tool_count && !s->has_failed; k++) {
+    for (int k = 1; k < s->tools.count && !s->progress.has_failed; k++) {
         int j, tip = next_out(s, k, &j);
-        if (tools_carries(&s->tool[k]) || tip < s->first_free || j < 1 || s->tips_changed & 1u << k)
+        if (tools_carries(&s->tools.tool[k]) || tip < s->first_free || j < 1 || s->progress.tips_changed & 1u << k)
             continue;
         size_t i = (size_t)tip * (size_t)s->state.inner_count + (size_t)k - 1;
-        double end = s->tool[k].wire.s[j], length = s->tool[k].wire.length[j - 1];
-        double began = end - s->start_slide[i], ends = began - s->u[row_of(s, tip) + (size_t)unknown_of(k)];
+        double end = s->tools.tool[k].wire.s[j], length = s->tools.tool[k].wire.length[j - 1];
+        double began = end - s->start.slide[i], ends = began - s->system.u[row_of(s, tip) + (size_t)unknown_of(k)];
         if (ends < JOIN * length || began < LEAST_OUT * length)
             continue;
-        s->tips_changed |= 1u << k;
+        s->progress.tips_changed |= 1u << k;
         stepper_go_back(s);
         join(s, k, began);
         return true;
@@ -508,13 +508,13 @@ bool tools_come_out(Stepper *s)
 // Tool k at the tip around it, where its material moves on by `ahead` [mm] in this step.
 static void pass_tip(Stepper *s, int k, double ahead)
 {
-    Tool *t = &s->tool[k];
+    Tool *t = &s->tools.tool[k];
     for (;;) {
         int j, tip = next_out(s, k, &j);
         if (tip < 0)
             return;
         bool carries = tools_carries(t);
-        bool is_held = carries && t->first + 1 == t->wire.node_count && vec3_norm2(s->force[t->start]) > 0;
+        bool is_held = carries && t->first + 1 == t->wire.node_count && vec3_norm2(s->points.force[t->start]) > 0;
         // by the hands' commands or by its last motion, whichever takes it further back: friction may hold it against its hand
         double out = *slide_of(s, tip, k), at = out - fmin(ahead, -slide_rate(s, tip, k) * s->dt);
         if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
@@ -532,7 +532,7 @@ static double pass_early(const Stepper *s, int last, double ahead) { return EARL
 // The inner tip of tool k passes nodes, on the way back …
 static bool pass_nodes_back(Stepper *s, int k, double ahead)
 {
-    Tool *t = &s->tool[k];
+    Tool *t = &s->tools.tool[k];
     int before = t->inside;
     for (int last = t->inside - 1; last > 0 && *slide_of(s, last, k) - ahead >= t->wire.total_length + 2 * pass_early(s, last, ahead); last--)
         t->inside--;
@@ -542,11 +542,11 @@ static bool pass_nodes_back(Stepper *s, int k, double ahead)
 // … or forth. Not both in a step: a tool that is squeezed in its last element would come and go for ever.
 static void pass_nodes(Stepper *s, int k, double ahead)
 {
-    Tool *t = &s->tool[k];
+    Tool *t = &s->tools.tool[k];
     WireState *w = &s->state;
     if (tools_carries(t) || pass_nodes_back(s, k, ahead))
         return;
-    for (int last = t->inside - 1; last >= 0 && t->inside < w->node_count && s->carrier[t->inside] <= k; last++) {
+    for (int last = t->inside - 1; last >= 0 && t->inside < w->node_count && s->tools.carrier[t->inside] <= k; last++) {
         double next = *slide_of(s, last, k) + tools_strained_length(s, last);
         if (next - ahead >= t->wire.total_length + pass_early(s, last, ahead))
             return;
@@ -561,8 +561,8 @@ static void pass_nodes(Stepper *s, int k, double ahead)
 
 static void pass(Stepper *s)
 {
-    for (int k = 1; k < s->tool_count; k++) {
-        double ahead = s->tool_command[k].advance - s->tool_command[0].advance;
+    for (int k = 1; k < s->tools.count; k++) {
+        double ahead = s->hands.command[k].advance - s->hands.command[0].advance;
         pass_nodes(s, k, ahead);
         pass_tip(s, k, ahead);
     }
@@ -571,17 +571,16 @@ static void pass(Stepper *s)
 void tools_feed(Stepper *s)
 {
     // where hubs will be; a tool's proximal end stays behind that of the tool around it, its tip beyond the outermost
-    double outermost = s->state.inserted + s->command.advance - s->tool[0].wire.total_length, around = outermost;
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
-        StepCommand *command = &s->tool_command[k];
+    double outermost = s->state.inserted + s->command.advance - s->tools.tool[0].wire.total_length, around = outermost;
+    for (int k = 1; k < s->tools.count; k++) {
+        Tool *t = &s->tools.tool[k];
+        StepCommand *command = &s->hands.command[k];
         double most = t->wire.total_length + around - t->inserted, least = fmin(most, outermost - t->inserted);
         if (command->advance > most || command->advance < least)
             s->report.flags |= command->advance > most ? STEP_FULLY_INSERTED : STEP_FULLY_WITHDRAWN;
         command->advance = fmin(most, fmax(least, command->advance));
         around = t->inserted + command->advance - t->wire.total_length;
     }
-    s->tips_changed = 0;
     pass(s);
 }
 
@@ -589,22 +588,22 @@ void tools_feed(Stepper *s)
 
 void tools_leave_out(Stepper *s)
 {
-    for (int c = 0; c < s->chain.count; c++)
-        for (int k = 1; k < s->tool_count; k++)
+    for (int c = 0; c < s->system.chain.count; c++)
+        for (int k = 1; k < s->tools.count; k++)
             for (int i = 0; !is_inside(s, c, k) && i < 2; i++)       // nothing has been added to these rows and columns
-                s->chain.diag[block_of(s, c) + (size_t)((s->chain.size + 1) * (unknown_of(k) + i))] = 1;
+                s->system.chain.diag[block_of(s, c) + (size_t)((s->system.chain.size + 1) * (unknown_of(k) + i))] = 1;
 }
 
 double tools_largest_part(const Stepper *s)
 {
     double part = 1;
-    for (int k = 1; k < s->tool_count; k++) {
-        const Tool *t = &s->tool[k];
+    for (int k = 1; k < s->tools.count; k++) {
+        const Tool *t = &s->tools.tool[k];
         int last = t->inside - 1;
         if (last < 0)
             continue;
         double end = tools_carries(t) ? t->wire.s[t->first] : t->wire.total_length, most = end + s->wire.length[last > 0 ? last - 1 : 0];
-        double from = slide_at(s, last, k), to = s->start_slide[last * s->state.inner_count + k - 1] + s->u[row_of(s, last) + (size_t)unknown_of(k)];
+        double from = slide_at(s, last, k), to = s->start.slide[last * s->state.inner_count + k - 1] + s->system.u[row_of(s, last) + (size_t)unknown_of(k)];
         if (to > most && to > from)
             part = fmin(part, fmax(0, most - from) / (to - from));
     }
@@ -614,16 +613,16 @@ double tools_largest_part(const Stepper *s)
 void tools_move(Stepper *s, double part)
 {
     for (int c = 0; c < s->state.node_count; c++)
-        for (int k = 1; k < s->tool_count; k++) {
+        for (int k = 1; k < s->tools.count; k++) {
             if (!is_inside(s, c, k))
                 continue;
             int at = unknown_of(k), i = c * s->state.inner_count + k - 1;
-            const double *u = s->u + row_of(s, c) + at;
-            double *done = s->linearised + row_of(s, c) + at;
+            const double *u = s->system.u + row_of(s, c) + at;
+            double *done = s->iterate.moved + row_of(s, c) + at;
             done[0] = part < 1 ? done[0] + part * (u[0] - done[0]) : u[0];
             done[1] = part < 1 ? done[1] + part * (u[1] - done[1]) : u[1];
-            s->state.slide[i] = s->start_slide[i] + done[0];
-            s->state.angle[i] = s->start_angle[i] + done[1];
+            s->state.slide[i] = s->start.slide[i] + done[0];
+            s->state.angle[i] = s->start.angle[i] + done[1];
         }
 }
 
@@ -631,11 +630,11 @@ void tools_set_velocities(Stepper *s)
 {
     WireState *w = &s->state;
     for (int c = 0; c < w->node_count; c++) {
-        Vec3 t = c < s->first_free ? s->axis[0] : quat_rotate(s->start_orientation[c], vec3(1, 0, 0));
-        for (int k = 1; k < s->tool_count; k++) {
+        Vec3 t = c < s->first_free ? s->entry.axis[0] : quat_rotate(s->start.orientation[c], vec3(1, 0, 0));
+        for (int k = 1; k < s->tools.count; k++) {
             if (!is_inside(s, c, k))
                 continue;
-            const double *u = s->linearised + row_of(s, c) + unknown_of(k);
+            const double *u = s->iterate.moved + row_of(s, c) + unknown_of(k);
             int i = c * w->inner_count + k - 1;
             w->slide_velocity[i] = vec3_dot(w->velocity[c], t) - u[0] / s->dt;
             w->slide_spin[i] = vec3_dot(w->spin[c], t) + u[1] / s->dt;
@@ -645,24 +644,24 @@ void tools_set_velocities(Stepper *s)
 
 // --- questions ---
 
-int stepper_node_capacity(const Stepper *s) { return s->tool_count > 1 ? s->capacity : s->state.node_count; }
+int stepper_node_capacity(const Stepper *s) { return s->tools.count > 1 ? s->tools.capacity : s->state.node_count; }
 
-int stepper_tool_count(const Stepper *s) { return s->tool_count; }
+int stepper_tool_count(const Stepper *s) { return s->tools.count; }
 
-double stepper_tool_inserted(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].inserted : s->state.inserted; }
+double stepper_tool_inserted(const Stepper *s, int tool) { return s->tools.count > 1 && tool > 0 ? s->tools.tool[tool].inserted : s->state.inserted; }
 
-double stepper_tool_turned(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].twist : s->state.twist; }
+double stepper_tool_turned(const Stepper *s, int tool) { return s->tools.count > 1 && tool > 0 ? s->tools.tool[tool].twist : s->state.twist; }
 
 int stepper_tool_nodes(const Stepper *s, int k, ToolNode *node)
 {
     const WireState *w = &s->state;
-    const Wire *own = s->tool_count > 1 ? &s->tool[k].wire : &s->wire;
+    const Wire *own = s->tools.count > 1 ? &s->tools.tool[k].wire : &s->wire;
     if (!node)
         return own->node_count;
     int c = 0;
     for (int j = 0; j < own->node_count; j++) {
         node[j] = (ToolNode){.s = own->s[j], .radius = own->radius[j]};
-        if (s->tool_count == 1) {
+        if (s->tools.count == 1) {
             node[j].position = w->position[j];
             node[j].orientation = w->orientation[j];
             node[j].carrier = j < s->first_free ? -1 : 0;

@@ -30,7 +30,7 @@ static const double SLIDE_PART = 0.5;    // of half a cell: the same
 bool stepper_is_slender(const Stepper *s)
 {
     const BeamRest *r = &s->beam.rest;
-    bool is_slender = s->has_sheath && s->tool_count == 1;
+    bool is_slender = s->entry.has_sheath && s->tools.count == 1;
     for (int i = 0; i < s->wire.element_count && is_slender; i++)
         is_slender = 12 * r->bending[i] < SHEARS * r->shear[i] * r->length[i] * r->length[i];
     return is_slender;
@@ -41,13 +41,13 @@ double stepper_slides(const Stepper *s)
     if (!s->is_slender)
         return 0;
     // a hand that slips, or begins to move, moves no tool: as far as it went in the last step too
-    double asked = s->command.advance, went = s->dt * vec3_dot(s->state.velocity[0], s->axis[0]), least = fmin(fabs(asked), fmin(fabs(went), SLIDE_MAX));
+    double asked = s->command.advance, went = s->dt * vec3_dot(s->state.velocity[0], s->entry.axis[0]), least = fmin(fabs(asked), fmin(fabs(went), SLIDE_MAX));
     return asked * went > 0 ? asked > 0 ? least : -least : 0;
 }
 
 static Vec3 own_tangent(const Stepper *s, int node) { return quat_rotate(s->state.orientation[node], vec3(1, 0, 0)); }
 
-static int points_on(const Stepper *s, int element) { return 1 + s->slot_start[element + 1] - s->slot_start[element]; }
+static int points_on(const Stepper *s, int element) { return 1 + s->points.slot_start[element + 1] - s->points.slot_start[element]; }
 
 // The cubic's second derivative; `at` of its rest length.
 static Vec3 bend_of(const Stepper *s, int e, double at)
@@ -71,17 +71,17 @@ static Vec3 bend_at(const Stepper *s, const Touch *t)
 
 bool touch_at(const Stepper *s, int point, double offset, Touch *t)
 {
-    SEL_ASSERT(point >= 0 && point < s->point_count, "the point is a node or a slot of the tool");
-    int nodes = s->state.node_count, e = point < nodes ? point : s->slot[point - nodes].element;
+    SEL_ASSERT(point >= 0 && point < s->points.count, "the point is a node or a slot of the tool");
+    int nodes = s->state.node_count, e = point < nodes ? point : s->points.slot[point - nodes].element;
     // the mouth's element and the last one are left out: the line ends there
-    if (s->tool_count > 1 || e <= s->first_free || e + 2 >= nodes)
+    if (s->tools.count > 1 || e <= s->first_free || e + 2 >= nodes)
         return false;
     const double *length = s->wire.length;
     double half = 0.5 * length[e] / points_on(s, e), xi = offset / length[e];
     if (point < nodes)
         half = fmin(half, 0.5 * length[e - 1] / points_on(s, e - 1));
     else
-        xi += s->slot[point - nodes].xi;
+        xi += s->points.slot[point - nodes].xi;
     if (xi < 0) {
         e--;
         xi = 1 + offset / length[e];
@@ -96,7 +96,7 @@ bool touch_at(const Stepper *s, int point, double offset, Touch *t)
 
 bool touch_of(const Stepper *s, int point, Touch *t)
 {
-    double offset = s->is_iterate ? s->touch_next[point] : s->touch[point];
+    double offset = s->iterate.is_moved ? s->points.touch_next[point] : s->points.touch[point];
     return offset != 0 && touch_at(s, point, offset, t);
 }
 
@@ -105,7 +105,7 @@ Vec3 touch_done(const Stepper *s, const Touch *t, Vec3 arm)
     const double weight[2] = {1 - t->place.weight, t->place.weight};
     Vec3 sum = vec3(0, 0, 0);
     for (int e = 0; e < 2; e++) {
-        const double *u = s->linearised + row_of(s, t->element + e);
+        const double *u = s->iterate.moved + row_of(s, t->element + e);
         sum = vec3_add_scaled(sum, weight[e], vec3(u[0], u[1], u[2]));
         sum = vec3_add(sum, vec3_cross(vec3(u[3], u[4], u[5]), vec3_add_scaled(t->place.lever[e], weight[e], arm)));
     }
@@ -148,14 +148,14 @@ void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, cons
     bool rolls = fabs(wish) < most;
     wish = rolls ? wish : wish > 0 ? most : -most;
     // an iterate keeps the points of the tool that touch
-    double step = wish - asked->offset, stride = s->is_iterate ? 0 : fmin(STRIDE_MAX, fmax(STRIDE_LEAST, STRIDE * fabs(s->slides)));
+    double step = wish - asked->offset, stride = s->iterate.is_moved ? 0 : fmin(STRIDE_MAX, fmax(STRIDE_LEAST, STRIDE * fabs(s->iterate.slides)));
     rolls &= fabs(step) < stride;
     step = fmax(-stride, fmin(stride, step));
-    double slides = s->is_iterate ? 0 : fmax(-SLIDE_PART * asked->half, fmin(SLIDE_PART * asked->half, s->slides)), offset = asked->offset + step;
+    double slides = s->iterate.is_moved ? 0 : fmax(-SLIDE_PART * asked->half, fmin(SLIDE_PART * asked->half, s->iterate.slides)), offset = asked->offset + step;
     Touch t;
     touch_at(s, point, offset - slides, &t);
-    if (!s->is_iterate)
-        s->touch_next[point] = t.offset;
+    if (!s->iterate.is_moved)
+        s->points.touch_next[point] = t.offset;
     c->node = t.element;
     c->is_between = true;
     c->xi = t.place.weight;
@@ -165,7 +165,7 @@ void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, cons
     c->normal = vec3_unit(vec3_add(hit->normal, sym3_mul_vec(&hit->hessian, on)));
     c->gap = gap + step * (slope + 0.5 * bend * step) - slides * vec3_dot(c->normal, along);
     c->slid = vec3_scale(along, slides);
-    if (s->is_iterate)
+    if (s->iterate.is_moved)
         c->gap -= vec3_dot(touch_done(s, &t, vec3_scale(c->normal, -c->tool_radius)), c->normal);
     if (!rolls)
         return;
@@ -180,43 +180,43 @@ static int neighbour(const Stepper *s, int point, int way)
     int nodes = s->state.node_count;
     if (point < nodes) {
         int e = way > 0 ? point : point - 1;
-        return points_on(s, e) == 1 ? point + way : nodes + (way > 0 ? s->slot_start[e] : s->slot_start[e + 1] - 1);
+        return points_on(s, e) == 1 ? point + way : nodes + (way > 0 ? s->points.slot_start[e] : s->points.slot_start[e + 1] - 1);
     }
-    int k = point - nodes, e = s->slot[k].element;
+    int k = point - nodes, e = s->points.slot[k].element;
     if (way > 0)
-        return k + 1 < s->slot_start[e + 1] ? point + 1 : e + 1;
-    return k > s->slot_start[e] ? point - 1 : e;
+        return k + 1 < s->points.slot_start[e + 1] ? point + 1 : e + 1;
+    return k > s->points.slot_start[e] ? point - 1 : e;
 }
 
 static void go_over(Stepper *s, int from, int to, double offset)
 {
-    SEL_ASSERT(from != to && to >= 0 && to < s->point_count, "a contact goes over to the next point");
-    s->touch[to] = offset;
-    s->force[to] = s->force[from];
-    s->place[to] = s->place[from];
-    s->met[to] = s->met[from];
-    s->touch[from] = 0;
-    s->force[from] = vec3(0, 0, 0);
-    s->clearance[to] = s->clearance[from] = 0;
+    SEL_ASSERT(from != to && to >= 0 && to < s->points.count, "a contact goes over to the next point");
+    s->points.touch[to] = offset;
+    s->points.force[to] = s->points.force[from];
+    s->points.place[to] = s->points.place[from];
+    s->points.met[to] = s->points.met[from];
+    s->points.touch[from] = 0;
+    s->points.force[from] = vec3(0, 0, 0);
+    s->points.clearance[to] = s->points.clearance[from] = 0;
 }
 
 void touch_keep(Stepper *s)
 {
-    if (s->tool_count > 1 || !s->vessel)
+    if (s->tools.count > 1 || !s->vessel)
         return;
     if (s->report.flags & STEP_LIMITED) {
-        memset(s->touch, 0, (size_t)s->point_count * sizeof *s->touch);
+        memset(s->points.touch, 0, (size_t)s->points.count * sizeof *s->points.touch);
         return;
     }
-    memcpy(s->touch, s->touch_next, (size_t)s->point_count * sizeof *s->touch);
-    for (int p = s->first_free; p < s->point_count; p++) {
+    memcpy(s->points.touch, s->points.touch_next, (size_t)s->points.count * sizeof *s->points.touch);
+    for (int p = s->first_free; p < s->points.count; p++) {
         Touch here, there;
         if (!stepper_presses(s, p))
-            s->touch[p] = 0;
-        if (s->touch[p] == 0 || !touch_at(s, p, 0, &here) || fabs(s->touch[p]) <= LEAVES * here.half)
+            s->points.touch[p] = 0;
+        if (s->points.touch[p] == 0 || !touch_at(s, p, 0, &here) || fabs(s->points.touch[p]) <= LEAVES * here.half)
             continue;
-        int way = s->touch[p] > 0 ? 1 : -1, to = neighbour(s, p, way);
+        int way = s->points.touch[p] > 0 ? 1 : -1, to = neighbour(s, p, way);
         if (!stepper_presses(s, to) && touch_at(s, to, 0, &there))
-            go_over(s, p, to, s->touch[p] - way * (here.half + there.half));
+            go_over(s, p, to, s->points.touch[p] - way * (here.half + there.half));
     }
 }

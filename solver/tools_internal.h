@@ -17,8 +17,8 @@ void tools_chain(Stepper *s);
 // Tool k >= 1 at node c: does it lie inside another there, and then where [mm], how it is turned [rad], and its two unknowns' place among the node's.
 static inline bool is_inside(const Stepper *s, int c, int k)
 {
-    SEL_ASSERT(c >= 0 && c < s->state.node_count && k >= 0 && k < s->tool_count, "a tool of the chain is looked for at one of its nodes");
-    return k > s->carrier[c] && c < s->tool[k].inside;
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k >= 0 && k < s->tools.count, "a tool of the chain is looked for at one of its nodes");
+    return k > s->tools.carrier[c] && c < s->tools.tool[k].inside;
 }
 static inline double slide_at(const Stepper *s, int c, int k)
 {
@@ -30,7 +30,7 @@ static inline double angle_at(const Stepper *s, int c, int k)
     SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "an inner tool has its place at each node");
     return s->state.angle[c * s->state.inner_count + k - 1];
 }
-static inline bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }    // another tool carries the next node
+static inline bool is_at_tip(const Stepper *s, int c) { return s->tools.carrier[c] != s->tools.carrier[c + 1]; }    // another tool carries the next node
 static inline int unknown_of(int k) { return 6 + 2 * (k - 1); }
 static inline bool tools_carries(const Tool *t)
 {

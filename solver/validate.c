@@ -26,7 +26,7 @@ static const char *broken_state(const WireState *w)
 
 static const char *broken_elements(const Stepper *s)
 {
-    for (int i = s->first_free; s->tool_count == 1 && i + 1 < s->state.node_count; i++) {    // of several tools ends of the chain come and go
+    for (int i = s->first_free; s->tools.count == 1 && i + 1 < s->state.node_count; i++) {    // of several tools ends of the chain come and go
         double chord = vec3_distance(s->state.position[i], s->state.position[i + 1]), rest = s->wire.length[i];
         if (!(chord < TORN * rest && chord > CRUSHED * rest))
             return "elements are about as long as at rest";
@@ -43,12 +43,12 @@ static bool is_in_cone(Vec3 force, Vec3 normal, double friction)
 
 static const char *broken_contacts(const Stepper *s)
 {
-    const ContactSet *set = &s->set;
+    const ContactSet *set = &s->system.set;
     if (set->count < 0 || set->count > set->capacity)
         return "there is room for all contacts";
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i], *before = i > 0 ? p - 1 : p;
-        if (p->node < 0 || p->node >= s->chain.count || !(p->xi >= 0 && p->xi < 1))
+        if (p->node < 0 || p->node >= s->system.chain.count || !(p->xi >= 0 && p->xi < 1))
             return "contacts are at nodes of the chain";
         if (p->node < before->node)
             return "contacts stand in the order of the chain";

@@ -79,7 +79,7 @@ static double deepest_of_curve(const Stepper *s, const Vessel *tube, double radi
         double length = s->wire.length[i];
         if (i + 1 == s->first_free) {
             length += stepper_sheath_coordinate(s, i);
-            x1 = s->mouth, t1 = s->axis[0];
+            x1 = s->entry.mouth, t1 = s->entry.axis[0];
         }
         for (int k = 1; k <= 100; k++) {
             double x = k / 100.0, y = 1 - x;
@@ -178,8 +178,8 @@ static void a_ridge_between_nodes_holds(void **state)
     double least = HUGE_VAL, radius = s->wire.radius[0], reported = 0;
     for (int i = 0; i < 100; i++) {
         reported = fmax(reported, step_once(s, 0, 0)->penetration);
-        for (int k = 0; k < s->slot_count; k++) {
-            const Slot *slot = &s->slot[k];
+        for (int k = 0; k < s->points.slot_count; k++) {
+            const Slot *slot = &s->points.slot[k];
             const WireState *w = stepper_state(s);
             int e = slot->element;
             Vec3 x = slot_place(slot, s->wire.length[e], w->position[e], quat_rotate(w->orientation[e], vec3(1, 0, 0)), w->position[e + 1],
@@ -263,15 +263,15 @@ static void sleepers_miss_nothing(void **state)
                 s[0] = bench_make(&b[0]);
                 stepper_restore(s[0], kept);
             }
-            memset(s[1]->clearance, 0, (size_t)s[1]->point_count * sizeof *s[1]->clearance);
+            memset(s[1]->points.clearance, 0, (size_t)s[1]->points.count * sizeof *s[1]->points.clearance);
             for (int j = 0; j < 2; j++)
                 step_once(s[j], advance, run[k].twist);
             // from the same state, so that what a step does is compared and not how small differences grow
             for (int n = 0; n < s[0]->state.node_count; n++)
                 apart = fmax(apart, vec3_distance(s[0]->state.position[n], s[1]->state.position[n]));
-            for (int p = 0; p < s[0]->point_count; p++) {
-                force_apart = fmax(force_apart, vec3_distance(s[0]->force[p], s[1]->force[p]));
-                force_most = fmax(force_most, vec3_norm(s[0]->force[p]));
+            for (int p = 0; p < s[0]->points.count; p++) {
+                force_apart = fmax(force_apart, vec3_distance(s[0]->points.force[p], s[1]->points.force[p]));
+                force_most = fmax(force_most, vec3_norm(s[0]->points.force[p]));
             }
             deepest = fmax(deepest, step_report(s[1])->penetration);
             memcpy(s[1]->memory, s[0]->memory, s[0]->memory_count * sizeof *s[0]->memory);
@@ -374,10 +374,10 @@ static void push_through_local_models_is_smooth(void **state)
     double mean[2] = {0, 0}, jump[2] = {0, 0}, share[2] = {0, 0};
     int crossings = 0;
     for (int i = 0; i < SLOW; i++) {
-        int tip = s->place[s->state.node_count - 1].node;
+        int tip = s->points.place[s->state.node_count - 1].node;
         const StepReport *r = step_once(s, 0.005, 0);
         felt[i][0] = r->proximal_force, felt[i][1] = r->proximal_torque;
-        crossings += s->place[s->state.node_count - 1].node != tip;
+        crossings += s->points.place[s->state.node_count - 1].node != tip;
         for (int k = 0; k < 2; k++)
             mean[k] += fabs(felt[i][k]) / SLOW;
     }
@@ -464,7 +464,7 @@ static void comes_back_from_outside(void **state)
         for (int i = 0; i < s->state.node_count; i++) {
             double part = fmin(1, fmax(0, (i - s->first_free - 3) / 3.0));
             s->state.position[i] = vec3_add_scaled(s->state.position[i], part * throw [k / 2], side);
-            s->clearance[i] = 0;
+            s->points.clearance[i] = 0;
         }
         double outside = 0;   // by the wall nearest to where a node now is, be it another branch's
         for (int i = s->first_free; i < s->state.node_count; i++) {

@@ -216,8 +216,8 @@ static double loop_error(int elements, double bend, double dip)
     Stepper *s = bench_make(&b);
     settle(s, 1000, 20000, 1e-7);
     double force = 0, stiffness = 2;
-    for (int k = 0; k < s->set.pair_count; k++)
-        force += fabs(s->set.pair[k].force.y);
+    for (int k = 0; k < s->system.set.pair_count; k++)
+        force += fabs(s->system.set.pair[k].force.y);
     double reference = loop_force(bend, straight, stiffness, 0.36);
     Vec3 tip = tip_of(s);
     print_message("loop of radius %g mm, %g mm too long, %d elements: force on its base %.6f N, elastica %.6f N (%+.3f %%), tip %.5f mm above the axis; "
@@ -264,8 +264,8 @@ static void forces_are_equal_and_opposite(void **state)
         const Stepper *s = sac.stepper;
         if (step_report(s)->newton > 0 || (step_report(s)->flags & (STEP_NOT_CONVERGED | STEP_LIMITED)))
             continue;
-        for (int k = 0; k < s->set.pair_count; k++) {
-            const ContactPair *p = &s->set.pair[k];
+        for (int k = 0; k < s->system.set.pair_count; k++) {
+            const ContactPair *p = &s->system.set.pair[k];
             double normal = vec3_dot(p->force, p->normal);
             if (!(normal > 1e-6) || p->end[0].node < s->first_free)
                 continue;
@@ -277,9 +277,9 @@ static void forces_are_equal_and_opposite(void **state)
                     int node = p->end[e].node + n;
                     Vec3 arm = vec3_add_scaled(p->end[e].lever[n], -sign * weight * p->end[e].radius, p->normal), f = vec3_scale(p->force, sign);
                     force = vec3_add_scaled(force, weight, f);
-                    moment = vec3_add(moment, vec3_add(vec3_cross(s->start_position[node], vec3_scale(f, weight)), vec3_cross(arm, f)));
-                    slip = vec3_add_scaled(slip, sign, vec3_add(vec3_scale(of(s->u, node, 0), weight), vec3_cross(of(s->u, node, 3), arm)));
-                    size += vec3_norm(s->start_position[node]) * vec3_norm(f);
+                    moment = vec3_add(moment, vec3_add(vec3_cross(s->start.position[node], vec3_scale(f, weight)), vec3_cross(arm, f)));
+                    slip = vec3_add_scaled(slip, sign, vec3_add(vec3_scale(of(s->system.u, node, 0), weight), vec3_cross(of(s->system.u, node, 3), arm)));
+                    size += vec3_norm(s->start.position[node]) * vec3_norm(f);
                 }
             assert_true(vec3_norm(force) < 1e-12 * vec3_norm(p->force) && vec3_norm(moment) < 1e-12 * size);
             Vec3 drag = vec3_add_scaled(p->force, -normal, p->normal);

@@ -63,8 +63,8 @@ static void what_is_broken_is_found(void **state)
     expect_broken(s, "nodes have finite velocities");
     s->state.velocity[tip] = speed;
     assert_null(stepper_broken(s));
-    assert_true(s->set.count > 1);
-    ContactPoint *last = &s->set.point[s->set.count - 1], kept = *last;
+    assert_true(s->system.set.count > 1);
+    ContactPoint *last = &s->system.set.point[s->system.set.count - 1], kept = *last;
     last->force = vec3_scale(last->normal, -1);
     expect_broken(s, "forces of contacts press and stay in their cones");
     last->force = vec3_add(last->normal, vec3_normal_to(last->normal));
@@ -72,7 +72,7 @@ static void what_is_broken_is_found(void **state)
     *last = kept;
     last->node = 0;
     expect_broken(s, "contacts stand in the order of the chain");
-    last->node = s->chain.count;
+    last->node = s->system.chain.count;
     expect_broken(s, "contacts are at nodes of the chain");
     *last = kept;
     last->normal = vec3_scale(kept.normal, 1.01);
