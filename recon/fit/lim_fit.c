@@ -350,8 +350,8 @@ static void gather_guards(const VesselTree *tree, int node, bool extended, Gathe
     }
 }
 
-// Collects the region for blobs: the tubes between nearby nodes and their parents, slightly thinner than the vessel; for aneurysms see below, because they
-// are seldom round.
+// Collects the region for blobs: the tubes between nearby nodes and their parents, slightly thinner than the vessel, but wider at an aneurysm, which is
+// seldom round.
 static void gather_tubes(const VesselTree *tree, Gather *gather)
 {
     const double inside = 0.9;
