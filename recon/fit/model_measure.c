@@ -160,11 +160,12 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
         f->join = more;
         f->join_capacity = capacity;
     }
-    double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across), anew = aside * vec3_dot(vec3_add(before.normal, fresh.normal), across);
+    double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across),
+           moved_fresh = aside * vec3_dot(vec3_add(before.normal, fresh.normal), across);
     f->join[f->joins++] = (Join){place_of(job, node, other),
                                  node,
                                  other,
-                                 {fabs(p.distance - q.distance), fabs(behind.gap - before.gap - moved), fabs(fresh.gap - before.gap - anew)},
+                                 {fabs(p.distance - q.distance), fabs(behind.gap - before.gap - moved), fabs(fresh.gap - before.gap - moved_fresh)},
                                  {vec3_angle(p.normal, q.normal), vec3_angle(before.normal, behind.normal), vec3_angle(before.normal, fresh.normal)}};
 }
 

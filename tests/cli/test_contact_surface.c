@@ -145,14 +145,14 @@ static void a_bad_mesh_is_told_and_mended_or_refused(void **state)
     for (int t = 0; t < bad.count; t += 7)
         turn(bad.triangle[t]);
     pipe_write(&bad, 1);
-    told("face against their neighbours", other);
+    told("oriented against their neighbours", other);
     assert_true(between(tip, other) < 1e-6);
 
     bad = good;
     for (int t = 0; t < bad.count; t++)
         turn(bad.triangle[t]);
     pipe_write(&bad, 1);
-    told("normals point into the lumen: all turned", other);
+    told("normals point into the lumen: all flipped", other);
     assert_true(between(tip, other) < 1e-6);
 
     bad = good;
