@@ -275,8 +275,8 @@ bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center,
         sac[i].point_count = kept;
         sac[i].inlier_rate = (double)kept / rays;
     }
-    // Prim's spanning tree over the centres, from the one attached to the vessel merging much of the neck changes which nodes border on it, so repeat
-    // once or twice
+    // Prim's spanning tree over the centres, starting from the one attached to the vessel. Merging much of the neck changes which nodes border on it, so
+    // make_hub is repeated once or twice.
     int root_center = 0, root = -1, before = 0;
     for (int i = 0; good && i < MAX_HUB_ROUNDS && before != t->tree.count && !t->out_of_memory; i++) {
         before = t->tree.count;
