@@ -10,7 +10,7 @@
 
 static void add_vector(cJSON *object, const char *name, Vec3 v) { cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3)); }
 
-// {"least", "median", "largest"} of `count` values.
+// Adds the object {"least", "median", "largest"} of `count` values.
 static void add_spread(cJSON *object, const char *name, const double *value, int count)
 {
     if (count == 0)
@@ -122,7 +122,7 @@ bool describe_surface(cJSON *object, const char *path, Faults *faults)
         cJSON_AddNumberToObject(object, "inside_out_parts", check.inside_out_count);
         cJSON_AddBoolToObject(object, "unit_is_doubtful", check.unit_is_doubtful);
     } else {
-        faults_add(faults, path, 0, 0, "cannot be checked: no memory");
+        faults_add(faults, path, 0, 0, "not enough memory to check the surface");
     }
     surface_free(mesh);
     return good;

@@ -1,4 +1,4 @@
-// What a tree, a model, a volume or a surface is: its figures as JSON, for `info`.
+// Describes trees, models, volumes and surfaces: adds their figures to a JSON object, for the verb `info`.
 #ifndef SELDINGER_RECON_DESCRIBE_H
 #define SELDINGER_RECON_DESCRIBE_H
 
@@ -7,7 +7,7 @@
 #include <cJSON.h>
 
 void describe_tree(cJSON *object, const VesselTree *tree, const TreeFileInfo *info);
-// Of a file, or the folder of a DICOM series. False with faults.
+// `path` is a file, or the folder of a DICOM series. Returns false, with faults, if it cannot be read.
 bool describe_volume(cJSON *object, const char *path, Faults *faults);
 bool describe_surface(cJSON *object, const char *path, Faults *faults);
 

@@ -1,4 +1,4 @@
-// The rules are in the header. They rely on the library reading creation lists, links and types without reading data or opening files.
+// The header gives the rules. They assume that the library reads creation lists, links and types without reading data or opening other files.
 #define ZLIB_CONST
 #include "recon/hdf5_reader.h"
 
@@ -24,27 +24,27 @@ struct Hdf5Reader {
     const char *name, *needs;
     Faults *faults;
     int faults_before;
-    hsize_t left;            // [bytes] of the file that no dataset has taken yet
-    hsize_t left_unpacked;   // [bytes] of memory that packed datasets may still take
+    hsize_t left;            // [bytes] of the file not yet claimed by a dataset
+    hsize_t left_unpacked;   // [bytes] of memory that compressed datasets may still take
     Hdf5Silence silence;
-    unsigned plugins;        // which kinds the library may load, as it was
+    unsigned plugins;        // the library's plug-in mask before opening; restored on close
 };
 
 enum { MOST_PATH = 256 };
 
 // --- opening ---
 
-// The library's clean-up at exit, which writes nothing, can fail on what remains of a damaged file ("infinite loop closing library").
+// The library's clean-up at exit writes nothing, but can fail on the remains of a damaged file ("infinite loop closing library"), so it is switched off.
 static void be_silent(Hdf5Reader *reader)
 {
-    H5dont_atexit();      // where it is not in use yet
+    H5dont_atexit();      // has an effect only before the library is initialised
     reader->silence = hdf5_silence_begin();
 }
 
-// --- rehearsal ---
+// --- trial read in a child process ---
 
-// Time limit of the child process that does what the library may not survive: a corrupted heap can also make it hang, and a loaded machine needs
-// seconds for milliseconds of work.
+// Limits the time of the child process, which runs library calls that may crash. A corrupted heap can also make it hang. The limit is long because a loaded
+// machine takes seconds for milliseconds of work.
 static void be_expendable(void) { process_be_expendable(5, 60); }
 
 static herr_t look_at_attribute(hid_t object, const char *name, const H5A_info_t *info, void *context)
@@ -79,8 +79,8 @@ static herr_t look_at_object(hid_t file, const char *name, const H5O_info_t *inf
     return 0;
 }
 
-// Whether the library (1.10) survives the file's structure: damaged sizes in headers without checksums make it overrun its memory. A child process
-// reads the whole structure first.
+// Returns true if the library (1.10) can read the file's structure without crashing: damaged sizes in headers without checksums make it overrun its memory. A
+// child process therefore reads the whole structure first.
 static bool is_survived(Hdf5Source *source)
 {
     int status = 0;
@@ -96,7 +96,7 @@ static bool is_survived(Hdf5Source *source)
     }
     while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR)
         continue;
-    return child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0);      // without a child process there is no rehearsal
+    return child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0);      // if fork fails, there is no trial read
 }
 
 // Takes ownership of the source's file.
@@ -157,7 +157,7 @@ void hdf5_reader_close(Hdf5Reader *reader)
         H5Fclose(reader->file);
     if (reader->source.file >= 0)
         close(reader->source.file);
-    // datasets that seemed missing or damaged were only unreadable
+    // after a failed read from disk, datasets only seemed missing or damaged
     if (reader->source.reason) {
         reader->faults->count = reader->faults_before;
         faults_add(reader->faults, reader->name, 0, 0, "cannot be read: %s", strerror(reader->source.reason));
@@ -171,7 +171,7 @@ void hdf5_reader_close(Hdf5Reader *reader)
 
 typedef enum { LINK_NONE, LINK_HARD, LINK_OTHER } LinkKind;
 
-// Looks at each link of the path before the library follows it.
+// Examines each link of the path before the library follows it.
 static LinkKind link_kind(const Hdf5Reader *reader, const char *path)
 {
     char part[MOST_PATH];
@@ -255,7 +255,7 @@ static void print_size(char text[80], int rank, const uint64_t *size)
     snprintf(text + used, 80 - (size_t)used, ")");
 }
 
-// Fills in the shape found.
+// Stores the shape found in `dataset`. Returns false, with a fault, if it is not the expected one.
 static bool has_shape(const Hdf5Reader *reader, hid_t space, Hdf5Dataset *dataset)
 {
     hsize_t found[H5S_MAX_RANK] = {0};
@@ -276,7 +276,7 @@ static bool has_shape(const Hdf5Reader *reader, hid_t space, Hdf5Dataset *datase
     return true;
 }
 
-// The product, UINT64_MAX where it is larger.
+// a b, or UINT64_MAX on overflow.
 static uint64_t times(uint64_t a, uint64_t b) { return b > 0 && a > UINT64_MAX / b ? UINT64_MAX : a * b; }
 
 static uint64_t value_count(const Hdf5Dataset *dataset)
@@ -300,7 +300,7 @@ typedef struct Packing {
     bool is_shuffled;
 } Packing;
 
-// NULL, or what is wrong. Each chunk has a bit for each filter that was skipped.
+// Returns NULL, or what is wrong. The mask stored with each chunk has a bit for each filter that was skipped.
 static const char *find_packing(hid_t creation, size_t value_bytes, Packing *packing)
 {
     static const char *const other = "is compressed by filters other than deflate, or shuffle followed by deflate (`h5repack -f NONE IN OUT` decompresses it)";
@@ -323,7 +323,7 @@ static const char huge[] = "has more or larger chunks than the file holds, or th
 
 // Sizes of a dataset, in values and bytes.
 typedef struct Chunks {
-    hsize_t size[3], bytes, count;       // of a value, of a chunk, of the whole
+    hsize_t size[3], bytes, count;       // size of a chunk [values], bytes of a chunk, number of chunks
 } Chunks;
 
 static const char *count_chunks(hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes, Chunks *chunks)
@@ -346,10 +346,10 @@ static void next_chunk(const Chunks *chunks, const Hdf5Dataset *dataset, hsize_t
         at[k] = 0;
 }
 
-// Deflate never makes a chunk much longer than its contents, so a longer one is refused.
+// Most bytes that a stored chunk may have. Deflate hardly lengthens incompressible data, so a longer chunk is refused.
 static hsize_t most_stored(const Chunks *chunks) { return chunks->bytes + chunks->bytes / 1000 + 100; }
 
-// Checks that each chunk exists with all its bytes: the library allocates by the index and reads by the shape. NULL, or what is wrong.
+// Checks that each chunk exists with all its bytes: the library allocates by the index and reads by the shape. Returns NULL, or what is wrong.
 static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes)
 {
     hsize_t at[3] = {0}, all_stored = 0, wide = value_bytes > sizeof(double) ? value_bytes : sizeof(double);
@@ -392,7 +392,7 @@ static const char *contiguous_trouble(Hdf5Reader *reader, hid_t set, uint64_t by
     return NULL;
 }
 
-// NULL, or why a dataset's bytes are not stored in this file in a supported layout.
+// Returns NULL, or the reason why a dataset's bytes are not stored in this file in a supported layout.
 static const char *storage_trouble(Hdf5Reader *reader, hid_t set, const Hdf5Dataset *dataset, size_t value_bytes)
 {
     hid_t creation = H5Dget_create_plist(set);
@@ -464,8 +464,8 @@ static bool is_finite(const Hdf5Reader *reader, const Hdf5Dataset *dataset, cons
 
 // --- decompression ---
 
-// Inflates to exactly `length` bytes with zlib itself, since the library's filter trusts the stream. False if the stream gives fewer or more bytes,
-// or has a tail.
+// Inflates to exactly `bytes` bytes. We call zlib ourselves, because the library's filter trusts the stream. Returns false if the stream yields fewer or more
+// bytes, or has trailing data.
 static bool inflate_exactly(const void *packed, size_t packed_bytes, unsigned char *out, size_t bytes)
 {
     unsigned char beyond;
@@ -518,7 +518,7 @@ typedef struct Unpacking {
     unsigned char *stored, *shuffled, *plain;
 } Unpacking;
 
-// `at`: its first value. False if it is damaged.
+// Reads and decompresses the chunk that begins at value `at`. Returns false if it is damaged.
 static bool unpack_chunk(const Unpacking *u, hid_t set, const hsize_t at[3])
 {
     const unsigned deflated = 1U << (u->packing.filter_count - 1);
@@ -557,7 +557,7 @@ static bool unpack_all(Unpacking *u, hid_t set, const Hdf5Dataset *dataset, unsi
     return good;
 }
 
-// Values as stored, converted in place to the requested type.
+// Reads all chunks of a compressed dataset and converts the values in place to the requested type.
 static bool read_packed(hid_t set, hid_t creation, const Hdf5Dataset *dataset, void *out)
 {
     hid_t type = H5Dget_type(set), wanted = memory_type(dataset->type);
@@ -611,7 +611,7 @@ void *hdf5_read(Hdf5Reader *reader, Hdf5Dataset *dataset)
     return NULL;
 }
 
-// --- texts and numbers ---
+// --- strings and numbers ---
 
 static bool is_one_text(hid_t type, hid_t space)
 {
@@ -629,7 +629,7 @@ static char *fixed_text(const Hdf5Reader *reader, hid_t type, hid_t set, hid_t a
     return NULL;
 }
 
-// In the child process: writes what the library reads into the pipe; a zero byte marks the end.
+// Runs in the child process: writes the string that the library reads into the pipe. A zero byte marks the end.
 static _Noreturn void send_variable_text(hid_t type, hid_t attribute, int end)
 {
     char *text = NULL;
@@ -655,8 +655,8 @@ static char *receive_text(int end)
     return NULL;
 }
 
-// A string of variable length, as h5py writes it. Its heap has no checksum, and wrong sizes there make the library (1.10) write beyond its memory, so
-// a child process reads it.
+// Reads a string of variable length, as h5py writes it. Its heap has no checksum, and wrong sizes there make the library (1.10) write beyond its memory, so a
+// child process reads it.
 static char *variable_text(hid_t type, hid_t attribute)
 {
     int ends[2];
@@ -693,7 +693,7 @@ char *hdf5_text(Hdf5Reader *reader, const char *path)
     return text;
 }
 
-// -1 if there is none.
+// Returns -1 if there is no such attribute.
 static hid_t open_attribute(const Hdf5Reader *reader, const char *object, const char *name)
 {
     bool is_here = strcmp(object, "/") == 0 || link_kind(reader, object) == LINK_HARD;

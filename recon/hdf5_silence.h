@@ -1,12 +1,12 @@
-// The HDF5 library prints its own messages to standard error unless it is told otherwise. What it was told belongs to the program that we are part of:
-// it is put back after each of our calls.
+// By default the HDF5 library prints its own messages to standard error. Its error handler belongs to the host program, so we restore it after each of our
+// calls.
 #ifndef SELDINGER_RECON_HDF5_SILENCE_H
 #define SELDINGER_RECON_HDF5_SILENCE_H
 
 #include <hdf5.h>
 
 typedef struct Hdf5Silence {
-    H5E_auto2_t handler;     // as it was
+    H5E_auto2_t handler;     // the host program's handler
     void *data;
 } Hdf5Silence;
 

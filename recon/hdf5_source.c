@@ -18,7 +18,7 @@ static herr_t driver_close(H5FD_t *driver)
     return 0;
 }
 
-// No accumulator and no other buffer.
+// Sets the driver's flags: no metadata accumulator and no other buffer.
 static herr_t driver_query(const H5FD_t *driver, unsigned long *flags)
 {
     (void)driver;
@@ -52,7 +52,7 @@ static bool read_file(Hdf5Source *source, char *data, size_t size, haddr_t addre
         if (got < 0 && errno == EINTR)
             continue;
         if (got <= 0) {
-            source->reason = got < 0 ? errno : EIO;      // the file became shorter
+            source->reason = got < 0 ? errno : EIO;      // got 0: the file became shorter
             return false;
         }
         data += got, address += (haddr_t)got, size -= (size_t)got;
@@ -94,7 +94,7 @@ static const H5FD_class_t driver_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
-// Kept until the program ends: a damaged file makes the library release its driver once too often.
+// The driver stays registered until the program ends: a damaged file makes the library release its driver once too often.
 static hid_t driver_id(void)
 {
     static hid_t driver = -1;

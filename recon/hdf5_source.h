@@ -1,5 +1,5 @@
-// The HDF5 library's access to a file in the guarded reader: bytes at an address, from a file or memory, read only, never beyond the end. It is our
-// own driver, because the library's drivers keep a metadata buffer (H5F__accum_read) in which damaged sizes lead to a null pointer.
+// The file driver that gives the HDF5 library access to a file in the guarded reader: it reads bytes from a file or from memory, read only, never beyond the
+// end. We use our own driver because the library's drivers keep a metadata buffer (H5F__accum_read) in which damaged sizes lead to a null pointer.
 #ifndef SELDINGER_RECON_HDF5_SOURCE_H
 #define SELDINGER_RECON_HDF5_SOURCE_H
 
@@ -7,15 +7,15 @@
 #include <stddef.h>
 
 typedef struct Hdf5Source {
-    H5FD_t driver;           // the library's part; first
-    haddr_t end;             // that the library knows of
-    int file;                // an open descriptor, -1: memory
+    H5FD_t driver;           // the library's part; must be the first member
+    haddr_t end;             // end of the allocated addresses, as set by the library
+    int file;                // an open descriptor; -1: bytes in memory
     const void *bytes;
-    size_t length;           // of either
-    int reason;              // errno of a failed read; 0: none
+    size_t length;           // [bytes] of the file or the memory
+    int reason;              // errno of a failed read; 0: no read failed
 } Hdf5Source;
 
-// Opens the source for reading; it must neither move nor end before the file is closed. Negative if the library refuses it.
+// Opens the source for reading. `source` must stay valid, at the same address, until the file is closed. Returns a negative value if the library refuses it.
 hid_t hdf5_source_open(Hdf5Source *source);
 
 #endif

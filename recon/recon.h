@@ -1,5 +1,6 @@
-// recon: from an angiogram or a surface to a model of the vessels. Uses base and geom. Lengths mm, in the frame of the image.
-// Reading order: volume/volume.h, track/rbt_track.h (image to tree), fit/field_fit.h and fit/lim_fit.h (tree to model), tree_file.h (both as files).
+// recon: builds a model of the vessels from an angiogram or a surface. Uses base and geom. Lengths are in mm, in the frame of the image.
+// Reading order: volume/volume.h, track/rbt_track.h (image to tree), fit/field_fit.h and fit/lim_fit.h (tree to model), tree_file.h (files of trees and
+// models).
 #ifndef SELDINGER_RECON_RECON_H
 #define SELDINGER_RECON_RECON_H
 
@@ -33,7 +34,7 @@
 #include "recon/surface/surface_file.h"
 #include "recon/surface/vtp_write.h"
 
-// synthetic shapes with exact truth
+// synthetic shapes whose geometry is known exactly
 #include "recon/phantom/phantom.h"
 #include "recon/phantom/phantom_report.h"
 #include "recon/phantom/phantom_write.h"

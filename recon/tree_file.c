@@ -1,6 +1,6 @@
-// Trees and models in HDF5. Both directions go through memory (writing by the core driver, whose image we keep): a full disk is then an error of our
-// own write rather than one inside the library, the same code serves the fuzz target, and the file cannot change meanwhile. Metadata are written in
-// the 1.8 format, whose checksums make the library refuse damaged headers.
+// Reads and writes trees and models in HDF5. Both directions go through memory (the core driver writes, and we keep its image): a full disk is then an error
+// of our own write, not one inside the library; the fuzz target uses the same code; and the file cannot change while it is read. Metadata are written in the
+// 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
 #include "base/base.h"
@@ -50,7 +50,7 @@ static bool expect_rows(const Reader *reader, const Hdf5Dataset *column, uint64_
     return false;
 }
 
-// An empty string if absent.
+// Returns an empty string if the attribute is absent.
 static char *read_text(const Reader *reader, const char *key)
 {
     char *text = hdf5_text_attribute(reader->file, "/", key);
@@ -58,7 +58,7 @@ static char *read_text(const Reader *reader, const char *key)
 }
 
 enum { KERNEL_CAUCHY, KERNEL_COMPACT, KERNELS };
-static const char *const kernel_name[KERNELS] = {"cauchy", "compact"};   // of local models, of shared blobs
+static const char *const kernel_name[KERNELS] = {"cauchy", "compact"};   // kernel of local models, kernel of shared blobs
 
 static int read_kernel(const Reader *reader)
 {
@@ -198,7 +198,7 @@ static bool write_column(hid_t file, const char *path, hid_t type, int rank, int
     return good;
 }
 
-// Fixed length: the heap of variable-length texts has no checksum, and damaged bytes there crash the library.
+// Writes a string of fixed length: the heap of variable-length strings has no checksum, and damaged bytes there crash the library.
 static bool write_text(hid_t file, const char *key, const char *text)
 {
     hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
@@ -257,8 +257,8 @@ static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *i
     return good;
 }
 
-// The core driver frees the file's memory when the file is closed: by then it is complete, so we take the memory over. (H5Fget_file_image of an open
-// file clears the superblock's flags without renewing its checksum; no program opens what it returns.)
+// The core driver frees the file's memory when the file is closed. The file is complete by then, so we take ownership of the memory. (H5Fget_file_image of an
+// open file clears the superblock's flags without updating its checksum; no program opens what it returns.)
 typedef struct Image {
     unsigned char *bytes;
     size_t capacity;
@@ -296,7 +296,7 @@ static herr_t image_forget(void *image)
     return 0;
 }
 
-// The end of the file as its superblock (version 2: after signature, four bytes, two addresses) says it, little-endian.
+// The end of the file according to its superblock, little-endian (version 2: after the signature, four bytes and two addresses).
 static size_t image_length(const Image *image)
 {
     enum { END_ADDRESS = 28, SUPERBLOCK = 48 };

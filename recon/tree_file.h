@@ -1,5 +1,5 @@
-// Trees and models as HDF5 files (docs/file-formats.md, "Trees and models"), float64, mm. Loading checks every size, type and rule of
-// vessel_tree_validate before it trusts the file; saving writes a temporary file and renames it, so no partial file remains.
+// Trees and models as HDF5 files (docs/file-formats.md, "Trees and models"), float64, mm. Loading checks every size, type and rule of vessel_tree_validate
+// before it trusts the file. Saving writes a temporary file and renames it, so no partial file remains.
 #ifndef SELDINGER_RECON_TREE_FILE_H
 #define SELDINGER_RECON_TREE_FILE_H
 
@@ -11,13 +11,13 @@ typedef struct TreeFileInfo {  // root attributes
     char *created_by;        // "seldinger VERSION segment" …
 } TreeFileInfo;
 
-// NULL with faults. `info` may be NULL; free it with tree_file_info_free.
+// Loads a tree or a model. Returns NULL with faults. `info` may be NULL; free it with tree_file_info_free.
 VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults);
-// The same from memory, without the rehearsal by a child process (recon/hdf5_reader.h); `name` is used in messages.
+// The same from memory, without the trial read in a child process (recon/hdf5_reader.h); `name` is used in messages.
 VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults);
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults);
 void tree_file_info_free(TreeFileInfo *info);
-// The number on the line `key: number` of the parameters (any indentation); `otherwise` if absent.
+// Returns the number on the line `key: number` of the parameters (any indentation), or `otherwise` if there is none.
 double tree_file_number(const TreeFileInfo *info, const char *key, double otherwise);
 
 #endif

@@ -7,11 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, in local radii: alone on a line or about a centre they have slope 2/r
-// The target for mean distances, if single points are to be within target_mm.
+static const double BASE_APART = 0.75, BASE_REACH = 2;   // distance and reach of the base blobs, in local radii: a line of them, or a single one, has slope 2/r
+// Target for mean distances, as a fraction of target_mm, which is for single points.
 static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
-// The loss gets sharper from level to level: with a sharp one from the start, a wall far from the base remains an outlier.
+// The loss gets sharper from level to level: with a sharp loss from the start, a wall far from the base would remain an outlier.
 static const double base_knee = 1, level_knee[] = {0.35, 0.35, 0.35, 0.25, 0.25, 0.25, 0.25, 0.25};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
@@ -43,7 +43,7 @@ static bool check_options(const FieldFitOptions *o, Faults *faults)
 
 // --- The base ---
 
-// Whether a base blob of a nearby node is too close to x for another one.
+// Returns true if a base blob of a nearby node is so close to x that no other one is needed.
 static bool is_crowded(const FieldModel *model, const int *first, const int *next, int node, Vec3 x)
 {
     const VesselTree *tree = model->tree;
@@ -83,7 +83,7 @@ static bool lay_base(FieldModel *model)
     for (int i = 0; i < tree->node_count && good; i++)
         first[i] = -1;
     for (int i = 0; i < tree->node_count && good; i++) {
-        if (field_link_is_lumen(tree, i)) {   // from the parent here, so that long links are filled
+        if (field_link_is_lumen(tree, i)) {   // place blobs from the parent to here, so that long links are filled
             Vec3 a = tree->center[tree->parent[i]], b = tree->center[i];
             int steps = (int)(vec3_distance(a, b) / (BASE_APART * tree->radius[i]));
             for (int k = 1; k <= steps && good; k++)
@@ -101,7 +101,7 @@ static bool lay_base(FieldModel *model)
     return good && field_model_list(model);
 }
 
-// --- The schedule ---
+// --- The sequence of levels ---
 
 typedef struct Schedule {
     FieldModel *model;
@@ -132,7 +132,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
         return false;
     all_due(model);
     model->knee = base_knee;
-    // first the amplitudes alone: centres that start far from the solution end in bad minima that no finer blob corrects
+    // fit the amplitudes alone first: centres that start far from the solution end in bad minima that no finer blob corrects
     for (int k = 0; k < 3; k++) {
         model->amplitudes_only = k < 2;
         sweep(&s, 3);

@@ -1,32 +1,32 @@
-// Each data point p is a candidate: the residuals of the data near by, weighted by what a blob of reach R at p would be there, w = (1 - d^2/R^2)^3,
-// have the mean m = sum w e / sum w and, for noise of standard deviation s, the deviation s sqrt(sum w^2) / sum w. s is measured at each node, as the
-// spread of the residuals about their mean over a third of the radius: over a larger region, misfit at a bifurcation would count as noise and no blob
-// would be added. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken
-// by size, none within 0.8 R of one taken before.
+// Each data point p is a candidate. The residuals of the data nearby, weighted by the profile of a blob of reach R at p, w = (1 - d^2/R^2)^3, have the mean m
+// = sum w e / sum w and, for noise of standard deviation s, the standard deviation s sqrt(sum w^2) / sum w. s is measured at each node, as the spread of the
+// residuals about their mean over a third of the radius: over a larger region, misfit at a bifurcation would count as noise and no blob would be added.
+// Residuals are weighted as in the fit: those above the loss's knee count less and less. Candidates above tolerance and noise are accepted by size, none
+// within 0.8 R of one accepted before.
 #include "recon/fit/field_refine.h"
 
 #include "base/base.h"
 
 #include <stdlib.h>
 
-// A blob's centre lies this share of its reach inside the wall; no two of a level are nearer than this share.
+// Depth of a new blob's centre inside the wall, and least distance between two blobs of a level, as fractions of its reach.
 static const double INSIDE = 0.25, APART = 0.8;
-// With fewer points than this per blob, more blobs would only fit the noise.
+// With fewer points per blob than this, more blobs would only fit the noise.
 static const double POINTS_A_BLOB = 3;
-// Over which the noise is measured, in local radii; twice that where points are few.
+// Radius of the region over which the noise is measured, in local radii; doubled where points are few.
 static const double NOISE_REACH = 0.35;
 
 typedef struct Candidate {
-    double score;            // of tolerances
+    double score;            // mean residual, in units of the tolerance
     int node;
     Vec3 at;
-    double mean;             // [mm] the residual
+    double mean;             // [mm] mean residual
 } Candidate;
 
 typedef struct Job {
     FieldModel *model;
     const FieldRefine *how;
-    float (*residual)[FIELD_TILE];   // (tiles) of the data
+    float (*residual)[FIELD_TILE];   // (tiles) residuals of the data
     double *noise;           // (N) [mm]
     Candidate **found;       // (N)
     int *count;              // (N)
@@ -50,7 +50,7 @@ static void measure_residuals(void *context, long index)
     }
 }
 
-// Blobs whose centres lie within `reach` of x.
+// Counts the blobs whose centres lie within `reach` of x.
 static int blobs_about(const FieldModel *model, int node, Vec3 x, double reach)
 {
     int count = 0;
@@ -63,7 +63,7 @@ typedef struct Mean {
     double weight, weight2, sum, sum2;
 } Mean;
 
-// Of the data of `from` within `reach` of x.
+// Adds the sums over the data of node `from` within `reach` of x.
 static void add_mean(const Job *job, int from, Vec3 x, double reach, float sum[4][FIELD_LANES])
 {
     const int *first = job->model->rows->first;
@@ -103,7 +103,7 @@ static int data_of(const Job *job, int node)
     return data;
 }
 
-// The effective number of points of the weighted mean.
+// Effective number of points of the weighted mean.
 static double points_of(const Mean *m) { return m->weight * m->weight / fmax(m->weight2, 1e-12); }
 
 static void measure_noise(void *context, long index)
@@ -162,7 +162,7 @@ static void find_candidates(void *context, long index)
                 list[found++] = (Candidate){fabs(mean) / least, node, x, mean};
         }
     }
-    // candidates too near to a larger one of the same node are excluded anyway
+    // sorting first: candidates too near to a larger one of the same node are excluded anyway
     if (found > 1)
         qsort(list, (size_t)found, sizeof *list, compare_candidates);
     int kept = 0;
@@ -176,7 +176,7 @@ static void find_candidates(void *context, long index)
     job->count[node] = kept;
 }
 
-// The candidate's blob: of the height that takes its mean away, for a slope of 2/r.
+// Adds the candidate's blob, with the amplitude that cancels its mean residual for a slope of 2/r.
 static bool put_blob(Job *job, const Candidate *c)
 {
     FieldModel *model = job->model;
@@ -194,7 +194,7 @@ static int take_candidates(Job *job)
     for (int i = 0; i < n; i++)
         total += job->count[i];
     Candidate *all = malloc(((size_t)total + 1) * sizeof *all);
-    int *first = malloc(((size_t)n + 1) * sizeof *first), *next = malloc(((size_t)total + 1) * sizeof *next);   // taken ones of each node, a linked list
+    int *first = malloc(((size_t)n + 1) * sizeof *first), *next = malloc(((size_t)total + 1) * sizeof *next);   // accepted candidates by node, a linked list
     bool good = all && first && next;
     total = 0;
     for (int i = 0; i < n && good; i++) {

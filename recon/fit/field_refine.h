@@ -5,13 +5,13 @@
 #include "recon/fit/field_model.h"
 
 typedef struct FieldRefine {
-    double reach;            // of the new blobs, in local radii
-    double tolerance, tolerance_mm;   // of a mean residual: the larger of so many local radii and so many mm
-    double least_reach;      // [mm] smallest blob (image resolution)
-    double significance;     // in standard deviations of the mean's noise
+    double reach;            // reach of the new blobs, in local radii
+    double tolerance, tolerance_mm;   // tolerance of a mean residual: the larger of `tolerance` in local radii and tolerance_mm
+    double least_reach;      // [mm] reach of the smallest blob (image resolution)
+    double significance;     // least mean residual, in standard deviations of the mean's noise
 } FieldRefine;
 
-// Adds blobs; returns how many, -1 if out of memory. Their rows become due.
+// Adds blobs and marks their rows as due. Returns the number added, or -1 if out of memory.
 int field_refine(FieldModel *model, const FieldRefine *how);
 
 #endif

@@ -1,13 +1,10 @@
-// The rows of the fit.
-//
-// Data: the nodes' points, each in the cell that it lies in; the root's once more upstream of an open inlet, so that the wall is a tube through its
-// plane. A point well inside another node's tube (half its radius) is not wall: rays cast from a parent hit the far wall of a child's mouth, and vice
-// versa.
-//
-// Guards inside: every node's centre, and along a lumen's link; between a point and its axis. Their bound is half of what a round vessel's scaled
-// field, 1 - (d/r)^2, has there, at most; in a cell wider than the link the field rises as slowly as that cell's, 2/r a millimetre. Guards outside:
-// beyond a point, along the normal, where neither a tube nor data of a node near by are; and on a ring where a section has no points. They act only
-// where they are violated. Without them a fit of signed blobs grows spurious sheets where there are no data.
+// Collects the rows of the fit.
+// Data: the nodes' points, each in the cell that contains it; the root's points once more upstream of an open inlet, so that the wall is a tube through its
+// plane. A point deep inside another node's tube (half its radius) is not wall: rays cast from a parent hit the far wall of a child's ostium, and vice versa.
+// Guards inside: at every node's centre, along links that are lumen, and between a point and its axis. Their bound is at most half the scaled field of a
+// round vessel, 1 - (d/r)^2; in a cell wider than the link the field rises only at that cell's rate, 2/r per millimetre. Guards outside: beyond a point,
+// along the normal, where there is neither a tube nor data of a nearby node; and on a ring where a cross-section has no points. Guards act only where they
+// are violated. Without them a fit of signed blobs grows spurious sheets where there are no data.
 #include "recon/fit/field_rows.h"
 
 #include "base/base.h"
@@ -16,20 +13,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Inside the field stays near the scaled distance's 0 to 1 in this direction, too: large amplitudes that cancel at the wall leave hollows beside the axis.
+// Largest value of the field inside, which so stays near the scaled distance's 0 to 1: large amplitudes that cancel at the wall would leave hollows beside
+// the axis.
 static const double MOST_INSIDE = 1.5;
-// Of a tube's radius: points nearer to its axis are not wall.
+// Points nearer to a tube's axis than this fraction of its radius are not wall.
 static const double LUMEN_POINT = 0.5;
-// An aneurysm is not a ball: only this share of its radius is certainly lumen; beyond that its data decide.
+// An aneurysm is not a ball: only this fraction of its radius is certainly lumen; outside that its data decide.
 static const double SAC_BALL = 0.6;
-// Cosine of the angle about a direction from a sac's centre within which a point of its wall says how far it reaches there.
+// Cosine of the half-angle of the cone around a direction from a sac's centre: a point of the sac's wall within the cone gives the wall's distance in that
+// direction.
 static const double SAC_CONE = 0.97;
-// The largest bound of an outside guard: enough to prevent a closed sheet there. Between two walls a smooth field is not deeper, and guards that
-// demand the scaled distance would push the walls apart.
+// Largest bound of an outside guard: enough to prevent a closed sheet there. Between two walls a smooth field is not lower, and guards that demand the scaled
+// distance would push the walls apart.
 static const double OUTSIDE = 0.15;
 enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
-typedef struct Draft {       // rows of a node while they are collected
+typedef struct Draft {       // rows of a node while they are being collected
     int data, guards, data_room, guard_room;
     Vec3 *point, *at;
     float (*bound)[2];
@@ -39,8 +38,8 @@ typedef struct Draft {       // rows of a node while they are collected
 typedef struct Job {
     const VesselTree *tree;
     PowerBlocks blocks;
-    Draft *draft;            // (N) what each node's points and tube give …
-    int **cell;              // … (N) and the cells that those rows lie in, data first
+    Draft *draft;            // (N) rows from each node's points and tube
+    int **cell;              // (N) the cells that contain those rows, data first
     FieldRows *rows;
     int64_t *dropped;        // (N)
 } Job;
@@ -86,7 +85,7 @@ static void add_guard(Draft *d, Vec3 x, double low, double high)
     d->bound[d->guards++][1] = (float)high;
 }
 
-// Distance of x from the axis of node's link to its parent (from its own centre if the link is not lumen), as a share of the radius there.
+// Distance of x from the axis of node's link to its parent (from its own centre if the link is not lumen), as a fraction of the radius there.
 static double share_of_tube(const VesselTree *tree, int node, Vec3 x)
 {
     int parent = tree->parent[node];
@@ -110,14 +109,14 @@ static bool is_in_lumen(const VesselTree *tree, int node, Vec3 x)
     return false;
 }
 
-// Whether a sac's wall, seen from its centre, lies behind x: a vessel's guards reach far into an aneurysm on it.
+// Returns true if a sac's wall point lies behind x, seen from the sac's centre. A vessel's guards would otherwise reach far into an aneurysm attached to it.
 static bool is_between(Vec3 x, Vec3 wall)
 {
     double along = vec3_dot(x, wall), x2 = vec3_norm2(x), wall2 = vec3_norm2(wall);
     return along > 0 && wall2 > x2 && along * along > SAC_CONE * SAC_CONE * wall2 * x2;
 }
 
-// Whether x is clear by `clear` of every tube and of all data near the node.
+// Returns true if x is at least `clear` away from every tube and from all data near the node.
 static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
 {
     for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
@@ -138,8 +137,8 @@ static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
     return true;
 }
 
-// The same near the node whose cell of the whole tree x lies in: just beyond a vessel's wall another's lumen may begin, a sibling's or that of the
-// vessel's own return path, which are not near in the tree but share blobs with it.
+// Returns true if x is clear near `node` and near the node whose power cell (of the whole tree) contains x: just outside a vessel's wall the lumen of another
+// vessel may begin, a sibling or a part of the same vessel that bends back, which is not near in the tree but shares blobs with it.
 static bool is_outside(const Job *job, int node, Vec3 x, double clear)
 {
     if (!is_clear(job->tree, node, x, clear))
@@ -155,7 +154,7 @@ static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)
     return vec3_add_scaled(c, fmax(-most, fmin(most, along)), d);
 }
 
-// The bound of a place at `clear` mm from the wall in a vessel of radius r.
+// The bound of a guard `clear` mm from the wall in a vessel of radius r.
 static double low_bound(double clear, double r) { return 0.5 * fmin(1, 2 * clear / r); }
 
 static void guard_around_point(const Job *job, int node, Vec3 p, Draft *d)
@@ -215,7 +214,7 @@ static void guard_axis(const VesselTree *tree, int node, Draft *d)
     }
 }
 
-// The root's own points again, upstream by their extent along the axis.
+// Repeats the root's own points upstream, shifted by their extent along the axis.
 static void extend_inlet(const VesselTree *tree, Draft *d)
 {
     Vec3 root = tree->center[0], up = vec3_negate(tree->direction[0]);
@@ -282,7 +281,7 @@ typedef struct Row {
     bool is_data;
 } Row;
 
-// Where a node's rows are halved: the middle of the longest axis, counted in rows.
+// Order of rows along an axis, to halve a node's rows at the middle of the longest axis.
 static int compare_rows(const void *a, const void *b, int axis)
 {
     float x = ((const Row *)a)->x[axis], y = ((const Row *)b)->x[axis];
@@ -294,7 +293,7 @@ static int by_z(const void *a, const void *b) { return compare_rows(a, b, 2); }
 
 static int padded(int count) { return (count + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES; }
 
-// Halves until a tile holds no more than it may; counts them, or with `tile` fills them, their numbers going to `memory`.
+// Halves the rows until a tile holds no more than its limit. Counts the tiles, or with `tile` fills them; their numbers go to `memory`.
 static void split_rows(Row *row, int count, int node, RowTile **tile, float **memory, int *tiles, size_t *floats)
 {
     int data = 0;
@@ -338,7 +337,7 @@ static void split_rows(Row *row, int count, int node, RowTile **tile, float **me
     }
 }
 
-// All rows, those of a cell side by side: (M), first (N+1).
+// Collects all rows (M), those of a cell consecutive; first (N+1) gives the first row of each cell.
 static Row *collect_rows(const Job *job, int *first)
 {
     const VesselTree *tree = job->tree;
@@ -353,7 +352,7 @@ static Row *collect_rows(const Job *job, int *first)
     }
     Row *row = malloc(((size_t)total + 1) * sizeof *row);
     int sum = 0;
-    for (int i = 0; i < n; i++) {   // first[i + 1] becomes the position of the next row of cell i, finally its end
+    for (int i = 0; i < n; i++) {   // first[i + 1] is the position of the next row of cell i, and finally its end
         int own = first[i + 1];
         first[i + 1] = sum;
         sum += own;
@@ -364,7 +363,7 @@ static Row *collect_rows(const Job *job, int *first)
             bool is_data = k < d->data;
             int cell = job->cell[i][k];
             Vec3 x = vec3_sub(is_data ? d->point[k] : d->at[k - d->data], tree->center[cell]);
-            // in a cell wider than the vessel that the guard is of, its field rises more slowly
+            // in a cell wider than the guard's own vessel, the field rises more slowly
             float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]), low = is_data ? 0 : d->bound[k - d->data][0],
                   high = is_data ? 0 : d->bound[k - d->data][1];
             row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, low * scale, high < 0 ? high * scale : high, is_data};

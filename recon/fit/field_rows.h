@@ -10,27 +10,28 @@
 
 enum { FIELD_TILE = 64, GUARD_TILE = 128 };
 
-typedef struct RowTile {     // neighbouring rows of one node: up to FIELD_TILE data, GUARD_TILE guards
+typedef struct RowTile {     // neighbouring rows of one node: at most FIELD_TILE data and GUARD_TILE guards
     int node;
-    int data, data_padded;   // D: points on the wall, f = 0
-    int guards, guards_padded;   // G: f within [low, high]
+    int data, data_padded;   // D: number of points on the wall, target f = 0
+    int guards, guards_padded;   // G: number of guards, target f within [low, high]
     float *x, *y, *z;        // (padded D + padded G) [mm] from the node's centre
-    float *weight;           // (padded D) of a point: 1, or 0 in the padding
+    float *weight;           // (padded D) weight of a point: 1, or 0 in the padding
     float *low, *high;       // (padded G)
-    float middle[3], radius; // [mm] a ball about all of them
+    float middle[3], radius; // [mm] a ball around all rows
 } RowTile;
 
 typedef struct FieldRows {
     int node_count;          // N
     int *first;              // (N+1) node i has tiles first[i] … first[i+1]-1
     RowTile *tile;
-    float *memory;           // of all tiles
-    int64_t dropped;         // data points left out because they lie in another tube's lumen
+    float *memory;           // memory of all tiles
+    int64_t dropped;         // number of data points omitted because they lie in another tube's lumen
 } FieldRows;
 
-// A link of the tree is lumen if its two balls meet; an aneurysm is not a ball and may reach half as far again.
+// Returns true if the link of a node to its parent is lumen: its two balls overlap. An aneurysm is not a ball, so a link to or from it may be half as long
+// again.
 bool field_link_is_lumen(const VesselTree *tree, int node);
-// How far the wall is continued upstream of an open inlet, in the root's radii.
+// Length of the wall's continuation upstream of an open inlet, in the root's radii.
 #define FIELD_INLET_RADII 2.2
 bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads);
 void field_rows_free(FieldRows *rows);

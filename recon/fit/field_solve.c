@@ -1,9 +1,8 @@
-// Levenberg and Marquardt's method on one region's blobs at a time, with the others fixed.
-//
-// Rows, in mm: data e = f/|g|, by Geman and McClure's loss; slope e = s r (r |g| / 2 - 1); guards e = w r/2 (f - clamp(f, low, high)). A
-// linearisation holds |g| and the direction of g. A region is some two dozen blobs that follow each other along the tree; its rows are those of all
-// nodes that see one of them, so an accepted step lowers the sum of squares of the whole tree, independently of the other regions. Regions that share
-// a node's rows are solved one after the other, in the order of their colours: the result does not depend on the threads.
+// Levenberg and Marquardt's method on one region's blobs at a time, with the other blobs fixed.
+// Rows, in mm: data e = f/|g|, with Geman and McClure's loss; slope e = s r (r |g| / 2 - 1); guards e = w r/2 (f - clamp(f, low, high)). The linearisation
+// keeps |g| and the direction of g fixed. A region is about two dozen blobs that are consecutive along the tree; its rows are those of all nodes that see one
+// of them, so an accepted step reduces the sum of squares of the whole tree, independently of the other regions. Regions that share a node's rows are solved
+// one after the other, in the order of their colours, so the result does not depend on the number of threads.
 #include "base/base.h"
 #include "recon/fit/field_model.h"
 #include "recon/fit/lim_energy.h"
@@ -13,26 +12,26 @@
 
 enum { REGION_BLOBS = 28, UNKNOWNS = 5 };
 static const double LEAST_SLOPE = 0.5;
-// Priors: a blob's position and size are tied to their initial values, as strongly as by a few points a hundredth of a radius off.
+// Priors: a blob's position and size are tied to their initial values, as strongly as by a few points with an error of a hundredth of a radius.
 static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.03, LEAST_BASE = 0.1;
 
-typedef struct TileWork {    // a tile's part in a region's solution
+typedef struct TileWork {    // a tile's data in a region's solution
     const RowTile *tile;
-    int count, *local;       // blobs of the region that reach it: their numbers in the region
+    int count, *local;       // blobs of the region that reach the tile: their numbers in the region
     float *still_f, *still_g[3], *f, *g[3];
 } TileWork;
 
 typedef struct Region {
     int first, count;        // blobs order[first … first+count-1]
-    int nodes, *node;        // that see one of them, ascending
+    int nodes, *node;        // nodes that see one of its blobs, ascending
     int colour;
-    double before, after;    // sum of squares
+    double before, after;    // sums of squares before and after the step
     bool failed;
 } Region;
 
 typedef struct Sweep {
     FieldModel *model;
-    int *order;              // (blobs) along the tree
+    int *order;              // (blobs) in order along the tree
     int *region_of, *local_of;   // (blobs)
     int regions;
     Region *region;
@@ -40,18 +39,18 @@ typedef struct Sweep {
     int steps;
 } Sweep;
 
-typedef struct Work {        // of one region
+typedef struct Work {        // memory of one region's solution
     const Sweep *sweep;
     const Region *region;
     int tiles;
     TileWork *tile;
-    int *local;              // of all tiles
+    int *local;              // local numbers of all tiles
     float *memory;
     int unknowns;
     double *matrix, *slope;  // (U, U), (U)
     double *factor, *step;
     FieldBlob *trial;        // (region's blobs)
-    float *row, *gram;       // of a tile: the columns, row by row, and their product
+    float *row, *gram;       // of a tile: its columns, stored by row, and their product
 } Work;
 
 // --- Setting up ---
@@ -64,7 +63,7 @@ static int tiles_of(const Sweep *sweep, const Region *region)
     return tiles;
 }
 
-// The region's blobs that reach the tile, to `local`; returns their number.
+// Lists the region's blobs that reach the tile in `local`; returns their number.
 static int find_blobs(const Sweep *sweep, int region, const RowTile *tile, int *local)
 {
     const FieldModel *model = sweep->model;
@@ -80,7 +79,7 @@ static int find_blobs(const Sweep *sweep, int region, const RowTile *tile, int *
     return count;
 }
 
-// The sums of the fixed blobs.
+// Computes the sums of the fixed blobs.
 static void sum_still(const Sweep *sweep, int region, TileWork *tw)
 {
     const FieldModel *model = sweep->model;
@@ -98,7 +97,7 @@ static void sum_still(const Sweep *sweep, int region, TileWork *tw)
     }
 }
 
-enum { POINTS_MAX = FIELD_TILE + GUARD_TILE, ROWS_MAX = POINTS_MAX + FIELD_TILE };          // of a tile: data, guards, slopes
+enum { POINTS_MAX = FIELD_TILE + GUARD_TILE, ROWS_MAX = POINTS_MAX + FIELD_TILE };          // limits of a tile: data and guards, and these plus slopes
 
 static bool begin_work(Work *w, const Sweep *sweep, const Region *region)
 {
@@ -162,10 +161,10 @@ static void sum_tile(const Work *w, TileWork *tw, const FieldBlob *blob)
     }
 }
 
-// Geman and McClure's loss: e^2 near 0, at most knee^2, so that points which contradict the others do not outweigh them.
+// Geman and McClure's loss: about e^2 near 0, at most knee^2, so that points which contradict the others do not outweigh them.
 static double loss(double e, double knee) { return e * e / (1 + e * e / (knee * knee)); }
 
-// Sum of squares of a tile's rows from the sums as they are.
+// Sum of squares of a tile's rows from the present sums.
 static double energy_of_tile(const FieldModel *model, const TileWork *tw)
 {
     const RowTile *tile = tw->tile;
@@ -240,10 +239,10 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
     }
 }
 
-// A pair of blobs' block of the product, to the upper triangle of the matrix.
+// Adds the block of a pair of blobs to the upper triangle of the matrix.
 static void add_pair(Work *w, int a, int b, const float *block, int stride)
 {
-    bool turned = a > b;     // because the numbers of a tile's blobs need not be sorted
+    bool turned = a > b;     // transposed, because the numbers of a tile's blobs need not be sorted
     double *to = w->matrix + (size_t)(UNKNOWNS * (turned ? b : a)) * (size_t)w->unknowns + (size_t)(UNKNOWNS * (turned ? a : b));
     for (int i = 0; i < UNKNOWNS; i++)
         for (int k = a == b ? i : 0; k < UNKNOWNS; k++)
@@ -310,16 +309,16 @@ static void linearise(Work *w)
 
 static double bound(double value, double most) { return fmax(-most, fmin(most, value)); }
 
-// `start`: the blob at the start of the sweep, whose rows are known up to FIELD_ROOM times its reach; beyond that the step would be judged without
-// the rows it worsens.
+// Returns the blob after a step. `start`: the blob at the start of the sweep, whose rows are known up to FIELD_ROOM times its reach; a larger blob would be
+// judged without the rows that it worsens.
 static FieldBlob moved_by(const FieldBlob *b, const double *step, const FieldBlob *start)
 {
     FieldBlob to = *b;
     to.amplitude += bound(step[0], 0.5 + 0.5 * fabs(b->amplitude));
     to.amplitude = b->is_base ? fmax(to.amplitude, LEAST_BASE) : to.amplitude;
-    Vec3 way = vec3_scale(vec3(step[1], step[2], step[3]), b->reach);
-    double length = vec3_norm(way), most = 0.15 * b->reach;
-    to.center = vec3_add_scaled(b->center, length > most ? most / length : 1, way);
+    Vec3 shift = vec3_scale(vec3(step[1], step[2], step[3]), b->reach);
+    double length = vec3_norm(shift), most = 0.15 * b->reach;
+    to.center = vec3_add_scaled(b->center, length > most ? most / length : 1, shift);
     Vec3 off = vec3_sub(to.center, b->birth);
     double away = vec3_norm(off), furthest = (b->is_base ? 0.25 : 0.6) * b->birth_reach;
     if (away > furthest)
@@ -423,7 +422,7 @@ static int compare_places(const void *a, const void *b)
     return (p->blob > q->blob) - (p->blob < q->blob);
 }
 
-// Gives spatial neighbours near numbers, because an aneurysm's many blobs all belong to one node.
+// Morton number of a blob: spatial neighbours get similar numbers, because an aneurysm's many blobs all belong to one node.
 static unsigned morton_of(const VesselTree *tree, const FieldBlob *b)
 {
     Vec3 x = vec3_scale(vec3_sub(b->birth, tree->center[b->owner]), 1 / tree->radius[b->owner]);
@@ -487,7 +486,8 @@ static bool is_due(const Sweep *s, const Region *region)
     return false;
 }
 
-// Graph colouring: a region takes the first colour not used on any of its nodes. `used` (N, WORDS) holds each node's colours as bits.
+// Graph colouring: a region takes the first colour that is not used on any of its nodes. `used` (N, WORDS) holds each node's colours as bits. Returns the
+// number of colours.
 static int colour_regions(const Sweep *s)
 {
     enum { WORDS = 4 };

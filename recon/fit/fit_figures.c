@@ -34,8 +34,8 @@ void fit_figures_print(FILE *out, const VesselTree *model, const FitFigures *f, 
 {
     fprintf(out, "nodes          %d, %lld points\n", model->node_count, (long long)model->point_count);
     if (f->left_out > 0)
-        fprintf(out, "left out       %ld points, in another vessel's lumen\n", f->left_out);
-    fprintf(out, "blobs          %ld: %.1f a node, median %d, most %d\n", f->blobs, (double)f->blobs / model->node_count, f->blobs_median, f->blobs_most);
+        fprintf(out, "not fitted     %ld points, in another vessel's lumen\n", f->left_out);
+    fprintf(out, "blobs          %ld: %.1f per node, median %d, at most %d\n", f->blobs, (double)f->blobs / model->node_count, f->blobs_median, f->blobs_most);
     fprintf(out, "d_a            median %.4f mm, worst %.4f mm (node %d)\n", f->error_median, f->error_worst, f->worst_node);
     fprintf(out, "d_a classes    C1 < 0.5 voxel %.2f %%, C2 < 1 voxel %.2f %%, C3 < 2 voxels %.2f %%, C4 %.2f %% (voxel %g mm)\n", f->class_percent[0],
             f->class_percent[1], f->class_percent[2], f->class_percent[3], voxel);

@@ -1,4 +1,5 @@
-// Rays from the node's centre to its own model's wall, as long as they stay in its cell, on rings about its direction; from there to the mixed wall.
+// Casts rays from the node's centre to its own model's wall, on rings around its direction, as long as they stay in its cell; then moves from there to the
+// blended wall.
 #include "recon/fit/lim_agree.h"
 
 #include "base/base.h"
@@ -36,7 +37,7 @@ void lim_frame(const VesselTree *tree, int node, Vec3 *e1, Vec3 *e2)
     *e2 = vec3_cross(d, *e1);
 }
 
-// From c along d to the wall; false if that is beyond the cell.
+// Finds the wall from c along d. Returns false if it is outside the cell.
 static bool find_wall(const VesselTree *tree, int node, const Blobby *model, Vec3 d, Vec3 *wall)
 {
     Vec3 c = tree->center[node];
@@ -78,7 +79,7 @@ static void agree_on_node(void *context, long index)
     lim_frame(tree, node, &e1, &e2);
     bool good = model.count > 0 && blobby_field(&model, tree->center[node]) > 0;
     for (int k = 0; good && k < RINGS * AROUND; k++) {
-        // every other ring turned by half a step: the pattern is its own mirror image
+        // every other ring is rotated by half a step, so that the pattern is its own mirror image
         double z = 1 - (2 * (k / AROUND) + 1.0) / RINGS, ring = sqrt(1 - z * z), angle = 2 * PI * (k % AROUND + 0.5 * (k / AROUND % 2)) / AROUND;
         Vec3 out = vec3_add(vec3_scale(e1, ring * same_cos(angle)), vec3_scale(e2, ring * same_sin(angle)));
         if (!find_wall(tree, node, &model, vec3_add_scaled(out, z, along), &wall))

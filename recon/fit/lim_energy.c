@@ -15,10 +15,11 @@
 #include <string.h>
 
 enum { ARRAYS = 20 };
-// a gradient this short has no direction, so its curvature gets almost no weight
+// squared gradient below which the direction is undefined, so the curvature gets almost no weight
 static const float LEAST_GRADIENT2 = 1e-8f;
 
-// One kernel text, three compilations: base/simd.h says which runs. No fused multiply-add (-ffp-contract=off), one accumulator a lane: same bits.
+// The kernel's source is compiled three times; base/simd.h chooses the version that runs. No fused multiply-add (-ffp-contract=off) and one accumulator per
+// lane, so all versions give the same bits.
 typedef struct LimKernels {
     void (*add)(LimPoints *, const LimBlob *, double);
     void (*sum)(LimPoints *, const LimBlob *, int, double);
@@ -89,7 +90,7 @@ void lim_points_approach(LimPoints *points, double longest, double slide) { kern
 
 void lim_points_feet(LimPoints *points, double radius, float *offset, float *slope) { kernels()->feet(points, (float)radius, offset, slope); }
 
-// Adds the lanes of an accumulator, in double, by halves: always in this order.
+// Adds the lanes of an accumulator in double precision by halves, always in this order.
 static double add_lanes(const float *lane)
 {
     double half[LIM_LANES / 2];

@@ -1,14 +1,14 @@
-// The tree's side of LIM (Kerrien et al. 2017, 4.5): the points to which a node's model is fitted, its start, and one job per node.
-//
-// Points are concatenated up to topological distance 2; where nodes stand closer than half a radius, as on imported centrelines, up to one radius
-// along the tree, so that overlap does not depend on spacing. The root's points are repeated upstream: without that a model closes 1.4 to 1.7 r
-// before the inlet. Guards (ours): the centres of the nodes must be in the lumen, and a ring of points beyond the wall outside it. They act only
-// where violated; they prevent constrictions in the tool's path, and ghost lobes where points are missing, for example at the mouth of an untracked
-// branch that one model would open and its neighbour close. Agreement (ours): on noisy points with holes neighbouring models stop at different
-// places, one a bulge richer than the next. The second pass starts from the first's models and adds points of the mixed wall, which all models around
-// see, where the first's wall is further than AGREES from it. Redoing every model instead costs a third more and gains little: p99 of the jump as a
-// tool meets it on the angiogram's tubes 0.003 mm both ways. Tried and rejected: agreed points alone (the wall drifts 0.02 mm from the data, and out
-// of the aneurysm); starting from scratch (1.3 times the jumps, more work).
+// LIM for a whole tree (Kerrien et al. 2017, 4.5): collects the points to which a node's model is fitted, chooses its start, and runs one job per node.
+// Points: concatenated up to topological distance 2; if nodes are closer than half a radius, as on imported centrelines, up to one radius along the tree, so
+// that the overlap does not depend on the spacing. The root's points are repeated upstream: without that a model closes 1.4 to 1.7 r before the inlet.
+// Guards (our extension): the centres of the nodes must be in the lumen, and a ring of points beyond the wall outside it. They act only where violated. They
+// prevent constrictions in the tool's path, and ghost lobes where points are missing, for example at the ostium of an untracked branch that one model would
+// open and its neighbour close.
+// Agreement (our extension): on noisy points with holes neighbouring models stop at different places, one with a bulge more than the next. The second pass
+// starts from the first pass's models and adds points of the blended wall, which all models around see, where the first wall is further than AGREES from it.
+// Fitting every model again costs a third more and gains little: the p99 of the jump as a tool meets it on the angiogram's tubes is 0.003 mm in both cases.
+// Tried and rejected: agreed points alone (the wall drifts 0.02 mm from the data, and out of the aneurysm); starting from scratch (1.3 times the jumps, more
+// work).
 #include "recon/fit/lim_fit.h"
 
 #include "base/base.h"
@@ -20,7 +20,7 @@
 
 enum { NEAR_CAPACITY = 256, GUARD_ANGLES = 12, GUARD_NODES = 6, SPHERE_DIRECTIONS = 48, LEAST_POINTS = 24 };
 
-// Models whose wall is within this distance of the agreed wall everywhere stay unchanged, in radii.
+// Models whose wall is everywhere within this distance of the agreed wall, in radii, are not fitted again.
 static const double AGREES = 0.03;
 
 LimFitOptions lim_fit_default_options(void)
@@ -52,7 +52,7 @@ LimFitOptions lim_fit_paper_options(void)
     options.beta = 1e-3;
     options.target_mm = 0.3;
     options.max_loops = 5;
-    options.line_searches = 20;   // with 4 the repulsion's displacement is never undone and the new blob vanishes outside
+    options.line_searches = 20;   // with 4 the displacement by the repulsion is never undone and the new blob vanishes outside
     options.weigh_distance = options.project_points = options.sweep_all_blobs = options.extend_inlet = options.guard_shape = options.agree = false;
     options.give_up_splits = 0;
     options.max_points = 1500;
@@ -87,13 +87,13 @@ static bool check_options(const LimFitOptions *o, Faults *faults)
 
 typedef struct Near {
     int node, hops;
-    double path;             // along the tree [mm]
+    double path;             // [mm] path length along the tree
 } Near;
 
 typedef struct Gather {      // the memory of one job
     Near near[NEAR_CAPACITY];
     int near_count;
-    int own_count;           // the first of `near` contribute points
+    int own_count;           // number of nodes, at the start of `near`, that contribute points
     Vec3 *point;
     int point_count, point_capacity;
     float *weight;           // (point_count), or NULL
@@ -107,10 +107,10 @@ typedef struct Gather {      // the memory of one job
     LimTube tube[NEAR_CAPACITY + 1];
     int tube_count;
     bool is_extended;        // the inlet's points were repeated upstream
-    double reach;            // points further from the node belong to other models
+    double reach;            // [mm] points further than this from the node belong to other models
 } Gather;
 
-// Breadth first, so `near` is sorted by hops; nodes that contribute points are moved to the front, in order.
+// Searches breadth first, so `near` is sorted by the number of links; then moves nodes that contribute points to the front, keeping their order.
 static void find_near(const VesselTree *tree, int node, const LimFitOptions *options, int hops, Gather *gather)
 {
     double radius = tree->radius[node], own_path = 0.5 * hops * radius, wide_path = 5 * radius;
@@ -155,7 +155,7 @@ static bool add_point(Gather *gather, Vec3 p)
     return true;
 }
 
-// The root's own points again, upstream, by their extent along the axis, so that the copies continue the tube to 2.2 r before the root.
+// Repeats the root's own points upstream by their extent along the axis, so that the copies continue the tube to 2.2 r before the root.
 static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
 {
     Vec3 root = tree->center[0], upstream = vec3_negate(tree->direction[0]);
@@ -179,7 +179,7 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
     for (int copy = 1; copy < 12 && most + (copy - 1) * slab < 2.2 * radius; copy++)
         for (int64_t i = first; i < last; i++) {
             Vec3 p = vec3_add_scaled(tree->point[i], copy * slab, upstream);
-            // further points of a bent vessel would add its sagitta, 0.1 mm on an arc of radius 4
+            // in a bent vessel more distant points would add its sagitta, 0.1 mm on an arc of radius 4 mm
             if (vec3_dot(vec3_sub(tree->point[i], root), upstream) >= most - slab && vec3_dot(vec3_sub(p, root), upstream) < 2.2 * radius &&
                 vec3_distance(p, center) < gather->reach && !add_point(gather, p))
                 return false;
@@ -187,7 +187,7 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
     return true;
 }
 
-// Keeps `most` of `count` points, evenly.
+// Keeps at most `most` of `count` points, evenly spaced in the list.
 static int thin_points(Vec3 *point, int count, int most)
 {
     if (count <= most)
@@ -199,7 +199,7 @@ static int thin_points(Vec3 *point, int count, int most)
     return kept;
 }
 
-// An aneurysm near a node needs more points: it is wide, and neither round nor a tube.
+// Returns true if an aneurysm is near the node: it needs more points, because it is wide and neither round nor a tube.
 static bool is_at_sac(const VesselTree *tree, const Gather *gather)
 {
     bool at_sac = false;
@@ -215,7 +215,7 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
     double widest = 0;
     for (int k = 0; k < gather->own_count; k++)
         widest = fmax(widest, tree->radius[gather->near[k].node]);
-    // this model is never evaluated beyond: its power cell ends before
+    // this model is never evaluated further away: its power cell ends before
     gather->reach = options->guard_shape ? fmax(3.5 * tree->radius[node], 1.5 * widest) : HUGE_VAL;
     gather->point_count = 0;
     gather->is_extended = false;
@@ -226,7 +226,7 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
             if (vec3_distance(tree->point[i], center) < gather->reach && !add_point(gather, tree->point[i]))
                 return false;
     }
-    // a sac's or branch's mouth may reach into this node's cell from a node further along the tree
+    // the ostium of a sac or branch may reach into this node's cell from a node further along the tree
     for (int k = gather->own_count; k < gather->near_count && options->guard_shape; k++) {
         int from = gather->near[k].node;
         double apart = vec3_distance(tree->center[from], center), slack = 0.3 * tree->radius[node] * apart;
@@ -261,7 +261,7 @@ static void guard_lumen(const VesselTree *tree, int node, bool extended, Gather 
         if (vec3_distance(tree->center[at], tree->center[node]) > 0.8 * gather->reach)
             continue;
         add_guard(gather, tree->center[at], 0.5 * tree->radius[at]);
-        // half way to the parent, where the two spheres overlap well (a link may run through background)
+        // halfway to the parent, if the two spheres overlap well (a longer link may run through background)
         double length = parent >= 0 ? vec3_distance(tree->center[at], tree->center[parent]) : HUGE_VAL;
         if (length < 0.8 * (tree->radius[at] + tree->radius[parent >= 0 ? parent : at]))
             add_guard(gather, vec3_mix(tree->center[at], tree->center[parent], 0.5), 0.4 * fmin(tree->radius[at], tree->radius[parent]));
@@ -271,7 +271,7 @@ static void guard_lumen(const VesselTree *tree, int node, bool extended, Gather 
             add_guard(gather, vec3_add_scaled(tree->center[0], -0.5 * k * tree->radius[0], tree->direction[0]), 0.5 * tree->radius[0]);
 }
 
-// Whether x is certainly outside: clear of all nearby data and tubes.
+// Returns true if x is certainly outside: clear of all nearby data and tubes.
 static bool is_outside(const VesselTree *tree, const Gather *gather, Vec3 x, double clearance)
 {
     for (int k = 0; k < gather->near_count; k++) {
@@ -285,7 +285,7 @@ static bool is_outside(const VesselTree *tree, const Gather *gather, Vec3 x, dou
     return true;
 }
 
-// A ring about a vessel node, half a radius beyond the furthest point of each sector; 1.6 r in sectors without points.
+// Adds a ring of guards around a vessel node, half a radius beyond the furthest point of each sector; 1.6 r in sectors without points.
 static void guard_ring(const VesselTree *tree, int at, Gather *gather)
 {
     Vec3 c = tree->center[at], d = tree->direction[at], e1, e2;
@@ -308,7 +308,7 @@ static void guard_ring(const VesselTree *tree, int at, Gather *gather)
     }
 }
 
-// The same about an aneurysm's centre, in all directions that have points.
+// The same around an aneurysm's centre, in all directions that have points.
 static void guard_sphere(const VesselTree *tree, int at, Gather *gather)
 {
     Vec3 c = tree->center[at];
@@ -341,7 +341,7 @@ static void gather_guards(const VesselTree *tree, int node, bool extended, Gathe
         int at = gather->near[k].node;
         if (tree->kind[at] != NODE_VESSEL)
             continue;
-        // dense centrelines: every so many nodes are enough
+        // on dense centrelines, a subset of the nodes is enough
         if (vessels <= GUARD_NODES || seen * GUARD_NODES / vessels >= taken) {
             guard_ring(tree, at, gather);
             taken++;
@@ -350,7 +350,8 @@ static void gather_guards(const VesselTree *tree, int node, bool extended, Gathe
     }
 }
 
-// The region for blobs: the tubes between nearby nodes and their parents, slightly thinner than the vessel; aneurysms are seldom round.
+// Collects the region for blobs: the tubes between nearby nodes and their parents, slightly thinner than the vessel, but wider at an aneurysm, which is
+// seldom round.
 static void gather_tubes(const VesselTree *tree, Gather *gather)
 {
     const double inside = 0.9;
@@ -361,13 +362,13 @@ static void gather_tubes(const VesselTree *tree, Gather *gather)
         bool sac = tree->kind[at] == NODE_ANEURYSM;
         double own = (sac ? 1.2 : inside) * tree->radius[at], before = inside * fmin(tree->radius[from], tree->radius[at]);
         gather->tube[gather->tube_count++] = (LimTube){tree->center[from], tree->center[at], from == at ? own : before, own};
-        if (at == 0)   // upstream of the inlet
+        if (at == 0)   // continue it upstream of the inlet
             gather->tube[gather->tube_count++] =
                 (LimTube){tree->center[0], vec3_add_scaled(tree->center[0], -3 * tree->radius[0], tree->direction[0]), own, own};
     }
 }
 
-// Blobs on nearby nodes, without crowding, for a second attempt.
+// Places blobs on nearby nodes, not too close to each other, for a second attempt.
 static void gather_retry(const VesselTree *tree, int node, Gather *gather)
 {
     gather->retry_count = 0;
@@ -390,7 +391,7 @@ typedef struct NodeModel {
     Vec3 *center;
     double *width;
     double error;
-    bool failed;             // memory
+    bool failed;             // out of memory
 } NodeModel;
 
 typedef struct Job {
@@ -399,13 +400,13 @@ typedef struct Job {
     const int *order;        // (N) nodes, the largest job first
     NodeModel *model;        // (N)
     // the second pass
-    const VesselTree *first; // the first's models, NULL in the first
+    const VesselTree *first; // the first pass's models; NULL in the first pass
     const Vec3 *agreed;      // (N, LIM_AGREED_MOST)
     const int *agreed_count; // (N)
-    const double *differs;   // (N) how far the first's wall is from the one agreed on
+    const double *differs;   // (N) [mm] largest distance of the first pass's wall from the agreed wall
 } Job;
 
-// d_a: the 90th percentile of Taubin's distance of the node's own points, or of `others` where it has none.
+// d_a: the 90th percentile of the Taubin distances of the node's own points, or of the gathered points if it has none.
 static double node_error(const VesselTree *tree, int node, const Gather *gather, const NodeModel *model, double iso_level)
 {
     int64_t first = tree->point_offset[node], own = tree->point_offset[node + 1] - first;
@@ -443,7 +444,7 @@ static bool add_agreed(const Job *job, int node, Gather *gather)
 static bool gather_node(const Job *job, int node, Gather *gather)
 {
     const LimFitOptions *options = job->options;
-    // a node with hardly any points nearby searches further along the tree
+    // if a node has very few points nearby, search further along the tree
     for (int more = 0; more <= 8; more++) {
         find_near(job->tree, node, options, options->topological_distance + more, gather);
         if (!gather_points(job->tree, node, options, gather))
@@ -451,15 +452,15 @@ static bool gather_node(const Job *job, int node, Gather *gather)
         if (gather->point_count >= LEAST_POINTS)
             break;
     }
-    if (options->guard_shape && gather->point_count >= 4) {   // both from the data, not from derived points
+    if (options->guard_shape && gather->point_count >= 4) {   // both use the data, not derived points
         gather_guards(job->tree, node, gather->is_extended, gather);
         gather_tubes(job->tree, gather);
     }
     return !job->first || add_agreed(job, node, gather);
 }
 
-// The model is evaluated in the node's cell, where a few blobs bulge: fitted evenly to five nodes' points they were 0.01 mm too wide there. So points
-// lose weight with their power distance beyond the node's ball, except at an aneurysm, whose cells reach far from their balls.
+// Reduces the weight of points with their power distance beyond the node's ball, except at an aneurysm, whose cells extend far from their balls. The model is
+// evaluated only in the node's cell, where a few blobs bulge: fitted evenly to five nodes' points they were 0.01 mm too wide there.
 static bool weigh_points(const VesselTree *tree, int node, Gather *gather)
 {
     const double least = 0.3;
@@ -506,7 +507,7 @@ static LimFitTask task_of(const Job *job, int node, Gather *gather, double *star
         task.retry = gather->retry;
         task.retry_radius = gather->retry_radius;
     }
-    if (tree->kind[node] == NODE_ANEURYSM) {   // the paper's figure 5: one blob
+    if (tree->kind[node] == NODE_ANEURYSM) {   // start with one blob, as in the paper's figure 5
         task.start_count = 1;
         task.start = &tree->center[node];
         task.start_radius = &tree->radius[node];
@@ -547,7 +548,7 @@ static void fit_node(void *context, long index)
     bool good = gather && center && width && start_radius && gather_node(job, node, gather);
     if (job->first && options.give_up_splits > 1)
         options.give_up_splits = 1;
-    // neighbours at an aneurysm agree only as well as each fits the data: 0.19 mm with the usual t_g, 0.06 with half of it
+    // neighbouring models at an aneurysm agree only as well as each fits the data: to 0.19 mm with the usual t_g, to 0.06 mm with half of it
     if (good && gather->at_sac)
         options.voxel_mm *= 0.5;
     if (good && options.target_mm == 0 && options.voxel_mm == 0)
@@ -558,7 +559,7 @@ static void fit_node(void *context, long index)
         LimFitTask task = task_of(job, node, gather, start_radius);
         model->count = lim_fit_model(&task, &options, center, width);
         good = model->count > 0;
-    } else if (good) {   // nothing to fit: the node's sphere
+    } else if (good) {   // no points to fit: use the node's sphere
         model->count = 1;
         center[0] = tree->center[node];
         width[0] = blob_width_for_radius(tree->radius[node], options.iso_level);
@@ -628,7 +629,7 @@ static int compare_sizes(const void *a, const void *b)
     return x->points != y->points ? (x->points < y->points) - (x->points > y->points) : (x->node > y->node) - (x->node < y->node);
 }
 
-// Nodes by the number of points around them, most first, so that the longest job, usually an aneurysm, does not run last on one core.
+// Orders nodes by the number of points around them, most first, so that the longest job, usually an aneurysm, does not run last on one core.
 static int *order_by_size(const VesselTree *tree)
 {
     int n = tree->node_count, *order = calloc((size_t)n, sizeof *order);
@@ -650,7 +651,7 @@ static int *order_by_size(const VesselTree *tree)
     return order;
 }
 
-typedef struct PassProgress {   // of one pass of several
+typedef struct PassProgress {   // progress of one pass of several
     const Progress *of_all;
     long before, total;
 } PassProgress;
@@ -662,7 +663,7 @@ static void pass_on(void *context, long done, long total)
     pass->of_all->call(pass->of_all->context, pass->before + done, pass->total);
 }
 
-// All nodes once; NULL if out of memory.
+// Fits all nodes once. Returns NULL if out of memory.
 static VesselTree *fit_pass(Job *job, const Progress *progress)
 {
     const VesselTree *tree = job->tree;
@@ -686,7 +687,7 @@ static VesselTree *fit_pass(Job *job, const Progress *progress)
     return out;
 }
 
-// The second pass; frees the first's models.
+// Makes the second pass; frees the first pass's models.
 static VesselTree *fit_to_agree(Job *job, VesselTree *first, const Progress *progress)
 {
     size_t nodes = (size_t)first->node_count;
@@ -717,7 +718,7 @@ VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const 
                    (long long)tree->point_count);
         return NULL;
     }
-    // T is a length: without an angiogram it scales with the vessels, and so do the possible shapes of blobs
+    // T is a length: without an angiogram it scales with the vessels, so that the possible shapes of blobs scale too
     LimFitOptions scaled = *options;
     double radius = 0;
     for (int i = 0; i < tree->node_count; i++)

@@ -1,12 +1,12 @@
-// One local model of LIM: select, split, optimise. Kerrien et al. 2017, 4.3 to 4.5.
+// Fits one local model of LIM: select, split, optimise. Kerrien et al. 2017, 4.3 to 4.5.
 //
 //   worst point    i* = argmax |f(P_i)| / |grad f(P_i)|                                                           (eq. 8)
 //   its blob       j* = argmin |f_j(P_i*) - T| / |grad f_j(P_i*)|, f_j = rho_j phi(|P - C_j| / rho_j)        (eq. 9, 10 corrected)
-//   split          rho'^2 (sqrt(2 rho'/c) - 1) = rho^2 (sqrt(rho/c) - 1): the level set of value c = f_j(P_i*) stays
+//   split          rho'^2 (sqrt(2 rho'/c) - 1) = rho^2 (sqrt(rho/c) - 1): the level set of value c = f_j(P_i*) is unchanged
 // The paper matches the level T; in a model of many blobs a blob contributes less than T at the surface, and for rho <= T that equation has no
 // solution. The new blob is optimised by Polak-Ribiere descent, centre before width (in the other order the new blob vanishes and never recovers).
-// Then a short pass over all blobs near the split: not in the paper; blob-wise descent converges badly because neighbouring blobs are strongly
-// coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
+// Then a short pass over all blobs near the split follows, which is not in the paper: descent blob by blob converges badly because neighbouring blobs are
+// strongly coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
 #include "recon/fit/lim_model.h"
 
 #include "base/base.h"
@@ -18,14 +18,15 @@
 
 enum { NOISE_PAIRS = 128, ROUNDS = 4, SWEEP_BLOBS = 16, SWEEP_SIZE = 4 * SWEEP_BLOBS, LINE_EVALUATIONS = 8 };
 
-// E_a's weight is this many times the variance of the noise times r^2 [mm^4]: exact points are not smoothed, noisy ones are. The noise is what
-// neighbours' distances differ by; the distances themselves include the misfit, which smoothing would preserve.
+// Weight of E_a, in units of the variance of the noise times r^2 [mm^4]: exact points are not smoothed, noisy ones are. The noise is estimated from the
+// differences between the distances of neighbouring points; the distances themselves include the misfit, which smoothing would preserve.
 static const double BEND_OF_NOISE = 1;
 
-// A model within t_g is done when its mean square distance exceeds the noise's by no more than the square of this share of t_g.
+// A model within t_g is accepted when its mean square distance exceeds that of the noise by at most the square of this fraction of t_g.
 static const double MISFIT = 0.17;
 
-// Gauss-Newton stops where an iteration gains less than this share of the energy; the second where the model is still far (2 t_g) from its data.
+// Gauss-Newton stops when an iteration reduces the energy by less than this fraction; the second value applies while the model is still far (2 t_g) from its
+// data.
 static const double LEAST_GAIN = 1.5e-3, ROUGH_GAIN = 1e-2;
 
 typedef struct Model {
@@ -39,15 +40,15 @@ typedef struct Fit {
     LimPoints points;        // data first, then guards
     Model model, best;
     int capacity;
-    bool uses_feet;          // E_d and E_a at the feet of the data on the surface, not at the data
-    double beta, target;     // of E_a at the moment; t_g [mm]
-    int pair_count, pair[NOISE_PAIRS][2];   // of neighbouring data: what their distances differ by is noise, not misfit
-    double noise2;           // variance of the noise, from these pairs [mm^2]
-    double alpha;            // weight of E_c at the moment
+    bool uses_feet;          // E_d and E_a are evaluated at the feet of the data on the surface, not at the data
+    double beta, target;     // present weight of E_a; t_g [mm]
+    int pair_count, pair[NOISE_PAIRS][2];   // pairs of neighbouring data: the difference of their distances is noise, not misfit
+    double noise2;           // [mm^2] variance of the noise, from these pairs
+    double alpha;            // present weight of E_c
     double reach;            // largest distance of a blob's centre from the node [mm]
-    float *distance;         // (padded) of the data
-    float *offset;           // (padded) signed distance of a point from its foot, > 0 inside
-    float *column;           // (SWEEP_SIZE, 2 padded) of the Gauss-Newton pass
+    float *distance;         // (padded) distances of the data
+    float *offset;           // (padded) [mm] signed distance of a point from its foot, > 0 inside
+    float *column;           // (SWEEP_SIZE, 2 padded) columns of the Gauss-Newton pass
     float *residual;         // (2 padded)
     double *normal;          // (SWEEP_SIZE, SWEEP_SIZE)
     double *factor;
@@ -65,7 +66,7 @@ static bool fit_create(Fit *fit, const LimFitTask *task, const LimFitOptions *op
     *fit = (Fit){.options = options, .task = task, .target = fit_target(options, task->radius)};
     int guards = options->guard_shape ? task->guard_count : 0;
     fit->capacity = options->max_blobs + 1;
-    // E_a is about 1 / (4 r^2): below 1 mm its pull is kept in proportion to the vessel
+    // E_a is about 1 / (4 r^2): for radii below 1 mm its effect is kept in proportion to the vessel
     fit->beta = options->beta * (options->weigh_distance ? fmin(1, same_square(same_square(task->radius))) : 1);
     fit->uses_feet = options->weigh_distance && options->project_points;
     if (!lim_points_create(&fit->points, task->point_count + guards))
@@ -94,7 +95,7 @@ static void fit_free(Fit *fit)
     free(fit->normal);
 }
 
-// Some data with their nearest neighbours.
+// Pairs a sample of the data with their nearest neighbours.
 static void find_pairs(Fit *fit)
 {
     const float *restrict x = fit->points.given[0], *restrict y = fit->points.given[1], *restrict z = fit->points.given[2];
@@ -137,7 +138,7 @@ static void fit_set_points(Fit *fit)
     int data = task->point_count;
     for (int i = 0; i < points->count; i++) {
         Vec3 p = vec3_sub(i < data ? task->point[i] : task->guard[i - data], task->center);
-        // beyond the points a blob only bends the field from afar (once seen: a chain of them 9 r out, without which the model was invalid)
+        // further out than the points a blob only bends the field from afar (seen once: a chain of blobs up to 9 r out, without which the model was invalid)
         if (i < data)
             fit->reach = fmax(fit->reach, 1.2 * vec3_norm(p));
         points->x[i] = (float)p.x;
@@ -155,8 +156,8 @@ static void fit_set_points(Fit *fit)
 
 static void fit_refresh_sums(Fit *fit) { lim_points_sum(&fit->points, fit->model.blob, fit->model.count, fit->options->iso_level); }
 
-// The slope between the data and the surface, |g| - d/2 f_nn with d = f / |g|: the slope at the point itself is smaller outside, where it
-// would weigh noise more than inside; that made vessels 0.03 mm too wide at 0.1 mm of noise.
+// Mean slope between a data point and the surface, |g| - d/2 f_nn with d = f / |g|. The slope at the point itself is smaller outside, where it would weight
+// noise more than inside; that made vessels 0.03 mm too wide at 0.1 mm of noise.
 static double between_slope(const LimPoints *points, int i)
 {
     double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i], g2 = gx * gx + gy * gy + gz * gz + 1e-12;
@@ -166,9 +167,9 @@ static double between_slope(const LimPoints *points, int i)
     return fmin(fmax(between, 0.4 * slope), 2.5 * slope);
 }
 
-// Moves the data to their feet on the present surface, and bounds each so that its residual is its distance times the slope there: then least squares
-// are those of true distances, and noise along the normal leaves no bias. A point whose foot is not found stays where it was measured. Starts from
-// the previous feet with the sums there, so two steps suffice.
+// Moves the data to their feet on the present surface, and sets each bound so that its residual is its distance times the slope there: the least squares are
+// then those of true distances, and noise along the normal causes no bias. A point whose foot is not found stays where it was measured. Starts from the
+// previous feet and the sums there, so two steps suffice; `afresh`: starts from the measured points.
 static void find_feet(Fit *fit, bool afresh)
 {
     const int steps = afresh ? 3 : 2;
@@ -183,7 +184,7 @@ static void find_feet(Fit *fit, bool afresh)
         if (afresh || step > 0)
             fit_refresh_sums(fit);
         lim_points_approach(points, 0.4 * radius, step < steps - 1 ? 0.7 : 0);
-        for (int k = 0; k < 3; k++)   // guards stay
+        for (int k = 0; k < 3; k++)   // guards do not move
             memcpy(at[k] + data, points->given[k] + data, (size_t)(points->padded - data) * sizeof(float));
     }
     fit_refresh_sums(fit);
@@ -199,7 +200,7 @@ static void find_feet(Fit *fit, bool afresh)
         fit_refresh_sums(fit);
 }
 
-// Distance of data point i: from its foot, which lies near the surface, or Taubin's. Signed, > 0 inside.
+// Distance of data point i from its foot, which lies near the surface, or Taubin's distance. Signed, > 0 inside.
 static double data_distance(const Fit *fit, int i)
 {
     const LimPoints *points = &fit->points;
@@ -207,7 +208,7 @@ static double data_distance(const Fit *fit, int i)
     return (double)fit->offset[i] + (double)points->f[i] / sqrt(gx * gx + gy * gy + gz * gz + 1e-8);
 }
 
-// Feet of the data, weights of E_d and E_a, bounds of the guards from the model as it is. The sums hold all blobs, before and after.
+// Updates the feet of the data, the weights of E_d and E_a and the bounds of the guards from the present model. The sums hold all blobs, before and after.
 static void fit_refresh_weights(Fit *fit, bool afresh)
 {
     LimPoints *points = &fit->points;
@@ -215,7 +216,7 @@ static void fit_refresh_weights(Fit *fit, bool afresh)
     double mean2 = 0, mean = 0, square = 0;
     if (fit->uses_feet)
         find_feet(fit, afresh);
-    for (int i = 0; i < data; i++) {   // residual: slopes
+    for (int i = 0; i < data; i++) {   // `residual` holds the slopes here
         if (!fit->uses_feet || fit->residual[i] < 0)
             fit->residual[i] = (float)between_slope(points, i);
         mean2 += (double)fit->residual[i] * (double)fit->residual[i];
@@ -242,7 +243,7 @@ static void fit_refresh_weights(Fit *fit, bool afresh)
     double iso_level = fit->options->iso_level;
     for (int i = data; i < points->count; i++) {
         double clearance = fit->task->clearance[i - data];
-        // inside f grows by about the slope per mm and flattens towards the axis; outside it can fall no lower than -T
+        // inside, f grows by about the slope per mm and flattens towards the axis; outside, it cannot fall below -T
         points->weight[i] = 1.0f / (float)data;
         points->low[i] = clearance > 0 ? (float)(0.5 * clearance * mean) : -1e30f;
         points->high[i] = clearance > 0 ? 1e30f : (float)fmax(0.35 * clearance * mean, -0.6 * iso_level);
@@ -255,7 +256,7 @@ typedef struct Trial {
     double energy, slope[4];
 } Trial;
 
-// E of the model with blob j at `blob`; the sums hold all the others.
+// Energy of the model with blob j at `blob`; the sums hold all the others.
 static Trial evaluate(Fit *fit, int j, LimBlob blob)
 {
     LimBlob kept = fit->model.blob[j];
@@ -273,8 +274,8 @@ static Trial evaluate(Fit *fit, int j, LimBlob blob)
     return trial;
 }
 
-// A blob is a piece of the vessel's inside: its centre, left outside all tubes, is drawn back to the one that it left least. Without that, noisy
-// points grow lobes: blobs outside the wall that fit one outlier each and narrow the lumen in between.
+// Moves a blob's centre that is outside all tubes back into the nearest one, because a blob is a part of the lumen. Without that, noisy points grow lobes:
+// blobs outside the wall that fit one outlier each and narrow the lumen in between.
 static void keep_in_tubes(const LimFitTask *task, LimBlob *blob)
 {
     Vec3 x = vec3_add(task->center, vec3(blob->center[0], blob->center[1], blob->center[2])), foot = x;
@@ -322,8 +323,8 @@ static double slope_along(const Trial *trial, const double *direction)
     return sum;
 }
 
-// The least energy found along `direction` (downhill at `at`), first step `step`, none longer than `longest`: the Lennard-Jones term is 1e9 at a
-// tenth of the width, an uncapped first step throws the new blob out of the vessel.
+// Finds the least energy along `direction` (downhill at `at`), with the first step `step` and no step longer than `longest`: the Lennard-Jones term is 1e9 at
+// a tenth of the width, so an unlimited first step would throw the new blob out of the vessel. Returns the step taken.
 static double line_search(Fit *fit, int j, LimBlob *blob, Trial *at, const double *direction, double step, double longest)
 {
     double a = 0, ea = at->energy, sa = slope_along(at, direction), s0 = sa, b = 0, eb = 0, sb = 0, taken = 0;
@@ -331,7 +332,7 @@ static double line_search(Fit *fit, int j, LimBlob *blob, Trial *at, const doubl
     LimBlob start = *blob;
     for (int i = 0; i < LINE_EVALUATIONS; i++) {
         double t = step;
-        if (bracketed) {   // minimum of the cubic through both ends, kept inside
+        if (bracketed) {   // minimum of the cubic through both ends, kept inside the bracket
             double d1 = sa + sb - 3 * (ea - eb) / (a - b), root = d1 * d1 - sa * sb, d2 = root > 0 ? sqrt(root) : 0;
             t = b - (b - a) * (sb + d2 - d1) / (sb - sa + 2 * d2);
             if (!(t > a + 0.1 * (b - a) && t < b - 0.1 * (b - a)))
@@ -362,7 +363,7 @@ static double line_search(Fit *fit, int j, LimBlob *blob, Trial *at, const doubl
     return taken;
 }
 
-// Centre (first = 0, three variables) or width (first = 3, one) of blob j; the sums hold all the others.
+// Optimises the centre (first = 0, three variables) or width (first = 3, one variable) of blob j; the sums hold all the others.
 static void descend(Fit *fit, int j, int first, int searches)
 {
     LimBlob *blob = &fit->model.blob[j];
@@ -377,7 +378,7 @@ static void descend(Fit *fit, int j, int first, int searches)
             g2 += at.slope[k] * at.slope[k];
             mixed += at.slope[k] * (at.slope[k] - previous[k]);
         }
-        double turn = norm2 > 0 ? fmax(0, mixed / norm2) : 0;   // Polak-Ribiere, restarted where negative
+        double turn = norm2 > 0 ? fmax(0, mixed / norm2) : 0;   // Polak-Ribiere, restarted if negative
         double length2 = 0, down = 0;
         for (int k = first; k < last; k++) {
             direction[k] = -at.slope[k] + turn * direction[k];
@@ -404,7 +405,7 @@ static void optimise_blob(Fit *fit, int j)
     for (int loop = 0; loop < fit->options->max_loops; loop++) {
         fit->alpha = fit->options->alpha;
         descend(fit, j, 0, fit->options->line_searches);
-        // a width would vanish under the repulsion of the twin, so there E_c moves centres only
+        // the repulsion of the twin would shrink the width to nothing, so E_c moves centres only
         if (fit->options->sweep_all_blobs)
             fit->alpha = 0;
         descend(fit, j, 3, fit->options->line_searches);
@@ -424,8 +425,8 @@ static double total_energy(Fit *fit)
     return isfinite(energy) ? energy : HUGE_VAL;
 }
 
-// (J'J + ...) and the downhill side of the blobs `which`: E_d and E_a by Gauss-Newton; E_c by its slope and a stiffness that limits its motion of a
-// blob to a third of its width.
+// Builds the normal matrix (J'J + ...) and the negative gradient `side` of the blobs `which`: E_d and E_a by Gauss-Newton, E_c by its slope and a stiffness
+// that limits its motion of a blob to a third of its width.
 static void build_normal(Fit *fit, const int *which, int count, double *side)
 {
     int length = fit->points.padded * (fit->beta > 0 ? 2 : 1), size = 4 * count;
@@ -449,7 +450,7 @@ static void build_normal(Fit *fit, const int *which, int count, double *side)
     }
 }
 
-// Cholesky of (normal + lambda diag) and the solution; false if it is not positive.
+// Solves (normal + lambda diag) by Cholesky decomposition. Returns false if the matrix is not positive definite.
 static bool solve_damped(Fit *fit, int size, double lambda, const double *side, double *step)
 {
     double *u = fit->factor, floor = 0;   // upper triangle, updated row by row: the innermost loop has no dependent sum
@@ -464,7 +465,7 @@ static bool solve_damped(Fit *fit, int size, double lambda, const double *side, 
     return lim_solve(u, size, SWEEP_SIZE, step);
 }
 
-// Improves the blobs `which` together; the sums hold all blobs before and after.
+// Improves the blobs `which` jointly; the sums hold all blobs before and after.
 static void sweep(Fit *fit, const int *which, int count, int iterations, double least_gain)
 {
     LimBlob kept[SWEEP_BLOBS];
@@ -478,7 +479,7 @@ static void sweep(Fit *fit, const int *which, int count, int iterations, double 
                 lambda *= 10;
                 continue;
             }
-            double shrink = 1;   // no centre moves further than half a width, no width changes by more than 40 %
+            double shrink = 1;   // scales the step so that no centre moves further than half a width and no width changes by more than 40 %
             for (int m = 0; m < count; m++) {
                 double width = fit->model.blob[which[m]].width;
                 for (int k = 0; k < 4; k++)
@@ -508,7 +509,7 @@ static void sweep(Fit *fit, const int *which, int count, int iterations, double 
     }
 }
 
-// The blobs nearest to blob j (itself first), in units of their widths, at most SWEEP_BLOBS.
+// Lists the blobs nearest to blob j (itself first), in units of their widths, at most SWEEP_BLOBS. Returns their number.
 static int near_blobs(const Fit *fit, int j, int *which)
 {
     double far[SWEEP_BLOBS];
@@ -534,7 +535,7 @@ static int near_blobs(const Fit *fit, int j, int *which)
 
 // --- Selection and subdivision ---
 
-// The worst point (eq. 8) and its distance. Taubin's one step overestimates by up to 2.3 times outside; measured from the foot it is exact.
+// Returns the worst point (eq. 8) and its distance. One Taubin step overestimates by up to 2.3 times outside; the distance from the foot is exact.
 static int worst_point(Fit *fit, double *worst_distance, double *mean_square)
 {
     int data = fit->task->point_count, worst = 0;
@@ -573,7 +574,7 @@ static int select_blob(const Fit *fit, Vec3 p)
     return selected;
 }
 
-// rho' of two co-centred blobs that together keep the level set of value c of one blob of width rho >= c.
+// rho' of two concentric blobs that together keep the level set of value c of one blob of width rho >= c.
 static double split_width(double rho, double c)
 {
     double right = rho * rho * (sqrt(rho / c) - 1), low = 0.5 * c, high = rho;
@@ -590,7 +591,7 @@ static double split_width(double rho, double c)
 
 double lim_split_width(double width, double level) { return level < width ? split_width(width, level) : 0.5 * width; }
 
-// Replaces blob j by two; the new one comes last, shifted by a tenth of the width towards p.
+// Replaces blob j by two. The new one is appended, shifted by a tenth of the width towards p.
 static void split_blob(Fit *fit, int j, Vec3 p)
 {
     LimBlob *old = &fit->model.blob[j], *new = &fit->model.blob[fit->model.count++];
@@ -606,17 +607,17 @@ static void split_blob(Fit *fit, int j, Vec3 p)
     new->center[2] += shift.z;
 }
 
-// Keeps blob j and adds a new one three quarters of the way to p, just wide enough to bring the surface there. For points far outside (a branch not
-// modelled yet) only the split is kept: the field is flat there and does not pull.
-static void reach_out(Fit *fit, int j, Vec3 p, double lack)
+// Keeps blob j and adds a new one at three quarters of the distance to p, just wide enough to bring the surface there. For points far outside (a branch not
+// modelled yet) a split alone does not help: the field is flat there and does not attract blobs.
+static void reach_out(Fit *fit, int j, Vec3 p, double deficit)
 {
     const LimBlob *old = &fit->model.blob[j];
     LimBlob *new = &fit->model.blob[fit->model.count++];
     Vec3 from = vec3(old->center[0], old->center[1], old->center[2]), c = vec3_mix(from, p, 0.75);
-    double d2 = vec3_norm2(vec3_sub(p, c)), low = lack, high = fmax(old->width, 2 * lack);
-    for (int i = 0; i < 40; i++) {   // rho phi(d / rho) = lack
+    double d2 = vec3_norm2(vec3_sub(p, c)), low = deficit, high = fmax(old->width, 2 * deficit);
+    for (int i = 0; i < 40; i++) {   // solve rho phi(d / rho) = deficit
         double rho = 0.5 * (low + high), u = 1 / (1 + d2 / (5 * rho * rho));
-        if (rho * u * u < lack)
+        if (rho * u * u < deficit)
             low = rho;
         else
             high = rho;
@@ -626,24 +627,24 @@ static void reach_out(Fit *fit, int j, Vec3 p, double lack)
         keep_in_tubes(fit->task, new);
 }
 
-// One more blob for the worst point: the paper's split, and where the point is far outside also a blob of its own; the better one stays.
+// Adds one blob for the worst point: tries the paper's split and, if the point is far outside, also a blob of its own; keeps the better one.
 static void add_blob(Fit *fit, int worst, double worst_distance)
 {
     Vec3 p = point_of(fit, worst);
-    double lack = (double)(fit->points.low[worst] - fit->points.f[worst]);
+    double deficit = (double)(fit->points.low[worst] - fit->points.f[worst]);
     int j = select_blob(fit, p), count = fit->model.count;
     LimBlob before = fit->model.blob[j], split_old, split_new;
     split_blob(fit, j, p);
     fit_refresh_sums(fit);
     optimise_blob(fit, count);
-    if (!fit->options->sweep_all_blobs || lack <= 0 || worst_distance < 3 * fit->target)
+    if (!fit->options->sweep_all_blobs || deficit <= 0 || worst_distance < 3 * fit->target)
         return;
     double energy = total_energy(fit);
     split_old = fit->model.blob[j];
     split_new = fit->model.blob[count];
     fit->model.blob[j] = before;
     fit->model.count = count;
-    reach_out(fit, j, p, lack);
+    reach_out(fit, j, p, deficit);
     fit_refresh_sums(fit);
     optimise_blob(fit, count);
     if (total_energy(fit) > energy) {
@@ -689,7 +690,7 @@ static void optimise_all(Fit *fit, int newest, int iterations, double least_gain
         return;
     fit_refresh_sums(fit);
     double before = HUGE_VAL;
-    for (int round = 0; round < ROUNDS; round++) {   // the feet move with the surface
+    for (int round = 0; round < ROUNDS; round++) {   // repeated, because the feet move with the surface
         sweep(fit, which, near_blobs(fit, newest, which), iterations, least_gain);
         if (!fit->uses_feet)
             break;
@@ -702,7 +703,7 @@ static void optimise_all(Fit *fit, int newest, int iterations, double least_gain
     }
 }
 
-// Removes vanished blobs: those that add less than a thousandth of T at any point. (None strays: see `reach`.)
+// Removes vanished blobs: those that contribute less than a thousandth of T at every point. (No blob can drift away: see `reach`.)
 static void clean_up(Fit *fit)
 {
     Model *model = &fit->model;
@@ -726,7 +727,7 @@ static void clean_up(Fit *fit)
     }
 }
 
-// One attempt; the model found is in fit->best. Returns its mean square distance, points counting no more than a radius.
+// Makes one attempt; the model found is in fit->best. Returns its mean square distance, where no point counts for more than one radius.
 static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
 {
     const LimFitOptions *options = fit->options;
@@ -742,7 +743,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         fit_refresh_sums(fit);
         fit_refresh_weights(fit, true);
         int worst = worst_point(fit, &worst_distance, &mean_square);
-        // a loose target is met by models whose error still exceeds the noise
+        // models can be within a loose target although their error exceeds the noise
         bool within = worst_distance <= fit->target, reached = within;
         if (fit->uses_feet && options->give_up_splits > 0)
             reached = within && mean_square <= fit->noise2 + same_square(MISFIT * fit->target);
@@ -757,7 +758,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         } else {
             idle++;
         }
-        // the worst of some hundred noisy points may need its own blobs, which do not show in the mean
+        // the worst of some hundred noisy points may need blobs of its own, which hardly change the mean
         int patience = options->give_up_splits * (best_worst > fit->target ? 2 : 1);
         if (reached || fit->model.count >= options->max_blobs || (options->give_up_splits > 0 && idle >= patience))
             break;
@@ -770,7 +771,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
 static void fit_run(Fit *fit)
 {
     double worst, square = attempt_fit(fit, false, &worst);
-    // far from the target, and not because of noise, whose maximum over some hundred points is 3 to 4 times its mean
+    // try again if it is far from the target and not because of noise, whose maximum over some hundred points is 3 to 4 times its standard deviation
     if (fit->task->retry_count > 0 && worst > 1.4 * fit->target && (worst > 4.5 * sqrt(square) || sqrt(square) > fit->target)) {
         Model kept = {malloc((size_t)fit->capacity * sizeof(LimBlob)), 0};
         if (kept.blob) {

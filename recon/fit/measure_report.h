@@ -1,4 +1,4 @@
-// What was measured of a model (recon/fit/model_measure.h), for people and as JSON.
+// Prints the measurements of a model (recon/fit/model_measure.h), as text and as JSON.
 #ifndef SELDINGER_RECON_FIT_MEASURE_REPORT_H
 #define SELDINGER_RECON_FIT_MEASURE_REPORT_H
 

@@ -1,6 +1,6 @@
-// Wall points are taken by rays from a node's centre to its model's surface, in Fibonacci directions, as long as they stay in the node's power cell
-// among the nodes near it. Those within 0.1 r of a border are moved onto it, along the wall: moved across the border's plane alone, those of a sac of
-// r = 5 mm came to lie up to 0.5 mm outside, where another vessel's cell begins that no tool in the lumen meets (2 mm of "jump").
+// Wall points are found by rays from a node's centre to its model's surface, in Fibonacci directions, as long as they stay in the node's power cell among the
+// nodes near it. Points within 0.1 r of a border are moved onto it along the wall. Moving them only perpendicular to the border's plane put those of a sac of
+// r = 5 mm up to 0.5 mm outside, where another vessel's cell begins that no tool in the lumen can touch (2 mm of "jump").
 #include "recon/fit/model_measure.h"
 
 #include "base/base.h"
@@ -9,7 +9,7 @@
 
 #include <stdlib.h>
 
-enum { VESSEL_RAYS = 120, SAC_RAYS = 1500, LINK_SAMPLES = 5 };   // a sac's neck is a small part of its wall
+enum { VESSEL_RAYS = 120, SAC_RAYS = 1500, LINK_SAMPLES = 5 };   // many for a sac, because its neck is a small part of its wall
 
 const char *const model_place_name[PLACES] = {"tube", "bifurcation", "sac", "end"};
 
@@ -20,14 +20,14 @@ typedef struct Join {
 } Join;
 typedef struct WallPoint {
     int place;
-    double excess;           // > 0 outside the truth
+    double excess;           // distance from the true wall, > 0 outside
 } WallPoint;
 typedef struct NodeFigures {
     Join *join;
     WallPoint *wall;
     int joins, join_capacity, walls;
-    double bare, ghost;      // [mm] furthest from data; 0: none
-    double clearance;        // least ratio of the link to the parent
+    double bare, ghost;      // [mm] largest distance from data; 0: none
+    double clearance;        // least clearance of the link to the parent, relative to the radius
     bool failed;
 } NodeFigures;
 typedef struct Job {
@@ -42,7 +42,7 @@ typedef struct Job {
 
 static void mark_around(const VesselTree *tree, int from, double reach, int place, uint8_t *mark, int *stack, double *path)
 {
-    // depth first; the tree has no loops, so storing the predecessor is enough
+    // depth-first search; the tree has no loops, so storing the predecessor is enough
     int depth = 0;
     int *came = stack + tree->node_count;
     stack[depth] = from, came[depth] = -1, path[depth++] = 0;
@@ -59,7 +59,7 @@ static void mark_around(const VesselTree *tree, int from, double reach, int plac
     }
 }
 
-// Later kinds overrule earlier ones: end, bifurcation, sac.
+// Returns the place of each link. Later kinds override earlier ones: end, bifurcation, sac.
 static uint8_t *find_places(const VesselTree *tree)
 {
     size_t n = (size_t)tree->node_count;
@@ -111,7 +111,7 @@ static Vec3 bisect(const Blobby *model, Vec3 c, Vec3 d, double low, double high)
     return vec3_add_scaled(c, low, d);
 }
 
-// The nearest data point of the node and those near it.
+// Distance from x to the nearest data point of the node and of those near it.
 static double distance_to_data(const VesselTree *tree, int node, Vec3 x)
 {
     double least2 = HUGE_VAL;
@@ -138,10 +138,10 @@ static VesselHit ask(const Job *job, int node, Vec3 x)
     return ask_on(job, &memory, x);
 }
 
-// At x on the border of the cells of node and other.
+// Measures the jump at x, on the border between the cells of `node` and `other`.
 static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, NodeFigures *f)
 {
-    const double aside = 1e-4;   // [mm] beyond the rounding of the cells' planes
+    const double aside = 1e-4;   // [mm] larger than the rounding of the cells' planes
     Blobby a = blobby_of(job->tree, node), b = blobby_of(job->tree, other);
     SurfacePoint p = blobby_project(&a, x, x), q = blobby_project(&b, x, x);
     VesselMemory memory = {.node = node};
@@ -160,26 +160,27 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
         f->join = more;
         f->join_capacity = capacity;
     }
-    double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across), anew = aside * vec3_dot(vec3_add(before.normal, fresh.normal), across);
+    double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across),
+           moved_fresh = aside * vec3_dot(vec3_add(before.normal, fresh.normal), across);
     f->join[f->joins++] = (Join){place_of(job, node, other),
                                  node,
                                  other,
-                                 {fabs(p.distance - q.distance), fabs(behind.gap - before.gap - moved), fabs(fresh.gap - before.gap - anew)},
+                                 {fabs(p.distance - q.distance), fabs(behind.gap - before.gap - moved), fabs(fresh.gap - before.gap - moved_fresh)},
                                  {vec3_angle(p.normal, q.normal), vec3_angle(before.normal, behind.normal), vec3_angle(before.normal, fresh.normal)}};
 }
 
-// Moves x in the plane across `across` to the model's wall; false if that is further than `far` off after some steps.
+// Moves x in the plane with normal `across` to the model's wall. Returns false if it is still further than `far` away after some steps.
 static bool slide_to_wall(const Blobby *model, Vec3 across, double far, Vec3 *x)
 {
     for (int i = 0; i < 6; i++) {
         SurfacePoint s = blobby_project(model, *x, *x);
         if (fabs(s.distance) < far)
             return true;
-        Vec3 way = vec3_add_scaled(s.normal, -vec3_dot(s.normal, across), across);
-        double steep = vec3_norm2(way);
-        if (!s.converged || steep < 0.04)   // the wall runs along the border
+        Vec3 tangent = vec3_add_scaled(s.normal, -vec3_dot(s.normal, across), across);
+        double steep = vec3_norm2(tangent);
+        if (!s.converged || steep < 0.04)   // the wall is nearly parallel to the border
             return false;
-        *x = vec3_add_scaled(*x, -s.distance / steep, way);
+        *x = vec3_add_scaled(*x, -s.distance / steep, tangent);
     }
     return false;
 }
@@ -231,7 +232,7 @@ static void cast_rays_of(const Job *job, int node, NodeFigures *f)
             if (first && in)
                 look_at_wall(job, node, p, f);
             double far = job->place[node] == PLACE_END && first ? 0 : distance_to_data(tree, node, p);
-            // a further sheet may be another branch's wall, which other nodes' models say where the tool gets there
+            // a second sheet may be another branch's wall, which other nodes' models represent in their own cells
             if (far > 0.6 * radius && far < HUGE_VAL && (first || power_nearest(tree, p) == node)) {
                 double *most = first ? &f->bare : &f->ghost;
                 *most = fmax(*most, far);

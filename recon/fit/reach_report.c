@@ -1,4 +1,4 @@
-// See reach_report.h.
+// Implements reach_report.h.
 #include "recon/fit/reach_report.h"
 
 #include "geom/geom.h"
@@ -13,31 +13,32 @@ static void print_stop(FILE *out, const VesselTree *tree, const Reach *reach, co
     Vec3 p = stop->place;
     fprintf(out, "  node %-6d ", stop->node);
     if (stop->capped)
-        fprintf(out, "capped, %.2f mm to lumen", -stop->clearance);
+        fprintf(out, "capped, %.2f mm to the lumen", -stop->clearance);
     else
-        fprintf(out, "narrow, %.2f mm free on the line", fmin(stop->clearance, tree->radius[stop->node]));
-    fprintf(out, "%s, at %.2f, %.2f, %.2f; %.1f mm behind it (%.1f %%)\n", stop->apart ? ", a link longer than its radii" : "", p.x, p.y, p.z, stop->lost,
-            percent(reach, stop->lost));
+        fprintf(out, "narrow, %.2f mm free on the centreline", fmin(stop->clearance, tree->radius[stop->node]));
+    fprintf(out, "%s, at %.2f, %.2f, %.2f; %.1f mm of centreline behind it (%.1f %%)\n", stop->apart ? ", a link longer than the sum of its radii" : "", p.x,
+            p.y, p.z, stop->lost, percent(reach, stop->lost));
 }
 
 static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
 {
     double tool = reach->options.tool_radius;
     fprintf(out,
-            "from the inlet a point gets to %.1f %% of %.0f mm of centreline, a tool of %.2f mm radius on the line to %.1f %%, up to %.2g r aside to %.1f %%\n",
+            "from the inlet a point reaches %.1f %% of %.0f mm of centreline, a tool of %.2f mm radius %.1f %% on the centreline and, up to %.2g r aside, %.1f "
+            "%%\n",
             percent(reach, reach->reached[REACH_POINT]), reach->length, tool, percent(reach, reach->reached[REACH_TOOL]), reach->options.aside,
             percent(reach, reach->reached[REACH_ASIDE]));
     fprintf(out, "junctions      %d: %d capped, %d with less than %.2f mm free", reach->junction_count, reach->capped, reach->narrow, tool);
     if (reach->apart_links > 0)
-        fprintf(out, "; %d of these and %d of these over links longer than their radii", reach->capped_apart, reach->narrow_apart);
+        fprintf(out, "; %d of the capped and %d of the narrow ones over links longer than the sum of their radii", reach->capped_apart, reach->narrow_apart);
     fprintf(out, "\n");
     if (reach->apart_links > 0)
-        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel, %d of them open; behind them %.1f mm\n",
+        fprintf(out, "links apart    %d longer than the sum of their radii, without evidence of a vessel, %d of them open; %.1f mm of centreline behind them\n",
                 reach->apart_links, reach->apart_open, reach->apart_length);
     if (reach->sac_nodes > 0)
         fprintf(out, "aneurysm nodes %d of %d are reached by a point\n", reach->sac_nodes_reached, reach->sac_nodes);
     if (reach->stop_count > 0)
-        fprintf(out, "closed         %d places, those with most behind them first:\n", reach->stop_count);
+        fprintf(out, "closed         %d places, sorted by the centreline behind them:\n", reach->stop_count);
     for (int k = 0; k < reach->stop_count && k < STOPS_SHOWN; k++)
         print_stop(out, tree, reach, &reach->stop[k]);
     if (reach->stop_count > STOPS_SHOWN)
@@ -78,7 +79,7 @@ static void add_junctions(cJSON *object, const Reach *reach)
     }
 }
 
-// Each branch with the share of it that is reached; the link to its first node counts as its own.
+// Adds each branch with the length that is reached; the link to its first node counts as part of the branch.
 static void add_branches(cJSON *object, const VesselTree *tree, const Reach *reach)
 {
     VesselBranches *branches = vessel_branches_create(tree);
@@ -147,7 +148,7 @@ static void print_ghosts(FILE *out, const GhostLumens *ghosts)
     }
     fprintf(out, "ghost lumens   %d not connected, %.3g mm3", ghosts->count, volume);
     if (ghosts->drop_count > 0)
-        fprintf(out, "; removing %d blobs that serve no other purpose would remove %d of them", ghosts->drop_count, dissolve);
+        fprintf(out, "; removing %d blobs that contribute to nothing else would remove %d of them", ghosts->drop_count, dissolve);
     fprintf(out, "\n");
     for (int k = 0; k < ghosts->count && k < GHOSTS_SHOWN; k++) {
         const GhostLumen *g = &ghosts->ghost[k];

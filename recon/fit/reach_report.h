@@ -7,8 +7,8 @@
 #include <cJSON.h>
 #include <stdio.h>
 
-// A tree without a model has no such report: nothing is printed or added, without a fault. False with a fault if out of memory. `json` may be NULL,
-// `out` too. `tool_radius` [mm].
+// Reports the reach of a tool of radius `tool_radius` [mm]. For a tree without a model nothing is printed or added, and it returns true. Returns false with a
+// fault if out of memory. `json` and `out` may be NULL.
 bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults);
 
 #endif

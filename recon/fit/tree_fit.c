@@ -73,7 +73,7 @@ void tree_fit_complete_options(TreeFitOptions *options, const VesselTree *tree, 
         double said = tree_file_number(info, "voxel_mm", 0);
         options->local.voxel_mm = said > 1e-4 && said < 100 ? said : 0;
     }
-    if (options->edge_blur < 0)      // a model's points are where its fit has put them
+    if (options->edge_blur < 0)      // the points of a model were already corrected by its fit
         options->edge_blur = vessel_tree_is_model(tree) || options->preset == FIT_PAPER ? 0 : fmax(tree_file_number(info, "edge_blur_mm", 0), 0);
 }
 

@@ -1,4 +1,4 @@
-// A tree's points to a model: what `seldinger fit` does, with either kind of blobs.
+// Fits a model to a tree's points, as `seldinger fit` does, with shared or local blobs.
 #ifndef SELDINGER_RECON_FIT_TREE_FIT_H
 #define SELDINGER_RECON_FIT_TREE_FIT_H
 
@@ -9,28 +9,28 @@
 typedef enum {
     FIT_DEFAULT,             // one field of shared blobs
     FIT_LOCAL,               // a local model for each node
-    FIT_PAPER                // the same with the published values and method
+    FIT_PAPER                // local models with the published values and method
 } FitPreset;
 
 typedef struct TreeFitOptions {
     FitPreset preset;
-    LimFitOptions local;     // the shared field has its target_mm, voxel_mm and threads from these
-    bool has_voxel;          // local.voxel_mm is given; else it is what the tree's file says, 0 where that says nothing
-    double edge_blur;        // [mm] blur that has moved the points inside the wall; < 0: what the tree's file says
+    LimFitOptions local;     // options of local models; the shared field takes its target_mm, voxel_mm and threads from them
+    bool has_voxel;          // local.voxel_mm is given; else it is taken from the tree's file, 0 if the file does not give it
+    double edge_blur;        // [mm] blur (standard deviation) that has moved the points inside the wall; < 0: taken from the tree's file
 } TreeFitOptions;
 TreeFitOptions tree_fit_default_options(void);
 
 typedef struct TreeFit {
-    VesselTree *model;       // the caller's to free
+    VesselTree *model;       // owned by the caller
     double seconds;
-    int64_t left_out;        // points that lie in another vessel's lumen
+    int64_t left_out;        // number of points that lie in another vessel's lumen and were not fitted
 } TreeFit;
 
-// Takes voxel and blur from what the file of `tree` says, where they are not given.
+// Takes voxel size and blur from the file of `tree` if they are not given.
 void tree_fit_complete_options(TreeFitOptions *options, const VesselTree *tree, const TreeFileInfo *info);
-// Moves the points of `tree` by the blur, then fits. `path` names it in faults. False with faults.
+// Corrects the points of `tree` for the blur, then fits. `path` is used in faults. Returns false with faults.
 bool tree_fit(VesselTree *tree, const char *path, const TreeFitOptions *options, const Progress *progress, TreeFit *fit, Faults *faults);
-// What was done, as YAML for the model's file, the tree's own parameters below; to be freed.
+// Returns the options of the fit as YAML for the model's file, with the tree's own parameters after them. The caller frees it.
 char *tree_fit_parameters(const TreeFitOptions *options, const TreeFileInfo *tree);
 
 #endif

@@ -1,4 +1,4 @@
-// The synthetic shapes by name, and their options.
+// Builds the synthetic shapes by name, and parses their options.
 #include "recon/phantom/phantom.h"
 
 #include "base/base.h"
@@ -53,13 +53,13 @@ static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
     return true;
 }
 
-// Flat, or rising out of its plane at a nearly even slope: u grows with arc length within 1 to 5 %.
+// A spiral, flat or rising out of its plane at a nearly even slope: the parameter u grows with arc length to within 1 to 5 %.
 static bool build_spiral(Shape *shape, const ShapeOptions *o)
 {
     enum { N = 64 };
     double knot[N][4], tangent[2][4];
     for (int i = 0; i < N; i++) {
-        // knots are denser where the spiral winds tightly
+        // knots are denser where the spiral is more strongly curved
         double u = (double)i / (N - 1), theta = PI * same_pow(4, u), polar = 15.75 / theta;
         double radius = 0.5 + (0.15 - 0.5) * (theta - PI) / (3 * PI);
         memcpy(knot[i], (double[4]){polar * same_cos(theta), polar * same_sin(theta), u * o->rise_mm, radius}, sizeof knot[i]);
@@ -73,8 +73,8 @@ static bool build_spiral(Shape *shape, const ShapeOptions *o)
     return shape_add(shape, (const double(*)[4])knot, N, true, false, -1, NODE_VESSEL, (const double(*)[4])tangent);
 }
 
-// An internal carotid with its siphon, continuing as the middle cerebral artery; anterior cerebral artery; two branches each, of which the anterior
-// ones kiss; a saccular aneurysm on the outer side of the siphon's anterior knee. x lateral, y anterior, z up [mm].
+// An internal carotid artery with its siphon, continuing as the middle cerebral artery, and the anterior cerebral artery; two branches each, of which the
+// anterior ones touch; a saccular aneurysm on the outer side of the siphon's anterior knee. x lateral, y anterior, z up [mm].
 static bool build_phantom(Shape *shape)
 {
     static const double carotid[][4] = {{0, 0, 0, 2.5},          {0, 0, 8, 2.45},        {0.4, 1.2, 15, 2.4},    {1.4, 6.2, 20.4, 2.3}, {2.4, 12.6, 22.2, 2.3},
@@ -113,8 +113,8 @@ static bool build_helix(Shape *shape, const ShapeOptions *o)
     return shape_add(shape, (const double(*)[4])knot, N, true, true, -1, NODE_VESSEL, (const double(*)[4])tangent);
 }
 
-// Symmetric: trunk and left daughter are one part, the right daughter is another that starts as wide as the trunk; each bends by the angle on an arc of
-// three of its radii, then runs straight. Murray's radii: r / 2^(1/3).
+// A symmetric bifurcation. Trunk and left daughter are one part; the right daughter is another, which starts as wide as the trunk. Each bends by the angle on
+// an arc of three of its radii, then runs straight. The radii follow Murray's law: r / 2^(1/3).
 static bool build_y(Shape *shape, const ShapeOptions *o)
 {
     enum { TRUNK = 17, ARM = 33 };
@@ -137,7 +137,8 @@ static bool build_y(Shape *shape, const ShapeOptions *o)
     return true;
 }
 
-// A gentle wave in the plane y = 0. Its neighbours run in the plane y = const as far as they kiss: the distance of the two centrelines is exactly that.
+// A gentle wave in the plane y = 0. The neighbour's centreline lies in the plane y = const while the vessels touch, so the distance of the two centrelines is
+// exactly that constant.
 static double wave(const ShapeOptions *o, double x) { return 2 * o->radius_mm * same_sin(x / (8 * o->radius_mm)); }
 
 static bool add_wave(Shape *shape, const ShapeOptions *o, double half_length)
@@ -151,7 +152,7 @@ static bool add_wave(Shape *shape, const ShapeOptions *o, double half_length)
     return shape_add(shape, (const double(*)[4])knot, N, true, false, -1, NODE_VESSEL, NULL);
 }
 
-// The neighbour runs beside the vessel for twelve radii at `gap_mm` from wall to wall, and bends away from it at both ends.
+// The neighbour runs beside the vessel over twelve radii with `gap_mm` from wall to wall, and bends away from it at both ends.
 static bool build_kissing(Shape *shape, const ShapeOptions *o)
 {
     enum { N = 97 };
@@ -174,7 +175,7 @@ static bool build_bone(Shape *shape, const ShapeOptions *o)
         return false;
     Random random = {shape->seed};
     for (int i = 0; i < (int)o->blocks; i++) {
-        // first one side, then the other, then round about
+        // first on one side, then on the other, then all around
         double x = half * ((i + 0.5) / o->blocks * 1.6 - 0.8), around = i * PI * (3 - sqrt(5)), size = (2 + 2 * random_open(&random)) * r;
         if (!shape_add_block(shape, vec3(x, 0, wave(o, x)), vec3(0, same_cos(around), same_sin(around)), vec3(size, size, size), o->gap_mm, &random))
             return false;
@@ -182,7 +183,7 @@ static bool build_bone(Shape *shape, const ShapeOptions *o)
     return true;
 }
 
-// A straight vessel that a tiny one leaves at right angles.
+// A straight vessel with a tiny branch at right angles.
 static bool build_twig(Shape *shape, const ShapeOptions *o)
 {
     enum { N = 9 };
@@ -334,7 +335,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
     if (built)
         return shape;
     if (faults->count == before)
-        faults_add(faults, file, 0, 0, "no room or memory for shape %s", name);
+        faults_add(faults, file, 0, 0, "cannot build shape %s: no free space for a block, or out of memory", name);
     shape_free(shape);
     return NULL;
 }

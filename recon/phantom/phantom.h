@@ -1,30 +1,30 @@
-// Synthetic vessels with known truth: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree, aorta.
+// Synthetic vessels whose geometry is known exactly: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree, aorta.
 //
 // A shape is a set of parts: tubes (the union of spheres of smoothly varying radius along a smooth curve) and ellipsoids (sacs). Each part's field is
-// its signed distance, > 0 inside; parts that belong together are joined by a smooth maximum of width `blend_mm`, parts that only lie side by side
-// (touching vessels) are not. The surface is the zero of that field; it is C1, and its distance is found by projection to 1e-10 mm, so truth is exact
-// also at the joints. Lengths mm.
+// its signed distance, > 0 inside; connected parts are joined by a smooth maximum of width `blend_mm`, parts that only lie side by side
+// (touching vessels) are not. The surface is the zero level of that field; it is C1. Distances are found by projection to 1e-10 mm, so they are exact
+// at the joints too. Lengths in mm.
 //
-// Options come as text pairs, from a scene's `shape: {name: …, key: value}` or from `synth --key value`:
+// Options are pairs of strings, from a scene's `shape: {name: …, key: value}` or from `synth --key value` (defaults in parentheses):
 //   points       samples per node of a vessel (default 108)
 //   sac_points   samples per aneurysm node (default 1500)
 //   noise_mm     standard deviation of the normal noise of samples (0)
 //   seed         of noise and of the samples' phase (1)
 //   spacing      node spacing in local radii (0.5)
-//   blend_mm     width of the joints (0.6 times the smaller radius where 0)
-//   length_mm    capsule: segment (4); y: trunk and daughters, twig: the vessel, at least 4 and 12 radii
-//   radius_mm    capsule, arc, bifurcation, helix, y, kissing, bone, twig: tube (1); tree: trunk (1.6)
-//   bend_radius_mm  arc, bifurcation, helix: of the centreline (4)
-//   rise_mm      spiral: how far it winds out of its plane (0, the paper's); helix: whole rise (12)
-//   turns        helix (2)
-//   angle_deg    y: of each daughter against the trunk (37.5, Murray's)
-//   twig_radius_mm  twig: the tiny vessel, 0.6 lengths long (0.2)
-//   branches     tree: segments between bifurcations, or bifurcation and end, up to 200 (51; odd)
-//   sacs         tree: aneurysms on its branches (0)
-//   blocks       bone, tree: dense blocks beside the vessels (6, 0)
-//   gap_mm       kissing: from wall to wall (0.2); bone, tree: from wall to block (0: they touch)
-//   crossing_deg kissing: angle of the two vessels, 0: they run side by side for twelve radii (0)
-//   scale        the whole shape is scaled by it (1)
+//   blend_mm     width of the joints (0: 0.6 times the smaller radius)
+//   length_mm    length; capsule: of the segment (4); y: of trunk and daughters, at least 4 radii; twig: of the vessel, at least 12 radii
+//   radius_mm    capsule, arc, bifurcation, helix, y, kissing, bone, twig: radius of the tube (1); tree: of the trunk (1.6)
+//   bend_radius_mm  arc, bifurcation, helix: radius of the centreline's bend (4)
+//   rise_mm      spiral: its rise out of the plane (0, as in the paper); helix: its total rise (12)
+//   turns        helix: number of turns (2)
+//   angle_deg    y: angle of each daughter to the trunk (37.5, Murray's)
+//   twig_radius_mm  twig: radius of the tiny branch, which is 0.6 lengths long (0.2)
+//   branches     tree: number of segments between bifurcations, or bifurcation and end, at most 200 (51; odd)
+//   sacs         tree: number of aneurysms on its branches (0)
+//   blocks       bone, tree: number of dense blocks beside the vessels (6, 0)
+//   gap_mm       kissing: distance from wall to wall (0.2); bone, tree: from wall to block (0: they touch)
+//   crossing_deg kissing: angle between the two vessels; 0: they run side by side for twelve radii (0)
+//   scale        scale factor of the whole shape (1)
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_H
 
@@ -35,46 +35,46 @@
 
 #include <stdint.h>
 
-// The names, separated by ", ", for messages and help.
+// Returns the names of all shapes, separated by ", ", for messages and help.
 const char *shape_names(void);
-// NULL with a fault for each unknown key, value out of range or unknown name; `file` is the prefix of messages.
+// Creates a shape. Returns NULL with a fault for each unknown key, value out of range or unknown name; `file` is the prefix of messages.
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 void shape_free(Shape *shape);
-// The voxel size that represents the samples' accuracy when a shape is fitted (LimFitOptions.voxel_mm): 0.05 mm, or twice the noise.
+// Returns the voxel size [mm] that represents the samples' accuracy when a shape is fitted (LimFitOptions.voxel_mm): 0.05 mm, or twice the noise.
 double shape_voxel_mm(const Shape *shape);
-// The same from a scene's text options, before or without a shape (unknown or bad values count as absent).
+// The same from a scene's options, without a shape. Unknown keys and invalid values count as absent.
 double shape_options_voxel_mm(int option_count, const char (*option)[2][64]);
 
-// Objects visible in an angiogram but not part of the truth: a touching neighbour (NULL: none), and bone.
+// Objects that are visible in an angiogram but not part of the vessel: a touching neighbour (NULL: none), and bone.
 const Shape *shape_neighbour(const Shape *shape);
 const ShapeBlock *shape_blocks(const Shape *shape, int *count);
 
-// Centreline nodes with surface samples, no model. Linked and valid.
+// Returns a tree of centreline nodes with samples of the surface, without a model; linked and valid. Returns NULL with a fault if out of memory.
 VesselTree *shape_sample(const Shape *shape, Faults *faults);
-// shape_create and shape_sample in one: for a scene's `shape:`.
+// Does shape_create and shape_sample in one call, for a scene's `shape:`.
 VesselTree *shape_tree(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
-// The surface as a closed mesh (open ends flat), marching tetrahedra with vertices projected onto it; every node is 0.
+// Returns the surface as a closed mesh (open ends are flat), by marching tetrahedra with vertices projected onto the surface. The node of every vertex is 0.
 TriangleMesh *shape_surface(const Shape *shape, double cell_mm, Faults *faults);
 // Options of the simulated angiogram. Vessels are 1, background 0.
 typedef struct VolumeOptions {
-    double voxel_mm[3];      // edges along the grid's axes
-    double psf_mm;           // standard deviation of the Gaussian blur
-    double noise;            // standard deviation of the white noise, in contrasts
-    uint64_t seed;           // of the noise
-    double rotate_deg;       // the grid is turned by this much about (1, 2, 3); patient coordinates stay the shape's
-    double clip, saturate;   // values below and above are cut, after the noise; -HUGE_VAL, HUGE_VAL: none
+    double voxel_mm[3];      // edges of a voxel along the grid's axes
+    double psf_mm;           // standard deviation of the Gaussian blur (point spread function)
+    double noise;            // standard deviation of the white noise, in units of the contrast
+    uint64_t seed;           // seed of the noise
+    double rotate_deg;       // rotation of the grid about the axis (1, 2, 3); patient coordinates stay those of the shape
+    double clip, saturate;   // values below and above are clipped, after the noise; -HUGE_VAL, HUGE_VAL: none
     double fade;             // fraction of the brightness lost between the root and the furthest tip
-    double bone;             // brightness of blocks (1.2)
-    double band;             // a slab across the trunk is brighter by so many contrasts (0: none), vessels in it too …
-    double band_mm;          // … its thickness [mm]; its place and direction come from the seed
-    double contrast_grey;    // > 0: whole grey values 0 to 255, vessels this much brighter than the background
-    double background_grey;  // 0 to 255
+    double bone;             // brightness of blocks; default 1.2
+    double band;             // contrast by which a slab across the trunk, and the vessels in it, are brighter; 0: no slab
+    double band_mm;          // thickness of the slab; its position and direction are random, from the seed
+    double contrast_grey;    // > 0: integer grey values 0 to 255; vessels are brighter than the background by this much
+    double background_grey;  // grey value of the background, 0 to 255
     int threads;             // 0: all cores; results do not depend on them
 } VolumeOptions;
 VolumeOptions volume_default_options(void);
-// Share of each voxel inside (partial voxels by the field), then blur, noise and clipping. NULL with a fault.
+// Computes the fraction of each voxel inside the vessel (partial voxels from the field), then applies blur, noise and clipping. Returns NULL with a fault.
 Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faults *faults);
-// The same with cubic voxels and nothing else.
+// The same with cubic voxels and default options otherwise.
 Volume *shape_volume(const Shape *shape, double voxel_mm, double psf_mm, double noise, uint64_t seed, Faults *faults);
 
 #endif

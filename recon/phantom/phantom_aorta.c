@@ -1,23 +1,23 @@
-// The path from the groin to the head: left iliac artery, aorta with the other iliac artery, arch, and the neck's arteries as far as the skull.
+// The arteries from the groin to the head: left iliac artery, aorta with the other iliac artery, arch, and the neck's arteries as far as the skull.
 //
-// Drawn by hand: an idealised course with the dimensions of the vessel in stEVE_bench's DualDeviceNav (15 branches, measured with `info` and `export`
+// An idealised course drawn by hand, with the dimensions of the vessel in stEVE_bench's DualDeviceNav (15 branches, measured with `info` and `export`
 // on the model that scenes/arch/prepare makes of it), so that the two-device task runs without that file:
-//                                   there, length and mean radius [mm]   here
+//                                   there: length, mean radius [mm]      here
 //   left iliac artery to the other            70, 6.1                        86, 4.9
-//   aorta to the end of what is drawn        436, 12.7 (5.0 to 16.5)        432, 11.9 (7.0 to 15.0)
+//   aorta to the end of this model           436, 12.7 (5.0 to 16.5)        432, 11.9 (7.0 to 15.0)
 //   left subclavian to its vertebral          37, 4.8                        47, 5.3
 //   left vertebral and basilar               258, 3.1                       248, 2.8
 //   brachiocephalic to its fork               46, 7.7                        38, 6.5
 //   left, right carotid into the skull       292, 3.1; 245, 3.3             242, 3.2; 222, 3.1
-// The summit of the arch has a radius of 31 mm. Left out: vessels that turn back within the skull, and the right vertebral's junction with the
-// basilar artery, since a tree has no loops. x to the patient's left, y to the front, z to the head.
+// The top of the arch has a bend radius of 31 mm. Omitted: vessels that turn back within the skull, and the right vertebral artery's junction with the
+// basilar artery, because a tree has no loops. x to the patient's left, y to the front, z to the head.
 #include "recon/phantom/phantom_parts.h"
 
 bool aorta_grow(Shape *shape)
 {
     static const double trunk[][4] = {{45, 0, -75, 4.3},         {28, 6, -45, 4.6},          {11, 5, -15, 5.2},   {2, 1, 12, 8.5},
                                       {0, -3, 40, 10.4},         {2, -8, 90, 10.3},          {6, -14, 140, 11},   {12, -20, 190, 12.5},
-                                      {18, -25, 240, 14},        {21, -27, 285, 14.8}, // and round the arch, in the upright plane from there to the front right
+                                      {18, -25, 240, 14},        {21, -27, 285, 14.8}, // then around the arch, in the vertical plane to the front right
                                       {18.9, -23.6, 300.5, 15},  {12.8, -14.1, 311.8, 14.8}, {4.5, -1, 316, 14},  {-3.8, 12.1, 311.8, 13},
                                       {-9.9, 21.6, 300.5, 12.6}, {-12, 25, 285, 12.6},       {-9, 29, 262, 12.8}, {-4, 30, 240, 13}};
     static const double iliac[][4] = {{4, 2, 6, 5}, {-8, 4, -14, 4.8}, {-24, 6, -42, 4.5}, {-40, 0, -68, 4.4}};

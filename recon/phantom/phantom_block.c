@@ -1,6 +1,6 @@
 #include "recon/phantom/phantom_block.h"
 
-// Exact outside; inside the distance to the nearest face.
+// Signed distance: exact outside, inside the distance to the nearest face.
 double shape_block_distance(const ShapeBlock *block, Vec3 x)
 {
     Vec3 d = vec3_sub(x, block->center);

@@ -1,7 +1,7 @@
-// Field and distance of a synthetic shape. A part and the part it grows from are joined by the cubic smooth maximum of width k (C2):
+// Computes the field and the distance of a synthetic shape. A part and its parent part are joined by the cubic smooth maximum of width k (C2):
 //   smax(a, b) = max(a, b) + (k/6) h^3, h = max(0, 1 - |a - b| / k)
-// and the shape is the plain maximum over parts and joints: kissing parts do not blend. Union and blend keep |grad f| <= 1, so that f may
-// be marched along (it never oversteps the surface).
+// and the shape is the plain maximum over parts and joints: parts that only touch do not blend. Union and blend keep |grad f| <= 1, so f
+// is a safe step length along a ray (it never oversteps the surface).
 #include "recon/phantom/phantom_field.h"
 
 #include "recon/phantom/phantom_parts.h"
@@ -13,7 +13,7 @@ enum { BLOCK = 8, MOST_PARTS = 1024, FEW_PARTS = 8 };
 
 // --- Splines ---
 
-// Cubic spline: tridiagonal system for the second derivatives; natural where an end's slope is NAN, else clamped to it.
+// Solves the tridiagonal system for the second derivatives of a cubic spline. An end is natural if its slope is NAN, else clamped to it.
 static void spline_solve(Spline *s, const double *at, int n, double first_slope, double last_slope)
 {
     double diagonal[KNOTS], upper[KNOTS], right[KNOTS];
@@ -35,7 +35,7 @@ static void spline_solve(Spline *s, const double *at, int n, double first_slope,
         s->bend[i] = (right[i] - (i < n - 1 ? upper[i] * s->bend[i + 1] : 0)) / diagonal[i];
 }
 
-// Value and first derivative; linear beyond the ends.
+// Returns the value and, in `slope`, the first derivative; linear beyond the ends.
 static double spline_at(const Spline *s, const double *at, int n, int i, double t, double *slope)
 {
     double h = at[i + 1] - at[i], u = t < at[0] ? at[0] : t > at[n - 1] ? at[n - 1] : t;
@@ -67,7 +67,8 @@ Station part_at(const Part *part, double t)
 
 // --- Parts ---
 
-// Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False if out of memory.
+// Builds a part through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends; NULL: natural. Returns false if out
+// of memory.
 static bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4])
 {
     *part = (Part){.knot_count = count, .open_start = open_start, .open_end = open_end, .parent = parent, .kind = kind};
@@ -129,7 +130,7 @@ void part_free(Part *part)
     free(part->block_at);
 }
 
-// d/dt of r(t) - |X - C(t)|
+// Returns d/dt of r(t) - |X - C(t)|.
 static double climb(const Part *part, Vec3 x, double t, double *value, Vec3 *away)
 {
     Station s = part_at(part, t);
@@ -145,7 +146,7 @@ double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradi
     double lowest = cut ? 0 : part->low, highest = cut ? part->at[part->knot_count - 1] : part->high, best = -HUGE_VAL,
            step = part->sample_count > 1 ? part->sample_at[1] - part->sample_at[0] : 1;
     int nearest = 0;
-    // the blocks' middle samples give a first best that rules out most blocks
+    // the blocks' middle samples give a first value that excludes most blocks
     for (int k = 0; k < part->block_count; k++) {
         double f = part->block_radius[k] - vec3_distance(x, part->block_center[k]);
         if (f > best && part->block_at[k] >= lowest && part->block_at[k] <= highest)
@@ -169,7 +170,7 @@ double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradi
         *at = 0;
         return enough - step;
     }
-    // the maximum lies between the samples beside the best one: bisection with secant steps on the slope
+    // the maximum lies between the neighbours of the best sample: find it by bisection with secant steps on the slope
     double low = part->sample_at[nearest > 0 ? nearest - 1 : 0];
     double high = part->sample_at[nearest < part->sample_count - 1 ? nearest + 1 : nearest], value, t = part->sample_at[nearest];
     Vec3 away;
@@ -201,7 +202,7 @@ double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradi
 
 static double joint_width(const Shape *shape, int child) { return shape->blend > 0 ? shape->blend : 0.6 * shape->part[child].coordinate[3].value[0]; }
 
-// The octree's cell, or all parts where there is none. Parts stand in their order.
+// Lists the parts of the octree cell that contains x, in order, and returns their number. Without a cell `list` is NULL: all parts.
 static int parts_near(const Shape *shape, Vec3 x, const int **list)
 {
     Vec3 at = vec3_scale(vec3_sub(x, shape->cell_low), 1 / shape->cell_edge);
@@ -219,13 +220,13 @@ static int parts_near(const Shape *shape, Vec3 x, const int **list)
     return cell->count;
 }
 
-// `f`, `g`: room for `count`, by place in the list.
+// Joins the listed parts. `f`, `g`: space for `count` values and gradients, in the order of the list.
 static double join(const Shape *shape, Vec3 x, bool cut, const int *list, int count, double *f, Vec3 *g, Vec3 *gradient, int *which, double *at)
 {
     double best = -HUGE_VAL, highest, t;
     Vec3 best_gradient = {0, 0, 0};
     for (int i = 0; i < count; i++) {
-        // a part further below the best than the width of the joints cannot matter
+        // a part whose value is below the best by more than the width of the joints has no effect
         int p = list ? list[i] : i;
         f[i] = part_field(&shape->part[p], x, best - shape->widest_joint, cut, &g[i], &t);
         if (f[i] > best)
@@ -236,7 +237,7 @@ static double join(const Shape *shape, Vec3 x, bool cut, const int *list, int co
         int p = list ? list[i] : i, parent = shape->part[p].parent, k = list ? 0 : parent;
         while (list && k < count && list[k] != parent)
             k++;
-        if (parent < 0 || k == count)   // a parent that is not in the list is too far below to join
+        if (parent < 0 || k == count)   // a parent that is not in the list is too small here to join
             continue;
         double width = joint_width(shape, p), h = 1 - fabs(f[i] - f[k]) / width;
         if (!(h > 0))
@@ -252,7 +253,7 @@ static double join(const Shape *shape, Vec3 x, bool cut, const int *list, int co
     return highest;
 }
 
-// Separate, so that the usual few parts do not pay for a large stack frame.
+// A separate function, so that the usual case of few parts does not need a large stack frame.
 __attribute__((noinline)) static double join_many(const Shape *shape, Vec3 x, bool cut, const int *list, int count, Vec3 *gradient, int *which, double *at)
 {
     double f[MOST_PARTS];
@@ -288,7 +289,7 @@ double shape_field_cut(const Shape *shape, Vec3 x)
         for (int end = 0; end < 2; end++) {
             if (!(end ? part->open_end : part->open_start))
                 continue;
-            // the half sphere beyond the end, and nothing else, lies in this ball
+            // this ball contains the half sphere beyond the end and nothing else
             Station s = part_at(part, end ? part->at[part->knot_count - 1] : 0);
             Vec3 away = vec3_sub(x, s.center);
             if (vec3_norm(away) < 3 * s.radius)
@@ -303,7 +304,7 @@ double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot)
     Vec3 p = x, g;
     double f = shape_field(shape, x, &g), sign = f < 0 ? -1 : 1, nearest = HUGE_VAL;
     Vec3 best = x;
-    // alternate: fall onto the surface along the gradient, then slide towards the point nearest to x, by less once that overshoots
+    // alternate: move onto the surface along the gradient, then slide towards the point nearest to x, by less after an overshoot
     double slide = 1;
     for (int round = 0; round < 200; round++) {
         for (int i = 0; i < 60; i++) {
@@ -358,7 +359,7 @@ void shape_bounds(const Shape *shape, Vec3 *low, Vec3 *high)
     }
 }
 
-// --- Making ---
+// --- Construction ---
 
 bool shape_add(Shape *shape, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4])
 {
@@ -388,7 +389,8 @@ bool part_scale(Part *part, double scale)
     return part_build(part, (const double(*)[4])knot, old.knot_count, old.open_start, old.open_end, old.parent, old.kind, (const double(*)[4])tangent);
 }
 
-// Of `list` the parts that can be within a joint's width of the largest anywhere in the ball around c; returns how many, `kept` in order.
+// Lists in `kept`, in order, the parts of `list` whose value can be within a joint's width of the largest somewhere in the ball around c. Returns their
+// number.
 static int parts_that_matter(const Shape *shape, const int *list, int count, Vec3 c, double reach, int *kept)
 {
     double upper[MOST_PARTS], lower = -HUGE_VAL;
@@ -401,7 +403,7 @@ static int parts_that_matter(const Shape *shape, const int *list, int count, Vec
             if (part->block_at[k] >= 0 && part->block_at[k] <= part->at[part->knot_count - 1])
                 lower = fmax(lower, part->block_radius[k] - away);
         }
-        upper[i] += 2 * (part->sample_at[1] - part->sample_at[0]);   // between the samples
+        upper[i] += 2 * (part->sample_at[1] - part->sample_at[0]);   // the maximum may lie between the samples
     }
     int n = 0;
     for (int i = 0; i < count; i++)

@@ -1,5 +1,5 @@
-// True surface points are taken by rays from the nodes' centres to the true surface; the model's surface points by rays to the local
-// model's, both as long as the ray stays in the node's power cell. 200 rays a node, Fibonacci directions.
+// True surface points are found by rays from the nodes' centres to the true surface, the model's surface points by rays to the local
+// model's surface, both while the ray stays in the node's power cell. 200 rays per node, Fibonacci directions.
 #include "recon/phantom/phantom_measure.h"
 
 #include "base/base.h"
@@ -30,13 +30,13 @@ static MeasureRow row_of(List *list)
     return row;
 }
 
-// From the node's centre along d to the first change of sign of the model's field (NULL: the shape's). False if that is not in the node's cell; cells
-// are convex, so only the end of the ray need be looked at.
+// Finds the first change of sign of the model's field (NULL: the shape's field) from the node's centre along d. Returns false if it is not in the node's
+// cell. Cells are convex, so only the end of the ray must be checked.
 static bool first_crossing(const Shape *shape, const Blobby *model, const VesselTree *tree, int node, Vec3 d, Vec3 *hit)
 {
     Vec3 c = tree->center[node];
     double step = 0.04 * tree->radius[node], low = 0, high = 0, longest = 8 * tree->radius[node];
-    for (int i = 1; !model && low < longest; i++) {   // |grad f| <= 1: the field is a safe stride
+    for (int i = 1; !model && low < longest; i++) {   // |grad f| <= 1: the field is a safe step length
         *hit = vec3_add_scaled(c, low, d);
         double f = shape_field(shape, *hit, NULL);
         if (f < 1e-9)
@@ -92,7 +92,7 @@ bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out
         Blobby model = blobby_of(tree, node);
         Vec3 c = tree->center[node], hit;
         double truth = shape_field(shape, c, NULL);
-        // on the axis there may be no closest point to find; the sign is then the field's
+        // on the axis the projection may find no closest point; the sign is then that of the field
         double clearance = blobby_project(&model, c, c).distance;
         bool inside = blobby_field(&model, c) > 0;
         if (inside == (clearance > 0))

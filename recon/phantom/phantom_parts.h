@@ -1,4 +1,4 @@
-// The parts that a synthetic shape is made of (phantom.h says what a shape is). Inside recon only.
+// The parts of a synthetic shape (phantom.h defines a shape). Internal to recon.
 //
 // A part is the union of spheres of radius r(t) along a curve C(t), both cubic splines of arc length (chord length at the knots), straight beyond
 // open ends:
@@ -21,23 +21,23 @@ typedef struct Part {
     int knot_count;
     double at[KNOTS];        // knot parameter [mm of chord]
     Spline coordinate[4];    // x, y, z, r
-    bool open_start, open_end;   // continued straight, instead of a cap
-    double low, high;        // parameter range with the straight pieces
-    int parent;              // part it grows from, or -1
-    uint8_t kind;            // of its nodes
-    int sample_count;        // coarse samples to start the search from …
+    bool open_start, open_end;   // continued straight, without a cap
+    double low, high;        // parameter range including the straight pieces
+    int parent;              // parent part, or -1
+    uint8_t kind;            // kind of its nodes
+    int sample_count;        // coarse samples from which the search starts
     Vec3 *sample;
     double *sample_radius, *sample_at;
-    int block_count;         // … and spheres around each eight of them
+    int block_count;         // spheres, each around eight samples
     Vec3 *block_center;
-    int *block_sample;       // the middle one, its radius and parameter
+    int *block_sample;       // the middle sample; its radius and parameter
     double *block_radius, *block_at;
     double *block_reach;     // largest |C - center| + r in the block: f <= reach - |X - center|
 } Part;
 
-typedef struct Cell {        // of the octree over the shape: the parts that can matter anywhere in it
-    int child;               // first of eight in a row, or -1
-    int first, count;        // of its parts in `cell_part`
+typedef struct Cell {        // a cell of the octree over the shape: the parts that can affect the field anywhere in it
+    int child;               // first of eight consecutive children, or -1
+    int first, count;        // range of its parts in `cell_part`
 } Cell;
 
 typedef struct Shape Shape;
@@ -51,36 +51,36 @@ struct Shape {
     double noise, spacing;
     uint64_t seed;
     Shape *neighbour;        // vessels visible in the volume but not part of the truth, or NULL
-    int block_count;         // and bone
+    int block_count;         // number of bone blocks
     ShapeBlock *block;
 
-    Vec3 cell_low;           // octree: a cube of edge `cell_edge` from there
+    Vec3 cell_low;           // octree: a cube of edge `cell_edge` with its low corner here
     double cell_edge;
     int cell_count, cell_capacity, cell_part_count, cell_part_capacity;
     Cell *cell;
     int *cell_part;
 };
 
-typedef struct Station {     // of a part at parameter t
+typedef struct Station {     // a point of a part's centreline at parameter t
     Vec3 center, tangent;    // tangent is dC/dt, nearly unit
     double radius, taper;    // taper is dr/dt; radius is constant beyond open ends
 } Station;
 
 Station part_at(const Part *part, double t);
 void part_free(Part *part);
-// The same part made larger or smaller about the origin.
+// Scales a part about the origin. Returns false if out of memory.
 bool part_scale(Part *part, double scale);
-// f_part, its gradient and the parameter of the sphere that makes it. `enough`: parts whose f is below it may answer any lower bound.
-// `cut`: without the straight pieces beyond open ends.
+// Returns f_part, its gradient and the parameter of the sphere that determines it. `enough`: if f is below it, any upper bound below `enough` may be
+// returned. `cut`: without the straight pieces beyond open ends.
 double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradient, double *at);
 
-// Appends a part; false if out of memory.
+// Appends a part. Returns false if out of memory.
 bool shape_add(Shape *shape, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4]);
-// The parts of the shape `aorta`.
+// Adds the parts of the shape `aorta`.
 bool aorta_grow(Shape *shape);
-// After the last part: joints and octree. False if out of memory.
+// Completes the shape after the last part: joints and octree. Returns false if out of memory.
 bool shape_finish(Shape *shape);
-// shape_field, and which part is the largest there and where on it.
+// Like shape_field; also returns the part with the largest value there and its parameter.
 double shape_field_of_part(const Shape *shape, Vec3 x, int *part, double *at);
 
 #endif

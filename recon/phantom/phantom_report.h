@@ -1,4 +1,4 @@
-// How far a model is from its true shape (recon/phantom/phantom_measure.h), for people and as JSON.
+// Reports the distance of a model from its true shape (recon/phantom/phantom_measure.h), as text and as JSON.
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_REPORT_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_REPORT_H
 

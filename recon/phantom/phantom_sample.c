@@ -1,4 +1,4 @@
-// Truth of a synthetic shape as a tree: nodes on the centreline with points on the true surface.
+// Samples a synthetic shape as a tree: nodes on the centreline with points on the true surface.
 #include "recon/phantom/phantom.h"
 
 #include "base/base.h"
@@ -8,7 +8,7 @@
 
 // --- Samples ---
 
-// From a point inside out along unit d to the surface; false if it is further than `most`.
+// Marches from a point inside along unit d to the surface. Returns false if it is further than `most`.
 static bool march_out(const Shape *shape, Vec3 x, Vec3 d, double most, Vec3 *hit)
 {
     double t = 0;
@@ -26,7 +26,7 @@ static bool march_out(const Shape *shape, Vec3 x, Vec3 d, double most, Vec3 *hit
 
 typedef struct Sampler {
     const Shape *shape;
-    VesselTree *tree;        // points grow behind the nodes
+    VesselTree *tree;        // points are appended with the nodes
     int64_t capacity;
     Random random;
     bool failed;
@@ -53,7 +53,7 @@ static void add_sample(Sampler *s, Vec3 p)
     tree->point[tree->point_count++] = p;
 }
 
-// Across the vessel, evenly over the cylinder's side; rays that leave into a branch or sac find the wall too late and are dropped.
+// Samples the side of the vessel by rays perpendicular to it, evenly over the cylinder. Rays into a branch or sac reach the wall too late and are discarded.
 static void sample_side(Sampler *s, const Part *part, double at, double height)
 {
     double phase = 2 * PI * random_open(&s->random), last = part->at[part->knot_count - 1];
@@ -84,7 +84,7 @@ static void sample_cap(Sampler *s, const Part *part, double at, double side)
     }
 }
 
-// All round a sac's centre; points on the parent's wall are left to the parent.
+// Samples a sac in all directions from its centre; points on the parent's wall belong to the parent.
 static void sample_sac(Sampler *s, const Part *part, double at)
 {
     Station station = part_at(part, at);
@@ -101,7 +101,7 @@ static void sample_sac(Sampler *s, const Part *part, double at)
     }
 }
 
-// Parameters of a part's nodes: about `spacing` local radii apart; a branch starts at its mouth, a sac has one node at its widest.
+// Places a part's nodes (their parameters): about `spacing` local radii apart. A branch starts at its ostium; a sac has one node at its widest place.
 static int place_nodes(const Shape *shape, int p, double *at, int capacity)
 {
     const Part *part = &shape->part[p];
@@ -160,7 +160,7 @@ VesselTree *shape_sample(const Shape *shape, Faults *faults)
             tree->height[node] = 2 * station.radius;
             tree->kind[node] = part->kind;
             tree->parent[node] = node - 1;
-            if (k == 0 && part->parent >= 0) {   // the nearest node of the parent part
+            if (k == 0 && part->parent >= 0) {   // link to the nearest node of the parent part
                 int nearest = first[part->parent];
                 for (int m = nearest; m < first[part->parent] + count[part->parent]; m++)
                     if (vec3_distance(tree->center[m], station.center) < vec3_distance(tree->center[nearest], station.center))

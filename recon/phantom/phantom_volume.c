@@ -1,7 +1,7 @@
-// The angiogram of a synthetic shape: contrast of each voxel by the share of it that lies in the vessel, blur, noise, clipping.
+// Simulates the angiogram of a synthetic shape: the contrast of each voxel is the fraction of it in the vessel; then blur, noise, clipping.
 //
-// The share is taken as that of a box filter across the wall: 1/2 + f / w, w = (sum_k (n . a_k)^2)^(1/2) for the normal n and the grid's steps a_k, so
-// that its second moment w^2 / 12 is the voxel's own. It adds to the blur: b^2 = psf^2 + w^2 / 12.
+// The fraction is that of a box filter across the wall: 1/2 + f / w, w = (sum_k (n . a_k)^2)^(1/2) for the normal n and the grid's steps a_k, so
+// that its second moment w^2 / 12 equals the voxel's. It adds to the blur: b^2 = psf^2 + w^2 / 12.
 #include "recon/phantom/phantom.h"
 
 #include "base/base.h"
@@ -14,25 +14,25 @@
 
 typedef struct Layer {       // the shape, or its neighbour
     const Shape *shape;
-    double *way;             // (parts) [mm] from the root to the part's start
+    double *arc;             // (parts) [mm] arc length from the root to the part's start
     double longest;
 } Layer;
 
-static bool measure_ways(Layer *layer)
+static bool measure_arcs(Layer *layer)
 {
     const Shape *shape = layer->shape;
-    layer->way = calloc((size_t)shape->part_count, sizeof *layer->way);
-    for (int p = 0; layer->way && p < shape->part_count; p++) {
+    layer->arc = calloc((size_t)shape->part_count, sizeof *layer->arc);
+    for (int p = 0; layer->arc && p < shape->part_count; p++) {
         const Part *part = &shape->part[p];
         if (part->parent >= 0) {
             Vec3 g;
             double at;
             part_field(&shape->part[part->parent], part_at(part, 0).center, -HUGE_VAL, false, &g, &at);
-            layer->way[p] = layer->way[part->parent] + at;
+            layer->arc[p] = layer->arc[part->parent] + at;
         }
-        layer->longest = fmax(layer->longest, layer->way[p] + part->at[part->knot_count - 1]);
+        layer->longest = fmax(layer->longest, layer->arc[p] + part->at[part->knot_count - 1]);
     }
-    return layer->way != NULL;
+    return layer->arc != NULL;
 }
 
 // --- Voxels ---
@@ -45,7 +45,7 @@ typedef struct Painter {
     Volume *volume;
     Layer layer[2];          // vessel and neighbour
     int cells[3];
-    double diagonal, width;  // of a voxel; the width is 0 if it depends on the direction
+    double diagonal, width;  // diagonal of a voxel, and its width w; 0 if it depends on the direction
 } Painter;
 
 static double field_of(const Painter *p, int which, Vec3 x, Vec3 *gradient, int *part, double *at)
@@ -64,7 +64,7 @@ static double brightness(const Painter *p, int which, int part, double at)
     if (which == BONE)
         return p->options->bone;
     const Layer *layer = &p->layer[which];
-    return p->options->fade > 0 ? 1 - p->options->fade * fmin(1, fmax(0, (layer->way[part] + at) / layer->longest)) : 1;
+    return p->options->fade > 0 ? 1 - p->options->fade * fmin(1, fmax(0, (layer->arc[part] + at) / layer->longest)) : 1;
 }
 
 static double voxel_value(const Painter *p, Vec3 x, const double *known)
@@ -79,7 +79,7 @@ static double voxel_value(const Painter *p, Vec3 x, const double *known)
             Vec3 n = {1, 0, 0};
             if (which != BONE)
                 field_of(p, which, x, &n, NULL, NULL);
-            else   // the blocks' faces, to the second order of a voxel
+            else   // smooth the blocks' faces, accurate to second order in the voxel size
                 for (int k = 0; k < 3; k++)
                     *(k == 0   ? &n.x
                       : k == 1 ? &n.y
@@ -99,7 +99,7 @@ static double voxel_value(const Painter *p, Vec3 x, const double *known)
     return value;
 }
 
-// Halves the cube until it lies wholly in or out of each field, |grad f| <= 1. `known`: > 0 all in, < 0 all out, 0 not known.
+// Subdivides the cube until it lies wholly inside or outside each field, using |grad f| <= 1. `known`: > 0 all inside, < 0 all outside, 0 not known.
 static void paint(const Painter *p, int i0, int j0, int k0, int edge, const double *known)
 {
     Volume *v = p->volume;
@@ -150,7 +150,7 @@ typedef struct Blur {
     bool *failed;            // (jobs)
 } Blur;
 
-// Lines along the axis, side by side in x where the axis is not x itself; beyond the border is background. Empty lines stay.
+// Blurs the lines along an axis, side by side in x unless the axis is x itself. Outside the grid is background. Empty lines are skipped.
 static void blur_slab(void *context, long index)
 {
     const Blur *b = context;
@@ -211,12 +211,12 @@ static bool blur_axis(Volume *volume, int axis, double sigma, int threads)
 
 // --- A bright band ---
 
-typedef struct Band {        // a slab; its faces are as blurred as the vessels' walls
+typedef struct Band {        // a slab whose faces are as blurred as the vessels' walls
     Vec3 center, normal;
-    double half, blur;       // [mm]
+    double half, blur;       // [mm] half of its thickness, and its blur
 } Band;
 
-// Across the trunk, between a fifth and four fifths of its length.
+// Places the slab across the trunk, between a fifth and four fifths of its length.
 static Band place_band(const Shape *shape, const VolumeOptions *o)
 {
     const Part *trunk = &shape->part[0];
@@ -248,7 +248,7 @@ static void finish_slice(void *context, long index)
 {
     const Finish *f = context;
     size_t plane = (size_t)f->volume->size[0] * (size_t)f->volume->size[1], first = (size_t)index * plane;
-    Random random = {f->options->seed + 2 * first * RANDOM_STEP};   // two numbers a voxel
+    Random random = {f->options->seed + 2 * first * RANDOM_STEP};   // two random numbers per voxel
     float low = HUGE_VALF, high = -HUGE_VALF;
     for (size_t i = first; i < first + plane; i++) {
         float *value = &f->volume->value[i];
@@ -285,7 +285,7 @@ VolumeOptions volume_default_options(void)
 
 static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *faults)
 {
-    // about an axis oblique to the grid
+    // rotate about an axis oblique to the grid
     Vec3 about = vec3_unit(vec3(1, 2, 3)), unit[3];
     double turn = o->rotate_deg * PI / 180, total = 1, grow = 0;
     for (int k = 0; k < 3; k++) {
@@ -336,7 +336,7 @@ Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faul
     p.diagonal = sqrt(p.diagonal);
     p.width = even ? options->voxel_mm[0] : 0;
     Finish f = {.volume = volume, .options = options, .band = place_band(shape, options), .extreme = calloc((size_t)volume->size[2], sizeof *f.extreme)};
-    bool good = f.extreme && measure_ways(&p.layer[0]) && (!shape->neighbour || measure_ways(&p.layer[1]));
+    bool good = f.extreme && measure_arcs(&p.layer[0]) && (!shape->neighbour || measure_arcs(&p.layer[1]));
     if (good)
         parallel_for(options->threads, (long)p.cells[1] * p.cells[2], paint_layer, &p, NULL);
     for (int k = 0; good && options->psf_mm > 0 && k < 3; k++)
@@ -348,8 +348,8 @@ Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faul
         volume->minimum = fminf(volume->minimum, f.extreme[k][0]);
         volume->maximum = fmaxf(volume->maximum, f.extreme[k][1]);
     }
-    free(p.layer[0].way);
-    free(p.layer[1].way);
+    free(p.layer[0].arc);
+    free(p.layer[1].arc);
     free(f.extreme);
     if (good)
         return volume;

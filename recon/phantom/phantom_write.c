@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Bone: no part of the truth.
+// Prints the bone blocks, which are not part of the vessel.
 static void print_blocks(FILE *out, const Shape *shape)
 {
     int blocks;
@@ -94,7 +94,7 @@ static bool write_ply(const TriangleMesh *mesh, const char *path, Faults *faults
     return written;
 }
 
-// F.stl -> F-truth.h5
+// Derives a file name, for example F.stl -> F-truth.h5.
 static void beside(const char *output, const char *extension, const char *what, char *path, size_t capacity)
 {
     snprintf(path, capacity, "%.*s-%s.h5", (int)(strlen(output) - strlen(extension)), output, what);
@@ -137,7 +137,7 @@ bool phantom_write(const PhantomFiles *files, const Shape *shape, const char *pa
     bool is_tree = !strcmp(extension, ".h5") || !strcmp(extension, ".hdf5"), is_volume = !strcmp(extension, ".nrrd");
     bool is_stl = !strcmp(extension, ".stl"), is_ply = !strcmp(extension, ".ply");
     if (!is_tree && !is_volume && !is_stl && !is_ply) {
-        faults_add(faults, path, 0, 0, "has no known extension; valid: .h5, .stl, .ply, .nrrd");
+        faults_add(faults, path, 0, 0, "unknown extension; expected .h5, .stl, .ply or .nrrd");
         return false;
     }
     VesselTree *tree = shape_sample(shape, faults);

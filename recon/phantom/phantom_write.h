@@ -1,4 +1,4 @@
-// A synthetic shape as files: its points, its surface or a noisy volume of it, and beside the last two the truth.
+// Writes a synthetic shape to files: its points, its surface or a noisy volume, and with the last two the exact shape.
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_WRITE_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_WRITE_H
 
@@ -7,15 +7,16 @@
 #include <stdio.h>
 
 typedef struct PhantomFiles {
-    const char *name;                // of the shape
-    int option_count;                // that made it, kept in the trees' files
+    const char *name;                // name of the shape
+    int option_count;                // options with which it was created; recorded in the trees' files
     const char (*option)[2][64];     // (option_count) key and value
-    double cell_mm;                  // grid of a surface's triangles
+    double cell_mm;                  // [mm] grid spacing for a surface's triangles
     VolumeOptions volume;
 } PhantomFiles;
 
-// `path` says by its extension what: .h5 points, .stl or .ply the surface, .nrrd a volume; beside the last two F-truth.h5 with the true centreline and exact
-// surface points, and F-neighbour.h5 where the shape has a neighbour that is no part of it. `out` (NULL: none) gets a line about it. False with faults.
+// The extension of `path` selects the contents: .h5 points, .stl or .ply the surface, .nrrd a volume. Beside the last two it also writes F-truth.h5 with the
+// true centreline and exact surface points, and F-neighbour.h5 if the shape has a neighbour that is not part of it. `out` (NULL: none) gets a line about each
+// file. Returns false with faults.
 bool phantom_write(const PhantomFiles *files, const Shape *shape, const char *path, FILE *out, Faults *faults);
 
 #endif

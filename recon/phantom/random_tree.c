@@ -6,29 +6,29 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct Way {         // a part as it grows
+typedef struct GrowingPart { // a part of the shape while it grows
     double (*knot)[4];       // (KNOTS)
     int count, parent;
-    Vec3 start;              // direction there
-} Way;
+    Vec3 start;              // direction at its start
+} GrowingPart;
 
-typedef struct Segment {     // from bifurcation to bifurcation
-    int way, first, last;    // knots
+typedef struct Segment {     // a vessel segment from bifurcation to bifurcation
+    int part, first, last;   // its part, and the range of its knots
     int parent, sister;      // -1: none
     double radius, length;
-    Vec3 direction;          // at its end
+    Vec3 direction;          // direction at its end
     bool is_tip;
 } Segment;
 
-typedef struct Bead {        // of a segment: space that others must keep clear of
+typedef struct Bead {        // a ball on a segment that other vessels must keep clear of
     Vec3 center;
-    double radius, arc;      // from the segment's start
+    double radius, arc;      // arc: length from the segment's start
     int segment;
 } Bead;
 
 enum { SEGMENT_KNOTS = 24 };
 
-typedef struct Draft {       // a segment that is not yet taken
+typedef struct Draft {       // a proposed segment
     double knot[SEGMENT_KNOTS][4];
     int count;
     Bead bead[SEGMENT_KNOTS];
@@ -37,10 +37,10 @@ typedef struct Draft {       // a segment that is not yet taken
 } Draft;
 
 typedef struct Growth {
-    Way *way;
+    GrowingPart *part;
     Segment *segment;
     Bead *bead;
-    int way_count, segment_count, bead_count, bead_capacity;
+    int part_count, segment_count, bead_count, bead_capacity;
     double clearance;
     Random random;
 } Growth;
@@ -53,7 +53,8 @@ static Vec3 random_direction(Random *random)
     return vec3(ring * same_cos(angle), ring * same_sin(angle), z);
 }
 
-// From x along d: first turned by `turn` towards `side`, then wandering. The radius goes from r0 to r within three of r0.
+// Draws a segment from x along d: first it turns by `turn` towards `side`, then its direction wanders randomly. The radius changes from r0 to r over a length
+// of 3 r0.
 static void draw(Random *random, Vec3 x, Vec3 d, Vec3 side, double turn, double r0, double r, Draft *out)
 {
     double step = r, bend = 3 * r, length = random_between(random, 6, 11) * r + 1.5 * (r0 - r);
@@ -68,7 +69,7 @@ static void draw(Random *random, Vec3 x, Vec3 d, Vec3 side, double turn, double 
             turn -= by;
         } else {
             curve = vec3_add_scaled(vec3_scale(curve, 0.75), 0.12 / r, random_direction(random));
-            double sharp = vec3_norm(curve) * 4 * r;   // no tighter than four radii
+            double sharp = vec3_norm(curve) * 4 * r;   // no bend tighter than four radii
             d = vec3_unit(vec3_add_scaled(d, step / fmax(1, sharp), vec3_add_scaled(curve, -vec3_dot(curve, d), d)));
         }
         x = vec3_add_scaled(x, step, vec3_unit(vec3_add(before, d)));
@@ -86,8 +87,8 @@ static bool collides(const Bead *a, const Bead *b, double clearance)
     return vec3_norm2(vec3_sub(a->center, b->center)) < least * least;
 }
 
-// Whether the draft, grown from segment `parent`, keeps clear of everything except what it must touch: itself, its parent and `sister` near the
-// bifurcation.
+// Returns true if the draft, which grows from segment `parent`, keeps clear of everything except what it must touch: itself, its parent, and `sister` near
+// the bifurcation.
 static bool fits(const Growth *g, const Draft *draft, int parent, double zone, const Draft *sister)
 {
     for (int i = 0; i < draft->count; i++) {
@@ -108,7 +109,7 @@ static bool fits(const Growth *g, const Draft *draft, int parent, double zone, c
     return true;
 }
 
-static bool take(Growth *g, const Draft *draft, int way, int parent)
+static bool take(Growth *g, const Draft *draft, int part, int parent)
 {
     if (g->bead_count + draft->count > g->bead_capacity) {
         int capacity = 2 * g->bead_capacity + 1024;
@@ -118,9 +119,9 @@ static bool take(Growth *g, const Draft *draft, int way, int parent)
         g->bead = more;
         g->bead_capacity = capacity;
     }
-    Way *w = &g->way[way];
+    GrowingPart *w = &g->part[part];
     Segment *s = &g->segment[g->segment_count];
-    *s = (Segment){.way = way,
+    *s = (Segment){.part = part,
                    .first = w->count,
                    .parent = parent,
                    .sister = -1,
@@ -141,25 +142,25 @@ static bool take(Growth *g, const Draft *draft, int way, int parent)
 
 static Vec3 knot_center(const double knot[4]) { return vec3(knot[0], knot[1], knot[2]); }
 
-static bool start_way(Growth *g, int parent, const double knot[4], Vec3 direction)
+static bool start_part(Growth *g, int parent, const double knot[4], Vec3 direction)
 {
-    Way *w = &g->way[g->way_count];
-    *w = (Way){.knot = calloc(KNOTS, sizeof *w->knot), .count = 1, .parent = parent, .start = direction};
+    GrowingPart *w = &g->part[g->part_count];
+    *w = (GrowingPart){.knot = calloc(KNOTS, sizeof *w->knot), .count = 1, .parent = parent, .start = direction};
     if (!w->knot)
         return false;
-    g->way_count++;
+    g->part_count++;
     memcpy(w->knot[0], knot, sizeof w->knot[0]);
     return true;
 }
 
-// Splits the tip; false if nothing fits, `*failed` if memory runs out.
+// Splits the tip. Returns false if no split fits; sets `*failed` if out of memory.
 static bool split(Growth *g, int tip, bool *failed)
 {
     Segment parent = g->segment[tip];
-    const Way *way = &g->way[parent.way];
-    Vec3 x = knot_center(way->knot[parent.last]), d = parent.direction, e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
+    const GrowingPart *part = &g->part[parent.part];
+    Vec3 x = knot_center(part->knot[parent.last]), d = parent.direction, e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
     double r0 = parent.radius, zone = 5 * r0;
-    for (int attempt = 0; attempt < 60 && way->count + SEGMENT_KNOTS < KNOTS; attempt++) {
+    for (int attempt = 0; attempt < 60 && part->count + SEGMENT_KNOTS < KNOTS; attempt++) {
         double ratio = random_between(&g->random, 0.5, 1), r1 = r0 / same_cbrt(1 + ratio * ratio * ratio), r2 = ratio * r1;
         double q0 = same_square(same_square(r0)), q1 = same_square(same_square(r1)), q2 = same_square(same_square(r2));
         double angle = random_between(&g->random, 0, 2 * PI);
@@ -170,14 +171,14 @@ static bool split(Growth *g, int tip, bool *failed)
         if (!fits(g, &one, tip, zone, NULL) || !fits(g, &two, tip, zone, &one))
             continue;
         double first[4] = {x.x, x.y, x.z, r2};
-        *failed = !take(g, &one, parent.way, tip) || !start_way(g, parent.way, first, d) || !take(g, &two, g->way_count - 1, tip);
+        *failed = !take(g, &one, parent.part, tip) || !start_part(g, parent.part, first, d) || !take(g, &two, g->part_count - 1, tip);
         g->segment[tip].is_tip = false;
         return true;
     }
     return false;
 }
 
-// A sac on the side of a random branch: a neck, and a sphere a third of a vessel's radius off the wall.
+// Adds a sac on the side of a random branch: a neck, and a sphere a third of a vessel's radius off the wall.
 static bool add_sac(Growth *g, Shape *shape)
 {
     for (int attempt = 0; attempt < 300; attempt++) {
@@ -187,7 +188,7 @@ static bool add_sac(Growth *g, Shape *shape)
         int k = s->first + (int)(seat->arc / s->radius + 0.5) - 1;
         if (seat->arc < 4 * r || s->length - seat->arc < 4 * r || k <= s->first || k >= s->last)
             continue;
-        Vec3 along = vec3_unit(vec3_sub(knot_center(g->way[s->way].knot[k + 1]), knot_center(g->way[s->way].knot[k - 1])));
+        Vec3 along = vec3_unit(vec3_sub(knot_center(g->part[s->part].knot[k + 1]), knot_center(g->part[s->part].knot[k - 1])));
         Vec3 side = random_direction(&g->random);
         side = vec3_unit(vec3_add_scaled(side, -vec3_dot(side, along), along));
         Bead ball = {.center = vec3_add_scaled(seat->center, far, side), .radius = size, .segment = seat->segment};
@@ -212,9 +213,9 @@ static bool add_sac(Growth *g, Shape *shape)
             g->bead = more;
             g->bead_capacity += 1024;
         }
-        int way = s->way;
-        g->bead[g->bead_count++] = ball;   // arc 0: no seat for another sac
-        return shape_add(shape, (const double(*)[4])knot, 5, false, false, way, NODE_ANEURYSM, NULL);
+        int part = s->part;
+        g->bead[g->bead_count++] = ball;   // arc 0: no other sac is placed on it
+        return shape_add(shape, (const double(*)[4])knot, 5, false, false, part, NODE_ANEURYSM, NULL);
     }
     return true;
 }
@@ -246,14 +247,16 @@ bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, Ran
 bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file, Faults *faults)
 {
     int most = o->branches + 2, before = faults->count;
-    Growth g = {
-        .way = calloc((size_t)most, sizeof(Way)), .segment = calloc((size_t)most, sizeof(Segment)), .clearance = 0.5 * o->radius_mm, .random = {o->seed}};
-    bool failed = !g.way || !g.segment;
+    Growth g = {.part = calloc((size_t)most, sizeof(GrowingPart)),
+                .segment = calloc((size_t)most, sizeof(Segment)),
+                .clearance = 0.5 * o->radius_mm,
+                .random = {o->seed}};
+    bool failed = !g.part || !g.segment;
     const double root[4] = {0, 0, 0, o->radius_mm};
     if (!failed) {
         Draft trunk;
         draw(&g.random, vec3(0, 0, 0), vec3(0, 0, 1), vec3(1, 0, 0), 0, o->radius_mm, o->radius_mm, &trunk);
-        failed = !start_way(&g, -1, root, vec3(0, 0, 1)) || !take(&g, &trunk, 0, -1);
+        failed = !start_part(&g, -1, root, vec3(0, 0, 1)) || !take(&g, &trunk, 0, -1);
     }
     while (!failed && g.segment_count + 2 <= o->branches) {
         int tip = -1;
@@ -261,16 +264,16 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
             if (g.segment[i].is_tip && (tip < 0 || g.segment[i].radius > g.segment[tip].radius))
                 tip = i;
         if (tip < 0) {
-            faults_add(faults, file, 0, 0, "no space for %d branches, only %d fit; try another seed", o->branches, g.segment_count);
+            faults_add(faults, file, 0, 0, "no space for %d branches: only %d fit; try another seed", o->branches, g.segment_count);
             break;
         }
         if (!split(&g, tip, &failed))
             g.segment[tip].is_tip = false;
     }
-    for (int w = 0; w < g.way_count && !failed; w++) {
-        const Way *way = &g.way[w];
-        const double slope[2][4] = {{way->start.x, way->start.y, way->start.z, 0}, {(double)NAN, (double)NAN, (double)NAN, (double)NAN}};
-        failed = !shape_add(shape, (const double(*)[4])way->knot, way->count, w == 0, false, way->parent, NODE_VESSEL, slope);
+    for (int w = 0; w < g.part_count && !failed; w++) {
+        const GrowingPart *part = &g.part[w];
+        const double slope[2][4] = {{part->start.x, part->start.y, part->start.z, 0}, {(double)NAN, (double)NAN, (double)NAN, (double)NAN}};
+        failed = !shape_add(shape, (const double(*)[4])part->knot, part->count, w == 0, false, part->parent, NODE_VESSEL, slope);
     }
     for (int i = 0; i < o->sacs && !failed; i++)
         failed = !add_sac(&g, shape);
@@ -285,10 +288,10 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
         left = added ? 40 : left - 1;
     }
     if (failed && faults->count == before)
-        faults_add(faults, file, 0, 0, "no room or memory for a tree of %d branches with %d blocks", o->branches, o->blocks);
-    for (int w = 0; w < g.way_count; w++)
-        free(g.way[w].knot);
-    free(g.way);
+        faults_add(faults, file, 0, 0, "cannot build a tree of %d branches with %d blocks: no free space, or out of memory", o->branches, o->blocks);
+    for (int w = 0; w < g.part_count; w++)
+        free(g.part[w].knot);
+    free(g.part);
     free(g.segment);
     free(g.bead);
     return !failed && faults->count == before;

@@ -1,4 +1,4 @@
-// See centreline_file.h. SWC: `id type x y z radius parent` a line (Cannon et al. 1998); a curve runs from a branching to the next or to an end.
+// Implements centreline_file.h. SWC has lines `id type x y z radius parent` (Cannon et al. 1998); a curve runs from one fork to the next or to an end.
 #include "recon/surface/centreline_file.h"
 
 #include "base/base.h"
@@ -216,7 +216,7 @@ static int find_sample(const Sample *sample, int count, long id)
     return low < count && sample[low].id == id ? low : -1;
 }
 
-// Curves end upstream at a branching, a root, or where the chain ends; each is gathered from its downstream end.
+// Adds the curves of an SWC file. A curve ends upstream at a fork, at a root, or where the chain ends; it is collected from its downstream end.
 static bool add_swc_curves(const Sample *sample, int count, CurveSet *set)
 {
     Vec3 *point = malloc(((size_t)count + 1) * sizeof *point);
@@ -371,7 +371,7 @@ bool centreline_load(const char *path, CurveSet *set, Faults *faults)
     return good;
 }
 
-// --- written ---
+// --- output ---
 
 static bool name_ends(const char *name, const char *end)
 {
@@ -418,7 +418,7 @@ static void write_markups(FILE *out, const CurveSet *set)
     fprintf(out, "\n]}\n");
 }
 
-// Curves that begin at another's point hang on its sample.
+// Writes SWC. A curve that begins at a point of another curve has that point as parent.
 static void write_swc(FILE *out, const CurveSet *set)
 {
     fprintf(out, "# id type x_mm y_mm z_mm radius_mm parent\n");
@@ -439,7 +439,7 @@ char *centreline_text(const CurveSet *set, const char *name, size_t *length, Fau
                                               : name_ends(name, ".swc")      ? write_swc
                                                                              : NULL;
     if (!write) {
-        faults_add(faults, name, 0, 0, "has no known centreline extension; expected .vtp, .mrk.json or .swc");
+        faults_add(faults, name, 0, 0, "unknown centreline extension; expected .vtp, .mrk.json or .swc");
         return NULL;
     }
     char *text = NULL;

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The branches of a tree: a branch is a chain from a child of a fork (or the root) to the next fork or end; it begins with the fork's node, so
-// that lines join. Calls `branch(context, nodes, count)` for each.
+// Calls `branch(context, nodes, count)` for each branch of a tree. A branch is a chain from a child of a fork (or the root) to the next fork or end; it
+// begins with the fork's node, so that lines join.
 static void each_branch(const VesselTree *tree, void (*branch)(void *context, const int *node, int count), void *context)
 {
     size_t nodes = (size_t)tree->node_count;
@@ -142,7 +142,7 @@ static void add_curve(void *context, const int *node, int count)
     cJSON_AddItemToArray(curves->list, curve);
 }
 
-// Markups of 3D Slicer, a curve a branch; `frame`: "RAS" or "LPS".
+// Prints 3D Slicer Markups, one curve per branch; `frame`: "RAS" or "LPS".
 static bool centreline_print_markups(FILE *out, const VesselTree *tree, const char *frame)
 {
     cJSON *root = cJSON_CreateObject();

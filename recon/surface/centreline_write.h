@@ -1,4 +1,4 @@
-// Centrelines of a tree for other programs. False: out of memory.
+// Writes the centrelines of a tree for other programs. Functions without faults return false if out of memory.
 #ifndef SELDINGER_RECON_SURFACE_CENTRELINE_WRITE_H
 #define SELDINGER_RECON_SURFACE_CENTRELINE_WRITE_H
 
@@ -7,7 +7,7 @@
 
 #include <stdio.h>
 
-// As a file ("-": standard output): ".vtp", ".swc", else markups. False with a fault.
+// Writes a file ("-": standard output) in the format of `extension`: ".vtp", ".swc", else markups. Returns false with a fault.
 bool centreline_write_file(const char *path, const char *extension, const VesselTree *tree, const char *frame, Faults *faults);
 
 #endif

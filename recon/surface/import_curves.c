@@ -1,8 +1,9 @@
-// Curves set in the mesh's frame and in its lumen. A given curve is kept except where the surface contradicts it: a stretch that runs out of the
-// lumen sideways goes back to the middle, one that runs out over a vessel's end is cut there, and a sample goes to the centroid of its section of the
-// lumen (16 rays square to the curve) where that has its wall at less than 0.15 of its median radius on one side, or at less than half of it where
-// the centroid has half as much clearance again; near a curve's ends only the former. Moving every sample to the middle was tried and rejected: it
-// bends exact curves at ends and ostia by half a radius.
+// A given curve is kept except where the surface contradicts it:
+//   - a stretch that leaves the lumen sideways is moved back to the middle;
+//   - a stretch that extends beyond a vessel's end is cut off there;
+//   - a sample is moved to the centroid of its cross-section of the lumen (16 rays perpendicular to the curve) if the wall on one side is nearer than 0.15 of
+//     the median radius, or if it is nearer than half of it and the centroid has 1.5 times the clearance; near a curve's ends only the former applies.
+// Moving every sample to the middle was tried and rejected: it bends exact curves at ends and ostia by half a radius.
 #include "recon/surface/import_curves.h"
 
 #include "base/base.h"
@@ -15,7 +16,7 @@ static const double STEP = 0.3, GRAZE = 0.15, BESIDE = 0.5, GAIN = 1.5;
 
 static double inside_share(const SurfaceMesh *mesh, const CurveSet *set, double sx, double scale)
 {
-    // each winding number visits all triangles
+    // limit the number of points, because each winding number visits all triangles
     int wanted = (int)fmin(fmax(2e7 / (mesh->triangle_count + 1), 20), 400), step = set->point_count / wanted + 1, inside = 0, count = 0;
     for (int i = 0; i < set->point_count; i += step, count++) {
         Vec3 p = set->point[i];
@@ -39,11 +40,11 @@ bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, I
     const double frame[4][2] = {{1, 1}, {-1, 1}, {1, scale}, {-1, scale}};
     int best = 0;
     double most = -1;
-    // curves of another unit are a speck that may well lie inside
+    // curves in another unit may be a speck that happens to lie inside
     double least_extent = 0.01 * extent(mesh->vertex, mesh->vertex_count), curves = extent(set->point, set->point_count);
     for (int f = 0; f < (scale != 1 ? 4 : 2); f++) {
         double share = curves * frame[f][1] < least_extent ? 0 : inside_share(mesh, set, frame[f][0], frame[f][1]);
-        // unchanged, unless that is clearly wrong
+        // keep the frame unchanged unless that is clearly wrong
         if (share > most + (f ? 0.25 : 0)) {
             most = share;
             best = f;
@@ -54,7 +55,7 @@ bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, I
     report->curves_scaled = frame[best][1];
     if (most < 0.5) {
         faults_add(faults, name, 0, 0,
-                   "only %.0f %% of the centrelines' points lie inside the surface, with x and y negated or not: they are of another frame or vessel",
+                   "only %.0f %% of the centrelines' points lie inside the surface, with or without x and y negated: they belong to another frame or vessel",
                    100 * most);
         return false;
     }
@@ -74,7 +75,7 @@ static Vec3 normal_of(const SurfaceMesh *mesh, int t)
     return vec3_unit(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
 }
 
-// By the side of the wall that rays meet first: most of those that meet any meet it from within.
+// Decides by the side of the wall that rays hit first: p is in the lumen if most rays that hit the wall hit its inner side.
 static bool is_in_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 p)
 {
     const Vec3 axis[3] = {{0.9341, 0.2717, 0.2318}, {-0.2453, 0.9611, -0.1270}, {-0.2594, 0.0622, 0.9638}};
@@ -99,7 +100,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
         double angle = 2 * PI * k / SECTION_RAYS;
         Vec3 direction = vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle)));
         length[k] = mesh_tree_ray(tree, p, direction, reach, NULL);
-        if (isfinite(length[k]))   // else through an opening
+        if (isfinite(length[k]))   // otherwise the ray leaves through an opening
             sorted[met++] = length[k];
     }
     *least = 0;
@@ -109,7 +110,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     sort_doubles(sorted, (size_t)met);
     double median = 0.5 * (sorted[(met - 1) / 2] + sorted[met / 2]);
     for (int k = 0; k < SECTION_RAYS; k++) {
-        // a branch's mouth does not belong to the section
+        // a branch's ostium does not belong to the cross-section
         double angle = 2 * PI * k / SECTION_RAYS, d = fmin(length[k], 1.6 * median);
         moment = vec3_add_scaled(moment, d * d * d / 3, vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle))));
         area += d * d / 2;
@@ -119,7 +120,8 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     return median;
 }
 
-// The middle of the chord that starts square to the wall at the nearest point; false if the wall lies along the curve (it left over an end).
+// Moves p to the middle of the chord that starts perpendicular to the wall at the nearest point. Returns false if the wall is perpendicular to the curve
+// there (the curve left through an end).
 static bool back_into_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tangent, double radius, Vec3 *p)
 {
     Vec3 foot = *p;
@@ -128,7 +130,7 @@ static bool back_into_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 
     if (!isfinite(off) || fabs(vec3_dot(vec3_sub(foot, *p), tangent)) > 0.7 * off)
         return false;
     Vec3 inward = vec3_negate(normal_of(mesh, t));
-    if (fabs(vec3_dot(inward, tangent)) > 0.7)   // it lies on a lid
+    if (fabs(vec3_dot(inward, tangent)) > 0.7)   // the nearest wall is a lid
         return false;
     double chord = mesh_tree_ray(tree, vec3_add_scaled(foot, 1e-4 * radius, inward), inward, 4 * radius, NULL);
     if (!isfinite(chord))
@@ -163,7 +165,7 @@ static int clear_sample(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tang
     return moved ? MOVED : KEPT;
 }
 
-// Samples curve c in steps of STEP widths into arrays of `room` entries; returns their number.
+// Samples curve c in steps of STEP widths into arrays of `room` entries. Returns the number of samples.
 static int sample_curve(const CurveSet *set, const MeshTree *tree, int c, double floor_step, int room, Vec3 *point, double *given, double *wide)
 {
     int n = 0;

@@ -9,9 +9,9 @@ static void print_junctions(FILE *out, const ImportReport *r)
     fprintf(out, "junctions      %d: %d supported by the surface, %d doubtful, %d refused", r->junction_count, r->junctions_with[IMPORT_SUPPORTED],
             r->junctions_with[IMPORT_DOUBTFUL], r->junctions_with[IMPORT_REFUSED]);
     if (r->junctions_moved)
-        fprintf(out, "; %d hung on another node", r->junctions_moved);
+        fprintf(out, "; %d attached to another node", r->junctions_moved);
     if (r->refused_nodes)
-        fprintf(out, "; %d nodes left out", r->refused_nodes);
+        fprintf(out, "; %d nodes removed", r->refused_nodes);
     fprintf(out, "; %d nodes on their links\n", r->link_nodes);
     for (int i = 0; i < r->named_count; i++) {
         const ImportJunction *j = &r->named[i];
@@ -25,7 +25,7 @@ static void print_junctions(FILE *out, const ImportReport *r)
         fprintf(out, "  and %d more\n", r->junction_count - r->junctions_with[IMPORT_SUPPORTED] - r->named_count);
 }
 
-// What was done to centrelines that were read.
+// Prints how the centrelines that were read were changed.
 static void print_curves(FILE *out, const ImportFigures *f)
 {
     const ImportReport *r = &f->report;
@@ -39,11 +39,11 @@ static void print_curves(FILE *out, const ImportFigures *f)
         fprintf(out, "centrelines: %.1f %% of their points graze the wall or lie beside the lumen: moved to its middle\n",
                 100.0 * r->moved_samples / r->samples);
     if (!f->computed && r->cut_samples)
-        fprintf(out, "centrelines: %.1f %% of their points lie over a vessel's end or in no vessel: cut off\n", 100.0 * r->cut_samples / r->samples);
+        fprintf(out, "centrelines: %.1f %% of their points lie beyond a vessel's end or in no vessel: cut off\n", 100.0 * r->cut_samples / r->samples);
     if (r->root_is_cut)
-        fprintf(out, "root: the surface is closed there: opened by a cut square to the vessel, %.2f mm before the end\n", r->root_cut);
+        fprintf(out, "root: the surface is closed there: opened by a cut perpendicular to the vessel, %.2f mm before the end\n", r->root_cut);
     if (r->lost_curves)
-        fprintf(out, "centrelines: %d touch no other and were left out, first at (%.4g, %.4g, %.4g)\n", r->lost_curves, r->lost.x, r->lost.y, r->lost.z);
+        fprintf(out, "centrelines: %d touch no other and were omitted, first at (%.4g, %.4g, %.4g)\n", r->lost_curves, r->lost.x, r->lost.y, r->lost.z);
     if (r->loop_count)
         fprintf(out, "centrelines: %d loops cut, first at (%.4g, %.4g, %.4g); a tool cannot pass there\n", r->loop_count, r->loop.x, r->loop.y, r->loop.z);
 }
@@ -52,9 +52,9 @@ void import_figures_print(FILE *out, const char *surface, const ImportFigures *f
 {
     const ImportReport *r = &f->report;
     if (r->unused_components)
-        fprintf(out, "%s: %d components have no centreline: left out\n", surface, r->unused_components);
+        fprintf(out, "%s: %d components have no centreline: omitted\n", surface, r->unused_components);
     print_curves(out, f);
-    fprintf(out, "surface        %d triangles, %.4g mm^2, lumen %.4g mm^3; %d lids taken off\n", f->check.triangle_count, f->check.area, f->check.volume,
+    fprintf(out, "surface        %d triangles, %.4g mm^2, lumen %.4g mm^3; %d lids removed\n", f->check.triangle_count, f->check.area, f->check.volume,
             r->lid_count);
     fprintf(out, "centrelines    %d curves %s, %d branches, %.1f mm, radius %.3g to %.3g mm\n", f->curve_count, f->computed ? "computed" : "read",
             r->branch_count, r->length, r->radius_min, r->radius_max);
@@ -62,7 +62,7 @@ void import_figures_print(FILE *out, const char *surface, const ImportFigures *f
     fprintf(out, "root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z,
             r->root_is_open ? "open" : "closed: no tool can enter there; --root X,Y,Z opens an end");
     print_junctions(out, r);
-    fprintf(out, "nodes          %d, %ld points; %ld of them out of every node's sight; %ld more belong to no node, %ld lie where a tool passes\n", f->nodes,
+    fprintf(out, "nodes          %d, %ld points; %ld of them visible from no node; removed: %ld that belong to no node, %ld in a tool's path\n", f->nodes,
             f->points, r->unseen_points, r->left_points, r->inner_points);
     fprintf(out, "seconds        %.2f\n", f->seconds);
 }

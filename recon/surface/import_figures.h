@@ -1,4 +1,4 @@
-// What an import found and did, for people and as JSON.
+// Reports the results of an import, as text and as JSON.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_FIGURES_H
 #define SELDINGER_RECON_SURFACE_IMPORT_FIGURES_H
 
@@ -11,13 +11,13 @@
 typedef struct ImportFigures {
     MeshCheck check;
     ImportReport report;
-    bool computed;           // the centrelines, else they were read
+    bool computed;           // the centrelines were computed; else they were read
     int curve_count, nodes;
     long points;
     double seconds;
 } ImportFigures;
 
-// But for what mesh_check_text() says of the surface. `surface` names it.
+// Prints all results except those of mesh_check_text() on the surface. `surface` is its name.
 void import_figures_print(FILE *out, const char *surface, const ImportFigures *figures);
 void import_figures_add(cJSON *root, const ImportFigures *figures);
 

@@ -1,8 +1,8 @@
-// The surface decides. Nodes in the parent's lumen see no wall of their own and were left out, so that a branch began with a link from the parent's
-// axis. Where the skeleton crosses a wall there, a path near it is searched, within the branch's radius; if there is none the link is refused,
-// however thin the wall: touching vessels are separate. Sheets inside the lumen, of vessels made of parts that overlap, are not walls; winding
-// numbers distinguish them. How narrow the path is, as a share of the branch's radius, says how well it is supported. Nodes stand on it every half
-// radius of the branch from one and a half of its radii inside the parent's wall on.
+// Each link is tested in the surface. Nodes in the parent's lumen see no wall of their own and were removed, so a branch begins with a link from the parent's
+// axis. If the skeleton crosses a wall there, a path near it is searched, within the branch's radius; if there is none, the link is refused, however thin the
+// wall, because touching vessels are separate. Sheets inside the lumen, in vessels made of overlapping parts, are not walls; winding numbers distinguish
+// them. The narrowest place of the path, as a fraction of the branch's radius, tells how well the link is supported. Nodes are placed on the path every half
+// radius of the branch, from 1.5 of its radii inside the parent's wall onwards.
 #include "recon/surface/import_ostia.h"
 
 #include "base/base.h"
@@ -13,12 +13,12 @@
 
 enum { ROOT_NODES = 5, STATIONS_MOST = 2000 };
 static const double SPACING = 0.5, INSIDE = 1.5,   // in radii of the branch
-    DOUBTFUL = 0.25;                             // narrower than this share of the branch's radius
+    DOUBTFUL = 0.25;                             // as a fraction of the branch's radius
 
 typedef struct Link {
     int node, parent;
     double radius, length;
-    bool is_inner;           // not the start of a branch: checked only where a wall crosses it
+    bool is_inner;           // not the start of a branch: checked only if a wall crosses the link
     bool is_moved, is_refused;
     Vec3 place;
     LinkPath path;
@@ -61,7 +61,7 @@ static double depth_in_segment(const Nodes *n, int i, Vec3 x)
     return ra + s * (rb - ra) - vec3_distance(x, vec3_add_scaled(a, s, along));
 }
 
-// How deep x lies in the parent's vessel, < 0 outside: along the nodes up from it and down from it within three radii.
+// Depth of x inside the parent's vessel, < 0 outside: over the nodes within three radii upstream and downstream.
 static double depth_in_parent(const Nodes *n, const int *first_child, int parent, Vec3 x)
 {
     double reach = 3 * n->radius[parent], deepest = depth_in_segment(n, parent, x), length = 0;
@@ -89,12 +89,12 @@ static double root_radius(const Nodes *n, const int *first_child, int node)
 
 // --- the surface ---
 
-typedef struct Room {        // the lattice of a path
+typedef struct Room {        // context of the lattice search
     const Wall *wall;
-    double radius;           // of the branch
+    double radius;           // radius of the branch
 } Room;
 
-// Whether the step stays inside. Winding numbers cost all triangles each: only behind walls that it meets.
+// Returns true if the step stays inside. A winding number visits all triangles, so it is computed only behind walls that the step crosses.
 static bool stays_inside(const void *context, Vec3 a, Vec3 b)
 {
     const Room *room = context;
@@ -112,7 +112,7 @@ static bool stays_inside(const void *context, Vec3 a, Vec3 b)
     return length <= 0;
 }
 
-// Distance to the wall as a share of the branch's radius.
+// Distance to the wall as a fraction of the branch's radius.
 static double room_at(const void *context, Vec3 x)
 {
     const Room *room = context;
@@ -123,7 +123,7 @@ static double room_at(const void *context, Vec3 x)
 
 // --- links ---
 
-// From the parent's node along the skeleton.
+// Takes the path from the parent's node along the skeleton.
 static bool follow_skeleton(const Nodes *n, const Skeleton *s, Link *link)
 {
     int count = 1, top = n->sample[link->parent], at = n->sample[link->node];
@@ -137,7 +137,7 @@ static bool follow_skeleton(const Nodes *n, const Skeleton *s, Link *link)
     return link->path.point != NULL;
 }
 
-// The skeleton's path, or the best one beside the straight link where a wall crosses that. False: out of memory.
+// Finds the skeleton's path, or the best path near the straight link if a wall crosses the skeleton's. Returns false if out of memory.
 static bool find_path(const Nodes *n, const Skeleton *s, const Wall *wall, Link *link)
 {
     Room room = {wall, link->radius};
@@ -169,7 +169,7 @@ static Vec3 path_at(const Link *link, double arc)
     return path->point[path->count - 1];
 }
 
-// Arc from the parent's axis up to the last place that lies so deep in the parent.
+// Arc length from the parent's axis to the last place that is `depth` deep in the parent.
 static double arc_at_depth(const Nodes *n, const int *first_child, const Link *link, double depth)
 {
     double arc = link->length;
@@ -208,8 +208,8 @@ static void mark_hanging(const Nodes *n, int node, bool *hangs)
         hangs[i] = n->parent[i] >= 0 && hangs[n->parent[i]];
 }
 
-// The nearest earlier node in line of sight, by the distance outside both vessels, in link->path. Nodes come after their parents, so later ones are
-// not considered. False: out of memory.
+// Finds the nearest earlier node in line of sight, by the distance outside both vessels; the path goes to link->path. Nodes come after their parents, so
+// later ones are not considered. Returns false if out of memory.
 static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
 {
     Room room = {wall, link->radius};
@@ -235,7 +235,7 @@ static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
     return true;
 }
 
-// All of them: curves may lead through walls anywhere. A branch begins with a node whose parent has an earlier child.
+// Collects all links, because curves may pass through walls anywhere. A branch begins with a node whose parent has an earlier child.
 static Link *collect_links(const Nodes *n, int *first_child, int *count)
 {
     Link *link = calloc((size_t)n->count + 1, sizeof *link);
@@ -250,7 +250,7 @@ static Link *collect_links(const Nodes *n, int *first_child, int *count)
     return link;
 }
 
-// A refused link within a branch is another junction: between two vessels that the curves treat as one.
+// Reports a link. A refused link within a branch counts as another junction: between two vessels that the curves treat as one.
 static void report_link(const Nodes *n, const Link *link, ImportReport *report)
 {
     if (link->is_inner && !link->is_refused && !link->is_moved)
@@ -326,7 +326,7 @@ bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, 
         stations += link[l].station_count;
     }
     for (int l = 0; good && l < count; l++) {
-        bool is_lost = dropped[link[l].node] || dropped[link[l].parent];   // with its parent
+        bool is_lost = dropped[link[l].node] || dropped[link[l].parent];   // it was removed with its parent
         if (!is_lost)
             report_link(nodes, &link[l], report);
         if (!is_lost && !link[l].is_refused)
@@ -363,7 +363,7 @@ LumenLines *nodes_lumen_lines(const Nodes *n)
     for (int i = 1; line && i < n->count; i++) {
         int p = n->parent[i];
         bool is_link = n->is_link[i] || n->is_link[p];
-        // the first link of a mouth begins on the parent's axis, in a lumen wider than its own
+        // the first link of an ostium begins on the parent's axis, in a lumen wider than the branch
         double radius = is_link && !n->is_link[p] ? n->radius[i] : fmin(n->radius[i], n->radius[p]);
         line[i - 1] = (LumenLine){n->center[p], n->center[i], (is_link ? LUMEN_LINK_CLEAR : LUMEN_TUBE_CLEAR) * radius};
     }

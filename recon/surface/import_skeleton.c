@@ -1,6 +1,6 @@
-// Curves to one rooted tree. All curves are sampled every tenth of the local inscribed radius. The tree starts as the root's curve; then, again and
-// again, the curve that touches it nearest to the root (along the tree) gives its stretches that lie apart from it. Two samples are of one
-// centreline where they are nearer than 0.35 of the smaller radius: overlapping curves differ by less, neighbouring vessels by more.
+// Joins curves to one rooted tree. All curves are sampled every tenth of the local inscribed radius. The tree starts as the root's curve. Then repeatedly the
+// curve that touches the tree nearest to the root (along the tree) contributes the stretches that lie apart from the tree. Two samples belong to the same
+// centreline if they are nearer than 0.35 of the smaller radius: overlapping curves differ by less, neighbouring vessels by more.
 #include "recon/surface/import_skeleton.h"
 
 #include <stdlib.h>
@@ -14,14 +14,14 @@ typedef struct Fine {        // the curves, sampled
     Vec3 *point;
     double *radius, *given;
     int *offset;             // (C+1)
-    double *distance;        // to the nearest sample of the tree …
-    int *nearest;            // … and that
+    double *distance;        // distance to the nearest sample of the tree
+    int *nearest;            // the nearest sample of the tree
     bool *done;
 } Fine;
 
 typedef struct Growing {
     Skeleton *s;
-    double *way;             // distance from the root along the tree
+    double *arc;             // [mm] path length from the root along the tree
     int *children;           // number of children
     int capacity;
 } Growing;
@@ -44,7 +44,7 @@ static double inscribed(const Wall *wall, Vec3 p)
     return fmax(mesh_tree_nearest(wall->tree, p, INFINITY, &foot, &triangle), 1e-6);
 }
 
-// Samples curve c; with out == NULL only counts.
+// Samples curve c; if `out` is NULL it only counts the samples.
 static int sample_curve(const CurveSet *set, const Wall *wall, int c, double floor_step, Vec3 *out, double *radius, double *given)
 {
     int count = 0;
@@ -102,7 +102,7 @@ static bool fine_create(const CurveSet *set, const Wall *wall, Fine *fine)
 // --- the root ---
 
 typedef struct End {
-    int sample, step;        // step: towards the curve's other end
+    int sample, step;        // step: +1 or -1, towards the curve's other end
     Vec3 outward;
     double radius;
     int opening;
@@ -127,7 +127,8 @@ static End end_at(const Fine *fine, const Wall *wall, int curve, bool last)
 
 static bool are_close(const Fine *fine, int i, int k) { return vec3_distance(fine->point[i], fine->point[k]) < SAME * fmin(fine->radius[i], fine->radius[k]); }
 
-// Whether another curve passes by or ends at this curve's end. One that ends there too and comes the same way overlaps: it leaves the end free.
+// Returns true if another curve passes or ends at this curve's end. One that ends there too and comes from the same direction overlaps this curve: the end is
+// then free.
 static bool end_is_joined(const Fine *fine, int curve, int sample)
 {
     Vec3 own = vec3_sub(fine->point[sample + (sample == fine->offset[curve] ? 1 : -1)], fine->point[sample]);
@@ -145,7 +146,7 @@ static bool end_is_joined(const Fine *fine, int curve, int sample)
     return false;
 }
 
-// The end that becomes the root: the one nearest to options->root, else the widest, open ends first.
+// Chooses the end that becomes the root: the one nearest to options->root, else the widest, open ends first.
 static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions *options, const char *name, End *root, Faults *faults)
 {
     double best = -INFINITY;
@@ -162,7 +163,7 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
             }
         }
     if (best == -INFINITY) {
-        faults_add(faults, name, 0, 0, "the centrelines have no free end where a tool could come in: all of them close loops");
+        faults_add(faults, name, 0, 0, "the centrelines have no free end where a tool could enter: all of them form closed loops");
         return false;
     }
     if (options->has_root && -best > 4 * root->radius + 1) {
@@ -179,12 +180,12 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
 static int grow(Growing *g, Vec3 point, double radius, double given, int parent)
 {
     Skeleton *s = g->s;
-    int i = s->count++;          // space for every sample and two openings' lines per curve was allocated before
+    int i = s->count++;          // the caller allocated space for every sample and two extensions to openings per curve
     s->point[i] = point;
     s->radius[i] = radius;
     s->given[i] = given;
     s->parent[i] = parent;
-    g->way[i] = parent < 0 ? 0 : g->way[parent] + vec3_distance(point, s->point[parent]);
+    g->arc[i] = parent < 0 ? 0 : g->arc[parent] + vec3_distance(point, s->point[parent]);
     g->children[i] = 0;
     if (parent >= 0)
         g->children[parent]++;
@@ -208,7 +209,7 @@ static void look_again(Fine *fine, const Skeleton *s, int first)
 
 static bool touches(const Fine *fine, const Skeleton *s, int i) { return fine->distance[i] < SAME * fmin(fine->radius[i], s->radius[fine->nearest[i]]); }
 
-// The samples from `at` on, towards `end` (exclusive), while they lie apart from the tree; returns whether anything was added.
+// Appends the samples from `at` on, towards `end` (exclusive), while they lie apart from the tree. Returns true if any was added.
 static bool grow_run(Growing *g, Fine *fine, int at, int step, int end, ImportReport *report)
 {
     while (at != end && touches(fine, g->s, at)) {
@@ -254,9 +255,9 @@ static void grow_all(Growing *g, Fine *fine, ImportReport *report)
     for (;;) {
         int best = -1;
         for (int i = 0; i < fine->count; i++)
-            if (!fine->done[i] && touches(fine, g->s, i) && (best < 0 || g->way[fine->nearest[i]] < g->way[fine->nearest[best]]))
+            if (!fine->done[i] && touches(fine, g->s, i) && (best < 0 || g->arc[fine->nearest[i]] < g->arc[fine->nearest[best]]))
                 best = i;
-        if (best < 0)   // a curve that begins within a vessel but off its centreline
+        if (best < 0)   // take a curve that begins within a vessel but off its centreline
             for (int i = 0; i < fine->count; i++)
                 if (!fine->done[i] && fine->distance[i] < g->s->radius[fine->nearest[i]] + fine->radius[i] &&
                     (best < 0 || fine->distance[i] < fine->distance[best]))
@@ -272,14 +273,14 @@ static void grow_all(Growing *g, Fine *fine, ImportReport *report)
 
 // --- ends at openings ---
 
-// Where a curve from `from` meets the opening: on the curve's line, unless that is off the opening's middle.
-static Vec3 way_out(const Opening *opening, Vec3 from)
+// Point of the opening at which a curve from `from` ends: straight ahead, unless that is far from the opening's centre.
+static Vec3 exit_point(const Opening *opening, Vec3 from)
 {
     Vec3 to = vec3_sub(from, opening->center), there = vec3_add_scaled(from, -vec3_dot(to, opening->normal), opening->normal);
     return vec3_distance(there, opening->center) < 0.3 * opening->radius ? there : opening->center;
 }
 
-// Whether a curve has run into the corner between an opening and its wall, or past the opening's plane.
+// Returns true if a curve has run into the corner between an opening and its wall, or past the opening's plane.
 static bool is_in_corner(const Opening *opening, Vec3 p)
 {
     Vec3 to = vec3_sub(p, opening->center);
@@ -287,7 +288,7 @@ static bool is_in_corner(const Opening *opening, Vec3 p)
     return depth < EDGE * opening->radius || (depth < opening->radius && aside > CORNER * opening->radius);
 }
 
-// Takes the end's last samples back to before the opening's plane and leads it straight out.
+// Removes the end's last samples that lie in the corner or past the opening's plane, and extends the curve straight to the opening.
 static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, double reach)
 {
     Skeleton *s = g->s;
@@ -313,7 +314,7 @@ static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, d
         kept[at] = false;
         at = up;
     }
-    Vec3 from = s->point[at], out = way_out(opening, from);
+    Vec3 from = s->point[at], out = exit_point(opening, from);
     int steps = (int)fmin(ceil(vec3_distance(from, out) / fmax(STEP * opening->radius, reach)), 200);
     for (int k = 1; k <= steps; k++) {
         Vec3 p = vec3_mix(from, out, (double)k / steps);
@@ -324,7 +325,8 @@ static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, d
     return true;
 }
 
-// A closed end tapers, or its curve runs into the wall: the piece with less than half of the width before it is left to the nodes there.
+// Removes the narrow last piece of a closed end, with less than half of the width before it: there the end tapers or its curve runs into the wall. The nodes
+// before it cover this piece.
 static void blunt_end(const Growing *g, int end, bool *kept)
 {
     const Skeleton *s = g->s;
@@ -387,7 +389,7 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
         int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c];
         for (; at != last && is_in_corner(opening, fine->point[at]); at += root.step)
             fine->done[at] = true;
-        Vec3 out = way_out(opening, fine->point[at]);
+        Vec3 out = exit_point(opening, fine->point[at]);
         double length = vec3_distance(fine->point[at], out);
         int steps = (int)fmin(fmax(ceil(length / (STEP * opening->radius)), 1), 200);
         for (int k = 0; k < steps; k++) {
@@ -396,7 +398,7 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
         }
         s->is_open_end[0] = true;
     } else if (options->has_root) {
-        // past the tip's taper, at the first place that is nearly as wide as the vessel
+        // cut behind the tip's taper, at the first place that is nearly as wide as the vessel
         int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c];
         for (bool narrow = true; narrow;) {
             double widest = fine->radius[at], arc = 0;
@@ -445,16 +447,16 @@ Skeleton *skeleton_join(const CurveSet *set, const Wall *wall, const ImportOptio
     if (good) {
         size_t room = (size_t)fine.count + 201 * (2 * (size_t)set->curve_count + 2);
         g.s = skeleton_create(room);
-        g.way = calloc(room, sizeof *g.way);
+        g.arc = calloc(room, sizeof *g.arc);
         g.children = calloc(room, sizeof *g.children);
         kept = calloc(room, sizeof *kept);
         place = calloc(room, sizeof *place);
-        good = g.s && g.way && g.children && kept && place;
+        good = g.s && g.arc && g.children && kept && place;
     }
     if (!good)
         faults_add(faults, name, 0, 0, "not enough memory");
     good = good && build(&g, &fine, wall, options, report, kept, place, name, faults);
-    free(g.way);
+    free(g.arc);
     free(g.children);
     free(kept);
     free(place);

@@ -1,4 +1,4 @@
-// Internal to import: joins curves to one rooted tree of fine samples with its ends at the openings of the wall.
+// Joins curves to one rooted tree of fine samples whose ends lie at the openings of the wall. Internal to the import.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_SKELETON_H
 #define SELDINGER_RECON_SURFACE_IMPORT_SKELETON_H
 
@@ -8,13 +8,13 @@
 typedef struct Skeleton {
     int count;
     Vec3 *point;
-    double *radius;          // inscribed [mm]
-    double *given;           // the curve's own [mm], 0 if it has none
-    int *parent;             // -1 at 0, parents before children
-    bool *is_open_end;       // at an opening
+    double *radius;          // [mm] radius of the inscribed sphere
+    double *given;           // [mm] radius given by the curve, 0 if none
+    int *parent;             // -1 for sample 0; parents precede children
+    bool *is_open_end;       // the sample lies at an opening
 } Skeleton;
 
-// NULL with faults.
+// Returns NULL with faults.
 Skeleton *skeleton_join(const CurveSet *set, const Wall *wall, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults);
 void skeleton_free(Skeleton *skeleton);
 

@@ -1,9 +1,9 @@
-// See import_surface.h. Nodes are spaced `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
-// points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle), and the samples
-// are moved to the smooth surface that the facets approximate. A node that gets fewer than eight points lies within its parent's lumen and is left
-// out: its children are attached to the parent. A node's radius is the median distance of the wall square to the curve, between 1 and 1.6 times the
-// inscribed radius (ostia and kissing walls pull the median away), or the curve's own on pieces where most of those agree with it. At a blind end,
-// where inscribed spheres shrink, it is that of the last sphere that reaches the end.
+// Implements import_surface.h. Nodes are spaced `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
+// points_per_node / (2 pi r spacing r), where r is the radius of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle), and
+// the samples are moved to the smooth surface that the facets approximate. A node that gets fewer than eight points lies within its parent's lumen and is
+// removed: its children are attached to the parent. A node's radius is the median distance of the wall perpendicular to the curve, between 1 and 1.6 times
+// the inscribed radius (ostia and touching walls increase the median), or the curve's own radius on pieces where most of those agree with it. At a blind end,
+// where inscribed spheres shrink, it is the radius of the last sphere that reaches the end.
 #include "recon/surface/import_surface.h"
 
 #include "base/base.h"
@@ -21,7 +21,8 @@ ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0
 
 // --- nodes ---
 
-// Along the unbranched piece at `end`, `next` giving the sample after each: up to the last sphere that reaches the end, none is smaller than it.
+// Increases the radii along the unbranched piece at `end`, up to the last sphere that reaches the end, so that none is smaller than that sphere. `next` gives
+// the sample after each.
 static void widen_end(Skeleton *s, int end, const int *next)
 {
     double arc = 0, widest = 0;
@@ -44,18 +45,19 @@ static double inscribed(const Wall *wall, Vec3 p)
     return mesh_tree_nearest(wall->tree, p, INFINITY, &foot, &t);
 }
 
-// Median distance of the wall square to the vessel at sample i, r being the inscribed radius.
+// Median distance of the wall perpendicular to the vessel at sample i, where r is the inscribed radius.
 static double wall_radius(const Skeleton *s, const Wall *wall, int i)
 {
     int a = i > 0 ? s->parent[i] : i, b = i > 0 ? i : i + (s->count > 1);
     double least, r = s->radius[i];
     Vec3 centroid;
     double section = section_radius(wall->tree, s->point[i], vec3_unit(vec3_sub(s->point[b], s->point[a])), 6 * fmax(r, s->given[i]), &least, &centroid);
-    // a curve beside the middle has an inscribed sphere that is too small; the section's middle tells
+    // beside the middle the inscribed sphere is too small: use that at the cross-section's centroid
     return fmin(fmax(section, r), PULLED * fmax(r, inscribed(wall, centroid)));
 }
 
-// Sections in the mouth of a branch see the trunk's wall: `radius` (S) rises by STEEP at most along a piece, but never falls below the inscribed one.
+// Limits the slope of `radius` (S): cross-sections in the ostium of a branch see the trunk's wall. The radius increases by STEEP at most along a piece, but
+// is never below the inscribed one.
 static void limit_slope(const Skeleton *s, const int *children, double *radius)
 {
     for (int pass = 0; pass < 2; pass++)
@@ -69,8 +71,8 @@ static void limit_slope(const Skeleton *s, const int *children, double *radius)
         }
 }
 
-// The curves' own radii on pieces between branchings where most agree with `radius` (S), but where they are far off. Agreement is narrow, for cells
-// are by power distance: trunks with radii a tenth too small lose their wall to branches. False if out of memory.
+// Uses the curves' own radii on pieces between forks where most of them agree with `radius` (S), except single values that are far off. The tolerance is
+// narrow because cells are defined by power distance: trunks with radii a tenth too small lose their wall to branches. Returns false if out of memory.
 static bool take_given(const Skeleton *s, const int *children, double *radius)
 {
     size_t room = (size_t)s->count + 1;
@@ -91,7 +93,7 @@ static bool take_given(const Skeleton *s, const int *children, double *radius)
     return good;
 }
 
-// From inscribed radii to those of the vessel.
+// Replaces the inscribed radii by those of the vessel.
 static bool vessel_radii(Skeleton *s, const Wall *wall)
 {
     size_t room = (size_t)s->count + 1;
@@ -164,9 +166,8 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
     return good;
 }
 
-// Along the vessel: from the parent, and to the child that continues straightest. To the first node a radius on, along the children that most nodes
-// hang on: the curve of a surface alone may come to the middle of its opening from the side, where a stenosis follows, or leave a stub in the
-// opening's corner, and the inlet would then look closed.
+// The root's direction: to the first node that is a radius away, along the children with the largest subtrees. A curve computed from the surface alone may
+// reach the middle of its opening from the side, where a stenosis follows, or leave a stub in the opening's corner, and the inlet would then appear closed.
 static Vec3 root_direction(const Nodes *nodes)
 {
     int at = 0;
@@ -193,6 +194,7 @@ static Vec3 root_direction(const Nodes *nodes)
     return vec3_unit_or(vec3_sub(nodes->center[at], nodes->center[0]), vec3(1, 0, 0));
 }
 
+// Sets the nodes' directions along the vessel: the mean of the directions from the parent and to the child that continues straightest.
 static void set_directions(Nodes *nodes)
 {
     for (int i = 0; i < nodes->count; i++) {
@@ -220,20 +222,20 @@ typedef struct Sampling {
     const Nodes *nodes;
     const Wall *wall;
     double points_per_node, spacing;
-    bool root_is_cut;        // the wall beyond the root's plane is left out
-    double *weight;          // (T) points wanted of each triangle
-    int *component;          // (V) of vertices: the first vertex of its component
-    bool *used;              // (V) components in which a node lies
-    Vec3 *normal;            // (V) 0 at an edge of the surface
+    bool root_is_cut;        // the wall beyond the root's plane is omitted
+    double *weight;          // (T) number of points wanted on each triangle
+    int *component;          // (V) the first vertex of each vertex's component
+    bool *used;              // (V) components that contain a node
+    Vec3 *normal;            // (V) normals; 0 at a sharp edge of the surface
     long count;
     Vec3 *point;             // (P) on facets
-    int *facet;              // (P)
-    Vec3 *curved;            // (P) where the surface would be that the facets stand for
-    int *owner;              // (P) -1: left out
-    bool *unseen;            // (P) given to a node that does not see it
+    int *facet;              // (P) facet of each point
+    Vec3 *curved;            // (P) points on the smooth surface that the facets approximate
+    int *owner;              // (P) node of each point; -1: none
+    bool *unseen;            // (P) assigned to a node that does not see the point
 } Sampling;
 
-// The nodes that are nearest to p by power distance |p - c|^2 - r^2, best first.
+// Lists the nodes that are nearest to p by power distance |p - c|^2 - r^2, best first.
 static int nearest_nodes(const Nodes *nodes, Vec3 p, int wanted, int *node)
 {
     double value[CANDIDATES];
@@ -262,7 +264,7 @@ static void weigh_triangle(void *context, long t)
     int node;
     Vec3 middle = vec3_scale(vec3_add(a, vec3_add(b, c)), 1.0 / 3);
     nearest_nodes(s->nodes, middle, 1, &node);
-    // far from every node the vessel is wider than the node's, or has no node
+    // far from every node the vessel is wider than at the node, or has no node
     double r = fmax(s->nodes->radius[node], vec3_distance(middle, s->nodes->center[node]) / PULLED);
     s->weight[t] = area * s->points_per_node / (2 * PI * r * r * s->spacing);
 }
@@ -274,8 +276,8 @@ static bool is_beyond_cut(const Sampling *s, Vec3 p, int owner)
     return s->root_is_cut && vec3_distance(n->center[owner], n->center[0]) < 3 * n->radius[0] && vec3_dot(vec3_sub(p, n->center[0]), upstream) > 0;
 }
 
-// In a branch that has no centreline: aside of the owner's vessel, and narrower by half. A model of the vessel cannot follow that; what is as wide,
-// a sac or a bulge, it can.
+// Returns true if the point lies in a branch without a centreline: aside of the owner's vessel, and in a lumen narrower by half. A model of the vessel cannot
+// represent that; a sac or a bulge, as wide as the vessel, it can.
 static bool is_in_side_branch(const Sampling *s, long i, int owner)
 {
     const SurfaceMesh *mesh = &s->wall->mesh;
@@ -300,7 +302,7 @@ static void find_owners(void *context, long chunk)
             double length = vec3_norm(to);
             if (length > SEEN_REACH * s->nodes->radius[node[k]])
                 continue;
-            // the wall is visible unless something lies clearly in front
+            // the wall is visible unless a surface lies clearly in front
             double hit = length > 0 ? mesh_tree_ray(s->wall->tree, from, vec3_scale(to, 1 / length), length, NULL) : INFINITY;
             if (!(hit < length - 0.1 * s->nodes->radius[node[k]]))
                 s->owner[i] = node[k];
@@ -323,7 +325,7 @@ static int first_of(int *component, int v)
     return v;
 }
 
-// Components of the wall, and which of them have a node; counts the others.
+// Finds the components of the wall, marks those that contain a node, and counts the others.
 static bool find_components(Sampling *s, ImportReport *report)
 {
     const SurfaceMesh *mesh = &s->wall->mesh;
@@ -356,7 +358,7 @@ static bool find_components(Sampling *s, ImportReport *report)
     return good;
 }
 
-// Weighted by the facets' angles. An edge, where normals would round what is sharp, has none.
+// Computes normals as means weighted by the facets' angles. A sharp edge, which normals would round off, has none.
 static bool find_normals(Sampling *s)
 {
     const SurfaceMesh *mesh = &s->wall->mesh;
@@ -384,8 +386,8 @@ static bool find_normals(Sampling *s)
     return good;
 }
 
-// Half of the way to the mean of the projections on the corners' tangent planes (Boubekeur, Alexa 2008: Phong tessellation): exact to second order
-// on a sphere and square to a cylinder's axis.
+// Moves a point half of the distance to the mean of its projections on the corners' tangent planes (Boubekeur, Alexa 2008: Phong tessellation): exact to
+// second order on a sphere and perpendicular to a cylinder's axis.
 static Vec3 curve_facet(const Sampling *s, const int *corner, const double *share, Vec3 flat)
 {
     Vec3 out = flat;
@@ -410,8 +412,7 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
         total += s->weight[t];
     }
     if (total > POINTS_MAX) {
-        faults_add(faults, name, 0, 0, "would take %.0f points: the centrelines leave wide parts of the surface out; expected a centreline in every vessel",
-                   total);
+        faults_add(faults, name, 0, 0, "would need %.0f points: large parts of the surface have no centreline; expected a centreline in every vessel", total);
         return false;
     }
     s->point = calloc((size_t)total + 2, sizeof *s->point);
@@ -440,7 +441,7 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
     return true;
 }
 
-// Leaves out the nodes (but the root) with too few points; returns how many.
+// Removes the nodes (except the root) with too few points. Returns how many.
 static int drop_nodes(Nodes *nodes, const long *points, int *place)
 {
     int kept = 0, before = nodes->count;
@@ -507,7 +508,7 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
     return tree;
 }
 
-// Nodes on the links, then owners once more; points in a tool's path are not wall.
+// Adds nodes to the links, then assigns owners again and removes points in a tool's path, which are not wall.
 static bool open_ostia(Nodes *nodes, const Skeleton *skeleton, Sampling *s, int threads, ImportReport *report)
 {
     if (!nodes_open_ostia(nodes, skeleton, s->wall, report))

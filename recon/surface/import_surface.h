@@ -1,8 +1,8 @@
-// From a surface and centrelines to the tree that `fit` takes: the part of RBT (Kerrien 2017, section 3) for vessels that are already segmented.
+// Builds the tree for `fit` from a surface and centrelines. It replaces RBT (Kerrien et al. 2017, section 3) for vessels that are already segmented.
 //
-// Curves are set in the mesh's frame, joined to one tree (curves may overlap, or begin on another; a loop is cut where it closes), and resampled to
-// nodes; flat lids over the ends of a closed surface are taken off, so that inlets and outlets are open; the surface is sampled evenly for each
-// local radius, and each point goes to the node that is nearest by power distance among those that see it. Lengths mm.
+// Curves are moved into the mesh's frame, joined to one tree (curves may overlap, or begin on another; a loop is cut where it closes), and resampled to
+// nodes; flat lids over the ends of a closed surface are removed, so that inlets and outlets are open; the surface is sampled with a density that suits the
+// local radius, and each point is assigned to the node nearest by power distance among those that see it. Lengths in mm.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_SURFACE_H
 #define SELDINGER_RECON_SURFACE_IMPORT_SURFACE_H
 
@@ -14,7 +14,7 @@
 
 ImportOptions import_default_options(void);
 
-// NULL with faults. `name` is used in messages.
+// Returns NULL with faults. `name` is used in messages.
 VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults);
 
 #endif

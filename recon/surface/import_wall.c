@@ -1,6 +1,6 @@
-// The wall: the surface without the flat lids over its vessels' ends. A lid is the region at which a centreline's end points: triangles of nearly one
-// plane, square to the centreline, as large as the lumen, meeting the wall at an edge. A round blind end has no such region: within 20 degrees of its
-// pole lies an eighth of the lumen's area.
+// A lid is the region at which a centreline's end points: triangles of nearly one
+// plane, perpendicular to the centreline, as large as the lumen, joined to the wall at a sharp edge. A round blind end has no such region: within 20 degrees
+// of its pole lies only an eighth of the lumen's area.
 #include "recon/surface/import_wall.h"
 
 #include "base/base.h"
@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const double LID_COSINE = 0.94, SQUARE_COSINE = 0.7, EDGE_COSINE = 0.82,   // 20 degrees, 45 degrees, 35 degrees
-    ROUND = 0.5;                                                                // area against the disc around it: triangles have 0.41 at most, squares 0.64
+    ROUND = 0.5;                                                                // area over that of the disc around it: triangle 0.41 at most, square 0.64
 
 static bool link_sides(const SurfaceMesh *mesh, int (*across)[3])
 {
@@ -29,13 +29,13 @@ static Vec3 area_of(const SurfaceMesh *mesh, int t)
     return vec3_scale(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)), 0.5);
 }
 
-// Marks the lid that a vessel's end points at, if there is one.
+// Marks the lid at which a vessel's end points, if there is one.
 static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across)[3], Vec3 end, Vec3 outward, double radius, bool *lid, int *lids, int *queue,
                      bool *seen)
 {
     int seed = -1, head = 0, tail = 0;
     Vec3 u = vec3_normal_to(outward), v = vec3_cross(outward, u);
-    // from a radius back, lest the end lies beyond its lid; beside the axis too, for facets there may be slivers
+    // start a radius back, in case the end lies beyond its lid; try beside the axis too, because facets there may be slivers
     for (int k = 0; k < 6 && seed < 0; k++) {
         Vec3 aside = vec3_add(vec3_scale(u, same_cos(2.4 * k)), vec3_scale(v, same_sin(2.4 * k)));
         Vec3 from = vec3_add_scaled(vec3_add_scaled(end, -radius, outward), 0.06 * k * radius, aside);
@@ -46,7 +46,7 @@ static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across
         return;
     Vec3 normal = vec3_unit(area_of(mesh, seed)), origin = mesh->vertex[mesh->triangle[seed][0]], sum = {0, 0, 0};
     double sharp = 0, border = 0, widest = 0;
-    // once about the first facet, then about the plane of what that found
+    // once around the first facet, then around the plane of the region found
     for (int pass = 0; pass < 2; pass++) {
         Vec3 moment = {0, 0, 0};
         double weight = 0;
@@ -88,7 +88,7 @@ static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across
         normal = vec3_unit_or(sum, normal);
     }
     double area = vec3_norm(sum);
-    // one facet of a coarse round end may be as large, but it is not a disc
+    // a facet of a coarse round end may be as large, but it is not a disc
     bool is_lid = area > 0.5 * PI * radius * radius && area < 4 * PI * radius * radius && sharp > 0.4 * border && area > ROUND * PI * widest * widest;
     for (int i = 0; i < tail; i++) {
         seen[queue[i]] = false;
@@ -97,7 +97,7 @@ static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across
     *lids += is_lid;
 }
 
-// A curve's end: outward direction over the last 1.5 radii, and the largest inscribed sphere there.
+// Finds a curve's end: its outward direction over the last 1.5 radii, and the largest inscribed sphere there.
 static void end_of_curve(const CurveSet *set, int curve, bool last, const MeshTree *tree, Vec3 *end, Vec3 *outward, double *radius)
 {
     int first = set->offset[curve], n = set->offset[curve + 1] - first, triangle = 0;
@@ -118,7 +118,7 @@ static void end_of_curve(const CurveSet *set, int curve, bool last, const MeshTr
     *outward = vec3_unit(vec3_sub(*end, far));
 }
 
-// Whether another curve continues, or aside, from this one's end: then it is not the end of a vessel.
+// Returns true if another curve continues from this one's end, straight or aside: then it is not the end of a vessel.
 static bool is_junction(const CurveSet *set, int curve, Vec3 end, Vec3 outward, double radius)
 {
     for (int c = 0; c < set->curve_count; c++) {
@@ -173,7 +173,7 @@ static bool find_openings(Wall *wall)
                 if (pass == 0) {
                     opening->center = vec3_add_scaled(opening->center, l, vec3_scale(vec3_add(p, q), 0.5));
                     length[o] += l;
-                } else   // a lid's edges run against the wall's
+                } else   // a lid's edges run opposite to the wall's
                     opening->normal = vec3_add(opening->normal, vec3_scale(vec3_cross(vec3_sub(q, opening->center), vec3_sub(p, opening->center)), 0.5));
             }
         for (int o = 0; o < count; o++) {
@@ -202,7 +202,7 @@ int wall_opening_near(const Wall *wall, Vec3 end, Vec3 outward, double radius)
         const Opening *opening = &wall->opening[o];
         Vec3 to = vec3_sub(opening->center, end);
         double along = vec3_dot(to, outward), aside = sqrt(fmax(0, vec3_norm2(to) - along * along));
-        // slits in a bad mesh are not ends: neither their size nor their direction fits
+        // slits in a damaged mesh are not ends: neither their size nor their direction fits
         if (opening->radius > 0.4 * radius && opening->radius < 3 * radius && vec3_dot(opening->normal, outward) > 0.3 && fabs(along) < 4 * radius &&
             aside < 1.5 * opening->radius && vec3_norm(to) < least) {
             least = vec3_norm(to);

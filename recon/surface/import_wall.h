@@ -1,4 +1,4 @@
-// Internal to import: the wall, i.e. the surface without the flat lids over its vessels' ends.
+// The wall, i.e. the surface without the flat lids over its vessels' ends. Internal to the import.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_WALL_H
 #define SELDINGER_RECON_SURFACE_IMPORT_WALL_H
 
@@ -7,8 +7,8 @@
 #include "recon/surface/mesh_tree.h"
 
 typedef struct Opening {     // a loop of open edges of the wall
-    Vec3 center, normal;     // normal: unit, out of the vessel
-    double radius;           // [mm] of the circle of the same area
+    Vec3 center, normal;     // normal: unit vector out of the vessel
+    double radius;           // [mm] radius of the circle of the same area
 } Opening;
 
 typedef struct Wall {        // the surface without lids
@@ -18,10 +18,10 @@ typedef struct Wall {        // the surface without lids
     int opening_count, lid_count;
 } Wall;
 
-// Removes flat lids at which a curve's end points. False if out of memory.
+// Creates the wall: removes flat lids at which a curve's end points. Returns false if out of memory.
 bool wall_open(const SurfaceMesh *mesh, const CurveSet *set, Wall *wall);
 void wall_close(Wall *wall);
-// The opening at which a vessel of that radius ends that runs to `end` along `outward`; -1 if there is none.
+// Returns the opening at which a vessel of that radius ends that runs to `end` along `outward`, or -1.
 int wall_opening_near(const Wall *wall, Vec3 end, Vec3 outward, double radius);
 
 #endif

@@ -1,10 +1,10 @@
-// See mesh_centreline.h. Symbols: d distance to the wall, s arc length along a path, r the largest d of a path beyond the curves' spheres. A path is
+// Implements mesh_centreline.h. Symbols: d distance to the wall, s arc length along a path, r the largest d of a path outside the curves' spheres. A path is
 // accepted if
 //   integral (d / r)^2 ds > 1.0 r
-// which is length less about 0.7 r for a tube, 0.5 to 0.6 r in the corners of lids, 0.33 cot(angle) r in a wedge; a sac, where d rises again beyond
-// its neck, has 0.7 r or more and gives one curve. Tried and rejected: centres of balls that touch the wall twice, joined as the wall's triangles are
-// (facets of coarse surfaces tear them apart: 279 curves of the aortic arch), covering by spheres 1.5 d wide (they reach into kissing vessels), cells
-// of an octree as small as each vessel asks for (as much of the arch, half as fast, short branches lost), and a start from any end (short trunks
+// which is length minus about 0.7 r for a tube, 0.5 to 0.6 r in the corners of lids, 0.33 cot(angle) r in a wedge; a sac, where d increases again behind
+// its neck, has 0.7 r or more and gives one curve. Tried and rejected: centres of balls that touch the wall twice, joined like the wall's triangles
+// (facets of coarse surfaces separate them: 279 curves in the aortic arch); covering by spheres 1.5 d wide (they reach into touching vessels); cells
+// of an octree as small as each vessel needs (as much of the arch, half as fast, short branches lost); a start from any end (short trunks
 // lost).
 #include "recon/surface/mesh_centreline.h"
 
@@ -16,7 +16,7 @@
 #include <string.h>
 
 enum { VOXELS_MAX = 2000000, CENTRING_PASSES = 12, RAY_PAIRS = 8, CURVES_MAX = 4096, BESIDE = 2, LID_RAYS = 200 };
-static const double LID_REACH = 3, LID_COSINE = 0.94, LID_SHARE = 0.15;   // a round tip has 0.06 of the half sphere within 20 degrees
+static const double LID_REACH = 3, LID_COSINE = 0.94, LID_SHARE = 0.15;   // LID_SHARE: a round tip has 0.06 of the half sphere within 20 degrees
 static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6,   // LEAST: voxels
     PINCHED = 0.25;                                                                                                                  // of the narrower side
 
@@ -24,19 +24,19 @@ typedef struct LineSearch {
     const Lumen *lumen;
     const MeshTree *tree;
     const SurfaceMesh *mesh; // closed
-    const int *component;    // (V) of each voxel …
-    int wanted;              // … and the one that is looked at
-    float *cost, *length;    // (V) from the start; length [mm]
-    int *from;               // (V) -1 at the start and where there is no path
-    int *owner;              // (V) the curve point in whose inscribed sphere the voxel lies, relatively deepest; -1
-    float *depth;            // (V) distance to that point in its radii
+    const int *component;    // (V) component of each voxel
+    int wanted;              // the component to be searched
+    float *cost, *length;    // (V) cost and length [mm] of the path from the start
+    int *from;               // (V) predecessor; -1 at the start and where there is no path
+    int *owner;              // (V) the curve point whose inscribed sphere contains the voxel most deeply; -1: none
+    float *depth;            // (V) distance to that point, in its radii
     PathHeap heap;
-    int *tip, tip_count;     // voxels farther than their neighbours, farthest first
+    int *tip, tip_count;     // voxels farther than all their neighbours, farthest first
     CurveSet *set;
-    int cut_count;           // loops that are pinched …
-    Vec3 cut;                // … and the first of those places
-    int *end, end_count;     // the voxel at each free end; the start first …
-    int *end_point;          // … and the curve's point a radius before it
+    int cut_count;           // number of loops that are pinched
+    Vec3 cut;                // the first of those places
+    int *end, end_count;     // the voxel at each free end; the start is first
+    int *end_point;          // the curve's point a radius before each end
 } LineSearch;
 
 // --- paths ---
@@ -47,7 +47,7 @@ static int compare_tips(const void *a, const void *b)
     return x->way != y->way ? (x->way < y->way) - (x->way > y->way) : (x->place > y->place) - (x->place < y->place);
 }
 
-static bool find_ways(LineSearch *f, int start)
+static bool find_paths(LineSearch *f, int start)
 {
     const Lumen *l = f->lumen;
     for (int i = 0; i < l->count; i++) {
@@ -80,7 +80,7 @@ static bool find_ways(LineSearch *f, int start)
     return good;
 }
 
-// Voxels that no neighbour is farther than, farthest first.
+// Finds the voxels that have no farther neighbour; the farthest comes first.
 static bool find_tips(LineSearch *f)
 {
     const Lumen *l = f->lumen;
@@ -124,7 +124,7 @@ typedef struct Path {
     int count, room;
     Vec3 *point;
     double *radius;
-    double first_radius, last_radius;    // of the spheres in which points are not centred: of those that the ends hang on; 0: free
+    double first_radius, last_radius;    // points within these spheres, of the curves to which the ends are attached, are not centred; 0: free end
 } Path;
 
 static double inscribed(const LineSearch *f, Vec3 p, double reach)
@@ -135,7 +135,7 @@ static double inscribed(const LineSearch *f, Vec3 p, double reach)
     return fmax(isfinite(d) ? d : reach, 1e-3 * f->lumen->h);
 }
 
-// Appends in steps of STEP radii.
+// Appends points up to `to` in steps of STEP radii.
 static bool path_to(const LineSearch *f, Path *path, Vec3 to)
 {
     Vec3 from = path->count ? path->point[path->count - 1] : to;
@@ -184,7 +184,7 @@ static void path_free(Path *path)
     free(path->radius);
 }
 
-// Moves the points between the walls that pairs of opposite rays square to the curve meet, and smooths; ends that hang on other curves stay.
+// Centres the points between the walls that pairs of opposite rays perpendicular to the curve hit, and smooths. Ends attached to other curves are fixed.
 static void path_centre(const LineSearch *f, Path *path)
 {
     for (int pass = 0; pass < CENTRING_PASSES; pass++) {
@@ -209,7 +209,7 @@ static void path_centre(const LineSearch *f, Path *path)
                 }
             Vec3 smooth = is_end ? here : vec3_scale(vec3_add(before, next), 0.5), moved = vec3_add_scaled(vec3_mix(here, smooth, smoothing), 0.5, shift);
             before = here;
-            // never to a wall's other side
+            // never move to the other side of a wall
             if (vec3_distance(moved, here) < 0.5 * path->radius[i])
                 path->point[i] = moved;
             path->radius[i] = inscribed(f, path->point[i], INFINITY);
@@ -217,15 +217,15 @@ static void path_centre(const LineSearch *f, Path *path)
     }
 }
 
-// The middle of the flat lid ahead of a curve's last point: of the wall that rays meet in one direction, each ray for the area it stands for. The wall
-// of a tube or of a round tip has no such direction. `outward`: the curve's own.
+// Finds the centre of the flat lid ahead of a curve's last point: of the wall that rays hit with normals in one direction, each ray weighted by the area it
+// represents. The wall of a tube or of a round tip has no dominant direction. `outward`: the curve's own direction.
 static bool find_lid(const LineSearch *f, Vec3 from, Vec3 outward, double radius, Vec3 *middle)
 {
     Vec3 u = vec3_normal_to(outward), v = vec3_cross(outward, u), hit[LID_RAYS], normal[LID_RAYS];
     double area[LID_RAYS];
     int most = 0, best = 0;
     for (int k = 0; k < LID_RAYS; k++) {
-        // even over the half sphere: turns of the golden angle, each with its opposite
+        // evenly spaced over the half sphere: multiples of the golden angle, each with its opposite
         int pair = k / 2;
         double z = 1 - (2 * pair + 1.0) / LID_RAYS, side = sqrt(1 - z * z), angle = 2.399963229728653 * pair + PI * (k % 2);
         Vec3 d = vec3_add_scaled(vec3_scale(outward, z), side, vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle))));
@@ -258,7 +258,7 @@ static bool find_lid(const LineSearch *f, Vec3 from, Vec3 outward, double radius
     return most > LID_SHARE * LID_RAYS;
 }
 
-// Leads the last point on to the lid ahead, which is about a radius off; false if out of memory.
+// Extends the curve from its last point to the lid ahead, which is about a radius away. Returns false if out of memory.
 static bool path_lead_out(const LineSearch *f, Path *path)
 {
     int tip = path->count - 1, back = tip;
@@ -276,7 +276,7 @@ static bool path_lead_out(const LineSearch *f, Path *path)
     return true;
 }
 
-// Takes off what runs into the corner of a lid or tip, beyond the outermost of the widest spheres that reach to it (a lid's rim is 1.41 radii off).
+// Removes the points in the corner of a lid or tip, beyond the outermost of the widest spheres that reach it (a lid's rim is 1.41 radii away).
 static void path_trim(Path *path)
 {
     int tip = path->count - 1, keep = tip;
@@ -286,16 +286,16 @@ static void path_trim(Path *path)
         widest = apart < 1.5 * path->radius[i] ? fmax(widest, path->radius[i]) : widest;
         in_wedge = apart < 3 * path->radius[i] ? fmax(in_wedge, path->radius[i]) : in_wedge;
     }
-    // the corner of a lid that was cut obliquely, or of a flare, is sharper: its widest sphere lies up to three radii off
+    // the corner of an oblique lid or of a flare is sharper: its widest sphere is up to three radii away
     if (path->radius[tip] < 0.5 * in_wedge)
         widest = in_wedge;
-    // only once, else a tapering vessel would be consumed
+    // only once, otherwise a tapering vessel would be removed
     while (keep > 1 && path->radius[tip] < 0.9 * widest && path->radius[keep] < 0.95 * widest)
         keep--;
     path->count = keep + 1;
 }
 
-// The voxels within the curve points' inscribed spheres are theirs.
+// Assigns the voxels within the inscribed spheres of curve points to these points.
 static void own_spheres(LineSearch *f, int first_point)
 {
     const Lumen *l = f->lumen;
@@ -319,7 +319,7 @@ static void own_spheres(LineSearch *f, int first_point)
     }
 }
 
-// `tip`: the set's point a radius before the last one's lid, `front`: before the first one's.
+// Adds a curve. `tip`: the set's point a radius before the lid at the last point, `front`: before that at the first point.
 static bool add_curve(LineSearch *f, Path *path, int *tip, int *front)
 {
     int first = f->set->point_count;
@@ -342,15 +342,15 @@ static bool add_curve(LineSearch *f, Path *path, int *tip, int *front)
     return true;
 }
 
-// Where the path from a voxel first is well within a curve's sphere, or the start.
-static int way_joins(const LineSearch *f, int voxel)
+// Returns the first voxel on the path from a voxel that is well within a curve's sphere, or the start.
+static int joining_voxel(const LineSearch *f, int voxel)
 {
     while (f->from[voxel] >= 0 && !(f->owner[voxel] >= 0 && f->depth[voxel] < ATTACHED))
         voxel = f->from[voxel];
     return voxel;
 }
 
-// Whether the path from a tip leaves the curves as far as a vessel or an aneurysm does, by more than a few voxels.
+// Returns true if the path from a tip leaves the curves as far as a vessel or an aneurysm does, by more than a few voxels.
 static bool is_branch(const LineSearch *f, int tip)
 {
     const float *d = f->lumen->distance;
@@ -367,7 +367,7 @@ static bool is_branch(const LineSearch *f, int tip)
         return false;
     if (sum > BRANCH * widest || (widest > SAC_WIDENS * d[entry] && sum > SAC * widest))
         return true;
-    // a short wide stub, unless it is the end of a flattened vessel
+    // reject a short wide stub, unless it is the end of a flattened vessel
     int own = f->owner[entry];
     bool is_stub = own >= 0 && widest > STUB_WIDTH * f->set->radius[own] && sum > STUB * widest;
     for (int e = 0; is_stub && e < f->end_count; e++)
@@ -375,7 +375,7 @@ static bool is_branch(const LineSearch *f, int tip)
     return is_stub;
 }
 
-// A voxel next to the tip whose path comes from elsewhere: a loop closes at the tip. -1 if there is none. `join`: where the tip's path joins.
+// Returns a voxel next to the tip whose path comes from elsewhere, so that a loop closes at the tip, or -1. `join`: where the tip's path joins a curve.
 static int beyond_loop(const LineSearch *f, int tip, int join)
 {
     int place[3], best = -1;
@@ -386,12 +386,12 @@ static int beyond_loop(const LineSearch *f, int tip, int join)
         for (int dy = -BESIDE; dy <= BESIDE; dy++)
             for (int dx = -BESIDE; dx <= BESIDE; dx++) {
                 int other = lumen_voxel(f->lumen, place[0] + dx, place[1] + dy, place[2] + dz);
-                int there = other >= 0 && f->component[other] == f->wanted ? way_joins(f, other) : -1;
+                int there = other >= 0 && f->component[other] == f->wanted ? joining_voxel(f, other) : -1;
                 if (there < 0 || f->owner[there] < 0)
                     continue;
                 int own = f->owner[there];
                 double apart = vec3_distance(f->set->point[own], at) / (f->set->radius[own] + f->set->radius[f->owner[join]]);
-                // from the other side, not from farther up in the same vessel
+                // the path must come from the other side, not from further upstream in the same vessel
                 if (apart > 1 && apart > farthest) {
                     farthest = apart;
                     best = other;
@@ -420,11 +420,11 @@ static bool path_end_at(const LineSearch *f, Path *path, int point)
     return true;
 }
 
-// From the joint of a tip's path through the loop that closes there to the joint on the other side.
+// Creates the path from the point where a tip's path joins a curve, through the loop that closes at the tip, to the joining point on the other side.
 static bool path_through(const LineSearch *f, Path *path, int tip, int join, int other)
 {
     Path back = {0};
-    int there = way_joins(f, other);
+    int there = joining_voxel(f, other);
     bool good = path_along(f, path, tip, join) && path_end_at(f, path, f->owner[join]) && path_along(f, &back, other, there);
     path_turn(path);
     for (int i = 0; good && i < back.count; i++)
@@ -433,7 +433,7 @@ static bool path_through(const LineSearch *f, Path *path, int tip, int join, int
     return good && path_end_at(f, path, f->owner[there]);
 }
 
-// Whether two vessels only touch: beyond the spheres of its parent curve it is somewhere far narrower than on both sides.
+// Returns true if two vessels only touch: the path, outside the spheres of its parent curve, is somewhere far narrower than on both sides.
 static bool is_pinched(const Path *path, Vec3 *place)
 {
     Vec3 first = path->point[0], last = path->point[path->count - 1];
@@ -455,7 +455,7 @@ static bool is_pinched(const Path *path, Vec3 *place)
 static bool add_branch(LineSearch *f, int tip)
 {
     Path path = {0};
-    int join = way_joins(f, tip);
+    int join = joining_voxel(f, tip);
     if (f->owner[join] < 0)
         return true;
     int other = beyond_loop(f, tip, join);
@@ -488,12 +488,12 @@ static bool add_branch(LineSearch *f, int tip)
     return good;
 }
 
-// All curves of the lumen from a voxel at an end.
+// Finds all curves of the lumen, starting from a voxel at an end.
 static bool find_curves(LineSearch *f, int start)
 {
     curve_set_free(f->set);
     f->set = curve_set_create();
-    if (!f->set || !find_ways(f, start) || !find_tips(f))
+    if (!f->set || !find_paths(f, start) || !find_tips(f))
         return false;
     free(f->end);
     free(f->end_point);
@@ -528,7 +528,7 @@ static bool find_curves(LineSearch *f, int start)
 
 // --- components ---
 
-// Numbers the lumens; returns the requested one, -1 if out of memory or there is none. `last`: a voxel of it at one of its ends.
+// Numbers the lumens. Returns the requested one, or -1 if there is none or if out of memory. `last`: a voxel at one of its ends.
 static int label(const Lumen *l, const ImportOptions *options, int *component, int *last)
 {
     int *queue = malloc(((size_t)l->count + 1) * sizeof *queue), count = 0, most = 0, wanted = -1, widest = -1, nearest = -1;
@@ -541,7 +541,7 @@ static int label(const Lumen *l, const ImportOptions *options, int *component, i
             nearest = i;
         }
     }
-    // the last pass starts from the widest voxel of the one that is wanted: what it comes to last is an end
+    // the last pass starts from the widest voxel of the wanted lumen: the voxel reached last is an end
     for (int seed = 0; queue && seed <= l->count; seed++) {
         if (seed == l->count) {
             wanted = nearest >= 0 ? component[nearest] : wanted;
@@ -578,7 +578,7 @@ static int label(const Lumen *l, const ImportOptions *options, int *component, i
     return widest < 0 ? -1 : wanted;
 }
 
-// The voxel at the end nearest to the requested root, else at the widest end.
+// Returns the voxel at the end nearest to the requested root, else at the widest end.
 static int choose_start(const LineSearch *f, const ImportOptions *options)
 {
     int best = f->end[0];
@@ -614,7 +614,7 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
                         .depth = malloc(n * sizeof(float))};
         good = component && f.cost && f.length && f.from && f.owner && f.depth;
         f.wanted = good ? label(l, options, component, &start) : -1;
-        // once from any end to find the ends, then from the root
+        // search once from any end to find the ends, then from the root
         if (good && f.wanted >= 0) {
             good = find_curves(&f, start);
             int root = good && f.end_count ? choose_start(&f, options) : start;

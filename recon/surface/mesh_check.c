@@ -1,5 +1,5 @@
-// See mesh_check.h. Edges are sorted records (low vertex, high vertex, triangle); orientation spreads breadth first over edges of exactly
-// two triangles, then each component is turned outwards by the sign of its volume, openings closed by fans about their loops' middles.
+// Implements mesh_check.h. Edges are sorted records (low vertex, high vertex, triangle); orientation is propagated breadth first over edges of exactly
+// two triangles, then each component is oriented outwards by the sign of its volume, with openings closed by fans around their loops' middles.
 #include "recon/surface/mesh_check.h"
 
 #include "base/base.h"
@@ -43,7 +43,7 @@ static uint64_t hash_cell(Cell c)
     return h ^ h >> 32;
 }
 
-// same[i]: the first vertex within `near` of vertex i.
+// Fills same[i] with the first vertex within `near` of vertex i. Returns false if out of memory.
 static bool find_same(const SurfaceMesh *mesh, Vec3 low, double near, int *same)
 {
     int n = mesh->vertex_count;
@@ -61,7 +61,7 @@ static bool find_same(const SurfaceMesh *mesh, Vec3 low, double near, int *same)
     for (int i = 0; i < n; i++) {
         Vec3 p = vec3_scale(vec3_sub(mesh->vertex[i], low), 1 / size);
         same[i] = i;
-        // a cell is twice the distance wide: of each axis only the nearer neighbour can hold a vertex within it
+        // a cell is twice the distance wide, so along each axis only the nearer neighbour can hold a vertex within that distance
         Cell own = {(int64_t)floor(p.x), (int64_t)floor(p.y), (int64_t)floor(p.z)};
         int sx = p.x - (double)own.x < 0.5 ? -1 : 1, sy = p.y - (double)own.y < 0.5 ? -1 : 1, sz = p.z - (double)own.z < 0.5 ? -1 : 1;
         for (int k = 0; k < 8; k++) {
@@ -82,17 +82,17 @@ static bool find_same(const SurfaceMesh *mesh, Vec3 low, double near, int *same)
 }
 
 typedef struct Work {
-    int *same;               // (V) as find_same
-    int *parent;             // (V) of the union-find of components
-    int *number;             // (V) component of a vertex that is a root
-    int *source;             // (T) triangle in the file
+    int *same;               // (V) see find_same
+    int *parent;             // (V) union-find of components
+    int *number;             // (V) component number of a vertex that is a union-find root
+    int *source;             // (T) index of the triangle in the file
     int *component;          // (T)
     int *queue;              // (T)
     bool *turned;            // (T)
     bool *seen;              // (T)
-    bool *used;              // (V) by the file's triangles
+    bool *used;              // (V) used by the file's triangles
     MeshEdge *edge;          // (3 T) sorted
-    int (*across)[3];        // (T) the other triangle of an edge that has two, else -1
+    int (*across)[3];        // (T) the other triangle of an edge of exactly two triangles, else -1
 } Work;
 
 static void weld(SurfaceMesh *mesh, MeshCheck *check, const int *same)
@@ -207,7 +207,7 @@ static void find_components(SurfaceMesh *mesh, MeshCheck *check, Work *work)
     }
 }
 
-// Counts open and crowded edges and links the triangles of the others.
+// Counts open and non-manifold edges and links the triangles at the others.
 static void link_triangles(const SurfaceMesh *mesh, MeshCheck *check, Work *work)
 {
     int count = 3 * mesh->triangle_count;
@@ -222,7 +222,7 @@ static void link_triangles(const SurfaceMesh *mesh, MeshCheck *check, Work *work
     }
 }
 
-// Whether two triangles run the same way along the edge that they share.
+// Returns true if two triangles traverse their common edge in the same direction, so that one of them must be flipped.
 static bool run_alike(const SurfaceMesh *mesh, int t, int side, int other)
 {
     int a = mesh->triangle[t][side], b = mesh->triangle[t][(side + 1) % 3];
@@ -265,7 +265,7 @@ static void turn(int *triangle)
     triangle[2] = swap;
 }
 
-// Loops of open edges: union-find over their vertices; each loop's middle is the apex of its lid. Adds the lids to the components' volumes.
+// Finds loops of open edges by union-find over their vertices, and adds the volume of a lid over each loop to the components' volumes.
 static void add_lids(const SurfaceMesh *mesh, MeshCheck *check, Work *work, double *volume, Vec3 from)
 {
     int count = 3 * mesh->triangle_count, *parent = work->parent;
@@ -281,7 +281,7 @@ static void add_lids(const SurfaceMesh *mesh, MeshCheck *check, Work *work, doub
                 disjoint_join(parent, edge->low, edge->high);
             else {
                 int a = disjoint_root(parent, edge->low);
-                // with the loop's first vertex as apex: any apex gives the same volume of a flat lid
+                // the loop's first vertex is the lid's apex: any apex gives the same volume of a flat lid
                 Vec3 p = vec3_sub(mesh->vertex[edge->low], from), q = vec3_sub(mesh->vertex[edge->high], from), apex = vec3_sub(mesh->vertex[a], from);
                 double lid = vec3_dot(apex, vec3_cross(p, q)) / 6;
                 bool forward = (mesh->triangle[edge->triangle][edge->side] == edge->low) != work->turned[edge->triangle];
@@ -423,11 +423,11 @@ SurfaceMesh *mesh_load_repaired(const char *path, double scale, const char *opti
     else if (check->unit_is_doubtful && !(scale > 0)) {
         Vec3 e = vec3_sub(check->high, check->low);
         faults_add(faults, path, 0, 0,
-                   "is %g x %g x %g across, which cannot be the size of a vessel in mm; %s1000 takes metres, %s0.001 micrometres, %s1 takes it "
+                   "is %g x %g x %g across, which cannot be the size of a vessel in mm; use %s1000 for metres, %s0.001 for micrometres, %s1 to accept it "
                    "as it is",
                    e.x, e.y, e.z, option, option, option);
     } else if (check->one_sided_edges.count)
-        faults_add(faults, path, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be distinguished", check->one_sided_edges.first);
+        faults_add(faults, path, 0, 0, "is one-sided (first at triangle %d): inside and outside cannot be distinguished", check->one_sided_edges.first);
     else if (mesh->triangle_count == 0 || !(check->area > 0))
         faults_add(faults, path, 0, 0, "has no triangle with an area");
     else
@@ -436,7 +436,7 @@ SurfaceMesh *mesh_load_repaired(const char *path, double scale, const char *opti
     return NULL;
 }
 
-// --- in words ---
+// --- text ---
 
 typedef struct Text {
     char *at;
@@ -462,21 +462,21 @@ static void say_finding(Text *text, const MeshFinding *f, const char *what, cons
         say(text, "%d %s, first: %s %d at (%g, %g, %g)%s\n", f->count, what, of, f->first, f->place.x, f->place.y, f->place.z, done);
 }
 
-int mesh_check_text(const MeshCheck *check, bool mended, char *out, size_t capacity)
+int mesh_check_text(const MeshCheck *check, bool repaired, char *out, size_t capacity)
 {
     Text text = {out, capacity, 0};
     out[0] = '\0';
     if (check->unit_is_doubtful) {
         Vec3 e = vec3_sub(check->high, check->low);
-        say(&text, "%g x %g x %g across: not millimetres, it seems%s\n", e.x, e.y, e.z, e.x < SMALL ? " but metres: scale by 1000" : "");
+        say(&text, "size %g x %g x %g: probably not in millimetres%s\n", e.x, e.y, e.z, e.x < SMALL ? " but in metres; scale by 1000" : "");
     }
-    say_finding(&text, &check->duplicate_vertices, "vertices repeat others", "vertex", mended ? ": welded" : "");
-    say_finding(&text, &check->unreferenced_vertices, "vertices are in no triangle", "vertex", mended ? ": removed" : "");
-    say_finding(&text, &check->degenerate_triangles, "triangles have no area", "triangle", mended ? ": removed where two corners are one" : "");
-    say_finding(&text, &check->duplicate_triangles, "triangles repeat others", "triangle", mended ? ": removed" : "");
-    say_finding(&text, &check->flipped_triangles, "triangles face against their neighbours", "triangle", mended ? ": turned" : "");
+    say_finding(&text, &check->duplicate_vertices, "vertices repeat others", "vertex", repaired ? ": welded" : "");
+    say_finding(&text, &check->unreferenced_vertices, "vertices are in no triangle", "vertex", repaired ? ": removed" : "");
+    say_finding(&text, &check->degenerate_triangles, "triangles have no area", "triangle", repaired ? ": removed if two corners coincide" : "");
+    say_finding(&text, &check->duplicate_triangles, "triangles repeat others", "triangle", repaired ? ": removed" : "");
+    say_finding(&text, &check->flipped_triangles, "triangles are oriented against their neighbours", "triangle", repaired ? ": flipped" : "");
     if (check->inside_out_count)
-        say(&text, "normals point into the lumen%s%s\n", check->component_count > 1 ? " in some components" : "", mended ? ": all turned" : "");
+        say(&text, "normals point into the lumen%s%s\n", check->component_count > 1 ? " in some components" : "", repaired ? ": all flipped" : "");
     if (check->component_count > 1)
         say(&text, "%d components that do not touch\n", check->component_count);
     if (check->open_edges.count) {
@@ -484,7 +484,7 @@ int mesh_check_text(const MeshCheck *check, bool mended, char *out, size_t capac
         snprintf(count, sizeof count, ", in %d opening%s", check->opening_count, check->opening_count == 1 ? "" : "s");
         say_finding(&text, &check->open_edges, "edges are open", "triangle", count);
     }
-    say_finding(&text, &check->nonmanifold_edges, "edges are shared by more than two triangles", "triangle", mended ? ": kept" : "");
-    say_finding(&text, &check->one_sided_edges, "edges where no orientation fits (a surface of one side)", "triangle", "");
+    say_finding(&text, &check->nonmanifold_edges, "edges are shared by more than two triangles", "triangle", repaired ? ": kept" : "");
+    say_finding(&text, &check->one_sided_edges, "edges have no consistent orientation (one-sided surface)", "triangle", "");
     return text.lines;
 }

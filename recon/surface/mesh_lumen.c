@@ -1,5 +1,5 @@
-// See mesh_lumen.h. Whether a row meets a triangle is asked of each side with its vertices in the order of their indices, so that neighbours agree on
-// what passes through a common side and no row slips between them.
+// Implements mesh_lumen.h. The test whether a row crosses a triangle evaluates each side with its vertices in the order of their indices, so that
+// neighbouring triangles agree on their common side and no row slips between them.
 #include "recon/surface/mesh_lumen.h"
 
 #include "base/base.h"
@@ -11,7 +11,7 @@
 #define SQRT3 1.73205081f
 
 enum { PROBES = 4000, PASSES = 8 };
-static const double VOXELS_PER_RADIUS = 6, NEAR = 2, CHANGE = 0.05, SMALLEST = 0.02;   // SMALLEST: share of the vessels' length that may be thinner
+static const double VOXELS_PER_RADIUS = 6, NEAR = 2, CHANGE = 0.05, SMALLEST = 0.02;   // SMALLEST: fraction of the vessels' length that may be thinner
 
 // --- lids ---
 
@@ -89,7 +89,8 @@ static int compare_probes(const void *a, const void *b)
     return x->radius != y->radius ? (x->radius > y->radius) - (x->radius < y->radius) : (x->length > y->length) - (x->length < y->length);
 }
 
-// Half the chord across the lumen from a triangle's middle is a radius, and area / radius the length of vessel that the triangle represents.
+// Estimates the smallest radius: half the chord across the lumen from a triangle's centroid is a radius, and area / radius is the length of vessel that the
+// triangle represents.
 static double smallest_radius(const SurfaceMesh *mesh, const MeshTree *tree, double size)
 {
     int stride = mesh->triangle_count / PROBES + 1, count = 0;
@@ -138,7 +139,7 @@ static bool is_left(const SurfaceMesh *mesh, int a, int b, double y, double z)
     return a < b ? left : !left;
 }
 
-// The crossings of all rows with the wall, sorted; NULL if out of memory.
+// Returns the crossings of all rows with the wall, sorted, or NULL if out of memory.
 static Crossing *find_crossings(const SurfaceMesh *mesh, const Lumen *l, size_t *count)
 {
     size_t room = 1 << 16;
@@ -187,7 +188,7 @@ static bool fill_rows(Lumen *l, const SurfaceMesh *mesh)
 {
     size_t count, i = 0, rows = (size_t)l->size[1] * (size_t)l->size[2];
     Crossing *crossing = find_crossings(mesh, l, &count);
-    // a spoilt row takes the runs of the row before
+    // a row with inconsistent crossings takes the runs of the row before
     l->run = crossing ? malloc((count + rows + 1) * sizeof *l->run) : NULL;
     l->row = calloc(rows + 1, sizeof *l->row);
     size_t room = count + rows + 1;
@@ -219,7 +220,7 @@ static bool fill_rows(Lumen *l, const SurfaceMesh *mesh)
     return l->run && l->row;
 }
 
-// --- places ---
+// --- positions ---
 
 void lumen_place(const Lumen *l, int voxel, int place[3])
 {
@@ -247,7 +248,7 @@ int lumen_voxel(const Lumen *l, int x, int y, int z)
     return -1;
 }
 
-// `bit` of each in a mask, or NULL.
+// Implements lumen_neighbours; `bit` receives the bit of each neighbour in the mask `walled` (may be NULL).
 static int neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS], int bit[LUMEN_NEIGHBOURS])
 {
     static const float length[4] = {0, 1, 1.41421356f, SQRT3};
@@ -282,8 +283,8 @@ typedef struct Measuring {
     Lumen *lumen;
     const SurfaceMesh *mesh;
     const MeshTree *tree;
-    int *nearest;            // (count) triangle …
-    float (*foot)[3];        // … and its nearest point, from the origin
+    int *nearest;            // (count) nearest triangle
+    float (*foot)[3];        // (count) nearest point on it, relative to the origin
 } Measuring;
 
 static void set_foot(float foot[3], Vec3 p)
@@ -308,8 +309,8 @@ static void measure_near(void *context, long r)
     }
 }
 
-// Voxels farther from the wall take the nearest of their neighbours' triangles, in alternating sweeps until nothing changes (Danielsson 1980),
-// because a tree search would visit all triangles around a vessel's middle.
+// Voxels far from the wall take the nearest of their neighbours' triangles, in alternating sweeps until nothing changes (Danielsson 1980), because a tree
+// search would visit all triangles around a vessel's middle.
 static void measure_far(const Measuring *m)
 {
     Lumen *l = m->lumen;
@@ -342,7 +343,7 @@ static void measure_far(const Measuring *m)
     }
 }
 
-// Whether the line between two voxels' middles leaves the lumen. No ray is needed if both distances to the wall cover it.
+// Returns true if the line between two voxels' centres leaves the lumen. No ray is needed if both distances to the wall together cover it.
 static bool is_walled(const Measuring *m, int a, int b, int winding, double steps)
 {
     const Lumen *l = m->lumen;
@@ -354,7 +355,7 @@ static bool is_walled(const Measuring *m, int a, int b, int winding, double step
         return false;
     const int *v = m->mesh->triangle[triangle];
     Vec3 p = m->mesh->vertex[v[0]], n = vec3_cross(vec3_sub(m->mesh->vertex[v[1]], p), vec3_sub(m->mesh->vertex[v[2]], p));
-    // in overlapping parts the first wall leads from one into the other
+    // in overlapping parts the first wall separates one part from the other
     return winding == 1 && vec3_dot(n, d) > 0;
 }
 
@@ -376,7 +377,7 @@ static void find_walls(void *context, long r)
     }
 }
 
-// The other voxel's side of each wall. `walled` is not asked while it is made: each voxel changes only its own.
+// Marks each wall for the voxel on its other side too. This is done afterwards, so that each parallel job changes only its own voxels.
 static void mirror_walls(Lumen *l)
 {
     for (int i = 0; i < l->count; i++)
@@ -406,10 +407,10 @@ Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_ma
     if (!l)
         return NULL;
     double size = vec3_distance(low, high);
-    // the grid of rows is bounded too
+    // limit the number of voxels
     double h = fmax(smallest_radius(mesh, tree, size) / VOXELS_PER_RADIUS, same_cbrt(fabs(volume) / voxels_max));
     l->h = fmax(h, size / 4000);
-    // offset from round coordinates, which vertices often have
+    // an irrational offset avoids round coordinates, which vertices often have
     l->origin = vec3_add_scaled(low, -l->h, vec3(0.3819660113, 0.4142135624, 0.2679491924));
     Vec3 extent = vec3_sub(high, l->origin);
     l->size[0] = (int)ceil(extent.x / l->h) + 1;

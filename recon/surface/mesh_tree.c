@@ -1,4 +1,4 @@
-// Boxes are halved at the median of their triangles' middles along their longest axis. Nearest point of a triangle: regions of its plane
+// Boxes are split at the median of their triangles' centroids along their longest axis. Nearest point of a triangle: regions of its plane
 // (Ericson 2005, Real-Time Collision Detection, 5.1.5). Ray: Moeller and Trumbore 1997. Solid angle: Van Oosterom and Strackee 1983.
 #include "recon/surface/mesh_tree.h"
 
@@ -10,7 +10,7 @@ enum { LEAF = 4, DEPTH = 64 };
 
 typedef struct Box {
     Vec3 low, high;
-    int first, count;        // leaf: order[first …]; else count 0 and children first, first + 1
+    int first, count;        // a leaf has triangles order[first …]; an inner box has count 0 and children first, first + 1
 } Box;
 
 struct MeshTree {
@@ -18,11 +18,11 @@ struct MeshTree {
     Box *box;
     int box_count;
     int *order;              // (T)
-    Vec3 *middle;            // (T) while building
+    Vec3 *middle;            // (T) centroids, during construction only
 };
 
 static double part(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
-// libm's are calls, for the sake of NaN
+// libm's fmin and fmax are function calls, because they handle NaN
 static double least(double a, double b) { return a < b ? a : b; }
 static double most(double a, double b) { return a > b ? a : b; }
 static Vec3 lower(Vec3 a, Vec3 b) { return vec3(least(a.x, b.x), least(a.y, b.y), least(a.z, b.z)); }
@@ -34,7 +34,7 @@ static bool before(const MeshTree *tree, int a, int b, int axis)
     return x < y || (x == y && a < b);
 }
 
-// Hoare's selection: the lesser half of order[first, last) before `middle`.
+// Hoare's selection: moves the smaller half of order[first, last) before `middle`.
 static void select_median(MeshTree *tree, int first, int last, int middle, int axis)
 {
     int *o = tree->order;
@@ -191,7 +191,7 @@ double mesh_tree_nearest(const MeshTree *tree, Vec3 point, double reach, Vec3 *f
         }
         if (box->count == 0) {
             double first = box_distance2(&tree->box[box->first], point), second = box_distance2(&tree->box[box->first + 1], point);
-            // the nearer one on top
+            // the nearer one goes on top of the stack
             int nearer = box->first + (first >= second), farther = box->first + (first < second);
             if ((first < second ? second : first) <= best) {
                 away[height] = first < second ? second : first;
@@ -213,11 +213,11 @@ static double ray_triangle(Vec3 from, Vec3 d, Vec3 a, Vec3 b, Vec3 c)
     double u = vec3_dot(s, h) / det;
     Vec3 q = vec3_cross(s, ab);
     double v = vec3_dot(d, q) / det, t = vec3_dot(ac, q) / det;
-    // a hair of slack: rays through an edge must not slip between its triangles
+    // a small tolerance: rays through an edge must not slip between its triangles
     return u >= -1e-9 && v >= -1e-9 && u + v <= 1 + 1e-9 && t > 0 ? t : INFINITY;
 }
 
-// How far the ray goes before the box; INFINITY if it misses it.
+// Distance along the ray to the box; INFINITY if it misses the box.
 static double ray_enters(const Box *box, const double from[3], const double direction[3], const double inverse[3], double reach)
 {
     const double low[3] = {box->low.x, box->low.y, box->low.z}, high[3] = {box->high.x, box->high.y, box->high.z};
@@ -232,7 +232,7 @@ static double ray_enters(const Box *box, const double from[3], const double dire
         enter = most(enter, least(a, b));
         leave = least(leave, most(a, b));
     }
-    // rounding must not lose a flat box
+    // the tolerance keeps a flat box from being missed by rounding
     return enter <= leave * (1 + 1e-12) + 1e-12 ? enter : INFINITY;
 }
 
@@ -260,7 +260,7 @@ double mesh_tree_ray(const MeshTree *tree, Vec3 from, Vec3 direction, double rea
         if (box->count == 0) {
             double first = ray_enters(&tree->box[box->first], start, d, inverse, least(best, reach));
             double second = ray_enters(&tree->box[box->first + 1], start, d, inverse, least(best, reach));
-            // the nearer one on top
+            // the nearer one goes on top of the stack
             int nearer = box->first + (first >= second), farther = box->first + (first < second);
             if (isfinite(most(first, second))) {
                 enters[height] = most(first, second);

@@ -1,4 +1,5 @@
-// A tree of boxes over the triangles of a surface: nearest point, first hit of a ray, inside or outside. Read-only once made, threads may share it.
+// A tree of boxes over the triangles of a surface, to find the nearest point, the first hit of a ray, and inside or outside. It is read-only once created, so
+// threads may share it.
 #ifndef SELDINGER_RECON_SURFACE_MESH_TREE_H
 #define SELDINGER_RECON_SURFACE_MESH_TREE_H
 
@@ -6,16 +7,16 @@
 
 typedef struct MeshTree MeshTree;
 
-// The mesh must outlive the tree. NULL if out of memory.
+// Creates the tree. The mesh must outlive it. Returns NULL if out of memory.
 MeshTree *mesh_tree_create(const SurfaceMesh *mesh);
 void mesh_tree_free(MeshTree *tree);
-// Distance to the nearest point `foot` of triangle `triangle` [mm]; INFINITY and the outputs untouched where none is within `reach`.
+// Distance [mm] to the nearest point `foot` of the surface, on `triangle`. Returns INFINITY and leaves the outputs unchanged if there is none within `reach`.
 double mesh_tree_nearest(const MeshTree *tree, Vec3 point, double reach, Vec3 *foot, int *triangle);
 // Distance to a triangle, and its nearest point.
 double mesh_triangle_nearest(const SurfaceMesh *mesh, int triangle, Vec3 point, Vec3 *foot);
-// Distance along unit `direction` to the first hit within `reach`; INFINITY if there is none. `triangle` may be NULL.
+// Distance along the unit vector `direction` to the first hit within `reach`; INFINITY if there is none. `triangle` may be NULL.
 double mesh_tree_ray(const MeshTree *tree, Vec3 from, Vec3 direction, double reach, int *triangle);
-// Solid angle of the surface seen from the point in units of 4 pi: 1 inside a closed surface with outward normals, 0 outside, between them near
+// Solid angle of the surface seen from the point, in units of 4 pi: 1 inside a closed surface with outward normals, 0 outside, values in between near
 // openings. Visits all triangles.
 double mesh_winding(const SurfaceMesh *mesh, Vec3 point);
 

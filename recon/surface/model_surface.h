@@ -1,4 +1,4 @@
-// The surface of a model as other programs get it: without bubbles and specks, and without what hangs on nothing.
+// The surface of a model for export to other programs: without bubbles, specks and parts that are not connected to the inlet.
 #ifndef SELDINGER_RECON_SURFACE_MODEL_SURFACE_H
 #define SELDINGER_RECON_SURFACE_MODEL_SURFACE_H
 
@@ -6,14 +6,14 @@
 #include "recon/surface/surface_write.h"
 
 typedef struct ModelSurfaceOptions {
-    double cell_mm;          // 0: by the thinnest branch
-    bool open_inlet;         // cut at the root's plane
-    bool keep_floating;      // also parts to which no point gets from the inlet
-    bool with_error;         // signed distance and distance of the nearest data point, for each vertex
-    FILE *figures, *warnings;        // what the surface is, what was dropped of it; NULL: not said
+    double cell_mm;          // [mm] grid spacing; 0: chosen for the thinnest branch
+    bool open_inlet;         // cut the surface open at the root's plane
+    bool keep_floating;      // keep parts that no point can reach from the inlet
+    bool with_error;         // compute the signed distance and the distance of the nearest data point for each vertex
+    FILE *figures, *warnings;        // streams for the surface's figures and for the list of removed parts; NULL: not printed
 } ModelSurfaceOptions;
 
-// False with faults, which `name` begins; model_surface_free() is due all the same.
+// Creates the surface. Returns false with faults, prefixed by `name`; the caller must call model_surface_free() in this case too.
 bool model_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults);
 void model_surface_free(SurfaceFigures *surface);
 

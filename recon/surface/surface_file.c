@@ -1,4 +1,4 @@
-// See surface_file.h. Text formats are read by a cursor over a NUL-terminated copy; once bad it stays bad.
+// Implements surface_file.h. Text formats are read by a cursor over a NUL-terminated copy; after an error the cursor stays invalid.
 #include "recon/surface/surface_file.h"
 
 #include "base/base.h"
@@ -13,7 +13,7 @@
 static const double COORDINATE_MAX = 1e9;
 enum { COUNT_MAX = 100000000, SURFACE_BYTES_MOST = INT_MAX };
 
-// A mesh being read.
+// A mesh while it is being read.
 typedef struct Growing {
     SurfaceMesh mesh;
     int vertex_capacity, triangle_capacity;
@@ -89,7 +89,7 @@ typedef struct Cursor {
     int line;
 } Cursor;
 
-// Spaces within a line.
+// Skips spaces within a line.
 static void skip_blanks(Cursor *c)
 {
     while (*c->at == ' ' || *c->at == '\t' || *c->at == '\r')
@@ -110,7 +110,7 @@ static void skip_line(Cursor *c)
         c->at++, c->line++;
 }
 
-// The word (no case) at the cursor, which moves behind it.
+// Returns true if the given word (case-insensitive) is at the cursor, and moves the cursor past it.
 static bool take_word(Cursor *c, const char *word)
 {
     size_t n = strlen(word);
@@ -120,7 +120,7 @@ static bool take_word(Cursor *c, const char *word)
     return true;
 }
 
-// A number on this line.
+// Reads a number on the current line.
 static bool take_number(Cursor *c, double *value)
 {
     char *end;
@@ -171,7 +171,7 @@ static void parse_stl_text(Growing *g, const char *text)
     if (corner != 0)
         fault_line(g, c.line, "ends within a facet");
     else if (!ended)
-        fault_line(g, c.line, "ends without endsolid: it is truncated");
+        fault_line(g, c.line, "ends without endsolid: the file is truncated");
 }
 
 static float float_at(const unsigned char *bytes, bool big)
@@ -193,7 +193,7 @@ static void parse_stl_binary(Growing *g, const unsigned char *bytes, size_t leng
 {
     uint32_t count = stl_count(bytes);
     if (84 + 50 * (uint64_t)count != length) {
-        faults_add_at_byte(g->faults, g->name, 80, "says %u triangles, which take %llu bytes, but the file has %zu", count,
+        faults_add_at_byte(g->faults, g->name, 80, "the header gives %u triangles, which need %llu bytes, but the file has %zu", count,
                            (unsigned long long)(84 + 50 * (uint64_t)count), length);
         g->bad = true;
         return;
@@ -214,7 +214,7 @@ static void parse_stl_binary(Growing *g, const unsigned char *bytes, size_t leng
 
 // --- OBJ ---
 
-// The vertex of `7`, `7/1`, `7/1/3`, `-1`: from 0; -1 if it is none.
+// Parses the vertex of `7`, `7/1`, `7/1/3`, `-1`. Returns its index from 0, or -1 if it is invalid.
 static int take_obj_index(Cursor *c, int vertex_count)
 {
     char *end;
@@ -263,17 +263,17 @@ enum { PLY_TEXT, PLY_LITTLE, PLY_BIG };
 enum { PROPERTIES = 32, ELEMENTS = 8 };
 
 typedef struct PlyProperty {
-    int size, list_size;     // bytes of a value and of a list's count, 0: no list
+    int size, list_size;     // bytes of a value, and of a list's count; 0: not a list
     bool is_float, is_signed, list_signed;
-    int role;                // x y z: 0 1 2; the list of vertices: 3; else -1
+    int role;                // 0, 1, 2: x, y, z; 3: the list of vertices; -1: ignored
 } PlyProperty;
 typedef struct PlyElement {
     long count;
-    int kind;                // 0 vertex, 1 face, 2 other
+    int kind;                // 0: vertex, 1: face, 2: other
     int property_count;
     PlyProperty property[PROPERTIES];
 } PlyElement;
-typedef struct PlyBody {     // binary or text, read in order
+typedef struct PlyBody {     // binary or text data, read in order
     Cursor text;
     const unsigned char *bytes;
     size_t at, length;
@@ -323,7 +323,7 @@ static void ply_header_property(Growing *g, Cursor *c, PlyElement *e)
     e->property[e->property_count++] = p;
 }
 
-// Number of elements; leaves the cursor on the line after end_header.
+// Parses the header and returns the number of elements; leaves the cursor on the line after end_header.
 static int ply_header(Growing *g, Cursor *c, PlyElement *element, int *format)
 {
     int count = 0;
@@ -350,7 +350,7 @@ static int ply_header(Growing *g, Cursor *c, PlyElement *element, int *format)
                 element[count++] = (PlyElement){.count = (long)number, .kind = kind};
         } else if (take_word(c, "property")) {
             if (count == 0)
-                fault_line(g, c->line, "a property stands before any element");
+                fault_line(g, c->line, "a property comes before any element");
             else
                 ply_header_property(g, c, &element[count - 1]);
         }

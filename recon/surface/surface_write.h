@@ -1,4 +1,4 @@
-// Surfaces as text or bytes for other programs: STL, PLY, OBJ, VTP.
+// Writes surfaces for other programs: STL, PLY, OBJ, VTP.
 #ifndef SELDINGER_RECON_SURFACE_SURFACE_WRITE_H
 #define SELDINGER_RECON_SURFACE_SURFACE_WRITE_H
 

@@ -1,7 +1,7 @@
-// See vtp_file.h. Appended data may be raw bytes, which are not XML: expat gets the text up to its `_` only. Array bodies:
-//   plain       [bytes] data                              one base64 text
-//   compressed  [blocks, block size, last size, sizes …]  a base64 text of its own, then the blocks as another
-// with header words of header_type (UInt32 unless said otherwise).
+// Implements vtp_file.h. Appended data may be raw bytes, which are not XML: expat gets only the text up to its `_`. Array bodies:
+//   plain       [bytes] data                              one base64 string
+//   compressed  [blocks, block size, last size, sizes …]  one base64 string, then the blocks as another
+// with header words of header_type (UInt32 by default).
 #include "recon/surface/vtp_file.h"
 
 #include <expat.h>
@@ -14,7 +14,7 @@
 enum { SECTION_NONE, SECTION_POINT_DATA, SECTION_POINTS, SECTION_LINES, SECTION_POLYS, SECTION_STRIPS };
 enum { ROLE_NONE, ROLE_POINTS, ROLE_RADIUS, ROLE_CONNECTIVITY, ROLE_OFFSETS };
 enum { FORMAT_ASCII, FORMAT_BASE64, FORMAT_APPENDED };
-enum { VALUES_MOST = 1 << 26 };    // of all arrays of a file
+enum { VALUES_MOST = 1 << 26 };    // most values of all arrays of a file
 
 typedef struct Number {      // type of an array's entries
     int size;
@@ -25,12 +25,12 @@ typedef struct Array {       // a requested array
     int section, role, piece, format;
     Number number;
     long line;
-    size_t offset;           // of appended arrays
-    char *text;              // of the others
+    size_t offset;           // offset of appended arrays
+    char *text;              // text of the other arrays
     size_t length, capacity;
-    double *value;           // decoded
+    double *value;           // decoded values
     size_t count;
-    size_t promised;         // values at most
+    size_t promised;         // most values according to the header
 } Array;
 
 typedef struct Reader {
@@ -42,8 +42,8 @@ typedef struct Reader {
     int array_count, array_capacity, open_array, array_depth;
     bool is_big_endian, is_polydata, is_compressed, appended_base64, has_appended, stopped;
     int header_size;
-    size_t promised[SECTION_STRIPS + 1];     // points or cells of each section of the piece, as its head says
-    size_t values_left;      // of VALUES_MOST
+    size_t promised[SECTION_STRIPS + 1];     // points or cells of each section of the piece, according to its header
+    size_t values_left;      // number of values still allowed of VALUES_MOST
 } Reader;
 
 static void stop(Reader *reader)
@@ -103,7 +103,7 @@ static void start_piece(Reader *reader, const char **list)
     }
 }
 
-// Values that an array may hold; the number of cell indices is not declared.
+// Most values that an array may hold. The number of cell indices is not declared.
 static size_t promised_values(const Reader *reader, int role)
 {
     size_t count = reader->promised[reader->section], most = role == ROLE_CONNECTIVITY ? VALUES_MOST : role == ROLE_POINTS ? 3 * count : count;
@@ -188,7 +188,7 @@ static void end_element(void *context, const char *element)
 static void take_text(void *context, const char *text, int length)
 {
     Reader *reader = context;
-    // VTK puts an InformationKey with values of its own (ranges) behind the array's
+    // VTK writes an InformationKey with its own values (ranges) after the array's values
     if (reader->stopped || reader->open_array < 0 || reader->depth != reader->array_depth)
         return;
     Array *array = &reader->array[reader->open_array];
@@ -210,7 +210,8 @@ static void take_text(void *context, const char *text, int length)
 
 // --- array bodies ---
 
-// Decodes up to `want` bytes; white space is skipped; stops at padding or anything else. *used: characters read, padding included.
+// Decodes up to `want` bytes. White space is skipped; decoding stops at padding or at any other character. *used: number of characters read, including
+// padding.
 static size_t base64_decode(const char *text, size_t length, size_t want, unsigned char *out, size_t *used)
 {
     static const char alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -265,7 +266,7 @@ static double number_at(const unsigned char *bytes, Number number, bool big)
     return number.is_signed ? (double)((int64_t)(word << shift) >> shift) : (double)word;
 }
 
-// A stretch of file or of array text that is read in order, raw or base64.
+// A part of the file or of an array's text that is read in order, raw or base64.
 typedef struct Body {
     const char *text;
     size_t length;
@@ -294,13 +295,13 @@ static const char *decode_compressed(const Reader *reader, Body body, size_t mos
 {
     unsigned char head[24];
     size_t w = (size_t)reader->header_size;
-    // a base64 header is one string of 3 + blocks words: read the first three words, then all of it again
+    // a base64 header is one string of 3 + blocks words: read the first three words, then read all of it again
     Body peek = body;
     if (!body_take(&peek, 3 * w, head))
         return cut_short;
     bool big = reader->is_big_endian;
     uint64_t blocks = word_at(head, (int)w, big), block = word_at(head + w, (int)w, big), last = word_at(head + 2 * w, (int)w, big);
-    // zlib packs at most 1032 to 1; a last block of size 0 is a whole one; an array of no block names the usual size of one
+    // zlib compresses at most 1032 to 1; a last size of 0 means a whole block; an array without blocks still gives a block size
     uint64_t grown = 1032 * (uint64_t)body.length + 1024, whole = blocks - (blocks && last);
     if (blocks > body.length / w || last > block || (blocks && (last > grown || (whole && block > (grown - last) / whole))))
         return cut_short;
@@ -388,7 +389,7 @@ static const char *decode_array(Reader *reader, Array *array, const char *append
     Body body = {array->text, array->length, true};
     if (array->format == FORMAT_APPENDED) {
         if (!appended || array->offset >= appended_length)
-            return "the array data lie beyond the end of the file";
+            return "the array data extend beyond the end of the file";
         body = (Body){appended + array->offset, appended_length - array->offset, reader->appended_base64};
     } else if (array->text) {
         while (body.length && strchr(" \t\r\n", *body.text))
@@ -409,7 +410,7 @@ static const char *decode_array(Reader *reader, Array *array, const char *append
     return array->value ? NULL : "not enough memory";
 }
 
-// --- pieces to one set ---
+// --- joining the pieces ---
 
 static const Array *find(const Reader *reader, int piece, int section, int role)
 {
@@ -419,7 +420,7 @@ static const Array *find(const Reader *reader, int piece, int section, int role)
     return NULL;
 }
 
-// Appends a piece's cells; `first_point` is that of the piece.
+// Appends a piece's cells; `first_point` is the index of the piece's first point.
 static const char *take_cells(const Reader *reader, int piece, int section, int first_point, int piece_points, VtpCells *cells)
 {
     const Array *index = find(reader, piece, section, ROLE_CONNECTIVITY), *offset = find(reader, piece, section, ROLE_OFFSETS);
@@ -509,7 +510,7 @@ static void build(Reader *reader, const char *appended, size_t appended_length, 
         faults_add(reader->faults, reader->name, 0, 0, "holds no points; expected a PolyData with Points");
 }
 
-// Offset of the byte behind the `_` of appended data; `length` where there is none.
+// Offset of the byte after the `_` of appended data; `length` if there is none.
 static size_t appended_start(const char *bytes, size_t length)
 {
     static const char tag[] = "<AppendedData";

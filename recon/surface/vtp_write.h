@@ -1,4 +1,4 @@
-// VTP as text: XML with the numbers as text, which every reader takes. Sections of a file in the order in which they are called.
+// Writes VTP as XML with numbers as text, which every reader accepts. The functions write a file's sections and must be called in this order.
 #ifndef SELDINGER_RECON_SURFACE_VTP_WRITE_H
 #define SELDINGER_RECON_SURFACE_VTP_WRITE_H
 
@@ -7,7 +7,7 @@
 #include <stdio.h>
 
 void vtp_begin(FILE *out, int points, int lines, int polygons);
-void vtp_array(FILE *out, const char *type, const char *name, int components);   // the caller prints the numbers
+void vtp_array(FILE *out, const char *type, const char *name, int components);   // opens an array; the caller prints the numbers
 void vtp_array_end(FILE *out);
 void vtp_numbers(FILE *out, const char *name, const double *value, int count);
 void vtp_vectors(FILE *out, const char *name, const Vec3 *value, int count);

@@ -1,4 +1,4 @@
-// Dijkstra's search over 26 neighbours on slices across the link, the first at its start, the last at its end.
+// Dijkstra's algorithm over 26 neighbours on slices across the link; the first slice is at its start, the last at its end.
 #include "recon/track/link_lattice.h"
 
 #include "base/base.h"
@@ -7,13 +7,13 @@
 #include <stdlib.h>
 
 enum { ACROSS_MOST = 6, ALONG_MOST = 400, SMOOTHINGS = 3 };
-static const double LEAST_CLEAR = 0.05;   // minimal step length that is charged
+static const double LEAST_CLEAR = 0.05;   // lower bound of the clearness in a step's cost
 
 typedef struct Lattice {
     Vec3 from, step[3];      // step[2] along the link
-    int half;                // places to each side of the link
+    int half;                // number of lattice points to each side of the link
     int size[3];
-    float *clear;            // (size[2], size[1], size[0]) < 0: no place
+    float *clear;            // (size[2], size[1], size[0]) clearness; < 0: not a lattice point
     float *cost;
     int *before;             // predecessor on the path
 } Lattice;
@@ -82,7 +82,7 @@ static void lattice_free(Lattice *l)
     free(l->before);
 }
 
-// False: out of memory.
+// Searches the cheapest path from `start` to `goal`. Returns false if out of memory.
 static bool cross_lattice(Lattice *l, const LinkGround *ground, int start, int goal)
 {
     PathHeap heap = {0};

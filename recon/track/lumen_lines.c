@@ -1,4 +1,4 @@
-// A spatial hash of cubic cells; a line is listed in every cell that its capsule's bounding box meets. Cells are as wide as the usual capsule is.
+// A spatial hash of cubic cells. A line is listed in every cell that its capsule's bounding box touches. A cell is as wide as the average capsule.
 #include "recon/track/lumen_lines.h"
 
 #include <stdint.h>
@@ -9,7 +9,7 @@ struct LumenLines {
     double cell;             // [mm]
     uint64_t mask;           // slots - 1, a power of two
     int *start;              // (slots + 1) slot s holds entries [start[s], start[s + 1])
-    int *entry;              // lines
+    int *entry;              // line numbers
     LumenLine *line;
 };
 
@@ -53,7 +53,7 @@ static void each_cell(LumenLines *lines, int count, bool fill)
     }
 }
 
-// The mean is close enough to the median; no line may fill more than a few thousand cells.
+// The mean width of the capsules, which is close enough to the median; limited so that no line fills more than a few thousand cells.
 static double cell_size(const LumenLine *line, int count)
 {
     double sum = 0, longest = 0;

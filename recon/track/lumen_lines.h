@@ -1,4 +1,5 @@
-// Line segments inside a lumen, each with a clearance radius within which no point can be wall. Used to drop wall points that lie in a tool's path.
+// A set of line segments inside a lumen, each with a clearance radius within which no point can be wall. Used to remove wall points that lie in a tool's
+// path.
 #ifndef SELDINGER_RECON_TRACK_LUMEN_LINES_H
 #define SELDINGER_RECON_TRACK_LUMEN_LINES_H
 
@@ -11,15 +12,15 @@ typedef struct LumenLine {
     double clear;            // [mm] > 0
 } LumenLine;
 
-// Fractions of the radius within which a point cannot be wall: for a link through an ostium, where the parent's edges are often mistaken for wall,
-// and for any other centreline, whose radius is less certain at bends and near branches.
+// Clearance radii as fractions of the vessel's radius: for a link through an ostium, where the parent's edges are often mistaken for wall, and for any other
+// centreline, whose radius is less certain at bends and near branches.
 static const double LUMEN_LINK_CLEAR = 0.7, LUMEN_TUBE_CLEAR = 0.5;
 
 typedef struct LumenLines LumenLines;
-// Keeps a copy of the lines. NULL if out of memory.
+// Creates a set with a copy of the lines. Returns NULL if out of memory.
 LumenLines *lumen_lines_create(const LumenLine *line, int count);
 void lumen_lines_free(LumenLines *lines);
-// Whether x lies within the clearance radius of a line. Read-only: threads may share it.
+// Returns true if x lies within the clearance radius of a line. Read-only: threads may share the set.
 bool lumen_lines_hold(const LumenLines *lines, Vec3 x);
 
 #endif

@@ -5,16 +5,16 @@
 #include <stdbool.h>
 
 typedef struct PathEntry {
-    float way;
+    float way;               // path length or cost from the start
     int place;
 } PathEntry;
 
-typedef struct PathHeap {     // {0} is empty; free(entry) at the end
+typedef struct PathHeap {     // {0} is empty; the caller frees `entry` at the end
     PathEntry *entry;
     int count, capacity;
 } PathHeap;
 
-bool path_heap_push(PathHeap *heap, PathEntry entry);   // false: out of memory
+bool path_heap_push(PathHeap *heap, PathEntry entry);   // returns false if out of memory
 PathEntry path_heap_pop(PathHeap *heap);                // the heap must not be empty
 
 #endif

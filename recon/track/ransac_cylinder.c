@@ -27,12 +27,12 @@ Random random_from_seed(uint64_t seed, uint64_t stream)
 // Trials are drawn and computed in batches; surplus draws of the last batch are discarded.
 enum { BATCH = 16 };
 typedef struct Circles {
-    double u0[BATCH], v0[BATCH], ax[BATCH], ay[BATCH], bx[BATCH], by[BATCH];   // first point; the others as seen from it
+    double u0[BATCH], v0[BATCH], ax[BATCH], ay[BATCH], bx[BATCH], by[BATCH];   // first point, and the two others relative to it
     double cu[BATCH], cv[BATCH], r2[BATCH];
-    int fits[BATCH];         // not on a line, and about within the limits
+    int fits[BATCH];         // trials whose points are not collinear and whose circle is roughly within the limits
 } Circles;
 
-// Each trial consumes three random numbers, whatever its outcome.
+// Each trial consumes three random numbers, whatever its result.
 static void draw_triples(Circles *c, const float *u, const float *v, int count, Random *random)
 {
     for (int k = 0; k < BATCH; k++) {
@@ -64,7 +64,7 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
         v[i] = (float)vec3_dot(q, e2);
     }
     int best = 0, trial = 0;
-    const double rounding = 1e-9;   // the exact test follows
+    const double rounding = 1e-9;   // tolerance; the exact test follows
     double least2 = options->radius_min * options->radius_min * (1 - rounding), most2 = options->radius_max * options->radius_max * (1 + rounding);
     const SimdLevel level = simd_level();
     for (bool more = true; more;) {
@@ -129,7 +129,7 @@ static Cylinder moved(const Cylinder *c, Vec3 e1, Vec3 e2, const double x[5])
                       vec3_unit(vec3_add_scaled(vec3_add_scaled(c->axis, x[2], e1), x[3], e2)), c->height};
 }
 
-// A x = b for a symmetric positive definite 5 x 5 matrix by Cholesky; false if it is not.
+// Solves A x = b for a symmetric positive definite 5 x 5 matrix by Cholesky decomposition. Returns false if A is not positive definite.
 static bool solve5(double a[5][5], double b[5])
 {
     for (int j = 0; j < 5; j++) {

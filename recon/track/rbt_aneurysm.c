@@ -29,7 +29,7 @@ static void cast_sac_rays(void *context, long index)
     cast_rays_first_edge(job->t->volume, job->center[index], job->direction, job->direction_count, &rays, job->distance[index]);
 }
 
-// Is x on the wall of a tracked cylinder, as its consensus set is?
+// Returns true if x lies on the wall of a tracked cylinder, as its consensus set does.
 static bool is_in_consensus(const Tracker *t, Vec3 x, int node_count)
 {
     for (int i = 0; i < node_count; i++) {
@@ -47,7 +47,7 @@ static bool is_in_consensus(const Tracker *t, Vec3 x, int node_count)
 
 static double power_of(const Cylinder *c, Vec3 x) { return vec3_norm2(vec3_sub(x, c->center)) - c->radius * c->radius; }
 
-// Does a vessel's node own x rather than the sac? Such points were reached through the neck and lie on the vessel's wall.
+// Returns true if x belongs to a vessel's node rather than to the sac. The ray to x then passed through the neck, and x lies on the vessel's wall.
 static bool is_vessels(const Tracker *t, Vec3 x, int node_count, const TrackNode *sac, int sac_count)
 {
     double least = HUGE_VAL;
@@ -59,7 +59,7 @@ static bool is_vessels(const Tracker *t, Vec3 x, int node_count, const TrackNode
     return false;
 }
 
-// Which of the listed vessel nodes owns x, or -1 where the sac does.
+// Returns the listed vessel node to which x belongs, or -1 if it belongs to the sac.
 static int vessel_owner(const Tracker *t, Vec3 x, const int *near, int near_count, const TrackNode *sac, int sac_count)
 {
     double least = HUGE_VAL;
@@ -74,11 +74,11 @@ static int vessel_owner(const Tracker *t, Vec3 x, const int *near, int near_coun
     return owner;
 }
 
-typedef struct Neck {        // where the sac's rays pass into the vessels' cells
+typedef struct Neck {        // where the sac's rays enter the vessels' cells
     int count;
     Vec3 *place;             // (count)
     int *owner;              // (count) vessel node
-    int *center;             // (count) of the sac
+    int *center;             // (count) centre of the sac
 } Neck;
 
 static bool find_neck(const Tracker *t, const SacJob *job, int node_count, const TrackNode *sac, int sac_count, Neck *neck)
@@ -138,7 +138,7 @@ static bool merge_nodes(Track *tree, int lo, int hi, const Cylinder *hub)
     }
     node.point_start = used;
     node.point_count = (int)points;
-    for (int i = lo; i <= hi; i++) {   // a copy at the end: the old space stays unused
+    for (int i = lo; i <= hi; i++) {   // copied to the end: the old space stays unused
         memcpy(tree->point + used, tree->point + tree->node[i].point_start, (size_t)tree->node[i].point_count * sizeof *tree->point);
         used += tree->node[i].point_count;
     }
@@ -156,10 +156,10 @@ static bool merge_nodes(Track *tree, int lo, int hi, const Cylinder *hub)
     return true;
 }
 
-// The node to which the sac is attached, and the centre attached there: -1 if no ray finds a neck. A tool that follows its node from neighbour to
-// neighbour must find its way from every vessel cell that borders on the sac's into it and out again, but the tree has one link: the vessel nodes
-// along the neck become one. It stands where they stood, weighted by their share of the neck, and its radius keeps the border between vessel and sac
-// where it was.
+// Chooses the node to which the sac is attached, or -1 if no ray finds a neck; `center` receives the sac's centre attached there. A tool's node search moves
+// from neighbour to neighbour, so it must be able to move from every vessel cell that borders on the sac's cells into them and back. The tree has only one
+// link, so the vessel nodes along the neck are merged into one. Its position is the mean of theirs, weighted by their share of the neck, and its radius
+// preserves the border between vessel and sac.
 static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac_count, int *center)
 {
     Neck neck;
@@ -202,7 +202,7 @@ static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac
                     used++;
                 }
             hub.radius = sqrt(fmax(square / used, same_square(tree->node[best].cylinder.radius)));
-            // neighbours that would lie in its cell are part of it
+            // neighbours that would lie in its cell are merged too
             grown = false;
             if (follows(tree, lo) && power_of(&hub, tree->node[lo - 1].cylinder.center) < -same_square(tree->node[lo - 1].cylinder.radius))
                 grown = true, lo--;
@@ -228,7 +228,7 @@ static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac
     return best;
 }
 
-// One sac: points by rays from each centre, a sphere for each, then the centres are linked: one to the tree, every next one to its nearest.
+// Adds one sac: finds wall points by rays from each centre, fits a sphere to each, then links the centres: one to the tree, each other one to its nearest.
 bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path)
 {
     int n = aneurysm->center_count, rays = (int)t->parameters->aneurysm_rays, vessel_count = t->tree.count;
@@ -275,8 +275,8 @@ bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center,
         sac[i].point_count = kept;
         sac[i].inlier_rate = (double)kept / rays;
     }
-    // Prim's spanning tree over the centres, from the one attached to the vessel merging much of the neck changes which nodes border on it, so repeat
-    // once or twice
+    // Prim's spanning tree over the centres, starting from the one attached to the vessel. Merging much of the neck changes which nodes border on it, so
+    // make_hub is repeated once or twice.
     int root_center = 0, root = -1, before = 0;
     for (int i = 0; good && i < MAX_HUB_ROUNDS && before != t->tree.count && !t->out_of_memory; i++) {
         before = t->tree.count;

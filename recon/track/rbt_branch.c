@@ -1,11 +1,11 @@
-// Prediction, eq. (1), (2): C* = C + s h/2 d, and r, d, h stay. Estimation: rays from C* give candidate points; for axis directions in order of their
+// Prediction, eq. (1), (2): C* = C + s h/2 d; r, d, h are unchanged. Estimation: rays from C* give candidate points; for axis directions in order of their
 // angle with d*, a RANSAC circle across each gives a cylinder, and the first valid one is kept; refinement by least squares; the centre goes to the
 // median of the consensus set along the axis; new rays from there give the node's points and its height. Kerrien et al. 2017, section 3.
 //
-// What was tried and rejected: the paper's method as written stalls at bifurcations and beside a sac, where the consensus lies upstream and the
-// median pulls the centre back to where it came from. A failed step is repeated from the last good node with longer steps, which look past such a
-// place; then the radius and the contrast must agree with the vessel, or spurious branches grow from open ends. That does not suffice at a giant
-// aneurysm: the natural path is straight into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is
+// Tried and rejected: the paper's method as published stalls at bifurcations and beside a sac, where the consensus set lies upstream and the
+// median pulls the centre back to where it came from. A failed step is therefore repeated from the last good node with longer steps, to get past this
+// place; then the radius and the contrast must agree with the vessel, or spurious branches grow from open ends. This is not enough at a giant
+// aneurysm: the direct path leads into the sac, and the tracking ends at its bottom. Where a branch widens or ends, the lumen ahead is
 // searched for tubes that leave it (rbt_exits.h), and the branch continues from the widest one that tracks.
 #include "recon/track/rbt_branch.h"
 
@@ -24,13 +24,13 @@ enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000 };
 
 // --- estimation, section 3.1 ---
 
-// Half of the sphere's vertices, +z first, then by angle with it: RANSAC uses these directions, rotated so that +z is the predicted axis.
+// Takes half of the sphere's vertices, +z first, then by increasing angle with it. RANSAC uses these directions, rotated so that +z is the predicted axis.
 void tracker_prepare_axes(Tracker *t)
 {
     Vec3 all[2 * MAX_AXES];
     int level = sphere_level_of(2 * t->axis_count), used = 0;
     sphere_directions(level, all);
-    // turn vertex 0 onto z, then keep the upper half; of two opposite vertices on the equator keep one
+    // rotate vertex 0 onto z, then keep the upper half; of two opposite vertices on the equator keep one
     Vec3 z = all[0], x = vec3_normal_to(z), y = vec3_cross(z, x);
     for (int i = 0; i < 2 * t->axis_count; i++) {
         Vec3 a = vec3(vec3_dot(all[i], x), vec3_dot(all[i], y), vec3_dot(all[i], z));
@@ -38,14 +38,14 @@ void tracker_prepare_axes(Tracker *t)
         if (!upper || used == t->axis_count)
             continue;
         int k = used++;
-        for (; k > 0 && t->axis[k - 1].z < a.z - 1e-9; k--)   // insertion sort is stable
+        for (; k > 0 && t->axis[k - 1].z < a.z - 1e-9; k--)   // insertion sort, because it is stable
             t->axis[k] = t->axis[k - 1];
         t->axis[k] = a;
     }
     t->axis_count = used;
 }
 
-// Brightness on the axis minus that of the darker half of a ring outside the wall, so that a touching neighbour does not hide the vessel.
+// Brightness on the axis minus the brightness of the darker half of a ring outside the wall, so that a touching neighbour does not hide the vessel.
 static double contrast_of(const Tracker *t, const Cylinder *c)
 {
     enum { RING = 16 };
@@ -63,8 +63,8 @@ static double contrast_of(const Tracker *t, const Cylinder *c)
     return inside - outside;
 }
 
-// RANSAC over the axis directions in order of their angle with the predicted one: the first valid cylinder, or the best of all if that is above the
-// relaxed rate. Returns its inlier rate, 0 if there is none.
+// RANSAC over the axis directions in order of their angle with the predicted one: takes the first valid cylinder, or the best of all if its inlier rate is
+// above the relaxed one. Returns the inlier rate, or 0 if there is no cylinder.
 static double search_axes(Tracker *t, const Cylinder *predicted, int candidates, double threshold, Cylinder *out)
 {
     const RbtParameters *p = t->parameters;
@@ -89,7 +89,7 @@ static double search_axes(Tracker *t, const Cylinder *predicted, int candidates,
     return best > p->relaxed * p->p_inl ? best : 0;
 }
 
-// The consensus set's median position along the axis becomes the centre; the height encloses the share of the inliers around it.
+// Returns the consensus set's median position along the axis, relative to the centre; the median becomes the new centre.
 static double median_along(Tracker *t, const Cylinder *c, int inliers)
 {
     for (int i = 0; i < inliers; i++)
@@ -98,7 +98,7 @@ static double median_along(Tracker *t, const Cylinder *c, int inliers)
     return inliers % 2 ? t->along[inliers / 2] : 0.5 * (t->along[inliers / 2 - 1] + t->along[inliers / 2]);
 }
 
-// The complete estimation step. False if no cylinder is valid (t->why says which part failed); else t->estimate holds the node.
+// The complete estimation step. Returns false if no cylinder is valid (t->why gives the reason); otherwise t->estimate holds the node.
 bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
 {
     const RbtParameters *p = t->parameters;
@@ -107,15 +107,15 @@ bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_thr
     int least = t->ray_count / 8;   // fewer edges than this cannot be a tube
     Cylinder c;
     int n = cast_rays(t->volume, predicted->center, t->ray, t->ray_count, &rays, t->candidate);
-    t->why = "too few rays meet a wall";
+    t->why = "too few rays reach a wall";
     if (n < least)
         return false;
-    t->why = "no cylinder among the points";
+    t->why = "no cylinder fits the points";
     if (search_axes(t, predicted, n, threshold, &c) <= 0)
         return false;
     if (vec3_dot(c.axis, predicted->axis) < 0)
         c.axis = vec3_negate(c.axis);
-    // refine, and select the consensus again: otherwise the axis of the discrete set lags
+    // refine, then select the consensus set again: otherwise its axis, one of a discrete set, stays inaccurate
     int inliers = cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
     for (int i = 0; i <= (int)p->refits; i++) {
         bool good;
@@ -162,7 +162,7 @@ static double recent_contrast(const Track *track)
     return sum / (track->count - first);
 }
 
-// Is the estimate the next node after the last one of the branch?
+// Returns true if the estimate is acceptable as the next node of the branch.
 static bool is_progress(Tracker *t, const Track *branch, double step, bool is_retry, bool may_overlap)
 {
     const RbtParameters *p = t->parameters;
@@ -172,7 +172,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     t->why = "leaves the volume";
     if (!tracker_is_inside(t->volume, next->cylinder.center))
         return false;
-    t->why = "ends where `until` says";
+    t->why = "stopped by `until`";
     if (tracker_is_stopped(t, last->cylinder.center, next->cylinder.center))
         return false;
     t->why = rbt_enters_forbidden;
@@ -186,21 +186,21 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
             p->back_step * last->cylinder.radius)
             return false;
     t->why = "turns back";
-    double way = vec3_norm(move), least = same_cos(p->turn_deg * PI / 180) - 1e-9;
-    for (int i = branch->count - 1; i >= 0 && way < 2 * last->cylinder.radius; i--) {
+    double arc = vec3_norm(move), least = same_cos(p->turn_deg * PI / 180) - 1e-9;
+    for (int i = branch->count - 1; i >= 0 && arc < 2 * last->cylinder.radius; i--) {
         if (vec3_dot(next->cylinder.axis, branch->node[i].cylinder.axis) < least)
             return false;
-        way += i > 0 ? vec3_distance(branch->node[i].cylinder.center, branch->node[i - 1].cylinder.center) : 0;
+        arc += i > 0 ? vec3_distance(branch->node[i].cylinder.center, branch->node[i - 1].cylinder.center) : 0;
     }
     t->why = "runs into itself";
-    way = vec3_norm(move);
+    arc = vec3_norm(move);
     for (int i = branch->count - 2; i >= 0; i--) {
-        way += vec3_distance(branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center);
-        if (way > 4 * last->cylinder.radius &&
+        arc += vec3_distance(branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center);
+        if (arc > 4 * last->cylinder.radius &&
             vec3_distance(next->cylinder.center, branch->node[i].cylinder.center) < p->overlap * branch->node[i].cylinder.radius)
             return false;
     }
-    t->why = "the contrast is lost";
+    t->why = "the contrast is too low";
     double contrast = recent_contrast(branch);
     if (next->contrast < p->contrast * contrast || !(next->contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)))
         return false;
@@ -213,7 +213,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     t->why = "leaks into a wider or brighter neighbour";
     if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * tracker_usual_radius(branch) || next->contrast > 1.8 * contrast))
         return false;
-    t->why = "no vessel beyond";
+    t->why = "no similar vessel ahead";
     if (is_retry &&
         (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius || next->contrast < p->retry_contrast * contrast))
         return false;
@@ -221,7 +221,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     return may_overlap || tracker_node_around(t, next->cylinder.center, p->overlap) < 0;
 }
 
-// The next node of a branch: the step of eq. (1), then the longer ones, each with both thresholds. False at the end of the vessel.
+// Finds the next node of a branch: the step of eq. (1), then the longer ones, each with both thresholds. Returns false at the end of the vessel.
 static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
 {
     const RbtParameters *p = t->parameters;
@@ -262,15 +262,16 @@ void tracker_opening(Tracker *t, const Cylinder *c, double contrast)
     t->estimate.node.inlier_rate = (double)kept / t->ray_count;
 }
 
-// Nodes on the straight line between two cylinders, in an opening where no cylinder fits: their points are the first walls that rays meet nearby.
+// Appends nodes on the straight line between two cylinders, in an opening where no cylinder fits: their points are the first wall points that rays hit
+// nearby.
 static bool append_junction(Tracker *t, Track *branch, const Cylinder *from, const Cylinder *to)
 {
-    Vec3 way = vec3_sub(to->center, from->center);
-    double gap = vec3_norm(way);
+    Vec3 line = vec3_sub(to->center, from->center);
+    double gap = vec3_norm(line);
     int steps = (int)ceil(gap / (0.5 * fmin(from->radius, to->radius)));
     for (int i = 1; i < steps; i++) {
         double share = (double)i / steps;
-        Cylinder c = {vec3_mix(from->center, to->center, share), from->radius + share * (to->radius - from->radius), vec3_unit(way), 2 * gap / steps};
+        Cylinder c = {vec3_mix(from->center, to->center, share), from->radius + share * (to->radius - from->radius), vec3_unit(line), 2 * gap / steps};
         tracker_opening(t, &c, recent_contrast(branch));
         if (!track_append(branch, &t->estimate.node, t->estimate.point))
             return false;
@@ -280,8 +281,8 @@ static bool append_junction(Tracker *t, Track *branch, const Cylinder *from, con
 
 static bool next_node(Tracker *t, const Track *branch, bool may_overlap);
 
-// From an exit back towards the branch, until it is met or the tube widens into the opening. Then joins the branch up to `keep` nodes, the junction,
-// and the return path reversed. False if the exit is not a vessel or is not in line of sight of the branch.
+// Tracks from an exit back towards the branch until it reaches the branch or the tube widens into the opening. Then joins the branch up to `keep` nodes, the
+// junction, and the return path reversed. Returns false if the exit is not a vessel or is not in line of sight of the branch.
 static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, int place)
 {
     const RbtParameters *p = t->parameters;
@@ -302,7 +303,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
         double link = tracker_link_brightness(t, last.center, c->center), distance = vec3_distance(c->center, last.center);
         if (t->is_guarded && tracker_darkest(t, last.center, c->center) < t->floor)   // do not bridge regions too faint for a vessel
             link = 0;
-        // it has met the branch, entered the wide part, or passed by
+        // it has reached the branch, entered the wide part, or passed the branch
         if (i > 0 && (distance < last.radius || c->radius > 1.35 * tracker_usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
             break;
         good = track_append(&back, &t->estimate.node, t->estimate.point);
@@ -330,7 +331,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     return good;
 }
 
-// The branch widens or ends: searches ahead for its continuation and joins the widest candidate that can be tracked.
+// Called where the branch widens or ends: searches ahead for its continuation and joins the widest candidate that can be tracked.
 static bool look_ahead(Tracker *t, Track *branch)
 {
     enum { MAX_EXITS = 16 };
@@ -363,8 +364,8 @@ static double branch_length(const Track *branch)
     return length;
 }
 
-// Tracks from an estimate of the first node until the vessel ends. The branch's nodes are appended to `branch`, without parents. `until_tree`: the
-// branch is tracked back towards its parent and ends inside another branch's tube.
+// Tracks from an estimate of the first node until the vessel ends. The nodes are appended to `branch`, without parents. `until_tree`: the branch is tracked
+// back towards its parent and ends inside another branch's tube.
 void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree)
 {
     const RbtParameters *p = t->parameters;
@@ -373,7 +374,7 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
     Cylinder predicted = *start;
     if (!tracker_estimate(t, &predicted, p->r_t) && !(p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second)))
         return;
-    int rest = 0;   // nodes until the next look ahead
+    int rest = 0;   // number of nodes until the next search ahead
     for (bool found = true; found;) {
         if (!track_append(branch, &t->estimate.node, t->estimate.point)) {
             t->out_of_memory = true;
@@ -382,13 +383,13 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         Vec3 here = t->estimate.node.cylinder.center;
         left = left || tracker_node_around(t, here, 1) < 0;
         length = branch_length(branch);
-        t->why = "is as long as max_length_mm";
+        t->why = "reached max_length_mm";
         if (length >= fmin(p->max_length_mm, t->longest) || branch->count >= MAX_NODES)
             return;
         t->why = "reached its parent";
         if (until_tree && tracker_node_around(t, here, 0.9) >= 0)
             return;
-        t->why = "does not leave its parent";
+        t->why = "stays inside its parent";
         if (!left && length > 6 * branch->node[0].cylinder.radius)
             return;
         found = next_node(t, branch, !left);
@@ -396,7 +397,7 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         rest -= rest > 0;
         if (p->look_ahead > 0 && !t->is_noisy && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
             rest = 12;
-            Estimate *kept = malloc(sizeof *kept);   // the search overwrites the tracker's estimate
+            Estimate *kept = malloc(sizeof *kept);   // because the search overwrites the tracker's estimate
             if (!kept) {
                 t->out_of_memory = true;
                 return;

@@ -1,7 +1,7 @@
-// A limb is tracked back first. At an ostium the return path ends in the parent's tube; where vessels touch it runs past the contact, and the limb is
-// rejected: its vessel has another parent, from which it is found later, or none. Then the outgoing path is tracked.
+// A limb is first tracked backwards. At an ostium this return path ends in the parent's tube. Where vessels only touch, it runs past the contact, and the
+// limb is rejected: its vessel has another parent, from which it is found later, or no parent. Then the outgoing path is tracked.
 //
-// Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
+// Limbs of a round are tracked in parallel on the same tree, and adopted widest first; parts that lie in a tube adopted before are omitted.
 #include "recon/track/rbt_branches.h"
 #include "base/base.h"
 #include "recon/track/rbt_branch.h"
@@ -13,15 +13,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAVE = 8 };          // limbs tracked concurrently; the tree depends on this number, not on the number of threads
-static const double least_tube = 0.7;   // mean inlier rate of a branch, as a share of the first one's
+enum { WAVE = 8 };          // limbs tracked in parallel; the tree depends on this number, not on the number of threads
+static const double least_tube = 0.7;   // mean inlier rate of a branch, as a fraction of the first branch's
 
-typedef struct Found {       // outcome of a limb
+typedef struct Found {       // result for a limb
     Track out, back;
     const char *why;
-    double radius;           // of its first nodes
+    double radius;           // radius of its first nodes
     int limb;
-    bool good, is_sac;       // an aneurysm is one node in `out`
+    bool good, is_sac;       // is_sac: an aneurysm, one node in `out`
     bool out_of_memory;
 } Found;
 
@@ -47,7 +47,7 @@ static double median_radius(const Track *track, int most)
     return n > 0 ? radius[n / 2] : 0;
 }
 
-// Is the estimate a vessel along the limb?
+// Returns true if the estimate is a vessel along the limb.
 static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 direction, double share)
 {
     const TrackNode *n = &t->estimate.node;
@@ -58,20 +58,21 @@ static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 dir
            tracker_node_around(t, n->cylinder.center, 0.8) < 0;
 }
 
-// Where the vessel comes from, behind the first start.
+// Returns true if the limb lies behind the first start, where the vessel comes from.
 static bool is_upstream(const Tracker *t, const RbtLimb *limb)
 {
     const Cylinder *root = &t->tree.node[0].cylinder;
-    Vec3 way = vec3_sub(limb->place[0], root->center);
-    double along = vec3_dot(way, root->axis);
-    return along < 0 && along > -4 * root->radius - 4 * t->voxel && vec3_norm(vec3_add_scaled(way, -along, root->axis)) < root->radius;
+    Vec3 offset = vec3_sub(limb->place[0], root->center);
+    double along = vec3_dot(offset, root->axis);
+    return along < 0 && along > -4 * root->radius - 4 * t->voxel && vec3_norm(vec3_add_scaled(offset, -along, root->axis)) < root->radius;
 }
 
-// The blurred rim of a dense neighbour takes every brightness: then most of the limb lies next to something too bright for a vessel.
+// Returns true if the limb is the blurred rim of a dense neighbour, in which every brightness occurs: most of the limb then lies next to something too bright
+// for a vessel.
 static bool is_rim(const Tracker *t, const RbtLimb *limb)
 {
     int beside = 0;
-    double bright = limb->ceiling - RBT_NOISE_SHARE * t->noise;   // one sample may be noise, two hardly
+    double bright = limb->ceiling - RBT_NOISE_SHARE * t->noise;   // one bright sample may be noise, two are unlikely to be
     for (int i = 0; i < limb->count; i++) {
         int count = 0;
         for (int k = 0; k < 18; k++) {
@@ -84,7 +85,7 @@ static bool is_rim(const Tracker *t, const RbtLimb *limb)
     return 2 * beside > limb->count;
 }
 
-// Noise may darken single samples of bone below the ceiling, but not their median.
+// Returns true if the track is too bright for a vessel. Noise may darken single samples of bone below the ceiling, but not their median.
 static bool is_dense(const Tracker *t, const RbtLimb *limb, const Track *track)
 {
     enum { MOST = 256 };
@@ -96,7 +97,7 @@ static bool is_dense(const Tracker *t, const RbtLimb *limb, const Track *track)
     return n > 0 && value[n / 2] > fmin(limb->ceiling, t->ceiling) - RBT_NOISE_SHARE * t->noise;
 }
 
-// Most nodes of a vessel are cylinders; what was tracked through a shapeless neighbour has few inliers all along.
+// Returns true if the nodes are a vessel: most nodes of a vessel are cylinders, while nodes tracked through a shapeless neighbour all have low inlier rates.
 static bool is_tube(const Tracker *t, const TrackNode *node, int count)
 {
     double sum = 0;
@@ -105,7 +106,7 @@ static bool is_tube(const Tracker *t, const TrackNode *node, int count)
     return sum >= least_tube * t->usual_inliers * count;
 }
 
-// A cylinder somewhere on the limb: its middle first, then outwards, then inwards.
+// Finds a cylinder on the limb: tries its middle first, then outwards, then inwards.
 static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder *seed)
 {
     const RbtParameters *p = t->parameters;
@@ -130,7 +131,7 @@ static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder
     return false;
 }
 
-// Along the limb back to the contact's node.
+// Distance of x from the limb's path, which starts at the contact's node.
 static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
 {
     double least = tracker_segment_distance(x, t->tree.node[limb->contact].cylinder.center, limb->place[0]);
@@ -139,7 +140,7 @@ static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
     return least;
 }
 
-// The darkest place between a node and one of the tree, between background (0) and the dimmer of both lumens (1).
+// Brightness of the darkest place between a node and a node of the tree, on a scale from background (0) to the darker of both lumens (1).
 static double neck_of(const Tracker *t, const TrackNode *parent, const TrackNode *node)
 {
     Vec3 x = node->cylinder.center, c = parent->cylinder.center;
@@ -151,8 +152,8 @@ static double neck_of(const Tracker *t, const TrackNode *parent, const TrackNode
     return least;
 }
 
-// Does the return path end at the wall of a vessel, further on than where the limb touches the tree, and point into it? Vessels that kiss lie side by
-// side.
+// Returns true if the return path ends at the wall of a vessel and points into it. The caller has found that it runs past the contact. Vessels that only
+// touch lie side by side.
 static bool meets_wall(const Tracker *t, const RbtPaint *paint, const TrackNode *end)
 {
     int node = rbt_paint_node(paint, end->cylinder.center);
@@ -162,7 +163,7 @@ static bool meets_wall(const Tracker *t, const RbtPaint *paint, const TrackNode 
     return vec3_dot(in, end->cylinder.axis) > 0.5 && neck_of(t, &t->tree.node[node], end) >= 0.8;
 }
 
-// Does the return path end where the limb begins? Cuts off what runs past it.
+// Returns true if the return path ends where the limb begins; removes the part that runs past it.
 static bool meets_parent(const Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track *back)
 {
     const Cylinder *end = &back->node[back->count - 1].cylinder;
@@ -173,7 +174,7 @@ static bool meets_parent(const Tracker *t, const RbtPaint *paint, const RbtLimb 
     for (int i = 0; i < back->count; i++)
         if (vec3_distance(back->node[i].cylinder.center, contact) < vec3_distance(back->node[nearest].cylinder.center, contact))
             nearest = i;
-    // it left the limb for a sibling straight ahead: up to there it was right
+    // it left the limb and followed a sibling straight ahead: keep the part before that
     if (distance_from_limb(t, limb, back->node[nearest].cylinder.center) > 2 * fmax(back->node[nearest].cylinder.radius, t->voxel))
         for (nearest = 0; nearest + 1 < back->count; nearest++)
             if (distance_from_limb(t, limb, back->node[nearest + 1].cylinder.center) > 2 * fmax(back->node[nearest + 1].cylinder.radius, t->voxel))
@@ -183,7 +184,7 @@ static bool meets_parent(const Tracker *t, const RbtPaint *paint, const RbtLimb 
         past += vec3_distance(back->node[i].cylinder.center, back->node[i - 1].cylinder.center);
     double gap = vec3_distance(back->node[nearest].cylinder.center, contact);
     bool goes_past = past > 4 * radius && past > 4 * t->voxel && gap < 1.25 * (radius + t->tree.node[limb->contact].cylinder.radius) + 3 * t->voxel;
-    // a vessel that ends in the side of another one forks there, a vessel that passes by does not
+    // if the parent ends here, the contact is a fork and its neck may be darker; a parent that continues only passes by
     int ahead = limb->contact;
     double left = 0;
     while (ahead + 1 < t->tree.count && t->tree.node[ahead + 1].branch == t->tree.node[limb->contact].branch && left < 3 * radius) {
@@ -264,14 +265,14 @@ bool rbt_ends_add(RbtEnds *ends, const char *why, int seed)
     return true;
 }
 
-// Where a branch is attached: the node that contains its first node, else the best attachment.
+// Returns the node to which a branch is attached: the node that contains its first node, else the best attachment.
 static int parent_of(const Tracker *t, const RbtPaint *paint, const Cylinder *first)
 {
     int inside = rbt_paint_node(paint, first->center);
     return inside >= 0 && tracker_node_around(t, first->center, 1) >= 0 ? inside : tracker_attachment(t, first->center, t->tree.count);
 }
 
-// Appends back turned round, then out, without what lies inside other tubes. False: out of memory.
+// Appends the return path reversed, then the outgoing path, without the parts inside other tubes. Returns false if out of memory.
 static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends)
 {
     int total = found->back.count - 1 + found->out.count, first = 0, last = total - 1, before = t->tree.count, number = ends->count;
@@ -289,7 +290,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
     if (good) {
         while (first < seed && tracker_node_around(t, node[first]->cylinder.center, 1) >= 0)
             first++;
-        // two limbs may lead to one vessel: the second ends at the first
+        // two limbs may lead to the same vessel: the second ends at the first
         int outside = seed;
         while (outside < total && !is_painted(paint, node[outside]->cylinder.center))
             outside++;
@@ -309,7 +310,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
             }
             bool is_joined = false;
             good = good && rbt_mend_links(t, paint, before, &is_joined);
-            if (good && is_joined && !is_tube(t, t->tree.node + before, t->tree.count - before)) {   // with the path that joins it
+            if (good && is_joined && !is_tube(t, t->tree.node + before, t->tree.count - before)) {   // including the path that joins it
                 track_cut(&t->tree, before);
                 is_joined = false;
             }
@@ -323,7 +324,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
     return good || total == 0;
 }
 
-// An aneurysm is attached to the nearest node; several limbs may lead to one aneurysm. False: out of memory.
+// Appends an aneurysm, attached to the nearest node. Several limbs may lead to the same aneurysm; it is added once. Returns false if out of memory.
 static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found *found, RbtEnds *ends)
 {
     int before = t->tree.count;
@@ -343,7 +344,7 @@ static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Fo
     return true;
 }
 
-// Wider limbs first, so that narrower ones stop at vessels already tracked.
+// Sorts wider limbs first, so that narrower ones stop at vessels already tracked.
 static int compare_limbs(const void *a, const void *b)
 {
     const RbtLimb *x = a, *y = b;
@@ -351,7 +352,7 @@ static int compare_limbs(const void *a, const void *b)
     return rx != ry ? (rx < ry) - (rx > ry) : (x->key > y->key) - (x->key < y->key);
 }
 
-// Limbs first … first+count-1 of a round at the same time. False: out of memory.
+// Tracks `count` limbs in parallel and adopts them. Returns false if out of memory.
 static bool grow_wave(Tracker *t, RbtPaint *paint, const RbtLimb *limb, int count, double share, double noise, int threads, RbtEnds *ends)
 {
     Found found[WAVE] = {0}, *order[WAVE];
@@ -373,7 +374,7 @@ static bool grow_wave(Tracker *t, RbtPaint *paint, const RbtLimb *limb, int coun
     return good;
 }
 
-// One round over branches whose nodes are first … end-1. False: out of memory.
+// Grows one round of limbs from the nodes first … end-1. Returns false if out of memory.
 static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double share, double noise, int threads, RbtEnds *ends)
 {
     int count = 0;
@@ -387,7 +388,7 @@ static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double s
     return good;
 }
 
-// Standard deviation of the spline's values in the background, from the median of their distances to its median: vessels are few.
+// Standard deviation of the spline's values in the background, from the median absolute deviation from their median, because vessels are few.
 static double noise_of(const Tracker *t)
 {
     enum { SAMPLES = 20000 };
@@ -406,8 +407,8 @@ static double noise_of(const Tracker *t)
     return 1.4826 * value[n / 2];
 }
 
-// Medians of brightness and contrast over the first branch set the limits for too faint and too bright; its inlier rate shows how well cylinders fit
-// in this volume.
+// Measures the first branch: the medians of its brightness and contrast set the limits for too faint and too bright; its inlier rate shows how well cylinders
+// fit in this volume.
 static void measure_root(Tracker *t, double noise)
 {
     enum { MOST = 512 };

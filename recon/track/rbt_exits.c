@@ -1,7 +1,7 @@
-// The shortest path through the lumen from the start to each voxel (Dijkstra over 26 neighbours) divides the lumen into shells of equal path length.
-// In a tube a shell is one disc; where tubes divide, a shell splits into as many pieces; a sac's bottom is a piece that ends. A piece's volume over
-// the shell's thickness is its cross-section. A piece that is followed by sections like its own over three times its width is a tube; the first such
-// piece after one that is none is an exit. (Walking back from the last pieces instead missed exits that soon fork.)
+// The length of the shortest path through the lumen from the start to each voxel (Dijkstra's algorithm over 26 neighbours) divides the lumen into shells.
+// In a tube a shell is one disc; where tubes divide, a shell splits into pieces, one per tube; a sac's bottom is a piece that ends. A piece's volume over
+// the shell's thickness is its cross-section. A piece is a tube if sections similar to its own follow over three times its width. The first tube piece
+// after a piece that is not a tube is an exit. (Going back from the last pieces was tried; it missed exits that soon fork.)
 #include "recon/track/rbt_exits.h"
 
 #include "base/base.h"
@@ -11,26 +11,26 @@
 #include <string.h>
 
 typedef struct HeapEntry {
-    float way;
+    float arc;
     int32_t voxel;
 } HeapEntry;
 
 typedef struct Flood {
     const Volume *volume;
     int low[3], size[3];     // box of voxels
-    float *way;              // (box) [mm], HUGE_VALF: not reached
-    int32_t *from;           // (box) the voxel before it
-    int32_t *piece;          // (box) -1: none
+    float *arc;              // (box) [mm], HUGE_VALF: not reached
+    int32_t *from;           // (box) predecessor on the path
+    int32_t *piece;          // (box) piece of each voxel; -1: none
     HeapEntry *heap;
     int heap_count, heap_capacity;
 } Flood;
 
 typedef struct Piece {
     int shell, parent, count;
-    Vec3 sum;                // of the voxels' places [mm]
+    Vec3 sum;                // [mm] sum of the voxels' positions
 } Piece;
 
-static bool heap_before(HeapEntry a, HeapEntry b) { return a.way < b.way || (a.way == b.way && a.voxel < b.voxel); }
+static bool heap_before(HeapEntry a, HeapEntry b) { return a.arc < b.arc || (a.arc == b.arc && a.voxel < b.voxel); }
 
 static void heap_push(Flood *f, HeapEntry entry)
 {
@@ -77,7 +77,7 @@ static float value_at(const Flood *f, const int at[3])
 
 static bool is_blocked(Vec3 x, Vec3 start, Vec3 direction, double radius, const RbtBlock *block, int count)
 {
-    // the balls near the start reach past it: they block only what is behind it
+    // the balls near the start extend past it: they block only the part behind it
     bool is_behind = vec3_dot(vec3_sub(x, start), direction) <= -0.3 * radius;
     for (int i = 0; i < count; i++)
         if (vec3_norm2(vec3_sub(x, block[i].center)) < block[i].radius * block[i].radius &&
@@ -86,7 +86,7 @@ static bool is_blocked(Vec3 x, Vec3 start, Vec3 direction, double radius, const 
     return false;
 }
 
-// The neighbour number n (0 … 26, 13 is the voxel itself) of a place; false outside the box.
+// Finds neighbour number n (0 … 26; 13 is the voxel itself) of a position. Returns false outside the box.
 static bool neighbour_of(const Flood *f, const int at[3], int n, int next[3], int32_t *voxel)
 {
     next[0] = at[0] + n % 3 - 1;
@@ -107,42 +107,43 @@ static void flood(Flood *f, int32_t first, Vec3 start, Vec3 direction, double ra
         step = vec3_add_scaled(vec3_add_scaled(step, n / 3 % 3 - 1, f->volume->axis[1]), n / 9 - 1, f->volume->axis[2]);
         length[n] = (float)vec3_norm(step);
     }
-    f->way[first] = 0;
+    f->arc[first] = 0;
     f->from[first] = -1;
     heap_push(f, (HeapEntry){0, first});
     while (f->heap_count > 0) {
         HeapEntry here = heap_pop(f);
         int at[3], next[3];
         int32_t voxel;
-        if (here.way > f->way[here.voxel])
+        if (here.arc > f->arc[here.voxel])
             continue;
         place_of(f, here.voxel, at);
         for (int n = 0; n < 27; n++) {
-            float way = here.way + length[n];
-            if (!neighbour_of(f, at, n, next, &voxel) || way > (float)reach || way >= f->way[voxel] || (double)value_at(f, next) < level ||
+            float arc = here.arc + length[n];
+            if (!neighbour_of(f, at, n, next, &voxel) || arc > (float)reach || arc >= f->arc[voxel] || (double)value_at(f, next) < level ||
                 is_blocked(point_of(f, next), start, direction, radius, block, block_count))
                 continue;
-            f->way[voxel] = way;
+            f->arc[voxel] = arc;
             f->from[voxel] = here.voxel;
-            heap_push(f, (HeapEntry){way, voxel});
+            heap_push(f, (HeapEntry){arc, voxel});
         }
     }
 }
 
-// Connected voxels of one shell form a piece; its parent is the piece from which its first voxel was reached. Pieces are numbered by shell.
+// Divides the shells into pieces of connected voxels. A piece's parent is the piece from which its first voxel was reached. Pieces are numbered in the order
+// of their shells.
 static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece_count)
 {
     int box = f->size[0] * f->size[1] * f->size[2], count = 0, capacity = 256;
     Piece *piece = HEAP_ZEROED((size_t)capacity, sizeof *piece);
     int32_t *stack = HEAP_ZEROED((size_t)box, sizeof *stack);
     for (int32_t i = 0; i < box; i++) {
-        if (f->way[i] > 1e30f || f->piece[i] >= 0)
+        if (f->arc[i] > 1e30f || f->piece[i] >= 0)
             continue;
         if (count == capacity) {
             capacity *= 2;
             piece = HEAP_GROWN(piece, (size_t)capacity, sizeof *piece);
         }
-        int shell = (int)((double)f->way[i] / thickness), held = 0;
+        int shell = (int)((double)f->arc[i] / thickness), held = 0;
         piece[count] = (Piece){.shell = shell < shells ? shell : shells - 1, .parent = i};   // temporarily: one of its voxels
         f->piece[i] = count;
         stack[held++] = i;
@@ -153,7 +154,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece
             piece[count].count++;
             piece[count].sum = vec3_add(piece[count].sum, point_of(f, at));
             for (int n = 0; n < 27; n++)
-                if (neighbour_of(f, at, n, next, &voxel) && f->way[voxel] < 1e30f && f->piece[voxel] < 0 && (int)((double)f->way[voxel] / thickness) == shell) {
+                if (neighbour_of(f, at, n, next, &voxel) && f->arc[voxel] < 1e30f && f->piece[voxel] < 0 && (int)((double)f->arc[voxel] / thickness) == shell) {
                     f->piece[voxel] = count;
                     stack[held++] = voxel;
                 }
@@ -171,8 +172,8 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece
     return piece;
 }
 
-// How many pieces follow `top` on the longest path down whose sections are like that of `first`; *next is the first of them. With some hundred pieces
-// a linear search for the children is cheap enough.
+// Counts the pieces that follow `top` on the longest downstream path whose sections are similar to that of `first`; *next is the first of them. With some
+// hundred pieces a linear search for the children is fast enough.
 static int tube_below(const Piece *piece, int count, int first, int top, int limit, int *next)
 {
     int longest = 0;
@@ -189,7 +190,7 @@ static int tube_below(const Piece *piece, int count, int first, int top, int lim
     return longest;
 }
 
-// Is a piece the head of a tube: do sections like its own follow for three times its width?
+// Returns true if a piece is the head of a tube: similar sections follow over three times its width.
 static bool is_tube(const Piece *piece, int count, int head, double voxel_volume, double thickness, double radius, double *width)
 {
     *width = sqrt(piece[head].count * voxel_volume / thickness / PI);
@@ -229,16 +230,16 @@ int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radi
             return 0;
         box *= (size_t)f.size[i];
     }
-    if (box > ((size_t)1 << 27))   // such a large reach would not be local
+    if (box > ((size_t)1 << 27))   // a search this far would not be local
         return 0;
     int found = 0, piece_count = 0;
     double thickness = fmax(0.5 * radius, 1.5 * volume_voxel_size(volume));
     int shells = (int)(reach / thickness) + 1;
-    f.way = HEAP_ZEROED(box, sizeof *f.way);
+    f.arc = HEAP_ZEROED(box, sizeof *f.arc);
     f.from = HEAP_ZEROED(box, sizeof *f.from);
     f.piece = HEAP_ZEROED(box, sizeof *f.piece);
     for (size_t i = 0; i < box; i++)
-        f.way[i] = HUGE_VALF;
+        f.arc[i] = HUGE_VALF;
     memset(f.piece, 0xff, box * sizeof *f.piece);
     int first[3];
     for (int i = 0; i < 3; i++)
@@ -248,7 +249,7 @@ int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radi
     for (int i = 0; i < piece_count; i++) {
         RbtExit exit;
         double width;
-        // the head of a tube: what comes before it is none
+        // the head of a tube: the piece before it is not a tube
         if (!is_tube(piece, piece_count, i, voxel_volume, thickness, radius, &exit.radius) ||
             (piece[i].parent >= 0 && is_tube(piece, piece_count, piece[i].parent, voxel_volume, thickness, radius, &width)))
             continue;
@@ -261,7 +262,7 @@ int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radi
             out[k] = exit;
     }
     free(piece);
-    free(f.way);
+    free(f.arc);
     free(f.from);
     free(f.piece);
     free(f.heap);

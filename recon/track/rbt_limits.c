@@ -1,6 +1,6 @@
-// A rival's branches are grown in the same rounds as the tree's, widest first, and a limb ends where it meets what was tracked before: so every
-// vessel belongs to the tree that reaches it through the wider path. Only the first branches, which are tracked without knowing of each other, are
-// divided here.
+// An excluded vessel of `not` is called a rival here. Its branches are grown in the same rounds as the tree's, widest first, and a limb ends where it reaches
+// a vessel tracked before: so every vessel belongs to the tree that reaches it through the wider path. Only the first branches of both, which are tracked
+// independently, are divided here.
 #include "recon/track/rbt_limits.h"
 #include "recon/track/rbt_start.h"
 #include "recon/track/rbt_start_check.h"
@@ -9,11 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RIVAL_STREAM = 1 << 20 };     // of random numbers
+enum { RIVAL_STREAM = 1 << 20 };     // stream of random numbers
 
 static Vec3 point_of(const Tracker *t, const RbtRegion *region) { return region->is_voxel ? volume_point_of(t->volume, region->center) : region->center; }
 
-// A fault if x is not in a vessel; `what` is the key.
+// Finds the vessel at a given point. Returns false with a fault if the point is not in a vessel; `what` is the key in the trace file.
 static bool vessel_at(Tracker *t, const RbtRegion *region, const char *what, const char *path, Faults *faults, RbtSeed *seed, Cylinder *out)
 {
     double rate;
@@ -52,7 +52,7 @@ bool rbt_place_stops(Tracker *t, Vec3 start, const char *path, Faults *faults)
             continue;
         }
         Vec3 q = vec3_sub(seed.start, c.center);
-        // across the vessel at the point itself, not at the best-fitting cylinder
+        // the disc lies at the point itself, not at the best-fitting cylinder
         *stop = (RbtStop){vec3_add_scaled(c.center, vec3_dot(q, c.axis), c.axis), c.axis, 1.5 * c.radius + t->voxel, fmax(0.5 * c.radius, t->voxel)};
         if (vec3_distance(start, stop->center) < 2 * stop->half) {
             faults_add(faults, path, seed.line, seed.column,
@@ -68,7 +68,7 @@ bool rbt_place_stops(Tracker *t, Vec3 start, const char *path, Faults *faults)
 
 // --- rivals ---
 
-// The node of a chain nearest to x; -1 where x lies outside its tube.
+// Returns the node of a chain nearest to x, or -1 if x lies outside its tube.
 static int node_at(const TrackNode *node, int count, Vec3 x, double share)
 {
     int best = -1;
@@ -79,7 +79,7 @@ static int node_at(const TrackNode *node, int count, Vec3 x, double share)
     return best;
 }
 
-// The narrowest node between `from` and `to` (in either order) that is two radii away from both; the middle one if there is none.
+// Returns the narrowest node between `from` and `to` (in either order) that is two radii away from both, or the middle one if there is none.
 static int narrowest_between(const TrackNode *node, int from, int to)
 {
     int low = from < to ? from : to, high = from < to ? to : from, best = (low + high) / 2;
@@ -96,7 +96,7 @@ static int narrowest_between(const TrackNode *node, int from, int to)
     return best;
 }
 
-// Keeps only nodes low … high, the first of them as root.
+// Keeps only nodes low … high; node `low` becomes the root.
 static bool keep_range(Track *chain, int low, int high)
 {
     bool *keep = malloc(((size_t)chain->count + 1) * sizeof *keep);
@@ -115,7 +115,7 @@ static bool keep_range(Track *chain, int low, int high)
     return good;
 }
 
-// Ends the chain on both sides of `seed` where it runs into the other one.
+// Cuts the chain on both sides of `seed` where it enters the tube of the other one.
 static bool end_at_tube(Track *chain, int seed, const Track *other)
 {
     int low = seed, high = seed;
@@ -126,13 +126,13 @@ static bool end_at_tube(Track *chain, int seed, const Track *other)
     return keep_range(chain, low, high);
 }
 
-// Cuts a chain at `at` and keeps the side of `seed`.
+// Cuts a chain at node `at` and keeps the side of `seed`.
 static bool cut_beyond(Track *chain, int seed, int at)
 {
     return at > seed ? keep_range(chain, 0, at - 1) : at < seed ? keep_range(chain, at + 1, chain->count - 1) : true;
 }
 
-// The nearest node, at any distance.
+// Returns the nearest node, at any distance.
 static int nearest_node(const Track *chain, Vec3 x) { return node_at(chain->node, chain->count, x, HUGE_VAL); }
 
 static bool divide(Track *wanted, Vec3 start, Track *rival, Vec3 point)
@@ -140,7 +140,7 @@ static bool divide(Track *wanted, Vec3 start, Track *rival, Vec3 point)
     int own = nearest_node(wanted, start), theirs = nearest_node(rival, point), passed = node_at(wanted->node, wanted->count, point, 1),
         passes = node_at(rival->node, rival->count, start, 1);
     if (passed >= 0 || passes >= 0) {
-        // one vessel holds both points: it is divided at its narrowest place between them
+        // one vessel contains both points: divide it at its narrowest place between them
         const Track *both = passed >= 0 ? wanted : rival;
         int at = passed >= 0 ? narrowest_between(both->node, own, passed) : narrowest_between(both->node, passes, theirs);
         Vec3 border = both->node[at].cylinder.center;
@@ -148,7 +148,7 @@ static bool divide(Track *wanted, Vec3 start, Track *rival, Vec3 point)
         if ((here >= 0 && !cut_beyond(wanted, own, here)) || (there >= 0 && !cut_beyond(rival, theirs, there)))
             return false;
     }
-    // beyond it, or where they meet elsewhere: the wanted one ends at the rival's tube
+    // where they still touch, the wanted vessel ends at the rival's tube
     return end_at_tube(wanted, nearest_node(wanted, start), rival);
 }
 
@@ -177,14 +177,14 @@ bool rbt_add_rival(Tracker *t, const RbtRegion *point, Vec3 start, int number, c
         faults_add(faults, path, point->line, point->column,
                    "nothing could be tracked from the point of `not` (%g, %g, %g) mm; expected a point well inside a vessel", seed.start.x, seed.start.y,
                    seed.start.z);
-    // only the first branch is divided: earlier rivals follow it
+    // only the first branch is divided; nodes of earlier rivals follow it in the list
     int first = 0;
     while (first < t->tree.count && t->tree.node[first].branch == 0)
         first++;
     if (found && first == t->tree.count) {
         t->out_of_memory = !divide(&t->tree, start, &rival, seed.start);
     } else if (found) {
-        // against the first branch only; nodes of earlier rivals stay
+
         Track chain = {0}, rest = {0};
         for (int i = 0; i < t->tree.count && !t->out_of_memory; i++)
             t->out_of_memory = !track_append(i < first ? &chain : &rest, &t->tree.node[i], t->tree.point + t->tree.node[i].point_start);

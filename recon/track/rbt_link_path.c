@@ -1,4 +1,4 @@
-// Near a straight link the search runs on a lattice along it (link_lattice.h), half a voxel apart. The search for another parent runs on the image's
+// Near a straight link the search uses a lattice along it (link_lattice.h), half a voxel apart. The search for another parent uses the image's
 // voxels, with the same cost: the length of a step over the fourth power of the brightness between background (0) and the child's lumen (1).
 #include "recon/track/rbt_link_path.h"
 
@@ -22,7 +22,7 @@ LinkLight rbt_link_light(const Track *tree, const Tracker *t, int node)
     }
     sort_doubles(inside, (size_t)n);
     sort_doubles(contrast, (size_t)n);
-    // an aneurysm given in the trace was not measured, but the vessel it is attached to was
+    // the contrast of an aneurysm given in the trace file is unknown; use that of the vessel to which it is attached
     double c = contrast[n / 2] > 0 || first->parent < 0 ? contrast[n / 2] : tree->node[first->parent].contrast;
     return (LinkLight){inside[n / 2], inside[n / 2] - c};
 }
@@ -40,10 +40,10 @@ static double lit_at(const Tracker *t, const LinkLight *light, Vec3 x)
 
 typedef struct Grid {
     int size[3];
-    float *lit;              // (size[2], size[1], size[0]) < 0: blocked, or not yet evaluated where `look` is set
+    float *lit;              // (size[2], size[1], size[0]) < 0: blocked, or not yet evaluated if `look` is set
     float *cost;
     int *from;
-    float length[27];        // [mm] of a step to each neighbour
+    float length[27];        // [mm] length of the step to each neighbour
 } Grid;
 
 static bool grid_create(Grid *g)
@@ -73,7 +73,7 @@ static void place_in(const Grid *g, int i, int at[3])
 
 static int index_in(const Grid *g, const int at[3]) { return (at[2] * g->size[1] + at[1]) * g->size[0] + at[0]; }
 
-// The neighbour number n (0 … 26) of a place, -1 outside the grid and for the place itself.
+// Index of neighbour number n (0 … 26) of a position; -1 outside the grid and for the position itself.
 static int neighbour_in(const Grid *g, const int at[3], int n)
 {
     int next[3] = {at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1};
@@ -91,7 +91,7 @@ static void set_lengths(Grid *g, const Vec3 step[3])
     }
 }
 
-// The path from `goal` back to the start.
+// Counts the steps of the path from `goal` back to the start.
 static int count_back(const Grid *g, int goal)
 {
     int count = 0;
@@ -124,7 +124,7 @@ bool rbt_link_path(const Tracker *t, Vec3 from, Vec3 to, double beside, const Li
 typedef struct Box {         // voxels low … low + size - 1
     Grid grid;
     int low[3];
-    int *owner;              // node + 1 in which a path may end, 0: none, -1: blocked
+    int *owner;              // number + 1 of the node in which a path may end; 0: none, -1: blocked
 } Box;
 
 static Vec3 box_point(const Tracker *t, const Box *b, const int at[3])
@@ -172,8 +172,8 @@ static bool box_create(const Tracker *t, int node, const bool *hangs, double rea
         return false;
     for (size_t i = 0; i < n; i++)
         b->grid.lit[i] = -1;
-    // the child's subtree is blocked with its blurred rim, except for the child's own beginning; vessels are marked last, because a path may end
-    // where they touch it
+    // the child's subtree is blocked with its blurred rim, except for the child's own beginning; vessels are marked last, because a path may end where they
+    // touch it
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < t->tree.count; i++) {
             const Cylinder *other = &t->tree.node[i].cylinder;
@@ -191,13 +191,13 @@ static void box_free(Box *b)
     free(b->owner);
 }
 
-// Returns the first voxel reached in a vessel's tube, -1: none. False in *good: out of memory.
+// Returns the first voxel reached in a vessel's tube, or -1 if there is none. *good is false if out of memory.
 static int search_box(const Tracker *t, Box *b, int start, double reach, double least, const LinkLight *light, bool *good)
 {
     Grid *g = &b->grid;
     PathHeap heap = {0};
     int found = -1, at[3];
-    // the cost limit allows a path that is dim throughout, but no longer one
+    // the cost limit allows a path of length `reach` that is dim throughout, but no longer path
     double most = reach / same_square(same_square(least));
     g->cost[start] = 0;
     g->from[start] = -1;
@@ -239,7 +239,7 @@ bool rbt_link_search(const Tracker *t, int node, const bool *hangs, double reach
     Box b;
     *out = (LinkPath){.share = 1};
     if (!box_create(t, node, hangs, reach, &b)) {
-        bool is_full = b.grid.size[0] > 0 && b.grid.size[1] > 0 && b.grid.size[2] > 0;   // otherwise it lies outside the image
+        bool is_full = b.grid.size[0] > 0 && b.grid.size[1] > 0 && b.grid.size[2] > 0;   // otherwise the box lies outside the image
         box_free(&b);
         return !is_full;
     }
@@ -250,7 +250,7 @@ bool rbt_link_search(const Tracker *t, int node, const bool *hangs, double reach
     bool good;
     int goal = search_box(t, &b, index_in(&b.grid, at), reach, least, light, &good);
     if (good && goal >= 0) {
-        // from the node's own centre over the voxels to the child's
+        // from the centre of the node reached over the voxels to the child's centre
         int count = count_back(&b.grid, goal);
         out->point = malloc(((size_t)count + 1) * sizeof *out->point);
         good = out->point != NULL;

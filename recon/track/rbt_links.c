@@ -1,5 +1,6 @@
-// The path is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen
-// (1), mean of its own and the spline's: it keeps to the middle and crosses what is dim only where it must.
+// The path is the cheapest one over 26 neighbours. A step to a voxel costs its length divided by the cube of the brightness on a scale from background (0) to
+// lumen (1), where the brightness is the mean of the voxel's and the spline's value. The path therefore stays in the middle and crosses dim places only where
+// it must.
 #include "recon/track/rbt_links.h"
 
 #include "base/base.h"
@@ -10,24 +11,24 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct Light {       // of a link: what is lumen there
+typedef struct Light {       // brightness scale of a link, from background to lumen
     double inside, outside;
 } Light;
 
-enum { MAX_WAY = 512 };
-static const double least_lit = 0.6;   // on a link
+enum { MOST_PATH = 512 };
+static const double least_lit = 0.6;   // least brightness on a link
 
 static Light light_of(const Tracker *t, const TrackNode *a, const TrackNode *b)
 {
     double ia = tracker_brightness(t, a->cylinder.center), ib = tracker_brightness(t, b->cylinder.center), inside = fmin(ia, ib);
     double outside = fmin(fmax(ia - a->contrast, ib - b->contrast), inside);
-    // what is too faint for a vessel is too faint for a link
+    // a brightness too low for a vessel is too low for a link
     if (outside + least_lit * (inside - outside) < 0.8 * t->floor && inside > 0.8 * t->floor)
         outside = inside - (inside - 0.8 * t->floor) / (1 - least_lit);
     return (Light){inside, outside};
 }
 
-// 0 background, 1 lumen.
+// Brightness on the scale 0 (background) to 1 (lumen).
 static double lit(const Light *l, double value)
 {
     double range = l->inside - l->outside;
@@ -65,15 +66,15 @@ static Vec3 voxel_in(const Search *s, int i)
     return vec3(s->low[0] + at[0], s->low[1] + at[1], s->low[2] + at[2]);
 }
 
-// The spline blurs: half a voxel outside a thin vessel it is still bright.
+// The value of the voxel itself: the spline blurs, so half a voxel outside a thin vessel it is still bright.
 static double voxel_value(const Volume *v, Vec3 voxel)
 {
     return (double)v->value[((size_t)voxel.z * (size_t)v->size[1] + (size_t)voxel.y) * (size_t)v->size[0] + (size_t)voxel.x];
 }
 
-// From `start` to `end`, or with `paint` to the nearest tube of a node below `before` whose centre is in line of sight; writes the voxels to way[0 …
-// count-1], start first, and the node reached. Returns the count, 0 if there is no way, -1 if memory runs out.
-static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 start, Vec3 end, const Light *light, Vec3 *way, int *met)
+// Searches the path from `start` to `end`, or with `paint` to the nearest tube of a node below `before` whose centre is in line of sight. Writes the voxels
+// to path[0 … count-1], start first, and the node reached to `met`. Returns the count, 0 if there is no path, -1 if out of memory.
+static int search_path(const Tracker *t, const RbtPaint *paint, int before, Vec3 start, Vec3 end, const Light *light, Vec3 *path, int *met)
 {
     const Volume *v = t->volume;
     Search s;
@@ -152,9 +153,9 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
             count++;
         int n = count;
         for (int i = reached; i >= 0; i = s.from[i])
-            if (--n < MAX_WAY)
-                way[n] = volume_point_of(v, voxel_in(&s, i));
-        if (count > MAX_WAY)
+            if (--n < MOST_PATH)
+                path[n] = volume_point_of(v, voxel_in(&s, i));
+        if (count > MOST_PATH)
             count = 0;
     }
     free(s.cost);
@@ -163,8 +164,9 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
     return count;
 }
 
-// Nodes along the path from the parent's centre to the child's: each as far along as it is in line of sight of the one before, at most half a radius.
-static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number, int parent_index,
+// Inserts nodes along the path from the parent's centre to the child's: each as far along as the line of sight from the previous one allows, but at most half
+// a radius.
+static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *path, int count, int number, int parent_index,
                          const Light *light)
 {
     Vec3 last = parent->cylinder.center;
@@ -172,13 +174,13 @@ static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const 
            spacing = fmax(0.7 * radius, t->voxel);
     for (int i = count - 1; i >= 0;) {   // the path runs from child to parent
         int next = i;
-        while (next > 0 && vec3_distance(way[next - 1], last) <= spacing && darkest(t, last, way[next - 1], light) >= least_lit)
+        while (next > 0 && vec3_distance(path[next - 1], last) <= spacing && darkest(t, last, path[next - 1], light) >= least_lit)
             next--;
         if (next == 0 && darkest(t, last, child->cylinder.center, light) >= least_lit && vec3_distance(last, child->cylinder.center) < 2 * spacing)
             break;
-        Vec3 ahead = next > 0 ? way[next - 1] : child->cylinder.center;
-        Cylinder c = {way[next], radius, vec3_unit_or(vec3_sub(ahead, last), child->cylinder.axis), 2 * fmax(vec3_distance(last, way[next]), 0.5 * t->voxel)};
-        // in a wide mouth the walls are further away than the branch's radius
+        Vec3 ahead = next > 0 ? path[next - 1] : child->cylinder.center;
+        Cylinder c = {path[next], radius, vec3_unit_or(vec3_sub(ahead, last), child->cylinder.axis), 2 * fmax(vec3_distance(last, path[next]), 0.5 * t->voxel)};
+        // in a wide ostium the walls are further away than the branch's radius
         for (int k = 0; k < 4; k++, c.radius = fmin(1.4 * c.radius, fmax(parent->cylinder.radius, child->cylinder.radius))) {
             tracker_opening(t, &c, fmax(0, child->contrast + tracker_brightness(t, c.center) - tracker_brightness(t, child->cylinder.center)));
             if (t->estimate.node.point_count >= t->ray_count / 4)
@@ -189,8 +191,8 @@ static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const 
         t->estimate.node.is_on_voxels = true;
         if (!track_append(out, &t->estimate.node, t->estimate.point))
             return false;
-        parent_index = -2;   // the one appended before
-        last = way[next];
+        parent_index = -2;   // marks the node appended before
+        last = path[next];
         i = next - 1;
     }
     return true;
@@ -203,26 +205,26 @@ bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joine
     int *place = malloc(((size_t)count + 1) * sizeof *place);   // new index of a node of the branch
     bool good = place != NULL;
     *is_joined = true;
-    Vec3 way[MAX_WAY];
+    Vec3 path[MOST_PATH];
     for (int i = 0; good && i < count; i++) {
         TrackNode node = tree->node[first + i];
-        int parent = node.parent, way_count = 0;
+        int parent = node.parent, path_count = 0;
         if (parent >= 0 && (parent >= first || paint)) {
             const TrackNode *p = &tree->node[parent];
             Light light = light_of(t, p, &node);
             if (darkest(t, p->cylinder.center, node.cylinder.center, &light) < least_lit) {
-                way_count = search_way(t, parent < first ? paint : NULL, first, node.cylinder.center, p->cylinder.center, &light, way, &parent);
-                good = way_count >= 0;
-                if (way_count == 0) {
+                path_count = search_path(t, parent < first ? paint : NULL, first, node.cylinder.center, p->cylinder.center, &light, path, &parent);
+                good = path_count >= 0;
+                if (path_count == 0) {
                     *is_joined = false;
-                    // keep what was tracked up to here, if it is attached to the tree
+                    // keep the nodes tracked up to here, if they are attached to the tree
                     break;
                 }
             }
-            if (good && way_count > 0) {
+            if (good && path_count > 0) {
                 int before = new.count;
-                good = insert_nodes(t, &new, &tree->node[parent], &node, way, way_count, node.branch, parent >= first ? first + place[parent - first] : parent,
-                                    &light);
+                good = insert_nodes(t, &new, &tree->node[parent], &node, path, path_count, node.branch,
+                                    parent >= first ? first + place[parent - first] : parent, &light);
                 for (int k = before; k < new.count; k++)
                     if (new.node[k].parent == -2)
                         new.node[k].parent = first + k - 1;

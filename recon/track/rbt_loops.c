@@ -1,5 +1,5 @@
-// An end meets a node if it lies within reach of its tube, points at it, and the straight line there stays in the lumen; and if the path along the
-// tree is longer than a bend of both vessels: six times both radii. A ring that two ends close from both sides is one loop.
+// An end closes a loop with a node if it lies within reach of the node's tube and points at it, if the straight line between them stays in the lumen, and if
+// the path along the tree is longer than a bend of both vessels: six times the sum of their radii. A ring that two ends close from both sides is one loop.
 #include "recon/track/rbt_loops.h"
 
 #include <stdlib.h>
@@ -16,8 +16,8 @@ static double lit_between(const Tracker *t, const TrackNode *a, const TrackNode 
     return least;
 }
 
-// The distance along the tree from a to b; parents come before children.
-static double way_between(const Track *tree, const double *arc, int a, int b)
+// Path length along the tree from a to b; parents come before children.
+static double arc_between(const Track *tree, const double *arc, int a, int b)
 {
     int x = a, y = b;
     while (x != y)
@@ -28,7 +28,7 @@ static double way_between(const Track *tree, const double *arc, int a, int b)
     return arc[a] + arc[b] - 2 * arc[x];
 }
 
-// The node that the end `tip`, which points along `ahead`, meets; -1: none.
+// Returns the node with which the end `tip`, which points along `ahead`, closes a loop, or -1. `round` receives the loop's length.
 static int met_by(const Tracker *t, const double *arc, int tip, Vec3 ahead, double *round)
 {
     const Track *tree = &t->tree;
@@ -42,12 +42,12 @@ static int met_by(const Tracker *t, const double *arc, int tip, Vec3 ahead, doub
         if (i == tip || n->kind != NODE_VESSEL || depth > end->cylinder.radius + 2 * t->voxel || depth >= least ||
             (depth > 0 && vec3_dot(to, ahead) < 0.5 * distance))
             continue;
-        double way = way_between(tree, arc, tip, i);
-        if (way < least_round * (end->cylinder.radius + n->cylinder.radius) || lit_between(t, end, n) < least_lit)
+        double along = arc_between(tree, arc, tip, i);
+        if (along < least_round * (end->cylinder.radius + n->cylinder.radius) || lit_between(t, end, n) < least_lit)
             continue;
         least = depth;
         best = i;
-        *round = way + distance;
+        *round = along + distance;
     }
     return best;
 }

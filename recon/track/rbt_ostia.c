@@ -1,12 +1,12 @@
-// The image decides. The best path near the straight link (within the child's radius, at least a voxel) is rated by its darkest place, as a share of
-// the child's contrast: from a half on the link is supported; below a quarter it is not, and the branch is attached elsewhere or dropped. Along a
-// supported path nodes stand every half radius of the child from one and a half of its radii inside the parent's wall on. Their wall points are found
-// by rays square to the path, scaled by the ratio that the same rays show at the child's own first nodes, because an image edge is not where a
-// least-squares cylinder lies. Points on the parent's wall or in a tool's path are not wall of the mouth and are left out, including the parent's own
-// points that edges on the ostium's far side have put across it.
+// Each link is tested in the image. The best path near the straight link (within the child's radius, at least a voxel) is rated by its darkest place, as a
+// fraction of the child's contrast: from a half up the link is supported; below a quarter it is not, and the branch is attached elsewhere or removed. Along a
+// supported path nodes are placed every half radius of the child, from 1.5 of its radii inside the parent's wall onwards. Their wall points are found by rays
+// perpendicular to the path, scaled by the ratio that the same rays show at the child's own first nodes, because an image edge is not where a least-squares
+// cylinder lies. Points on the parent's wall or in a tool's path are not wall of the ostium and are removed, including the parent's own points across the
+// ostium that come from edges on its far side.
 //
 // Tried before: without nodes on the links 31 to 40 of 131 ostia stayed closed; a cylinder of the child's radius on the straight link opened them,
-// but not where the image shows the mouth.
+// but not where the image shows the ostium.
 #include "recon/track/rbt_ostia.h"
 #include "base/base.h"
 #include "recon/track/lumen_lines.h"
@@ -17,27 +17,27 @@
 #include <string.h>
 
 enum { ROOT_NODES = 8, NEAR_MOST = 64, STATIONS_MOST = 2000 };
-static const double SPACING = 0.5,        // of the nodes, in radii of the child
-    INSIDE = 1.5,                  // that far inside the parent's wall they begin, in radii of the child
-    NEAR_REACH = 3,                // of the parent's nodes about a mouth, in its radii
+static const double SPACING = 0.5,        // spacing of the nodes, in radii of the child
+    INSIDE = 1.5,                  // depth inside the parent's wall at which they begin, in radii of the child
+    NEAR_REACH = 3,                // distance along the parent that counts as near the ostium, in its radii
     IN_PARENT = 0.1;               // depth in the parent up to which a point may be wall, in its radii
 
 typedef struct Link {
-    int node, parent;        // node of t->tree: as tracked, or the present parent
-    bool is_inner;           // within a branch
+    int node, parent;        // nodes of t->tree: the child, and its parent as tracked or as attached now
+    bool is_inner;           // a link within a branch
     bool is_moved, is_named;
     double radius, length, share, scale;
     Vec3 place;
     RbtSupport support;
     LinkLight light;
     LinkPath path;
-    Track nodes;             // from the parent to the child; their `parent` is not set
+    Track nodes;             // nodes from the parent to the child; their `parent` is not set
     bool failed;             // out of memory
 } Link;
 
-// --- the vessel about a node ---
+// --- the vessel around a node ---
 
-// The nodes of the parent's branch within reach of `node`, and their ancestors; returns their number.
+// Lists the nodes of the parent's branch within reach of `node`, and their ancestors. Returns their number.
 static int nodes_about(const Track *tree, int node, int *list)
 {
     double reach = NEAR_REACH * tree->node[node].cylinder.radius, length = 0;
@@ -68,7 +68,7 @@ static double depth_in(const Track *tree, const int *list, int count, Vec3 x)
     double deepest = tree->node[list[0]].cylinder.radius - vec3_distance(x, tree->node[list[0]].cylinder.center);
     for (int i = 0; i < count; i++) {
         int parent = tree->node[list[i]].parent;
-        // a link longer than both radii is not lumen
+        // a link longer than the sum of both radii is not lumen
         bool is_tube = parent >= 0 && vec3_distance(tree->node[list[i]].cylinder.center, tree->node[parent].cylinder.center) <=
                                           tree->node[list[i]].cylinder.radius + tree->node[parent].cylinder.radius;
         if (is_tube)
@@ -104,7 +104,7 @@ static Vec3 path_at(const LinkPath *path, double arc)
     return path->point[path->count - 1];
 }
 
-// Arc length from the parent's axis to the last point that is `depth` deep in the parent; 0 if none is.
+// Arc length from the parent's axis to the last point that is `depth` deep in the parent; 0 if there is none.
 static double arc_at_depth(const Track *tree, const int *list, int count, const LinkPath *path, double depth)
 {
     double arc = path_length(path);
@@ -116,7 +116,7 @@ static double arc_at_depth(const Track *tree, const int *list, int count, const 
     return 0;
 }
 
-// One node: its centre and radius are those of the section that the rays see; its points are those on the mouth's wall.
+// Appends one node: its centre and radius are those of the cross-section measured by the rays; its points are those on the ostium's wall.
 static bool append_station(const Tracker *t, Link *link, Vec3 x, Vec3 axis, double spacing, const int *list, int near)
 {
     const TrackNode *child = &t->tree.node[link->node];
@@ -147,7 +147,7 @@ static bool append_station(const Tracker *t, Link *link, Vec3 x, Vec3 axis, doub
     return track_append(&link->nodes, &node, point);
 }
 
-// The best parent node for the first one: that of least power distance.
+// Chooses the parent node for the first node of the link: that of least power distance.
 static void choose_parent(const Tracker *t, Link *link, const int *list, int near)
 {
     Vec3 x = link->nodes.count > 0 ? link->nodes.node[0].cylinder.center : t->tree.node[link->node].cylinder.center;
@@ -186,7 +186,7 @@ static bool make_nodes(const Tracker *t, Link *link)
 
 static RbtSupport support_of(double share) { return share >= 0.5 ? RBT_SUPPORTED : share >= 0.25 ? RBT_DOUBTFUL : RBT_REFUSED; }
 
-// Median over a vessel's first nodes, because the mouth may widen the first one.
+// Median radius over a vessel's first nodes, because the ostium may widen the first one.
 static double root_radius(const Track *tree, int node)
 {
     double radius[ROOT_NODES];
@@ -213,7 +213,7 @@ static void measure_link(const Tracker *t, Link *link)
     link->place = vec3_mix(parent->cylinder.center, child->cylinder.center, 0.5);
 }
 
-// Nodes where the link may have them: a sac's neck is described by the sac's own points, as long as both touch.
+// Adds nodes to the link where they are allowed: a sac's neck is described by the sac's own points if sac and vessel touch.
 static void fill_link(const Tracker *t, Link *link)
 {
     const TrackNode *child = &t->tree.node[link->node], *parent = &t->tree.node[link->parent];
@@ -235,7 +235,7 @@ static void measure_job(void *context, long index)
     fill_link(round->t, &round->link[index]);
 }
 
-// Where branches begin, and links within branches that are longer than both radii.
+// Collects the links at which branches begin, and links within branches that are longer than the sum of both radii.
 static Link *collect_links(const Track *tree, const bool *is_named, int *count)
 {
     Link *link = calloc((size_t)tree->count + 1, sizeof *link);
@@ -251,7 +251,7 @@ static Link *collect_links(const Track *tree, const bool *is_named, int *count)
     return link;
 }
 
-// The subtree of `node`, itself included. Repeats until nothing is added, because a branch may be attached to a later one.
+// Marks the subtree of `node`, including itself. Repeats until nothing is added, because a branch may be attached to a later one.
 static void mark_hanging(const Track *tree, int node, bool *hangs)
 {
     memset(hangs, 0, (size_t)tree->count * sizeof *hangs);
@@ -266,7 +266,7 @@ static void mark_hanging(const Track *tree, int node, bool *hangs)
     }
 }
 
-// Another parent for a branch whose link the image does not support. `hangs`: room for all nodes. False: out of memory.
+// Finds another parent for a branch whose link the image does not support. `hangs`: space for all nodes. Returns false if out of memory.
 static bool attach_elsewhere(Tracker *t, Link *link, bool *hangs)
 {
     static const double least[2] = {0.5, 0.25};
@@ -297,10 +297,10 @@ static bool attach_elsewhere(Tracker *t, Link *link, bool *hangs)
 typedef struct Rebuild {
     Tracker *t;
     Link *link;
-    int *link_of;            // (nodes) -1: none
+    int *link_of;            // (nodes) link of each node; -1: none
     bool *keep;              // (nodes)
-    int *place;              // (nodes) in the new tree
-    int *first, *end;        // (branches) nodes
+    int *place;              // (nodes) index in the new tree
+    int *first, *end;        // (branches) range of nodes
     bool *is_done;           // (branches)
     int branches;
     Track new;
@@ -310,7 +310,7 @@ typedef struct Rebuild {
 
 static void add_line(Rebuild *r, Vec3 from, Vec3 to, double clear) { r->line[r->line_count++] = (LumenLine){from, to, clear}; }
 
-// A node with its link. What the points must keep clear of is collected with it.
+// Appends a node with its link, and collects the lines that wall points must keep clear of.
 static bool append_node(Rebuild *r, int i)
 {
     const Track *tree = &r->t->tree;
@@ -338,7 +338,7 @@ static bool append_node(Rebuild *r, int i)
     return good && track_append(&r->new, &node, tree->point + tree->node[i].point_start);
 }
 
-// Puts a branch after its parent branch.
+// Appends a branch after its parent branch.
 static bool append_branch(Rebuild *r, int branch)
 {
     const Track *tree = &r->t->tree;
@@ -355,7 +355,7 @@ static bool append_branch(Rebuild *r, int branch)
     return good;
 }
 
-// Points in a tool's path are not wall.
+// Removes points in a tool's path, which are not wall.
 static bool drop_inner_points(Track *tree, const LumenLine *line, int line_count)
 {
     LumenLines *lines = lumen_lines_create(line, line_count);
@@ -409,7 +409,7 @@ static bool rebuild_tree(Rebuild *r)
     return good;
 }
 
-// Refused links: the branch is dropped with its subtree, unless the trace names it or part of the subtree.
+// Handles refused links: the branch is removed with its subtree, unless the trace file gives it or a part of the subtree.
 static void decide(const Track *tree, Link *link, int link_count, const bool *is_named, bool *hangs, bool *keep)
 {
     for (int i = 0; i < tree->count; i++)
@@ -442,7 +442,7 @@ static void report_link(const Track *tree, const Link *link, const bool *keep, R
         out->point_count += link->nodes.node[k].point_count;
 }
 
-// Nodes and mm of centreline dropped with a refused link, without those of earlier refused links.
+// Counts the nodes and the length [mm] of centreline removed with a refused link, without those of earlier refused links.
 static void count_dropped(const Track *tree, const Link *link, bool *hangs, bool *counted, RbtJunction *out)
 {
     mark_hanging(tree, link->node, hangs);
@@ -463,7 +463,7 @@ static bool list_junctions(const Track *tree, const Link *link, int link_count, 
     bool good = counted && out->junction;
     for (int l = 0; good && l < link_count; l++) {
         RbtJunction j;
-        if (link[l].support != RBT_REFUSED && !keep[link[l].node])   // dropped with its parent
+        if (link[l].support != RBT_REFUSED && !keep[link[l].node])   // removed with its parent
             continue;
         report_link(tree, &link[l], keep, &j);
         if (link[l].support == RBT_REFUSED)

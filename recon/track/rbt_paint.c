@@ -22,7 +22,6 @@ void rbt_paint_free(RbtPaint *paint)
     free(paint);
 }
 
-// Voxels that a ball may meet; empty (high < low) where it lies outside.
 RbtBox rbt_box_of_ball(const Volume *v, Vec3 center, double radius)
 {
     Vec3 c = volume_voxel_of(v, center);
@@ -68,7 +67,7 @@ void rbt_paint_nodes(RbtPaint *paint, const Track *tree, int first, int end)
 {
     for (int i = first; i < end; i++) {
         const TrackNode *n = &tree->node[i];
-    // an aneurysm is not a ball: parts that stick out of it are not painted
+    // an aneurysm is not a ball: parts of the ball outside it are not painted
         paint_ball(paint, tree, i, n->cylinder.center, (n->kind == NODE_ANEURYSM ? 0.8 : 1) * n->cylinder.radius);
         if (n->parent < 0)
             continue;
@@ -91,10 +90,9 @@ int rbt_paint_node(const RbtPaint *paint, Vec3 x)
     return paint->owner[rbt_voxel_index(v, at)] - 1;
 }
 
-// A node of the finished tree whose tube holds x near its middle, or -1.
 int tracker_node_around(const Tracker *t, Vec3 x, double share)
 {
-    if (t->paint) {   // a voxel's owner is the nearest node in units of its radius; at a voxel's border it may be a neighbour
+    if (t->paint) {   // a voxel's owner is the nearest node in units of its radius; near the voxel's border x may belong to a neighbouring node
         int owner = rbt_paint_node(t->paint, x);
         for (int i = owner > 0 ? owner - 1 : owner; i >= 0 && i <= owner + 1 && i < t->tree.count; i++)
             if (vec3_distance(x, t->tree.node[i].cylinder.center) < share * t->tree.node[i].cylinder.radius)

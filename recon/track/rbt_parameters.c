@@ -62,37 +62,37 @@ RbtParameters rbt_default_parameters(void)
 #define FIELD(NAME) offsetof(RbtParameters, NAME)
 const RbtParameterName rbt_parameter_table[] = {
     {"p_inl", FIELD(p_inl), 0.05, 1, false, "inlier rate above which a cylinder is valid"},
-    {"r_t", FIELD(r_t), 0.001, 1, false, "inlier threshold, share of the predicted radius"},
-    {"N_r", FIELD(n_r), 42, 2562, true, "rays from a centre: 42, 162, 642 or 2562"},
-    {"N_d", FIELD(n_d), 21, 321, true, "axis directions: 21, 81 or 321"},
-    {"N_p", FIELD(n_p), 8, 1024, true, "samples along a ray"},
-    {"N_min", FIELD(n_min), 1, 100000, true, "RANSAC trials for a direction, at least"},
-    {"N_max", FIELD(n_max), 1, 100000, true, "RANSAC trials for a direction, at most"},
-    {"s", FIELD(s), 0.05, 2, false, "step in half heights"},
-    {"ray_length", FIELD(ray_length), 1.1, 10, false, "length of a ray in predicted radii"},
-    {"height_share", FIELD(height_share), 0.1, 1, false, "share of the inliers that a node's height encloses"},
-    {"back_step", FIELD(back_step), 0, 1, false, "least distance of a centre from the former centreline, in radii"},
-    {"relaxed", FIELD(relaxed), 0.1, 1, false, "share of p_inl that the best cylinder needs if none is valid"},
+    {"r_t", FIELD(r_t), 0.001, 1, false, "inlier threshold, as a fraction of the predicted radius"},
+    {"N_r", FIELD(n_r), 42, 2562, true, "number of rays from a centre: 42, 162, 642 or 2562"},
+    {"N_d", FIELD(n_d), 21, 321, true, "number of axis directions: 21, 81 or 321"},
+    {"N_p", FIELD(n_p), 8, 1024, true, "number of samples along a ray"},
+    {"N_min", FIELD(n_min), 1, 100000, true, "least number of RANSAC trials for a direction"},
+    {"N_max", FIELD(n_max), 1, 100000, true, "largest number of RANSAC trials for a direction"},
+    {"s", FIELD(s), 0.05, 2, false, "step, in half heights of a node"},
+    {"ray_length", FIELD(ray_length), 1.1, 10, false, "length of a ray, in predicted radii"},
+    {"height_share", FIELD(height_share), 0.1, 1, false, "fraction of the inliers that a node's height encloses"},
+    {"back_step", FIELD(back_step), 0, 1, false, "least distance of a centre from the centreline tracked before, in radii"},
+    {"relaxed", FIELD(relaxed), 0.1, 1, false, "fraction of p_inl that the best cylinder needs if none is valid"},
     {"powell", FIELD(powell), 0, 1, true, "1: refine by Powell's method, 0: by Gauss-Newton"},
-    {"r_t_voxels", FIELD(r_t_voxels), 0, 5, false, "inlier threshold, lower bound in voxels"},
-    {"r_t_second", FIELD(r_t_second), 0, 1, false, "inlier threshold of a second try, share of the radius; 0: none"},
-    {"refits", FIELD(refits), 0, 20, true, "repeated selections of the consensus with the refined axis"},
+    {"r_t_voxels", FIELD(r_t_voxels), 0, 5, false, "lower bound of the inlier threshold, in voxels"},
+    {"r_t_second", FIELD(r_t_second), 0, 1, false, "inlier threshold of a second attempt, as a fraction of the radius; 0: none"},
+    {"refits", FIELD(refits), 0, 20, true, "number of repeated selections of the consensus set with the refined axis"},
     {"retry_radius", FIELD(retry_radius), 0, 1, false, "largest relative change of the radius over a longer step"},
-    {"retry_contrast", FIELD(retry_contrast), 0, 1, false, "least contrast after a longer step, share of the branch's"},
-    {"ray_smoothing_voxels", FIELD(ray_smoothing_voxels), 0, 10, false, "moving average along a ray"},
-    {"ray_edge", FIELD(ray_edge), 0, 1, false, "rays that fall less per voxel than this share of the brightness range are discarded"},
-    {"contrast", FIELD(contrast), 0, 1, false, "least contrast of a node, share of its predecessors'"},
+    {"retry_contrast", FIELD(retry_contrast), 0, 1, false, "least contrast after a longer step, as a fraction of the branch's"},
+    {"ray_smoothing_voxels", FIELD(ray_smoothing_voxels), 0, 10, false, "width of the moving average along a ray, in voxels"},
+    {"ray_edge", FIELD(ray_edge), 0, 1, false, "rays whose fall per voxel is below this fraction of the brightness range are discarded"},
+    {"contrast", FIELD(contrast), 0, 1, false, "least contrast of a node, as a fraction of its predecessors'"},
     {"turn_deg", FIELD(turn_deg), 10, 180, false, "largest turn of the axis within two radii of path"},
-    {"look_ahead", FIELD(look_ahead), 0, 40, false, "radii ahead searched for the continuation of a branch that widens or ends; 0: none"},
-    {"overlap", FIELD(overlap), 0, 1, false, "a branch ends this many radii from the centre of another's node"},
-    {"max_length_mm", FIELD(max_length_mm), 1, 100000, false, "longest branch"},
-    {"aneurysm_rays", FIELD(aneurysm_rays), 42, 2562, true, "rays from each centre of an aneurysm: 42, 162, 642 or 2562"},
-    {"aneurysm_reach_mm", FIELD(aneurysm_reach_mm), 0.1, 1000, false, "length of these rays"},
-    {"automatic", FIELD(automatic), 0, 1, true, "1: the whole tree from the first start; 0: only branches in the trace"},
+    {"look_ahead", FIELD(look_ahead), 0, 40, false, "radii ahead to search for the continuation of a branch that widens or ends; 0: none"},
+    {"overlap", FIELD(overlap), 0, 1, false, "a branch ends this many radii from the centre of a node of another branch"},
+    {"max_length_mm", FIELD(max_length_mm), 1, 100000, false, "largest length of a branch"},
+    {"aneurysm_rays", FIELD(aneurysm_rays), 42, 2562, true, "number of rays from each centre of an aneurysm: 42, 162, 642 or 2562"},
+    {"aneurysm_reach_mm", FIELD(aneurysm_reach_mm), 0.1, 1000, false, "length of the rays from an aneurysm's centres"},
+    {"automatic", FIELD(automatic), 0, 1, true, "1: track the whole tree from the first start; 0: only the branches in the trace file"},
     {"find_aneurysms", FIELD(find_aneurysms), 0, 1, true, "1: also search for aneurysms (automatic: 1)"},
-    {"residue", FIELD(residue), 0.05, 0.5, false, "least contrast of a vessel found automatically, share of its parent's"},
-    {"ostia", FIELD(ostia), 0, 1, true, "1: nodes along the links of branches, if the image supports them; 0: none"},
-    {"seed", FIELD(seed), 0, 9007199254740991.0, true, "of the random numbers"},
+    {"residue", FIELD(residue), 0.05, 0.5, false, "least contrast of a vessel found automatically, as a fraction of its parent's"},
+    {"ostia", FIELD(ostia), 0, 1, true, "1: add nodes to the links of branches if the image supports them; 0: do not"},
+    {"seed", FIELD(seed), 0, 9007199254740991.0, true, "seed of the random numbers"},
 };
 const int rbt_parameter_count = sizeof rbt_parameter_table / sizeof rbt_parameter_table[0];
 
@@ -123,6 +123,6 @@ char *rbt_parameters_help(void)
         double a = *(const double *)(const void *)((const char *)&ours + p->offset), b = *(const double *)(const void *)((const char *)&paper + p->offset);
         used += (size_t)snprintf(text + used, capacity - used, "  %-20s %s (%g; %g)\n", p->name, p->meaning, a, b);
     }
-    snprintf(text + used, capacity - used, "  %-20s %s\n", "retry_steps", "multiples of the step after a failed one ([1.7, 2.4, 3.1]; [])");
+    snprintf(text + used, capacity - used, "  %-20s %s\n", "retry_steps", "multiples of the step that are tried after a failed step ([1.7, 2.4, 3.1]; [])");
     return text;
 }

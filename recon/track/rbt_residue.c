@@ -1,6 +1,6 @@
-// The shortest path through the residue from the labelled tubes to each voxel divides it into shells; connected voxels of one shell form a piece, and
-// the pieces form a forest by reachability (as in rbt_exits.c). The deepest leaf with its path to the root is a limb, then the deepest of the rest,
-// and so on; short ones are ragged edges.
+// The length of the shortest path through the residue from the labelled tubes to each voxel divides it into shells. Connected voxels of one shell form a
+// piece, and the pieces form a forest by reachability (as in rbt_exits.c). The deepest leaf with its path to the root is a limb, then the deepest of the
+// rest, and so on; short ones are ragged edges.
 #include "recon/track/rbt_residue.h"
 #include "base/base.h"
 #include "recon/track/path_heap.h"
@@ -13,8 +13,8 @@
 
 typedef struct Wet {         // a voxel of the residue
     int at[3];
-    float way;               // [mm]
-    int from, piece;         // -1: none
+    float arc;               // [mm] path length from the tube
+    int from, piece;         // predecessor and piece; -1: none
     int node;                // node at which the path started
 } Wet;
 
@@ -22,7 +22,7 @@ typedef struct Flood {
     const Volume *volume;
     Wet *wet;
     int count, capacity;
-    int *slot;               // (slots, a power of two) index + 1 of a wet voxel by its place
+    int *slot;               // (slots, a power of two) hash table: index + 1 of the wet voxel at a position
     int slots;
     PathHeap heap;
     bool out_of_memory;
@@ -54,7 +54,7 @@ static void put_in_slot(Flood *f, int wet)
     f->slot[s] = wet + 1;
 }
 
-static int add_wet(Flood *f, const int at[3], float way, int from, int node)
+static int add_wet(Flood *f, const int at[3], float arc, int from, int node)
 {
     if (f->count == f->capacity) {
         int capacity = f->capacity ? 2 * f->capacity : 1024;
@@ -74,12 +74,12 @@ static int add_wet(Flood *f, const int at[3], float way, int from, int node)
         for (int i = 0; i < f->count; i++)
             put_in_slot(f, i);
     }
-    f->wet[f->count] = (Wet){{at[0], at[1], at[2]}, way, from, -1, node};
+    f->wet[f->count] = (Wet){{at[0], at[1], at[2]}, arc, from, -1, node};
     put_in_slot(f, f->count);
     return f->count++;
 }
 
-static void put_in_heap(Flood *f, float way, int wet) { f->out_of_memory = !path_heap_push(&f->heap, (PathEntry){way, wet}) || f->out_of_memory; }
+static void put_in_heap(Flood *f, float arc, int wet) { f->out_of_memory = !path_heap_push(&f->heap, (PathEntry){arc, wet}) || f->out_of_memory; }
 
 static bool neighbour_of(const Volume *v, const int at[3], int n, int next[3])
 {
@@ -92,7 +92,7 @@ static bool neighbour_of(const Volume *v, const int at[3], int n, int next[3])
     return n != 13;
 }
 
-typedef struct Border {      // of the residue beside a node
+typedef struct Border {      // brightness limits of the residue beside a node
     double level, ceiling, reach;
 } Border;
 
@@ -117,24 +117,24 @@ static void flood(Flood *f, const Tracker *t, const RbtPaint *paint, int first, 
         PathEntry here = path_heap_pop(&f->heap);
         Wet wet = f->wet[here.place];
         const Border *b = &border[wet.node - first];
-        if (here.way > wet.way)
+        if (here.way > wet.arc)
             continue;
         for (int n = 0; n < 27 && !f->out_of_memory; n++) {
             int next[3];
-            float way = here.way + length[n];
-            if (!neighbour_of(t->volume, wet.at, n, next) || way > (float)b->reach)
+            float arc = here.way + length[n];
+            if (!neighbour_of(t->volume, wet.at, n, next) || arc > (float)b->reach)
                 continue;
             int known = find_wet(f, next);
-            if (known >= 0 ? way >= f->wet[known].way : !is_residue(t, paint, next, b))
+            if (known >= 0 ? arc >= f->wet[known].arc : !is_residue(t, paint, next, b))
                 continue;
             if (known < 0)
-                known = add_wet(f, next, way, here.place, wet.node);
+                known = add_wet(f, next, arc, here.place, wet.node);
             if (known < 0)
                 return;
-            f->wet[known].way = way;
+            f->wet[known].arc = arc;
             f->wet[known].from = here.place;
             f->wet[known].node = wet.node;
-            put_in_heap(f, way, known);
+            put_in_heap(f, arc, known);
         }
     }
 }
@@ -144,8 +144,8 @@ static void flood(Flood *f, const Tracker *t, const RbtPaint *paint, int first, 
 typedef struct Piece {
     int shell, parent, count, node, farthest;
     Vec3 sum;
-    int limb;                // that has it, -1: none yet
-    int place;               // in that limb, from its tip
+    int limb;                // limb that contains it, -1: none yet
+    int place;               // position in that limb, from its tip
 } Piece;
 
 static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
@@ -160,7 +160,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
             capacity *= 2;
             piece = HEAP_GROWN(piece, (size_t)capacity, sizeof *piece);
         }
-        int shell = (int)((double)f->wet[i].way / thickness), held = 0;
+        int shell = (int)((double)f->wet[i].arc / thickness), held = 0;
         piece[count] = (Piece){.shell = shell, .parent = i, .node = f->wet[i].node, .farthest = i, .limb = -1};
         f->wet[i].piece = count;
         stack[held++] = i;
@@ -170,14 +170,14 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
             const Wet *w = &f->wet[here];
             p->count++;
             p->sum = vec3_add(p->sum, volume_point_of(f->volume, vec3(w->at[0], w->at[1], w->at[2])));
-            if (w->way > f->wet[p->farthest].way ||
-                (w->way == f->wet[p->farthest].way && rbt_voxel_index(f->volume, w->at) < rbt_voxel_index(f->volume, f->wet[p->farthest].at)))
+            if (w->arc > f->wet[p->farthest].arc ||
+                (w->arc == f->wet[p->farthest].arc && rbt_voxel_index(f->volume, w->at) < rbt_voxel_index(f->volume, f->wet[p->farthest].at)))
                 p->farthest = here;
             for (int n = 0; n < 27; n++) {
                 if (!neighbour_of(f->volume, w->at, n, next))
                     continue;
                 int k = find_wet(f, next);
-                if (k >= 0 && f->wet[k].piece < 0 && (int)((double)f->wet[k].way / thickness) == shell) {
+                if (k >= 0 && f->wet[k].piece < 0 && (int)((double)f->wet[k].arc / thickness) == shell) {
                     f->wet[k].piece = count;
                     stack[held++] = k;
                 }
@@ -187,7 +187,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
     }
     free(stack);
     for (int i = 0; i < count; i++) {
-        int wet = piece[i].parent;   // so far one of its voxels
+        int wet = piece[i].parent;   // until now `parent` holds one of its voxels
         while (wet >= 0 && f->wet[wet].piece == i)
             wet = f->wet[wet].from;
         piece[i].parent = wet >= 0 ? f->wet[wet].piece : -1;
@@ -230,7 +230,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
             top = i;
         }
         width /= length;
-        // a ragged edge: its subtree stays available to other limbs, the edge itself does not
+        // if it is a ragged edge, its subtree stays available to other limbs, but the edge itself does not
         bool is_long = length * thickness >= fmax(3 * voxel, width);
         if (!is_long) {
             for (int i = leaf, n = 0; n < length; n++, i = piece[i].parent)
@@ -246,7 +246,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
         *l = (RbtLimb){.contact = piece[top].node,
                        .level = b->level,
                        .ceiling = b->ceiling,
-                       .depth = (double)f->wet[piece[leaf].farthest].way,
+                       .depth = (double)f->wet[piece[leaf].farthest].arc,
                        .key = rbt_voxel_index(v, f->wet[piece[leaf].farthest].at),
                        .stem = -1};
         l->is_cut = l->depth > b->reach - 2 * thickness;
@@ -272,7 +272,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
     return limb;
 }
 
-// Brightness inside and beside the vessel, medians over a few nodes.
+// Sets the limits of each node from the brightness inside and beside the vessel, medians over a few nodes.
 static void set_borders(const Tracker *t, int first, int end, double share, double noise, Border *border)
 {
     enum { HALF = 3 };
@@ -290,7 +290,7 @@ static void set_borders(const Tracker *t, int first, int end, double share, doub
         sort_doubles(outside, (size_t)n);
         double in = inside[n / 2], out = fmin(outside[n / 2], in);
         border[i - first].level = out + fmax(share * (in - out), noise);
-        // narrow vessels are dim, but their branches need not be
+        // narrow vessels appear dim, but their branches may be brighter
         border[i - first].ceiling = t->tree.node[i].cylinder.radius < 2 * t->voxel ? t->ceiling : in + RBT_BRIGHTER * (in - out) + RBT_NOISE_SHARE * noise;
         border[i - first].reach = fmax(14 * t->voxel, 3.5 * t->tree.node[i].cylinder.radius);
         brightest = fmax(brightest, border[i - first].ceiling);

@@ -1,12 +1,13 @@
-// See rbt_ring.h. The level is half way between the background beside the vessel and the brightness at the ring's middle, so that a dim place has an edge too.
+// Implements rbt_ring.h. The edge level is halfway between the background beside the vessel and the brightness at the ring's middle, so that a dim place has
+// an edge too.
 #include "recon/track/rbt_ring.h"
 
 #include "base/base.h"
 #include "recon/track/cast_rays.h"
 
 enum { SAMPLES_MOST = 160, SCALE_NODES = 8, ROUNDS = 2 };
-static const double MOST_MOVED = 0.8;     // largest shift of a node placed on voxels, in its radii, and at most a voxel
-static const double NARROW = 2;           // voxels: such a node's radius, at most
+static const double MOST_MOVED = 0.8;     // largest shift of a node placed on voxels, in its radii; also at most a voxel
+static const double NARROW = 2;           // [voxel] largest radius of a node that is measured by a ring
 
 static double reach_of(const Tracker *t, double radius) { return 1.2 * RING_WIDEST * radius + 2 * t->voxel; }
 
@@ -80,7 +81,7 @@ bool rbt_ring_center(const Vec3 *direction, const double *distance, double most,
 
 // --- nodes placed on the image's voxels ---
 
-// In wide openings half a voxel is nothing, and rays in all directions see more.
+// Returns true if a node was placed on voxels and is narrow. In wide openings half a voxel does not matter, and rays in all directions are better.
 static bool is_set(const Track *tree, int i, double voxel)
 {
     return i > 0 && i < tree->count && tree->node[i].is_on_voxels && tree->node[i].cylinder.radius < NARROW * voxel;
@@ -112,7 +113,7 @@ static void set_axes(Track *tree, double voxel)
         }
 }
 
-// The first node behind the stretch that was measured; `from` where there is none.
+// Returns the first measured node after `from`; `from` itself if there is none.
 static int measured_behind(const Track *tree, int from, double voxel)
 {
     int i = from;
@@ -121,8 +122,8 @@ static int measured_behind(const Track *tree, int from, double voxel)
     return is_set(tree, i, voxel) ? from : i;
 }
 
-// Centre, radius and points by rays square to the vessel. This removes the spurious walls across the vessel that rays in all directions found in dim
-// places. Nodes whose ring is open to the side stay as they were.
+// Measures centre, radius and points by rays perpendicular to the vessel. This removes the spurious walls across the vessel that rays in all directions found
+// in dim places. Nodes whose ring is open to the side are unchanged.
 static void measure_set_node(const Tracker *t, TrackNode *n, Vec3 *point, double scale)
 {
     Cylinder *c = &n->cylinder;
@@ -147,7 +148,7 @@ static void measure_set_node(const Tracker *t, TrackNode *n, Vec3 *point, double
     for (int k = 0; k < RING && kept < n->point_count; k++)
         if (distance[k] > 0 && distance[k] < most && scale * distance[k] < 1.6 * c->radius)
             point[kept++] = vec3_add_scaled(c->center, scale * distance[k], direction[k]);
-    n->point_count = kept;   // the places behind are left unused
+    n->point_count = kept;   // the space after them stays unused
 }
 
 void rbt_measure_set_nodes(Tracker *t)

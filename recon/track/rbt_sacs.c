@@ -1,9 +1,8 @@
-// From the widest place of the limb the centre climbs to that of the sphere of least squares through the first walls. It is a sac where even the
-// nearest walls (10th percentile) are further away than the vessel's radius by a good part, and rays that meet none within reach are few: bone and
-// open background continue, and a tube that is merely continued is no wider than itself.
-//
-// An aneurysm that is not spherical gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its
-// walls the one whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A spherical one keeps a single centre.
+// The centre starts at the widest place of the limb and moves to the centre of the sphere fitted by least squares to the first wall points. The limb is a sac
+// if even the nearest walls (10th percentile) are clearly further away than the vessel's radius, and if few rays reach no wall within reach. Bone and open
+// background extend further, and a vessel that merely continues is no wider than before.
+// An aneurysm that is not spherical gets further centres (section 3.4 has several in a giant one). The next centre is the point between the first centre and
+// its walls whose inscribed ball protrudes furthest from the other centres' balls, until none protrudes much. A spherical aneurysm keeps a single centre.
 #include "recon/track/rbt_sacs.h"
 #include "base/base.h"
 #include "recon/track/cast_rays.h"
@@ -11,9 +10,9 @@
 
 #include <stdlib.h>
 
-static const double wider = 1.3;          // than the vessel beside it
-static const double least_closed = 0.7;   // share of the rays that meet a wall
-// Of a further centre's inscribed ball, shares of the first one's radius: its radius, and how far it sticks out of the other balls.
+static const double wider = 1.3;          // least ratio of its radius to the radius of the vessel beside it
+static const double least_closed = 0.7;   // least fraction of the rays that reach a wall
+// For a further centre's inscribed ball, as fractions of the first one's radius: its least radius, and how far it must protrude from the other balls.
 static const double least_lobe = 0.35;
 
 // The vessel's radius around its node, without its widening in front of the neck.
@@ -29,7 +28,8 @@ static double radius_beside(const Track *tree, int node)
     return radius[n / 2];
 }
 
-// Distances of the first walls from x (0: none) to distance[0 … rays-1], the same sorted without the zeros to sorted; their number.
+// Finds the distances of the first walls from x: distance[0 … rays-1], 0 if there is none; `sorted` receives the same in ascending order without the zeros.
+// Returns their number.
 static int see_walls(const Tracker *t, Vec3 x, const Vec3 *ray, int rays, double reach, double *distance, double *sorted)
 {
     int samples = (int)(reach / (0.5 * t->voxel)), met = 0;
@@ -42,7 +42,7 @@ static int see_walls(const Tracker *t, Vec3 x, const Vec3 *ray, int rays, double
     return met;
 }
 
-// Keeps walls within 1.5 times the median distance, because rays down the vessels go far. Writes them to `point` and returns their number.
+// Keeps walls within 1.5 times the median distance, because rays along the vessels reach far. Writes the points to `point` and returns their number.
 static int near_walls(Vec3 x, const Vec3 *ray, int rays, const double *distance, double median, Vec3 *point)
 {
     int kept = 0;
@@ -52,7 +52,7 @@ static int near_walls(Vec3 x, const Vec3 *ray, int rays, const double *distance,
     return kept;
 }
 
-// Wall points visible from the vessels belong to them.
+// Removes wall points that lie in the vessels' tubes: they belong to the vessels.
 static int drop_painted(const RbtPaint *paint, Vec3 *point, int count)
 {
     int kept = 0;
@@ -125,9 +125,9 @@ bool rbt_is_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb)
     return good;
 }
 
-typedef struct Lobe {        // a place inside a sac
+typedef struct Lobe {        // a candidate centre inside a sac
     Vec3 center;
-    double inscribed;        // [mm] to its walls, 10th percentile
+    double inscribed;        // [mm] distance to its walls, 10th percentile
 } Lobe;
 
 bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track *sac)
@@ -158,7 +158,7 @@ bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track 
         int best = -1;
         double furthest = least_lobe * chosen[0].inscribed;
         for (int i = 0; i < count; i++) {
-            double out = HUGE_VAL;   // how far its ball sticks out of the others
+            double out = HUGE_VAL;   // how far its ball protrudes from the others
             for (int k = 0; k < used; k++)
                 out = fmin(out, vec3_distance(lobe[i].center, chosen[k].center) + lobe[i].inscribed - chosen[k].inscribed);
             if (out > furthest) {
@@ -182,8 +182,8 @@ bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track 
         if (!good || kept < rays / 4)
             continue;
         TrackNode node = sac->node[0];
-        Vec3 way = vec3_sub(chosen[used].center, chosen[parent[used]].center);
-        node.cylinder = (Cylinder){chosen[used].center, radius, vec3_unit_or(way, node.cylinder.axis), 2 * radius};
+        Vec3 link = vec3_sub(chosen[used].center, chosen[parent[used]].center);
+        node.cylinder = (Cylinder){chosen[used].center, radius, vec3_unit_or(link, node.cylinder.axis), 2 * radius};
         node.inlier_rate = (double)kept / rays;
         node.point_count = kept;
         node.parent = parent[used++];

@@ -1,6 +1,7 @@
-// The template is a cylinder of radius r and length 2 r in a ring from 1.4 r on. Against the noise of single voxels its score is contrast r^(3/2): the best is
-// taken over radii, axes and places. The face of a bright band has half of the ring as bright as the inside, a band as wide as the tube a third of it: the search
-// takes the ring's third and fourth brightest twelfth for all of it, so that a neighbour may touch the vessel and a band scores nothing.
+// The template is a cylinder of radius r and length 2 r in a ring whose inner radius is 1.4 r. Relative to the noise of single voxels its score is contrast
+// r^(3/2); the best score is sought over radii, axes and positions. At the face of a bright band half of the ring is as bright as the inside; at a band as
+// wide as the tube, a third of it. The search therefore takes the ring's third and fourth brightest twelfth as the brightness of the ring, so that a
+// neighbour may touch the vessel and a band scores zero.
 #include "recon/track/rbt_scan.h"
 
 #include "base/base.h"
@@ -12,7 +13,7 @@
 const double rbt_level_voxels[RBT_LEVELS] = {0, 0.7, 1.4, 2, 2.8};
 enum { SECTORS = 12, DROPPED = 2, STATIONS = 5, CERTAIN = 6 };
 static const double least_evenness = 0.35;
-static const double clear_contrast = 8;   // over the noise of a level: the steepest place of a ray is then its wall
+static const double clear_contrast = 8;   // contrast over the noise of a level above which the steepest point of a ray is its wall
 
 RbtLevels rbt_levels_of(const Volume *volume, int threads) { return (RbtLevels){.volume = volume, .noise = {-1, -1, -1, -1, -1}, .threads = threads}; }
 
@@ -38,10 +39,10 @@ static void free_near(RbtLevels *levels)
     }
 }
 
-// Copies the voxels around x to levels->near[0]. False: out of memory.
+// Copies the voxels around x to levels->near[0]. Returns false if out of memory.
 static bool crop_near(RbtLevels *levels, Vec3 x)
 {
-    enum { REACH = 84 };     // voxels: the widest template and its ring, and what smoothing looks at
+    enum { REACH = 84 };     // [voxel] the widest template with its ring, plus the reach of the smoothing
     const Volume *v = levels->volume;
     if (levels->near[0] && vec3_distance(x, levels->center) == 0)
         return true;
@@ -77,11 +78,11 @@ static const Volume *near_level(RbtLevels *levels, int level)
 
 double rbt_level_noise(RbtLevels *levels, int level)
 {
-    // smoothed copies of the neighbourhood, if there is one
+    // smoothed copies of the neighbourhood, if it was copied
     const Volume *volume = level == 0 ? levels->volume : levels->near[0] ? near_level(levels, level) : rbt_level(levels, level);
     if (volume && levels->noise[level] < 0) {
         double noise = volume_noise(volume, (int)ceil(4 * rbt_level_voxels[level]) + 1);
-        // a smaller variance is rounding or the tail of a blur
+        // a smaller value comes from rounding or from the tail of a blur
         levels->noise[level] = noise > 1e-4 * ((double)levels->volume->maximum - (double)levels->volume->minimum) ? noise : 0;
     }
     return volume ? levels->noise[level] : 0;
@@ -165,7 +166,7 @@ bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylind
 
 // --- the search ---
 
-// Trilinear: on a smoothed copy as good as the spline, and several times cheaper. Outside the last voxel is repeated.
+// Trilinear interpolation: on a smoothed copy it is as accurate as the spline and several times faster. Outside the grid the border voxel repeats.
 static double smooth_value(const Volume *v, Vec3 x)
 {
     Vec3 c = volume_voxel_of(v, x);
@@ -210,9 +211,9 @@ typedef struct Scan {
     const Tracker *t;
     RbtLevels *levels;
     Vec3 x;
-    const Vec3 *axis;        // NULL: all are tried
+    const Vec3 *axis;        // NULL: all axes are tried
     double radius[RBT_SCANS];
-    Cylinder best[RBT_SCANS];    // by radius
+    Cylinder best[RBT_SCANS];    // best tube of each radius
     double score[RBT_SCANS];
 } Scan;
 
@@ -259,7 +260,7 @@ int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *a
     double noise = fmax(rbt_level_noise(levels, 0), 1e-9);
     for (int i = 0; i < count; i++) {   // measured over all voxels, not the template's samples
         RbtSight sight = scan.score[i] > 0 ? rbt_sight_of(levels->volume, noise, &scan.best[i]) : (RbtSight){0, 0, 0};
-        // a ball around many vessels is more significant than one of them, but fainter
+        // a ball around many vessels is more significant than one of them, but has less contrast
         double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) * same_square(sight.evenness * sight.contrast) * scan.radius[i] : 0;
         int k = found;
         if (!(own > 0))

@@ -1,5 +1,5 @@
-// Rays find where the brightness falls half-way to the background. Of the chords through the start the short ones cross the vessel: the point that is
-// nearest to their middles, weighed by length^-4, is nearer to the middle of the lumen, and the direction across which they lie is the axis.
+// Rays find where the brightness falls halfway to the background. The short chords through the start cross the vessel. The point nearest to the middles of
+// the chords, weighted by length^-4, is closer to the middle of the lumen; the direction perpendicular to the short chords is the axis.
 #include "recon/track/rbt_start.h"
 
 #include "base/base.h"
@@ -14,7 +14,7 @@ static double wall_distance(const Tracker *t, Vec3 x, Vec3 direction, double lev
     double step = 0.25 * t->voxel, before = tracker_brightness(t, x);
     for (double s = step; s < reach; s += step) {
         Vec3 here = vec3_add_scaled(x, s, direction);
-        if (!tracker_is_inside(t->volume, here))   // open: a vessel that leaves the volume has no wall there
+        if (!tracker_is_inside(t->volume, here))   // an open chord: a vessel that leaves the volume has no wall there
             return reach;
         double value = tracker_brightness(t, here);
         if (value < level)
@@ -26,7 +26,7 @@ static double wall_distance(const Tracker *t, Vec3 x, Vec3 direction, double lev
 
 typedef struct Chords {
     double ahead[MAX_RAYS], behind[MAX_RAYS];
-    double nearest;          // wall
+    double nearest;          // distance of the nearest wall
     Mat3 across;             // sum of length^-4 d d^T
     Vec3 middles;            // sum of length^-4 (ahead - behind) / 2 d
 } Chords;
@@ -47,7 +47,8 @@ static void cast_chords(const Tracker *t, Vec3 x, double level, double reach, Ch
     }
 }
 
-// (across + a little) x = middles by Cramer's rule: along the axis, where no chord says anything, nothing moves.
+// Solves (across + a small multiple of the identity) x = middles by Cramer's rule. Along the axis, where the chords give no information, the point does not
+// move.
 static Vec3 step_to_middle(const Chords *c)
 {
     Mat3 a = c->across;
@@ -59,7 +60,7 @@ static Vec3 step_to_middle(const Chords *c)
     return vec3_scale(vec3(vec3_dot(b, vec3_cross(v, w)), vec3_dot(u, vec3_cross(b, w)), vec3_dot(u, vec3_cross(v, b))), 1 / det);
 }
 
-// Half the median chord across the axis.
+// Half the median chord perpendicular to the axis.
 static double radius_across(const Tracker *t, const Chords *c, Vec3 axis)
 {
     double half[MAX_RAYS];
@@ -71,7 +72,7 @@ static double radius_across(const Tracker *t, const Chords *c, Vec3 axis)
     return n > 0 ? half[n / 2] : c->nearest;
 }
 
-// The darker half of the places half a radius outside the wall across the axis: the background beside this vessel.
+// Background beside this vessel: the darker half of the points half a radius outside the wall, perpendicular to the axis.
 static double background_beside(const Tracker *t, Vec3 x, Vec3 axis, double radius)
 {
     double value[MAX_RAYS], sum = 0;
@@ -85,7 +86,7 @@ static double background_beside(const Tracker *t, Vec3 x, Vec3 axis, double radi
     return n > 1 ? sum : t->background;
 }
 
-// Of the ray directions the one that the short chords lie across.
+// Returns the ray direction to which the short chords are most nearly perpendicular.
 static Vec3 axis_of(const Tracker *t, const Chords *c)
 {
     int best = 0;
@@ -100,7 +101,7 @@ static Vec3 axis_of(const Tracker *t, const Chords *c)
     return t->ray[best];
 }
 
-// … and the one of the longest chord, where the lumen is not a tube.
+// Returns the direction of the longest chord, for a lumen that is not a tube.
 static Vec3 longest_of(const Tracker *t, const Chords *c)
 {
     int best = 0;
@@ -110,7 +111,7 @@ static Vec3 longest_of(const Tracker *t, const Chords *c)
     return t->ray[best];
 }
 
-// The cylinder of the highest inlier rate about the middle x, or somewhat further along. False if there is none.
+// Finds the cylinder of highest inlier rate near the middle x, or a little further along. Returns false if there is none.
 static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, double radius, bool is_known, double level, Cylinder *out, double *inlier_rate)
 {
     static const double along[] = {0, 1.5, -1.5, 3, -3}, size[] = {1, 0.75, 1.35};
@@ -176,7 +177,7 @@ bool rbt_estimate_start(Tracker *t, const RbtSeed *seed, Cylinder *out, double *
             out->axis = vec3_negate(out->axis);
         return true;
     }
-    t->why = "no tube around it";
+    t->why = "no tube found there";
     return false;
 }
 

@@ -1,6 +1,5 @@
-// Limits: a click lies within one radius of the axis of its vessel, at most within two; half of the edge points lie on the cylinder; the vessel is
-// narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see
-// test_starts).
+// Limits: a click lies within one radius of the axis of its vessel, at most within two; half of the edge points lie on the cylinder; the vessel is narrower
+// than the volume; inside and outside differ by five standard errors (the best of all tubes in pure noise differs by less: see test_starts).
 #include "recon/track/rbt_start_check.h"
 
 #include "base/base.h"
@@ -12,7 +11,7 @@
 #include <string.h>
 
 static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6;
-enum { NOISE_LAG = 3 };      // voxels: neighbours may share their noise
+enum { NOISE_LAG = 3 };      // [voxel] distance for the noise estimate, because the noise of neighbours may be correlated
 
 static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
 {
@@ -33,10 +32,11 @@ static double least_extent(const Volume *volume)
 
 typedef struct Verdict {
     RbtStartCheck check;
-    char refusal[300];       // empty: it is not refused
+    char refusal[300];       // reason of a refusal; empty: accepted
 } Verdict;
 
-// The place along the tube counts only beyond four radii: the cylinder may be looked for further along the vessel.
+// Distance of the click from the cylinder's axis. An offset along the tube counts only above four radii, because the cylinder may be searched further along
+// the vessel.
 static double drift_of(Vec3 click, const Cylinder *c)
 {
     Vec3 q = vec3_sub(click, c->center);
@@ -44,7 +44,7 @@ static double drift_of(Vec3 click, const Cylinder *c)
     return same_hypot(across, fmax(0, fabs(along) - 4 * c->radius));
 }
 
-// Of the copy that is tracked.
+// Noise of the copy that is tracked.
 static double level_noise(const Tracker *t, RbtLevels *levels)
 {
     for (int i = RBT_LEVELS - 1; i > 0; i--)
@@ -97,10 +97,10 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
         doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
     }
     if (sight.evenness < least_evenness) {
-        snprintf(
-            text, sizeof text,
-            "what was found at the start is bright on both sides too (its wall shows %.0f %% of its contrast there): a band or a sheet, or vessels that touch",
-            100 * fmax(0, sight.evenness));
+        snprintf(text, sizeof text,
+                 "the volume beside the tube found at the start is bright on both sides (only %.0f %% of the tube's contrast there): a band, a sheet or "
+                 "touching vessels?",
+                 100 * fmax(0, sight.evenness));
         doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness, text);
     }
     return v;
@@ -139,7 +139,7 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
         }
     }
     if (best.certainty < least_certainty && tracker_brightness(t, first->start) < t->dark)
-        return true;   // background: reported with all starts
+        return true;   // on background: reported later, with all starts
     t->is_noisy = true;
     if (best.certainty < least_certainty) {
         snprintf(t->refusal, sizeof t->refusal,
@@ -151,7 +151,7 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
     return true;
 }
 
-// From now on the copy that suits this tube is tracked.
+// Switches the tracking to the copy that suits this tube.
 static bool take_level(Tracker *t, RbtLevels *levels, const Cylinder *tube)
 {
     int level = t->is_noisy ? rbt_level_for(levels, tube) : 0;
@@ -176,7 +176,7 @@ bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
            (t->is_noisy || (is_inside && sight.contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)));
 }
 
-// Noise alone is no reason to refuse a doubtful start, but deserves a warning.
+// Adds a warning about the noise, which alone is not a reason to refuse a start.
 static void say_noise(Tracker *t)
 {
     char text[240];
@@ -184,14 +184,14 @@ static void say_noise(Tracker *t)
     if (!t->is_noisy || !(check->noise > 0))
         return;
     snprintf(text, sizeof text,
-             "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked, "
+             "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked; "
              "thin branches may be missing",
              check->contrast, check->noise, check->certainty, check->smoothing_mm);
     doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
 }
 
-// Is there a tube around the click that stands out much more than the one found, or a much thinner one inside it? The one found is then, for example,
-// a band that the vessel lies in: inside a wide vessel hardly anything stands out.
+// Returns true if a tube around the click stands out much more than the one found, or if a much thinner one stands out inside it. The one found is then, for
+// example, a band in which the vessel lies; inside a wide vessel hardly anything stands out.
 static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtStartCheck *check)
 {
     char text[240];
@@ -251,7 +251,7 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
         is_clean = !best.refusal[0] && best.check.warning_count == 0;
     }
     if (!found) {
-        t->why = "no tube around it";
+        t->why = "no tube found there";
         return false;
     }
     if (suited && !take_level(t, levels, suited))
@@ -271,7 +271,7 @@ bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const T
     return !t->refusal[0];
 }
 
-// A bright band or bone across the first branch: branches are compared with its brightness, and missed where that differs.
+// Warns about a bright band or bone across the first branch: branches are compared with its brightness, and missed where that changes.
 static void judge_background(Tracker *t, int count)
 {
     enum { MOST = 512 };
@@ -294,7 +294,7 @@ static void judge_background(Tracker *t, int count)
     doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
 }
 
-// It ends before something much brighter than itself, such as the face of a band that it may continue in.
+// Warns if the first branch ends in front of something much brighter than itself, such as the face of a band in which it may continue.
 static void judge_ends(Tracker *t, int count)
 {
     char text[240];

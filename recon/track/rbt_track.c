@@ -20,8 +20,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Nodes of a branch follow each other; a later aneurysm may have joined some of them. Nodes of links are counted but not used for the vessel's
-// statistics.
+// Fills in the report of a branch. Nodes of a branch are consecutive; a later aneurysm may have merged some of them. Nodes of links are counted but not used
+// for the vessel's statistics.
 static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchReport *report)
 {
     int first = t->tree.count, end = 0, links = 0;
@@ -60,7 +60,7 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         report->radius = sac_radius / sacs;
 }
 
-// The nearest point of the centreline and its node, for the projection of section 3.3.
+// Finds the nearest point of the centreline and its node, for the projection of section 3.3.
 static int project_to_tree(const Tracker *t, Vec3 x, Vec3 *foot)
 {
     int node = 0;
@@ -78,8 +78,8 @@ static int project_to_tree(const Tracker *t, Vec3 x, Vec3 *foot)
     return node;
 }
 
-// Tracks seed `number`. With a `toward`: from its start, and for further branches also back to the parent. Without: as section 3.3 has it, from just
-// outside the parent's wall; where nothing is found there (the point was set far down the branch) from the point itself, and back.
+// Tracks seed `number`. With a `toward`: from its start, and for further branches also back to the parent. Without: as in section 3.3, from just outside the
+// parent's wall; if nothing is found there (the point was set far along the branch), from the point itself in both directions.
 static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
 {
     Track out = {0}, back = {0};
@@ -123,12 +123,12 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
     if (both_ways && out.count > 0 && !t->out_of_memory) {
         Cylinder behind = out.node[0].cylinder;
         behind.axis = vec3_negate(behind.axis);
-        Track way = {0};
-        tracker_run(t, &behind, &way, true);
-        // its first node is the branch's own first one, seen the other way
-        for (int i = 1; i < way.count && !t->out_of_memory; i++)
-            t->out_of_memory = !track_append(&back, &way.node[i], way.point + way.node[i].point_start);
-        track_free(&way);
+        Track reverse = {0};
+        tracker_run(t, &behind, &reverse, true);
+        // its first node is the branch's own first node in the opposite direction
+        for (int i = 1; i < reverse.count && !t->out_of_memory; i++)
+            t->out_of_memory = !track_append(&back, &reverse.node[i], reverse.point + reverse.node[i].point_start);
+        track_free(&reverse);
     }
     t->why = why;
     bool found = out.count > 0 && !t->out_of_memory;
@@ -139,10 +139,10 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
     return found;
 }
 
-// --- the whole ---
+// --- the whole tree ---
 
-// [low, high] of a million samples: the first quartile, which is background (vessels fill less than three quarters of any angiogram), and the 99.9th
-// percentile. The extremes would be noise, air or metal: with them half of a noisy background passed for vessel.
+// Brightness range of a million samples: `low` is the first quartile, which is background (vessels fill less than three quarters of any angiogram), `high`
+// the 99.9th percentile. The extremes would be noise, air or metal: with them half of a noisy background was taken for vessel.
 static void brightness_range(const Volume *volume, double *low, double *high)
 {
     enum { BINS = 1 << 12 };
@@ -215,7 +215,7 @@ static RbtSeed seed_in_mm(const Volume *volume, const RbtSeed *given)
 static VesselTree *finish_tree(const Track *track)
 {
     int64_t points = 0, used = 0;
-    for (int i = 0; i < track->count; i++)   // merged nodes left unused ones
+    for (int i = 0; i < track->count; i++)   // merging nodes left unused points
         points += track->node[i].point_count;
     VesselTree *tree = vessel_tree_create(track->count, points, 0);
     if (!tree)
@@ -283,7 +283,7 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     return false;
 }
 
-// The numbers of the branches in the order of their nodes: a branch attached to a later one comes after it. Returns how many have nodes.
+// Lists the branches in the order of their nodes: a branch attached to a later one comes after it. Returns how many have nodes.
 static int order_branches(const Track *tree, int total, int *order)
 {
     int count = 0;
@@ -293,7 +293,7 @@ static int order_branches(const Track *tree, int total, int *order)
     return count;
 }
 
-// Takes the junctions over, their branches by the report's numbers.
+// Moves the junctions into the report, with the report's branch numbers.
 static void report_junctions(RbtJunctions *junctions, const int *renamed, RbtReport *report)
 {
     for (int i = 0; i < junctions->count; i++) {
@@ -306,7 +306,7 @@ static void report_junctions(RbtJunctions *junctions, const int *renamed, RbtRep
     *junctions = (RbtJunctions){0};
 }
 
-// Branches that lost all of their nodes are left out.
+// Writes the report. Branches that lost all of their nodes are omitted.
 static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunctions *junctions, RbtReport *report)
 {
     int total = ends->count + job->aneurysm_count;
@@ -342,7 +342,7 @@ static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunc
     return good;
 }
 
-// Distance from x to node i, and to its link as far as that lies outside its parent's lumen: there the node's own branch is cut.
+// Distance from x to node i and to the part of its link outside its parent's lumen: a cut there belongs to the node's own branch.
 static double distance_to_node(const Tracker *t, int i, Vec3 x)
 {
     const TrackNode *n = &t->tree.node[i];
@@ -356,7 +356,7 @@ static double distance_to_node(const Tracker *t, int i, Vec3 x)
     return least;
 }
 
-// The rest of a branch after a cut is removed too if it reaches less than two of its radii beyond its parent's wall.
+// After a cut the rest of a branch is removed too if it extends less than two of its radii outside its parent's wall.
 static void drop_stub(const Track *tree, int branch, bool *keep)
 {
     int first = 0, last = -1;
@@ -372,7 +372,7 @@ static void drop_stub(const Track *tree, int branch, bool *keep)
             keep[i] = false;
 }
 
-// Removes each branch from the node nearest to a cut point on, with its subtree. False with a fault where a point is on no branch.
+// Removes each branch from the node nearest to a cut point onwards, with its subtree. Returns false with a fault if a point is not on a branch.
 static bool make_cuts(Tracker *t, const Job *job)
 {
     Track *tree = &t->tree;
@@ -398,7 +398,7 @@ static bool make_cuts(Tracker *t, const Job *job)
         double radius = tree->node[nearest].cylinder.radius;
         if (nearest == 0 || distance > 2 * radius + 3 * t->voxel) {
             faults_add(job->faults, job->path, cut->line, cut->column, "the cut at (%g, %g, %g) mm %s; expected a point on the branch to cut", x.x, x.y, x.z,
-                       nearest == 0 ? "leaves nothing of the tree" : "is on no branch");
+                       nearest == 0 ? "would remove the whole tree" : "is not on a branch");
             good = false;
         } else {
             keep[nearest] = false;
@@ -417,7 +417,7 @@ static bool make_cuts(Tracker *t, const Job *job)
     return good;
 }
 
-// A found branch that ends in front of a forbidden region before it has left its parent is a stub. False: out of memory.
+// Removes stubs: found branches that end in front of a forbidden region before they have left their parent. Returns false if out of memory.
 static bool drop_forbidden_stubs(Tracker *t, const RbtEnds *ends)
 {
     Track *tree = &t->tree;
@@ -438,16 +438,16 @@ static bool drop_forbidden_stubs(Tracker *t, const RbtEnds *ends)
     return good;
 }
 
-// Whether a node of the tree lies on this start: the branch was found already.
+// Returns true if a node of the tree lies on this start: the branch was already found.
 static bool is_found_already(const Tracker *t, const RbtSeed *seed) { return tracker_node_around(t, seed->start, 1) >= 0; }
 
-// Adds what grows from the nodes from `first` on.
+// Grows branches from the nodes `first` and later.
 static bool grow(Tracker *t, const Job *job, RbtPaint *paint, int first, RbtEnds *ends)
 {
     return rbt_grow_branches(t, paint, first, job->threads, job->progress, ends) || out_of_memory_at(job, ends->count);
 }
 
-// The vessels that `not` names compete with the first branch.
+// Adds the vessels given by `not`, which compete with the first branch.
 static bool add_rivals(Tracker *t, const Job *job, RbtEnds *ends)
 {
     if (!rbt_ends_add(ends, t->why, 0))
@@ -461,7 +461,7 @@ static bool add_rivals(Tracker *t, const Job *job, RbtEnds *ends)
     return true;
 }
 
-// Removes their subtrees, which must not contain a named branch.
+// Removes the subtrees of these vessels, which must not contain a branch given in the trace file.
 static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
 {
     if (t->parameters->rival_count == 0)
@@ -482,7 +482,7 @@ static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
     return true;
 }
 
-// The whole tree: all that is found from the first start, then the cuts, then what the other starts add to the rest.
+// Tracks the whole tree: all branches found from the first start, then the cuts, then the branches that the other starts add.
 static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
 {
     bool is_joined, good = run_seed(t, job, 0) && add_rivals(t, job, ends) && (rbt_mend_links(t, NULL, 0, &is_joined) || out_of_memory_at(job, 0));
@@ -514,7 +514,7 @@ static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
     return good;
 }
 
-// The ostia of the tree as it now is.
+// Models the ostia of the present tree.
 static bool open_ostia(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunctions *junctions)
 {
     int total = ends->count + job->aneurysm_count;

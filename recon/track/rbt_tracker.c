@@ -40,7 +40,6 @@ void track_cut(Track *track, int count)
     track->count = count;
 }
 
-// Removes the nodes for which keep[i] is false; no kept node may be attached to them.
 void track_keep(Track *tree, const bool *keep, int *place)
 {
     int used = 0;
@@ -107,7 +106,6 @@ bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b)
     return false;
 }
 
-// Darkest place between a and b.
 double tracker_darkest(const Tracker *t, Vec3 a, Vec3 b)
 {
     double least = HUGE_VAL;
@@ -117,7 +115,6 @@ double tracker_darkest(const Tracker *t, Vec3 a, Vec3 b)
     return least;
 }
 
-// … as a share of the lumen's brightness at both ends.
 double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b)
 {
     double base = (double)t->volume->minimum, ends = fmin(tracker_brightness(t, a), tracker_brightness(t, b)) - base;

@@ -5,8 +5,8 @@
 
 #include <stdio.h>
 
-// Where to attach a subtree that starts at x: the node of least power distance whose straight link stays inside the lumen (at least half as bright as
-// its ends); if no link does, the brightest one among the near nodes.
+// Returns the node to which a subtree that starts at x is attached: the node of least power distance whose straight link stays inside the lumen (at least
+// half as bright as its ends); if no link does, the node with the brightest link among those nearby.
 int tracker_attachment(const Tracker *t, Vec3 x, int node_count)
 {
     int best = -1, brightest = -1;
@@ -31,7 +31,6 @@ int tracker_attachment(const Tracker *t, Vec3 x, int node_count)
     return best >= 0 ? best : brightest;
 }
 
-// Appends a branch's nodes: those of the return path reversed, then those of the outgoing path.
 bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number)
 {
     int before = t->tree.count;
@@ -50,7 +49,6 @@ bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number)
     return true;
 }
 
-// What was estimated at the first start, for the report.
 void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root)
 {
     char radius[48] = "", direction[80] = "";
@@ -58,51 +56,51 @@ void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, c
         snprintf(radius, sizeof radius, ", radius %.2f mm", start->radius);
     if (!seed->has_toward)
         snprintf(direction, sizeof direction, ", direction (%.2f, %.2f, %.2f)", start->axis.x, start->axis.y, start->axis.z);
-    snprintf(t->start, sizeof t->start, "first start estimated: middle (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x, start->center.y,
+    snprintf(t->start, sizeof t->start, "first start estimated: centre (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x, start->center.y,
              start->center.z, vec3_distance(start->center, seed->start), radius, direction, root);
 }
 
-// Number of nodes of `way` before it meets `other`, which starts at the same place: a loop of vessels closes there.
-static int nodes_before_meeting(const Track *way, const Track *other, double share)
+// Number of nodes of `path` before it touches `other`, which starts at the same place: the vessels form a loop there.
+static int nodes_before_meeting(const Track *path, const Track *other, double share)
 {
     double length = 0;
-    for (int i = 1; i < way->count; i++) {
-        length += vec3_distance(way->node[i].cylinder.center, way->node[i - 1].cylinder.center);
-        for (int k = 0; length > 4 * way->node[0].cylinder.radius && k < other->count; k++)
-            if (vec3_distance(way->node[i].cylinder.center, other->node[k].cylinder.center) < share * other->node[k].cylinder.radius)
+    for (int i = 1; i < path->count; i++) {
+        length += vec3_distance(path->node[i].cylinder.center, path->node[i - 1].cylinder.center);
+        for (int k = 0; length > 4 * path->node[0].cylinder.radius && k < other->count; k++)
+            if (vec3_distance(path->node[i].cylinder.center, other->node[k].cylinder.center) < share * other->node[k].cylinder.radius)
                 return i;
     }
-    return way->count;
+    return path->count;
 }
 
-// The first branch from a start without direction: it may lie anywhere along the vessel.
+// Tracks the first branch from a start without direction, which may lie anywhere along the vessel.
 bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number)
 {
-    Track way[2] = {{0}, {0}}, back = {0};
-    const char *end[2], *why = "the vessel was tracked one way only";
+    Track side[2] = {{0}, {0}}, back = {0};
+    const char *end[2], *why = "the vessel was tracked in one direction only";
     for (int i = 0; i < 2 && !t->out_of_memory; i++) {
         Cylinder from = *start;
         from.axis = i ? vec3_negate(from.axis) : from.axis;
-        tracker_run(t, &from, &way[i], false);
+        tracker_run(t, &from, &side[i], false);
         end[i] = t->why;
     }
-    if (way[0].count > 0 && way[1].count > 0)
-        track_cut(&way[1], nodes_before_meeting(&way[1], &way[0], t->parameters->overlap));
-    int out = way[0].count == 0 || (way[1].count > 0 && rbt_root_is_at_end_of(t, &way[0], &way[1], &why));
-    bool found = way[out].count > 0 && !t->out_of_memory;
-    // the first node of both is the same, in opposite directions
-    for (int i = 1; found && i < way[1 - out].count && !t->out_of_memory; i++)
-        t->out_of_memory = !track_append(&back, &way[1 - out].node[i], way[1 - out].point + way[1 - out].node[i].point_start);
+    if (side[0].count > 0 && side[1].count > 0)
+        track_cut(&side[1], nodes_before_meeting(&side[1], &side[0], t->parameters->overlap));
+    int out = side[0].count == 0 || (side[1].count > 0 && rbt_root_is_at_end_of(t, &side[0], &side[1], &why));
+    bool found = side[out].count > 0 && !t->out_of_memory;
+    // both have the same first node, in opposite directions
+    for (int i = 1; found && i < side[1 - out].count && !t->out_of_memory; i++)
+        t->out_of_memory = !track_append(&back, &side[1 - out].node[i], side[1 - out].point + side[1 - out].node[i].point_start);
     if (found && !t->out_of_memory)
-        t->out_of_memory = !tracker_adopt(t, &way[out], &back, number);
+        t->out_of_memory = !tracker_adopt(t, &side[out], &back, number);
     if (found) {
         char root[120];
-        snprintf(root, sizeof root, "tracked both ways, the root is %s", why);
-        tracker_say_start(t, seed, start, way[1 - out].count > 0 ? root : why);
+        snprintf(root, sizeof root, "tracked in both directions, the root is %s", why);
+        tracker_say_start(t, seed, start, side[1 - out].count > 0 ? root : why);
         t->why = end[out];
     }
     for (int i = 0; i < 2; i++)
-        track_free(&way[i]);
+        track_free(&side[i]);
     track_free(&back);
     return found && !t->out_of_memory;
 }

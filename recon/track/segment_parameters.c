@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// b [mm] of all that moved the edges that were tracked: the image's blur, or what its voxels and the spline make at least, the smoothing of a noisy volume, and
-// the average along the rays.
+// Blur b [mm] (standard deviation) of everything that shifted the tracked edges: the image's blur (or at least that of its voxels and the spline), the
+// smoothing of a noisy volume, and the moving average along the rays.
 static double edge_blur(const RbtParameters *parameters, const Volume *volume, double smoothing, const VesselTree *tree)
 {
     Volume *smooth = smoothing > 0 ? volume_smoothed(volume, smoothing, 0) : NULL;

@@ -1,4 +1,4 @@
-// What a tree's file says of how it was tracked.
+// Writes the record of how a tree was tracked, for its file.
 #ifndef SELDINGER_RECON_TRACK_SEGMENT_PARAMETERS_H
 #define SELDINGER_RECON_TRACK_SEGMENT_PARAMETERS_H
 
@@ -7,7 +7,7 @@
 #include "recon/track/rbt_report.h"
 #include "recon/volume/volume.h"
 
-// What was found beside the parameters that found it, in the words of a trace; to be freed.
+// Returns the parameters and the results of tracking in the syntax of a trace file. The caller frees it.
 char *segment_parameters_text(const RbtParameters *parameters, const RbtReport *report, const Volume *volume, const VesselTree *tree);
 
 #endif

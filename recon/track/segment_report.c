@@ -4,7 +4,7 @@
 
 static const char *const support_name[] = {"supported", "doubtful", "refused", "kept"};
 
-// How many junctions have this support; gaps within branches are none.
+// Number of junctions with this support, without gaps within branches.
 static int junctions_with(const RbtReport *report, RbtSupport support)
 {
     int count = 0;
@@ -13,7 +13,7 @@ static int junctions_with(const RbtReport *report, RbtSupport support)
     return count;
 }
 
-// Names each junction that the image does not clearly support.
+// Prints each junction that the image does not clearly support.
 static void print_junctions(FILE *out, const RbtReport *report)
 {
     int moved = 0, inner = 0, nodes = 0;
@@ -30,7 +30,7 @@ static void print_junctions(FILE *out, const RbtReport *report)
     fprintf(out, "%d junctions: %d supported by the image, %d doubtful, %d refused", report->junction_count - inner, junctions_with(report, RBT_SUPPORTED),
             junctions_with(report, RBT_DOUBTFUL), junctions_with(report, RBT_REFUSED) + junctions_with(report, RBT_KEPT));
     if (moved)
-        fprintf(out, "; %d hung on another parent", moved);
+        fprintf(out, "; %d attached to another parent", moved);
     if (inner)
         fprintf(out, "; %d gaps within branches", inner);
     fprintf(out, "; %d nodes with %ld points on their links\n", nodes, points);
@@ -41,10 +41,10 @@ static void print_junctions(FILE *out, const RbtReport *report)
         fprintf(out, "  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support],
                 j->is_inner ? "gap" : "junction", j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
         if (j->support == RBT_REFUSED)
-            fprintf(out, ": %d nodes, %.1f mm dropped", j->dropped_nodes, j->dropped_mm);
+            fprintf(out, ": %d nodes, %.1f mm removed", j->dropped_nodes, j->dropped_mm);
         else
             fprintf(out, ": branch %d on %d%s", j->branch + 1, j->parent + 1, j->is_moved ? ", its second parent" : "");
-        fprintf(out, "%s\n", j->support == RBT_KEPT ? "; warning: the trace names it, so it stays, but nothing opens into it" : "");
+        fprintf(out, "%s\n", j->support == RBT_KEPT ? "; warning: kept because the trace file gives it, but no tool can enter it" : "");
     }
 }
 
@@ -76,11 +76,11 @@ void segment_report_print(FILE *out, const VesselTree *tree, const RbtReport *re
     print_junctions(out, report);
     for (int i = 0; i < report->loop_count; i++) {
         const RbtLoop *l = &report->loop[i];
-        fprintf(out, "loop: the end of branch %d meets branch %d at (%.2f, %.2f, %.2f) mm, %.1f mm around\n", l->branch + 1, l->meets + 1, l->place.x,
-                l->place.y, l->place.z, l->length);
+        fprintf(out, "loop: the end of branch %d touches branch %d at (%.2f, %.2f, %.2f) mm; the loop is %.1f mm long\n", l->branch + 1, l->meets + 1,
+                l->place.x, l->place.y, l->place.z, l->length);
     }
     if (report->left_out_count > 0)
-        fprintf(out, "left out, as `not` says: %d branches, %.0f mm\n", report->left_out_count, report->left_out_length);
+        fprintf(out, "removed because of `not`: %d branches, %.0f mm\n", report->left_out_count, report->left_out_length);
     fprintf(out, "%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count,
             (long)tree->point_count, load_s, track_s);
 }

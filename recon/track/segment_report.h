@@ -1,4 +1,4 @@
-// What tracking found (recon/track/rbt_report.h), for people and as JSON.
+// Reports the results of tracking (recon/track/rbt_report.h), as text and as JSON.
 #ifndef SELDINGER_RECON_TRACK_SEGMENT_REPORT_H
 #define SELDINGER_RECON_TRACK_SEGMENT_REPORT_H
 
@@ -8,7 +8,7 @@
 #include <cJSON.h>
 #include <stdio.h>
 
-// A row a branch, then junctions that the image does not clearly support, loops, what was left out, sums. Times [s].
+// Prints a row for each branch, then the junctions that the image does not clearly support, the loops, the removed vessels, and totals. Times in seconds.
 void segment_report_print(FILE *out, const VesselTree *tree, const RbtReport *report, double load_s, double track_s);
 void segment_report_add(cJSON *root, const VesselTree *tree, const RbtReport *report, double load_s, double track_s);
 

@@ -1,4 +1,4 @@
-// YAML by libyaml's document interface: it keeps the line and column of every node, and this walker refuses what libyaml accepts (duplicate and
+// Reads YAML by libyaml's document interface, which keeps the line and column of every node. This reader refuses things that libyaml accepts (duplicate and
 // unknown keys, several documents).
 #include "recon/track/trace.h"
 #include "base/base.h"
@@ -29,7 +29,7 @@ static int pair_count(const yaml_node_t *map) { return (int)(map->data.mapping.p
 
 static int item_count(const yaml_node_t *list) { return (int)(list->data.sequence.items.top - list->data.sequence.items.start); }
 
-// The key of pair `i`; NULL with a fault if it is not a string or is a duplicate.
+// Returns the key of pair `i`, or NULL with a fault if it is not a string or is a duplicate.
 static const char *key_of(const Walk *w, const yaml_node_t *map, int i, yaml_node_t **value)
 {
     yaml_node_t *key = node_at(w, map->data.mapping.pairs.start[i].key);
@@ -88,7 +88,7 @@ static void read_name(const Walk *w, const yaml_node_t *node, char out[32])
         memcpy(out, text, strlen(text) + 1);
 }
 
-// One of a pair of keys in mm and in voxels; a fault if both are given.
+// Reads a position given in mm or in voxels. It is a fault if both are given.
 static void read_place(const Walk *w, const yaml_node_t *node, const char *key, bool is_voxel, bool *given, Vec3 *out, bool *out_is_voxel)
 {
     if (*given)
@@ -187,7 +187,7 @@ static void read_list(const Walk *w, const yaml_node_t *list, bool is_branches, 
     }
 }
 
-// Lists of places: `forbid` holds balls, the others points.
+// Lists of positions: `forbid` holds balls, the others points.
 typedef struct PlaceKind {
     const char *key, *what, *mm, *voxel;
     bool has_radius;
@@ -233,7 +233,7 @@ static void read_region(const Walk *w, const yaml_node_t *map, const PlaceKind *
         FAULT(w, map, "the %s has no radius; expected radius_mm", kind->what);
 }
 
-// The array of the trace for a kind of place.
+// The trace's array for a kind of position.
 static RbtRegion **places_of(Trace *trace, int kind, int **count)
 {
     RbtRegion **list[PLACE_KINDS] = {&trace->forbid, &trace->cut, &trace->until, &trace->rival};
@@ -277,7 +277,7 @@ static void read_retry_steps(const Walk *w, const yaml_node_t *list, RbtParamete
     }
 }
 
-// Ray and direction counts must be those of a subdivided icosahedron.
+// Checks that ray and direction counts are those of a subdivided icosahedron.
 static void check_counts(const Walk *w, const yaml_node_t *node, const char *name, double value)
 {
     if ((!strcmp(name, "N_r") || !strcmp(name, "aneurysm_rays")) && sphere_level_of((int)value) < 1)
@@ -312,7 +312,7 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
         return;
     }
     bool has_branches = false, has_automatic = false;
-    // the parameter set first, wherever it is: single parameters override it
+    // read the parameter set first, wherever it is, because single parameters override it
     for (int i = 0; i < pair_count(root); i++) {
         yaml_node_t *key = node_at(w, root->data.mapping.pairs.start[i].key), *value = node_at(w, root->data.mapping.pairs.start[i].value);
         const char *name = key ? scalar_of(key) : NULL, *set = value ? scalar_of(value) : NULL;

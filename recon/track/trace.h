@@ -1,6 +1,6 @@
-// The trace file of `segment` (YAML): where branches start, where aneurysms are, where the tree ends, corrections, and parameters of the tracking by
-// name. `automatic` defaults to 1 if the file names no branch beyond the first. Format: docs/file-formats.md, "Trace files". At most 1 MB. All faults
-// of a file are reported in one pass, with line and column.
+// The trace file of `segment` (YAML): starts of branches, aneurysms, points where the tree ends, corrections, and tracking parameters by name. `automatic`
+// defaults to 1 if the file gives no branch after the first. Format: docs/file-formats.md, "Trace files". At most 1 MB. All faults of a file are reported in
+// one pass, with line and column.
 #ifndef SELDINGER_RECON_TRACK_TRACE_H
 #define SELDINGER_RECON_TRACK_TRACE_H
 
@@ -12,14 +12,14 @@ typedef struct Trace {
     RbtSeed *branch;
     int aneurysm_count;
     RbtAneurysm *aneurysm;
-    int forbid_count, cut_count, until_count, rival_count;   // corrections, and points where the tree ends; `parameters` points into them
+    int forbid_count, cut_count, until_count, rival_count;   // `parameters` points into these arrays
     RbtRegion *forbid, *cut, *until, *rival;                 // `rival`: the key `not`
 } Trace;
 
-// `text` need not be NUL-terminated; `path` is used in messages. NULL with faults.
+// Parses a trace file. `text` need not be NUL-terminated; `path` is used in messages. Returns NULL with faults.
 Trace *trace_parse(const char *text, size_t length, const char *path, Faults *faults);
 Trace *trace_load(const char *path, Faults *faults);
-// Adds a point [mm] given on the command line to `until` or `not` (`key`). False: out of memory.
+// Adds a point [mm] given on the command line to `until` or `not` (`key`). Returns false if out of memory.
 bool trace_add_point(Trace *trace, const char *key, Vec3 point);
 void trace_free(Trace *trace);
 

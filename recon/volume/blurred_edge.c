@@ -11,7 +11,7 @@
 // I0(z) / I1(z)
 static double bessel_ratio(double z)
 {
-    if (z > 30)              // asymptotic, right to 1e-7 there
+    if (z > 30)              // asymptotic series; relative error below 1e-7 in this range
         return 1 + 1 / (2 * z) + 3 / (8 * z * z) + 3 / (8 * z * z * z);
     double q = z * z / 4, term = 1, zeroth = 0, first = 0;
     for (int k = 0; k < 200 && term > 1e-17 * zeroth; k++) {
@@ -55,8 +55,8 @@ double blurred_edge_undo(double edge, double blur)
 // --- the image's blur ---
 
 enum { SIDE = 12, PROFILE = 2 * SIDE + 1, NODES = 400, NODES_LEAST = 10 };
-static const double SAMPLING = 0.25;     // [voxel] between samples of a profile, which so reaches three voxels to either side
-static const double WIDE = 3;            // [voxel] radius from which the inside is bright and the wall nearly flat
+static const double SAMPLING = 0.25;     // [voxel] between samples of a profile, which therefore reaches three voxels to either side
+static const double WIDE = 3;            // [voxel] radius above which the inside is bright and the wall nearly flat
 
 static Vec3 outward(const VesselTree *tree, int node, Vec3 x)
 {
@@ -81,7 +81,7 @@ static void mean_profile(const Volume *volume, const VesselTree *tree, int node,
     }
 }
 
-// Squared misfit of the best a + c s, s a step down at the middle blurred by b samples; c in `height`.
+// Squared misfit of the best fit a + c s to the profile, where s is a step down at the middle, blurred by b samples; stores c in `height`.
 static double misfit(const double profile[PROFILE], double b, double *height)
 {
     double s1 = 0, s2 = 0, y1 = 0, y2 = 0, sy = 0;
@@ -94,7 +94,7 @@ static double misfit(const double profile[PROFILE], double b, double *height)
     return y2 - y1 * y1 / PROFILE - with * with / spread;
 }
 
-// [samples]; 0 where the profile does not fall.
+// Returns the blur [samples], or 0 if the profile does not fall.
 static double profile_blur(const double profile[PROFILE])
 {
     static const double GOLDEN = 0.6180339887498949;

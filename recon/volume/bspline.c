@@ -1,10 +1,10 @@
 // s(x) = sum_ijk v_ijk b(x - i) b(y - j) b(z - k), b the cubic B-spline: with t = x - floor(x) the four weights are
 // (1-t)^3 / 6, (4 - 6 t^2 + 3 t^3) / 6, (4 - 6 u^2 + 3 u^3) / 6 with u = 1 - t, t^3 / 6.
-// Floats: 64 products of values known to a few digits. A row's four taps are four lanes, joined at the end: rows are added along y, then slices along z,
-// then lanes, always in this order, so that a sample has the same bits on every instruction set and whether it stands alone or in a line.
+// Floats suffice: 64 products of values known to a few digits. A row's four taps are four lanes, joined at the end: rows are added along y, then slices
+// along z, then lanes, always in this order, so that a sample has the same bits on every instruction set, alone or in a line.
 //
-// Lines are sampled in blocks: places and cells of a block at once, then sample by sample with the cell's taps in registers, which the next sample
-// mostly shares (a ray takes ten samples a voxel). Lanes of samples would have to gather each of their 64 taps.
+// Lines are sampled in blocks: positions and cells of a block at once, then sample by sample with the cell's taps in registers, which the next sample
+// mostly shares (a ray takes ten samples per voxel). Lanes of different samples would have to gather each of their 64 taps.
 #include "recon/volume/bspline.h"
 #include "base/base.h"
 
@@ -12,7 +12,7 @@
 
 typedef float Row __attribute__((vector_size(16)));
 
-// Of the taps at -1, 0, 1, 2 from the cell of which t is the part.
+// Weights of the taps at -1, 0, 1, 2 from the cell; `t` is the position within the cell, 0 to 1.
 INLINE void weights(float t, float *w0, float *w1, float *w2, float *w3)
 {
     const float sixth = 1.0f / 6;
@@ -30,7 +30,7 @@ INLINE Row load_row(const float *from)
     return row;
 }
 
-// Of four samples: each one's lanes times its weights (one array of samples for each lane), added as (0 + 1) + (2 + 3).
+// Four samples at once: the lanes of each sample times its weights (one array of samples for each lane), added as (0 + 1) + (2 + 3).
 INLINE Row join_lanes(const Row *r, const float *w, size_t stride)
 {
     Row a = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5), b = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5);
@@ -40,7 +40,7 @@ INLINE Row join_lanes(const Row *r, const float *w, size_t stride)
     return (l0 * load_row(w) + l1 * load_row(w + stride)) + (l2 * load_row(w + 2 * stride) + l3 * load_row(w + 3 * stride));
 }
 
-// Taps that lie beyond the grid.
+// Samples near the border, where some taps lie outside the grid; those taps count as the volume's minimum.
 static float sample_at_border(const Volume *volume, const int base[3], const float wx[4], const float wy[4], const float wz[4])
 {
     float sum = 0;
@@ -55,14 +55,14 @@ static float sample_at_border(const Volume *volume, const int base[3], const flo
     return sum;
 }
 
-// At continuous voxel coordinates near the border, or anywhere.
+// Samples at any continuous voxel coordinates, near the border too.
 static float sample(const Volume *volume, double x, double y, double z)
 {
     const int *size = volume->size;
     // far outside (or not a number) no tap is inside
     if (!(x > -3 && y > -3 && z > -3 && x < size[0] + 2 && y < size[1] + 2 && z < size[2] + 2))
         return volume->minimum;
-    // all are > -3: truncation of the shifted number is floor(), which is a call without SSE4
+    // all coordinates are > -3, so truncating the shifted number equals floor(), which is a function call without SSE4
     int base[3] = {(int)(x + 4) - 5, (int)(y + 4) - 5, (int)(z + 4) - 5};
     float w[3][4];
     const double place[3] = {x, y, z};
@@ -88,10 +88,10 @@ enum { LINE_BLOCK = 16 };
 typedef struct LineBlock {
     double place[3][LINE_BLOCK];     // voxel coordinates
     float weight[3][4][LINE_BLOCK];
-    int cell[LINE_BLOCK];            // index of the first of its 64 taps; -1: not all are inside
+    int cell[LINE_BLOCK];            // index of the first of its 64 taps; -1: some tap is outside the grid
 } LineBlock;
 
-// The samples from number `first` on.
+// Fills in the block for the samples from number `first` on.
 INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start, Vec3 step, int first)
 {
     const double begin[3] = {start.x, start.y, start.z}, along[3] = {step.x, step.y, step.z};
@@ -100,7 +100,7 @@ INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start,
     for (int a = 0; a < 3; a++) {
         double most = volume->size[a];
         for (int s = 0; s < LINE_BLOCK; s++) {
-            double x = begin[a] + (first + s) * along[a], held = x > 0 ? x : 0;   // clamped to the range where a cast to int is defined; there is no cell beyond
+            double x = begin[a] + (first + s) * along[a], held = x > 0 ? x : 0;   // clamped to where a cast to int is defined; no cell lies outside
             held = held < most ? held : most;
             base[a][s] = (int)(held + 4) - 5;
             block->place[a][s] = x;
@@ -113,7 +113,7 @@ INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start,
     for (int s = 0; s < LINE_BLOCK; s++) {
         int x = base[0][s], y = base[1][s], z = base[2][s];
         bool inside = (x >= 0) & (y >= 0) & (z >= 0) & (x + 3 < nx) & (y + 3 < ny) & (z + 3 < nz);
-        unsigned cell = ((unsigned)z * (unsigned)ny + (unsigned)y) * (unsigned)nx + (unsigned)x;   // may wrap where it is not used
+        unsigned cell = ((unsigned)z * (unsigned)ny + (unsigned)y) * (unsigned)nx + (unsigned)x;   // may wrap around for samples that do not use it
         block->cell[s] = inside ? (int)cell : -1;
     }
 }

@@ -1,4 +1,4 @@
-// Cubic B-spline approximation of a volume: the voxel values themselves are the coefficients, so that sampling smooths (standard deviation 1/sqrt(3)
+// Cubic B-spline approximation of a volume: the voxel values themselves are the coefficients, so sampling smooths (standard deviation 1/sqrt(3)
 // voxel: 0.1155 mm at 0.2 mm) and needs no prefilter. Kerrien et al. 2017, 3.2. Outside the grid the value is the volume's minimum.
 #ifndef SELDINGER_RECON_VOLUME_BSPLINE_H
 #define SELDINGER_RECON_VOLUME_BSPLINE_H

@@ -1,7 +1,7 @@
-// seldinger-dicom: unpacks the pixels of a DICOM image. Standard input is the file, standard output the same image in explicit little endian,
-// uncompressed. A separate program, because GDCM reads untrusted data here: the caller limits its memory and time (volume_dicom_pixels.c), and a
-// crash is just another fault. GDCM reads JPEG (8 to 16 bits, lossless too), JPEG-LS, JPEG 2000 and RLE. Exit code 0; 1 where the image cannot be
-// read, 2 where its pixels cannot be unpacked, 3 where the answer cannot be written.
+// seldinger-dicom: decompresses the pixels of a DICOM image. It reads the file from standard input and writes the same image to standard output,
+// uncompressed, in explicit little endian. It is a separate program because GDCM reads untrusted data here: the caller limits its memory and time
+// (volume_dicom_pixels.c), and a crash is just another fault. GDCM reads JPEG (8 to 16 bits, also lossless), JPEG-LS, JPEG 2000 and RLE. Exit code 0 on
+// success; 1 if the image cannot be read, 2 if its pixels cannot be decompressed, 3 if the result cannot be written.
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
@@ -17,7 +17,7 @@ int main()
         reader.SetFileName("/dev/stdin");
         if (!reader.Read())
             return 1;
-        // no more files: GDCM's last resort (PVRG) leaves temporary ones behind
+        // forbid further files: GDCM's last resort (PVRG) leaves temporary files behind
         const rlimit files = {3, 3};
         setrlimit(RLIMIT_NOFILE, &files);
         gdcm::ImageChangeTransferSyntax change;

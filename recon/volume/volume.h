@@ -1,8 +1,8 @@
-// Volumes: scalar voxel grids in patient coordinates (files: volume_file.h).
+// Volumes: scalar voxel grids in patient coordinates (volume_file.h reads and writes files).
 //
-// Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS) of
+// Voxel (i, j, k), i fastest, has its centre at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame in
 // the header is kept, never converted. Values are finite floats: a NaN would pass silently through every interpolation, and only the user knows which
-// background it represents.
+// background value it represents.
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_H
 #define SELDINGER_RECON_VOLUME_VOLUME_H
 
@@ -18,20 +18,20 @@ typedef struct Volume {
     Mat3 to_voxel;           // inverse of the axes: voxel = to_voxel (x - origin)
     float *value;            // (size[2], size[1], size[0])
     float minimum, maximum;
-    char frame[32];          // "RAS", "LPS", … or "" where the header does not say
+    char frame[32];          // "RAS", "LPS", …; "" if the header does not give it
     char format[16];         // "nrrd", "metaimage", "nifti", "dicom"
 } Volume;
 
-// of all voxels
+// largest number of voxels of a volume
 #define VOLUME_VOXELS_MOST ((size_t)1 << 31)
-// A volume of the given grid, values zero. NULL if size is not positive or memory runs out.
+// Creates a volume of the given grid with all values zero. Returns NULL if a size is not positive or if out of memory.
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
 void volume_free(Volume *volume);
-static inline double volume_voxel_size(const Volume *v)   // mean edge [mm]
+static inline double volume_voxel_size(const Volume *v)   // [mm] mean edge of a voxel
 {
     return (vec3_norm(v->axis[0]) + vec3_norm(v->axis[1]) + vec3_norm(v->axis[2])) / 3;
 }
-// Continuous voxel coordinates of a point and back.
+// Converts a point [mm] to continuous voxel coordinates, and back.
 static inline Vec3 volume_voxel_of(const Volume *v, Vec3 x) { return mat3_mul_vec(&v->to_voxel, vec3_sub(x, v->origin)); }
 static inline Vec3 volume_point_of(const Volume *v, Vec3 voxel)
 {

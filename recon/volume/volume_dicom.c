@@ -1,13 +1,13 @@
-// DICOM (PS3.5 encoding, PS3.3 C.7.6 image modules): a series of single-frame files, or one multi-frame file with a position for each frame (enhanced
+// Reads DICOM (PS3.5 encoding, PS3.3 C.7.6 image modules): a series of single-frame files, or one multi-frame file with a position for each frame (enhanced
 // CT, MR, XA 3D). Implicit and explicit little endian, explicit big endian; with or without the preamble. Compressed pixels are decoded by a separate
 // program, seldinger-dicom (volume_dicom_pixels.h); the geometry is read here.
 //
 // Voxel (i, j) of slice k lies at ImagePositionPatient_k + i dx u + j dy v, where ImageOrientationPatient = (u, v) and PixelSpacing = (dy, dx).
 // Slices are sorted by position along u x v; their spacing comes from the positions (SliceThickness is not the spacing), so that a tilted gantry
-// gives sheared axes. The frame is LPS by rule. value = slope sample + intercept, each slice with its own; MONOCHROME1 displays small samples as
+// gives sheared axes. DICOM prescribes the frame LPS. value = slope sample + intercept, both given for each slice; MONOCHROME1 displays small samples as
 // bright: its samples are first inverted within their range.
 //
-// Two passes: headers of all files of the folder, then the samples file by file, so that no more than one file is in memory beside the volume.
+// Reads in two passes: the headers of all files of the folder, then the samples file by file, so that only one file is in memory beside the volume.
 #include "recon/volume/volume_dicom.h"
 
 #include "base/base.h"
@@ -22,7 +22,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// the length of pixels is written in 32 bits
+// largest file: the length of the pixels is a 32-bit number
 #define DICOM_BYTES_MOST (((size_t)1 << 32) + ((size_t)1 << 26))
 
 enum { PREAMBLE = 128, UID_ROOM = 68, MAX_DEPTH = 24 };
@@ -55,7 +55,7 @@ enum Tag {
     T_TRANSFORMATION = TAG(0x0028, 0x9145),
     T_SHARED = TAG(0x5200, 0x9229)
 };
-// beyond the range of int, which an enumerator must keep within
+// macros, because an enumerator must be within the range of int
 #define T_PER_FRAME TAG(0x5200u, 0x9230)
 #define T_PIXELS TAG(0x7fe0u, 0x0010)
 #define T_ITEM TAG(0xfffeu, 0xe000)
@@ -73,14 +73,14 @@ typedef struct DicomImage {
     long rows, columns, allocated, stored, high_bit, is_signed, samples, frames;
     Plane file, shared, *frame;
     int frame_count, frame_room;
-    bool is_walked;          // completely, or to the pixels
+    bool is_walked;          // read completely, or up to the pixels
     bool has_pixels, is_encapsulated, big_endian, is_words;
     size_t pixel_place, pixel_length;
 } DicomImage;
 
 typedef struct Cursor {
     const uint8_t *byte;
-    size_t length, at, offset;   // offset: of byte[0] in the file, for messages
+    size_t length, at, offset;   // [bytes]; offset: position of byte[0] in the file, for messages
     bool explicit_vr, big_endian;
     const char *path;
     Faults *faults;
@@ -89,7 +89,7 @@ typedef struct Cursor {
 typedef struct Element {
     uint32_t tag, length;
     char vr[3];
-    size_t place;            // of the tag
+    size_t place;            // [bytes] position of the tag
 } Element;
 
 // The enclosing sequence; values of other sequences do not belong to the image.
@@ -120,8 +120,8 @@ static bool fail(const Cursor *c, size_t at, const char *what)
     return false;
 }
 
-// The next element's head; the cursor then stands at its value, which lies within `end` where its length is defined (top-level pixels may be
-// truncated: the missing part is reported later, in pixels).
+// Reads the next element's header. The cursor then points at its value, which lies within `end` if its length is defined (top-level pixels may be truncated:
+// the missing part is reported later, as missing pixels).
 static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
 {
     static const char cut[] = "the file ends within an element; expected the whole file";
@@ -169,7 +169,7 @@ static void take_text(const Cursor *c, const Element *e, char *out, size_t room)
             out[i] = '?';
 }
 
-// Decimal strings, separated by backslashes. An empty value is none.
+// Reads `count` decimal strings, separated by backslashes. An empty value counts as absent.
 static bool take_decimals(const Cursor *c, const Element *e, int count, double *out, bool *has)
 {
     char text[512];
@@ -261,7 +261,7 @@ static Plane *next_frame(DicomImage *image)
 
 static bool walk(Cursor *c, size_t end, bool is_open, Scope scope, Plane *plane, DicomImage *image, int depth);
 
-// The items of a sequence, or the fragments of encapsulated pixels.
+// Reads the items of a sequence, or the fragments of encapsulated pixels.
 static bool walk_items(Cursor *c, size_t end, const Element *sequence, Scope scope, Plane *plane, DicomImage *image, int depth)
 {
     bool is_open = sequence->length == UNDEFINED_LENGTH;
@@ -289,7 +289,7 @@ static bool walk_items(Cursor *c, size_t end, const Element *sequence, Scope sco
     return true;
 }
 
-// The scope inside a sequence that is met in `scope`.
+// The scope inside a sequence that occurs in `scope`.
 static Scope scope_within(uint32_t tag, Scope scope)
 {
     if (scope == SCOPE_FILE)
@@ -298,7 +298,7 @@ static Scope scope_within(uint32_t tag, Scope scope)
     return is_macro ? scope : SCOPE_OTHER;
 }
 
-// Elements up to `end`, or to the delimiter of an open item. At the top it ends at the pixels.
+// Reads the elements up to `end`, or up to the delimiter of an open item. The top level ends at the pixels.
 static bool walk(Cursor *c, size_t end, bool is_open, Scope scope, Plane *plane, DicomImage *image, int depth)
 {
     while (is_open || c->at < end) {
@@ -319,7 +319,7 @@ static bool walk(Cursor *c, size_t end, bool is_open, Scope scope, Plane *plane,
         bool is_open_value = e.length == UNDEFINED_LENGTH, is_unknown = !strcmp(e.vr, "UN");
         if (is_open_value || !strcmp(e.vr, "SQ") || (within != SCOPE_OTHER && (!c->explicit_vr || is_unknown))) {
             bool kept = c->explicit_vr, order = c->big_endian;
-            if (is_unknown)   // PS3.5, 6.2.2: implicit little endian inside
+            if (is_unknown)   // PS3.5, 6.2.2: a value of unknown VR is implicit little endian inside
                 c->explicit_vr = c->big_endian = false;
             bool good = walk_items(c, end, &e, within, plane, image, depth);
             c->explicit_vr = kept;
@@ -337,7 +337,8 @@ static bool walk(Cursor *c, size_t end, bool is_open, Scope scope, Plane *plane,
 
 // --- a file ---
 
-// A first element of the groups with which a file without preamble begins. Its type, or its length, tells explicit from implicit.
+// Detects a file without preamble by its first element, which must belong to one of the groups with which files begin. The element's type or length shows
+// whether the encoding is explicit or implicit.
 static bool begins_bare(const FileBytes *file, bool *explicit_vr, bool *big_endian)
 {
     const uint8_t *b = file->byte;
@@ -358,7 +359,7 @@ bool volume_is_dicom(const FileBytes *file)
     return (file->length > PREAMBLE + 4 && !memcmp(file->byte + PREAMBLE, "DICM", 4)) || begins_bare(file, &a, &b);
 }
 
-// The group 0002 of a file, always explicit little endian, sets how the rest is read.
+// Reads group 0002 of a file, always explicit little endian; it determines how the rest is read.
 static bool take_meta(Cursor *c, DicomImage *image)
 {
     c->explicit_vr = true;
@@ -376,7 +377,7 @@ static bool take_meta(Cursor *c, DicomImage *image)
     return true;
 }
 
-// Uncompressed.
+// Bytes of the uncompressed pixels.
 static size_t bytes_of_pixels(const DicomImage *m) { return (size_t)m->rows * (size_t)m->columns * (size_t)m->frames * (size_t)(m->allocated / 8); }
 
 static bool check_image(const Cursor *c, const DicomImage *m)
@@ -426,7 +427,7 @@ static void image_free(DicomImage *image)
     image->frame = NULL;
 }
 
-// The header of a file. False with faults; `image` then holds what was understood and has nothing to be freed.
+// Reads the header of a file. Returns false with faults; `image` then holds what was read until then. The caller has nothing to free.
 static bool read_image(const FileBytes *file, DicomImage *image, Faults *faults)
 {
     static const char implicit_little[] = "1.2.840.10008.1.2", explicit_little[] = "1.2.840.10008.1.2.1", explicit_big[] = "1.2.840.10008.1.2.2";
@@ -441,7 +442,7 @@ static bool read_image(const FileBytes *file, DicomImage *image, Faults *faults)
         is_big = !strcmp(image->syntax, explicit_big);
         is_explicit = is_big || !strcmp(image->syntax, explicit_little);
         if (!is_explicit && strcmp(image->syntax, implicit_little)) {
-            // what is compressed has explicit little-endian headers; only a deflated file is compressed as a whole
+            // compressed pixels have explicit little-endian headers; only a deflated file is compressed as a whole
             if (!strcmp(image->syntax, "1.2.840.10008.1.2.1.99")) {
                 faults_add_at_byte(faults, file->path, c.offset + c.at, "the file is deflated; decompress it with `gdcmconv --raw IN.dcm OUT.dcm`");
                 return false;
@@ -473,7 +474,7 @@ typedef struct Slice {
     const DicomFile *file;
     int frame;
     Plane plane;
-    double along;            // [mm] place along the normal
+    double along;            // [mm] position along the normal
 } Slice;
 
 typedef struct Series {
@@ -490,7 +491,7 @@ static void series_free(Series *s)
     free(s->file);
 }
 
-// Takes the image over. False if out of memory.
+// Adds an image to the series, which takes ownership of it. Returns false if out of memory.
 static bool series_add(Series *s, const char *path, const DicomImage *image)
 {
     if (s->count == s->room) {
@@ -508,7 +509,7 @@ static bool series_add(Series *s, const char *path, const DicomImage *image)
     return true;
 }
 
-// The frame's own value, else that for all frames, else the file's.
+// Returns the position and scaling of a frame. Each value is the frame's own, else that given for all frames, else the file's.
 static Plane plane_of(const DicomImage *m, int frame)
 {
     const Plane *said[3] = {m->frame_count > 0 ? &m->frame[frame] : &m->shared, &m->shared, &m->file};
@@ -539,7 +540,7 @@ static int compare_slices(const void *a, const void *b)
 
 static Vec3 vec3_of(const double *x) { return vec3(x[0], x[1], x[2]); }
 
-// Checks what a slice must have, and share with the first.
+// Checks that a slice has what is required, and that it agrees with the first slice.
 static bool check_slice(const Slice *s, const Slice *first, Faults *faults)
 {
     const Plane *p = &s->plane, *q = &first->plane;
@@ -636,7 +637,7 @@ static void convert_slice(const DicomImage *m, const Plane *p, const uint8_t *sa
     bool inverted = !strcmp(m->photometric, "MONOCHROME1"), wide = m->allocated == 16, big = m->big_endian;
     int32_t top = m->is_signed ? -1 : range - 1;
     for (size_t i = 0; i < count; i++) {
-        // 8-bit samples in big-endian words stand in pairs, the other way round
+        // 8-bit samples in big-endian words are stored in pairs, in reversed order
         int32_t x = wide ? (big ? sample[2 * i] << 8 | sample[2 * i + 1] : sample[2 * i + 1] << 8 | sample[2 * i]) : sample[big && m->is_words ? i ^ 1 : i];
         x = x >> shift & (range - 1);
         x = x >= half ? x - range : x;
@@ -657,7 +658,7 @@ bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults)
 // A file whose slices are being read, with uncompressed pixels.
 typedef struct OpenFile {
     const DicomFile *file;
-    DicomImage image;        // how the pixels of `from` lie; its planes are none of ours
+    DicomImage image;        // layout of the pixels of `from`; its planes belong to another image
     FileBytes own;
     const FileBytes *from;
 } OpenFile;
@@ -670,7 +671,7 @@ static void file_close(OpenFile *open)
 
 static bool unpack(OpenFile *open, Faults *faults)
 {
-    enum { HEADER_ROOM = 1 << 20 };      // more than a header grows when it is written again
+    enum { HEADER_ROOM = 1 << 20 };      // [bytes] more than a header grows when it is rewritten
     const DicomImage *m = &open->file->image;
     DicomImage plain;
     if (!dicom_unpack(open->file->path, m->pixel_place, m->syntax, m->pixel_place + bytes_of_pixels(m) + HEADER_ROOM, &open->own, faults) ||
@@ -690,7 +691,7 @@ static bool unpack(OpenFile *open, Faults *faults)
     return false;
 }
 
-// `whole`: the bytes of the only file, or NULL if they are read file by file.
+// Opens a file of the series. `whole`: its bytes if it is the only file; NULL if the series is read file by file.
 static bool file_open(OpenFile *open, const DicomFile *file, const FileBytes *whole, Faults *faults)
 {
     if (open->file == file)
@@ -769,7 +770,7 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
 
 static int compare_names(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
-// The folder's entries by name; *count is -1 if it cannot be read.
+// The folder's entries, sorted by name; *count is -1 if the folder cannot be read.
 static char **list_folder(const char *folder, int *count)
 {
     DIR *directory = opendir(folder);
@@ -796,7 +797,8 @@ static char **list_folder(const char *folder, int *count)
     return name;
 }
 
-// A regular file whose first bytes are DICOM's, or cannot be read (reported when it is read): other files of a folder are not read completely.
+// Returns true for a regular file that begins like DICOM or that cannot be read (this is reported when it is read). Other files of a folder are not read
+// completely.
 static bool may_be_dicom(const char *path)
 {
     uint8_t head[PREAMBLE + 16];
@@ -811,8 +813,8 @@ static bool may_be_dicom(const char *path)
     return is_unread || volume_is_dicom(&bytes);
 }
 
-// Images of the folder into the series: those of `wanted`, or all. Files without an image (reports, DICOMDIR) are skipped; a damaged file is a fault
-// unless it is known to belong to another series.
+// Adds the folder's images to the series: those of the series of `wanted`, or all if it is NULL. Files without an image (reports, DICOMDIR) are skipped. A
+// damaged file is a fault unless it is known to belong to another series.
 static bool gather_folder(const char *folder, const DicomImage *wanted, Series *series, Faults *faults)
 {
     int count;
@@ -831,7 +833,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
             continue;
         bool good = read_image(&file, &image, &own), is_other = wanted && image.series[0] && strcmp(image.series, wanted->series) != 0;
         if (!good && !is_other && !(image.is_walked && !image.has_pixels))
-            read_image(&file, &image, faults);   // again, to tell its faults
+            read_image(&file, &image, faults);   // read again, to report its faults
         file_bytes_free(&file);
         if (!good)
             continue;
@@ -848,7 +850,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
     return faults->count == before;
 }
 
-// Multi-frame files are series of their own.
+// Each multi-frame file is a series of its own.
 static bool is_same_series(const DicomFile *a, const DicomFile *b)
 {
     return a == b || (a->image.frames == 1 && b->image.frames == 1 && !strcmp(a->image.series, b->image.series));
@@ -871,7 +873,7 @@ Volume *volume_load_dicom_folder(const char *path, Faults *faults)
     for (int i = 1; i < series.count; i++)
         is_one = is_one && is_same_series(&series.file[0], &series.file[i]);
     if (good && !is_one) {
-        // one fault for each series, by its first file
+        // one fault for each series, reported at its first file
         faults_add(faults, path, 0, 0, "several series in one folder; name one file of the series that you want:");
         for (int i = 0; i < series.count; i++) {
             const DicomFile *f = &series.file[i];
@@ -912,7 +914,7 @@ Volume *volume_parse_dicom(const FileBytes *file, Faults *faults)
         snprintf(folder, sizeof folder, "%.*s", slash ? (n > 0 ? n : 1) : 1, slash ? file->path : ".");
         good = gather_folder(folder, &image, &series, faults);
         image_free(&image);
-        if (good && series.count == 0) {   // the file disappeared meanwhile
+        if (good && series.count == 0) {   // the file disappeared while the folder was read
             faults_add(faults, file->path, 0, 0, "cannot be opened; expected a readable file");
             good = false;
         }

@@ -7,9 +7,9 @@
 bool volume_is_dicom(const FileBytes *file);
 // Reads a multi-frame file alone, and a slice with the other files of its series in the same folder.
 Volume *volume_parse_dicom(const FileBytes *file, Faults *faults);
-// A whole DICOM file, which has 4 GB at most.
+// Reads a whole DICOM file, of 4 GB at most.
 bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults);
-// The only series of a folder; several are a fault that lists them.
+// Reads the only series of a folder. If there are several, the fault lists them.
 Volume *volume_load_dicom_folder(const char *path, Faults *faults);
 
 #endif

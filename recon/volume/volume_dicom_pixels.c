@@ -10,10 +10,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-// The program's memory limit: it holds the compressed file, the pixels and the output at once, twice each.
+// The program's memory limit: it holds the compressed file, the pixels and the output at once, each of them twice.
 enum { LIBRARIES_BYTES = 1 << 28, COPIES = 6, SLOWEST_BYTES_S = 1 << 20, LEAST_S = 20 };
 
-// In the child: it reads the file and writes its answer.
+// In the child process: runs `program`, which reads `file` and writes the decoded image to `answer`.
 static void start(const char *program, int file, int answer, size_t most)
 {
     rlim_t memory = (rlim_t)LIBRARIES_BYTES + COPIES * (rlim_t)most;
@@ -26,7 +26,7 @@ static void start(const char *program, int file, int answer, size_t most)
     _exit(127);
 }
 
-// Reads all output of the program, up to `most` bytes; false if there is more, or no memory.
+// Reads all output of the program, up to `most` bytes. Returns false if there is more, or if out of memory.
 static bool take_answer(int answer, size_t most, uint8_t **byte, size_t *length)
 {
     size_t room = 0;

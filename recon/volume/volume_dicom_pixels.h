@@ -4,9 +4,9 @@
 
 #include "recon/volume/volume_format.h"
 
-// The file `path` in explicit little endian, uncompressed, into *out; the caller frees it (file_bytes_free): at most `most` bytes. `place` (where the
-// pixels begin) and `syntax` (their compression) are used in faults. False with a fault if decoding fails, takes too long or yields more, or if the
-// program is missing.
+// Decodes the file `path` to explicit little endian, uncompressed, at most `most` bytes, into *out; the caller frees it (file_bytes_free). `place` (the byte
+// where the pixels begin) and `syntax` (their compression) are used in faults. Returns false with a fault if decoding fails, takes too long or yields more
+// bytes, or if the program is missing.
 bool dicom_unpack(const char *path, size_t place, const char *syntax, size_t most, FileBytes *out, Faults *faults);
 
 #endif

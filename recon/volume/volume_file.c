@@ -1,4 +1,4 @@
-// Choice of the reader by content, the files that a volume is made of, NRRD output.
+// Selects the reader by content, lists the files of which a volume consists, and writes NRRD.
 #include "recon/volume/volume_file.h"
 
 #include "base/base.h"
@@ -17,11 +17,11 @@
 #include <unistd.h>
 #include <zlib.h>
 
-// --- which files a volume is made of ---
+// --- the files of a volume ---
 
 typedef void FileCall(void *context, const char *path);
 
-// The name that an option like `data file: NAME` gives, in the header's folder.
+// Calls for the file that an option such as `data file: NAME` gives, in the header's folder.
 static void call_beside(const char *header_path, const char *name, size_t length, FileCall *call, void *context)
 {
     char path[4096];
@@ -35,7 +35,7 @@ static void call_beside(const char *header_path, const char *name, size_t length
         call(context, path);
 }
 
-typedef struct Named {       // each name that a header gives, in its folder
+typedef struct Named {       // context: calls for each name that a header gives, in the header's folder
     const char *header_path;
     FileCall *call;
     void *context;
@@ -67,7 +67,7 @@ static void call_folder(const char *folder, FileCall *call, void *context)
         closedir(directory);
 }
 
-// Header and samples of a NIfTI pair, whichever was named.
+// Calls for the header and the samples of a NIfTI pair, whichever of the two was given.
 static void call_pair(const char *path, FileCall *call, void *context)
 {
     static const char *const endings[] = {".hdr", ".img", ".hdr.gz", ".img.gz"};
@@ -159,7 +159,7 @@ Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults 
     return parse(&file, faults);
 }
 
-// Of a file that is longer than its header can be, as much as that promises; a DICOM file is its own header.
+// Reads a file, but no more of it than its header implies. A DICOM file is read completely: its headers extend through the whole file.
 static bool read_promised(const char *path, FileBytes *out, Faults *faults)
 {
     if (!file_bytes_read(path, VOLUME_HEADER_MOST, out, faults))
@@ -174,7 +174,7 @@ static bool read_promised(const char *path, FileBytes *out, Faults *faults)
     bool is_dicom = volume_is_dicom(&head) && !volume_is_nrrd(&head) && !volume_is_nifti(&head) && !volume_is_metaimage(&head);
     if (!is_dicom)
         parse(&head, &ignored);
-    if (!is_dicom && needed == 0)   // detached, or bad: the fault is reported below
+    if (!is_dicom && needed == 0)   // a detached or invalid header: the fault is reported below
         return true;
     file_bytes_free(out);
     return is_dicom ? dicom_bytes_read(path, out, faults) : file_bytes_read(path, needed, out, faults);
@@ -190,7 +190,7 @@ Volume *volume_load(const char *path, Faults *faults)
         return NULL;
     size_t n = strlen(path);
     char header[4096];
-    // the samples of a NIfTI pair were named: their header tells
+    // the path may name the samples of a NIfTI pair: its header decides
     bool pair = names_samples_of_pair(path) && n < sizeof header && !volume_is_nrrd(&file) && !volume_is_nifti(&file);
     if (pair) {
         memcpy(header, path, n - 3);
@@ -215,7 +215,7 @@ static const struct SaveType {
     double least, most;
 } save_types[] = {{"float", 4, 0, 0}, {"uint8", 1, 0, 255}, {"int16", 2, -32768, 32767}};
 
-// Little-endian samples of the voxels; NULL with a fault where a value does not fit the type.
+// Encodes the voxels as little-endian samples. Returns NULL with a fault if a value does not fit the type.
 static uint8_t *encode_samples(const Volume *volume, size_t count, const struct SaveType *type, const char *path, Faults *faults)
 {
     uint8_t *out = malloc(count * type->size);

@@ -1,21 +1,22 @@
-// Volumes from files and to them: NRRD (raw, gzip; attached and detached), MetaImage, NIfTI, uncompressed DICOM (a folder, one file of a series, or a
-// multi-frame file). Every header figure is checked before memory is taken: an inconsistent header is a fault with its line (or byte) and what was
-// expected. So is a voxel that is not a finite number.
+// Reads volumes from NRRD (raw, gzip; attached and detached), MetaImage, NIfTI and DICOM (a folder, one file of a series, or a multi-frame file), and writes
+// NRRD. Every figure in a header is checked before memory is allocated: an inconsistent header is a fault with its line (or byte) and what was expected. A
+// voxel that is not a finite number is a fault too.
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_FILE_H
 #define SELDINGER_RECON_VOLUME_VOLUME_FILE_H
 
 #include "recon/volume/volume.h"
 
-// By content, not by extension. A folder is read as a DICOM series; for one file of a series the others are found in its folder. NULL with faults.
+// Loads a volume; its format is detected by content, not by extension. A folder is read as a DICOM series; the other files of a series are found in the
+// folder of the given one. Returns NULL with faults.
 Volume *volume_load(const char *path, Faults *faults);
 // The same from memory; `path` is used in messages, and detached data files are searched in its folder.
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
-// Whether a file that begins with these bytes (4096 tell) is one for volume_load; by `path` the samples of a NIfTI pair.
+// Returns true if volume_load accepts a file that begins with these bytes (4096 are enough); the samples of a NIfTI pair are recognised by `path`.
 bool volume_is_known(const void *bytes, size_t length, const char *path);
-// Calls for each file, there or not, from which volume_load(path) would take samples besides `path` itself: those that a header names, the other half
-// of a NIfTI pair, every file of a DICOM series' folder.
+// Calls `call` for each file, existing or not, that volume_load(path) would read in addition to `path` itself: those that a header gives, the other half of a
+// NIfTI pair, every file in a DICOM series' folder.
 void volume_each_data_file(const char *path, void (*call)(void *context, const char *path), void *context);
-// Writes .nrrd (gzip, float or uint8 / int16 as `type` says: "float", "uint8", "int16").
+// Writes a gzip-compressed .nrrd with samples of `type`: "float", "uint8" or "int16". Returns false with faults.
 bool volume_save_nrrd(const Volume *volume, const char *path, const char *type, Faults *faults);
 
 #endif

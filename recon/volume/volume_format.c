@@ -1,7 +1,7 @@
-// What the readers share: a header's text, the files that it names, and the one place where samples become voxels.
+// Code that the readers share: parsing a header's text, finding the files that it gives, and converting samples to voxels.
 //
-// A header may be wrong. Before memory is allocated the promised samples are compared with the available bytes: raw data must be complete, a deflate
-// stream cannot grow by more than 1032 times, a number written as text takes two bytes. Nor is more of a file read than its header promises.
+// A header may be wrong. Before memory is allocated, the number of samples is compared with the available bytes: raw data must be complete, a deflate
+// stream expands by 1032 times at most, a number written as text takes two bytes. No more of a file is read than its header implies.
 #include "recon/volume/volume_format.h"
 
 #include "base/base.h"
@@ -35,7 +35,7 @@ bool line_cursor_next(LineCursor *cursor, const char **text, size_t *length)
     return true;
 }
 
-// One number at the head of the text; advances past it. The text need not end in NUL.
+// Parses one number at the start of the text and advances past it. The text need not end in NUL.
 static bool take_number(const char **text, size_t *length, double *value)
 {
     char word[64];
@@ -123,7 +123,7 @@ void file_bytes_free(FileBytes *file)
     *file = (FileBytes){0};
 }
 
-// Bytes of a data file that are looked at: what the header promises, and how much longer that may be in the file.
+// Most bytes of a data file that are read: what the header implies, and the tolerance for a longer file.
 static size_t data_most(const VolumeHeader *header)
 {
     size_t count = (size_t)header->size[0] * (size_t)header->size[1] * (size_t)header->size[2], bytes = count * voxel_type_size(header->type);
@@ -132,11 +132,11 @@ static size_t data_most(const VolumeHeader *header)
     if (bytes > SIZE_MAX / 2 - skip)
         return SIZE_MAX / 2;
     bytes += skip;
-    // deflate may also grow: 5 bytes a block of 16 KB, and a head
+    // deflate may also lengthen the data: by 5 bytes per block of 16 KB, and a header
     return header->encoding == ENCODING_RAW && header->line_skip == 0 && header->byte_skip >= 0 ? bytes : bytes + bytes / 1000 + SLACK;
 }
 
-// Samples at the end of a file, or after skipped lines, have no known offset: a file much longer than expected is another file.
+// If the samples are at the end of a file or follow skipped lines, their offset is unknown: a file much longer than expected is then probably the wrong file.
 static bool is_not_too_long(const VolumeHeader *header, const FileBytes *file, Faults *faults)
 {
     if (file->whole <= file->length || (header->byte_skip >= 0 && header->line_skip == 0))
@@ -219,7 +219,7 @@ bool volume_header_check(const VolumeHeader *header, const char *path, int line,
 typedef struct Inflater {
     z_stream stream;
     const FileBytes *data;
-    size_t in;               // compressed bytes taken
+    size_t in;               // compressed bytes consumed
     int state;
 } Inflater;
 
@@ -229,7 +229,7 @@ static bool inflater_open(Inflater *inflater, const FileBytes *data)
     return inflateInit2(&inflater->stream, 15 + 32) == Z_OK;
 }
 
-// The next `wanted` bytes, fewer where the stream ends or is damaged.
+// Reads the next `wanted` bytes, or fewer if the stream ends or is damaged.
 static size_t inflater_read(Inflater *inflater, uint8_t *out, size_t wanted)
 {
     const size_t chunk = (size_t)1 << 30;
@@ -386,7 +386,7 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
     return volume;
 }
 
-// Skips, then converts piecewise, so a stream needs no memory besides the voxels. One byte more than the header promises shows that they do not
+// Skips, then converts piecewise, so a stream needs no memory except the voxels. One byte more than the header implies shows that header and data do not
 // belong together.
 static bool inflate_values(const VolumeHeader *header, const FileBytes *data, size_t skip, size_t count, Volume *volume, Faults *faults)
 {
@@ -510,7 +510,7 @@ static bool is_list(const char *text, size_t length)
 
 bool data_names_several(const char *text, size_t length) { return is_list(text, length) || (length > 0 && memchr(text, '%', length)); }
 
-typedef struct NumberedName {   // before, number, after
+typedef struct NumberedName {   // text before the number, the number, text after it
     const char *text;
     int before, width, after_at, after;
     bool zeros;
@@ -549,7 +549,7 @@ static bool read_numbered(const char *text, size_t length, NumberedName *out)
     return out->step != 0 && (out->step > 0 ? out->first <= out->last : out->first >= out->last);
 }
 
-// The name of file `index`, 0 …; false after the last. Blank lines of a list are passed over.
+// Writes the name of file `index` (from 0). Returns false after the last. Blank lines of a list are skipped.
 static bool next_name(const NumberedName *numbered, LineCursor *names, long index, char name[1200], int *line)
 {
     if (!numbered) {
@@ -613,7 +613,7 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
         good = skip <= data.length && data.length - skip >= share;
         if (!good)
             faults_add_at_byte(faults, path, data.length, "the data ends after %zu of %zu bytes", data.length, skip + share);
-        else if (!joined && !(joined = malloc(bytes)))   // after one file the sizes are plausible
+        else if (!joined && !(joined = malloc(bytes)))   // allocate after the first file, which shows that the sizes are plausible
             faults_add(faults, header_path, line, 0, "needs %zu bytes of memory, more than is available", bytes);
         good = good && joined;
         if (good)

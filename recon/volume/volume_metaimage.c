@@ -1,4 +1,4 @@
-// MetaImage (itk.org/Wiki/ITK/MetaIO): lines `Key = Value`, the last one ElementDataFile: LOCAL (the samples follow), a file, LIST (names follow, one
+// Reads MetaImage (itk.org/Wiki/ITK/MetaIO): lines `Key = Value`, the last one ElementDataFile: LOCAL (the samples follow), a file, LIST (names follow, one
 // per line) or numbered names.
 //
 // Voxel (i, j, k) lies at Offset + sum_a index_a ElementSpacing_a D_a, where D_a is the a-th triple of TransformMatrix.
@@ -82,7 +82,7 @@ bool volume_is_metaimage(const FileBytes *file)
     const char *equals = memchr(text, '=', length);
     if (!equals)
         return false;
-    // ObjectType leads where the file is written by rule; old ones start with NDims or a comment
+    // ObjectType comes first in conforming files; old ones start with NDims or a comment
     size_t n = (size_t)(equals - text);
     return header_text_is(text, n, "ObjectType") || header_text_is(text, n, "NDims") || header_text_is(text, n, "Comment");
 }
@@ -152,7 +152,7 @@ static bool read_grid(const KeyValue *value, const char *path, VolumeHeader *out
     read_numbers(&value[DIM_SIZE], d, size, path, faults);
     read_numbers(value[SPACING].line ? &value[SPACING] : &value[ELEMENT_SIZE], d, spacing, path, faults);
     read_numbers(&value[OFFSET], d, offset, path, faults);
-    if (d == 4)   // the identity of four dimensions, where none is given
+    if (d == 4)   // identity matrix of four dimensions, if none is given
         memcpy(matrix, (double[16]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, sizeof matrix);
     read_numbers(&value[MATRIX], d * d, matrix, path, faults);
     if (faults->count > before)

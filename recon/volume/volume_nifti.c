@@ -1,7 +1,7 @@
-// NIfTI-1: a header of 348 bytes at fixed places, in either byte order, then the samples (.nii), or the samples in a .img beside the .hdr. libnifti
+// Reads NIfTI-1: a header of 348 bytes at fixed offsets, in either byte order, then the samples (.nii), or the samples in a .img beside the .hdr. libnifti
 // is not used, because it trusts the sizes of a header and prints its own messages.
 //
-// Grid: sform where its code is > 0 (rows srow_x, srow_y, srow_z), else qform (quaternion and qfac), else pixdim alone. The frame is RAS by rule.
+// Grid: sform if its code is > 0 (rows srow_x, srow_y, srow_z), else qform (quaternion and qfac), else pixdim alone. NIfTI prescribes the frame RAS.
 #include "recon/volume/volume_nifti.h"
 
 #include <stdio.h>
@@ -168,7 +168,7 @@ static bool read_header(const FileBytes *file, NiftiBytes *h, VolumeHeader *out,
     }
     double offset = float_at(h, AT_VOX_OFFSET), least = *is_pair ? 0 : DATA_START;
     if (offset == 0)
-        offset = least;   // common in pairs, tolerated in single files
+        offset = least;   // a smaller offset is common in pairs and tolerated in single files
     if (!(offset >= least && offset < 1e9) || floor(offset) != offset) {
         faults_add_at_byte(faults, path, AT_VOX_OFFSET, "the data offset %g is not valid; expected a whole number from %g", offset, least);
         return false;
@@ -177,14 +177,14 @@ static bool read_header(const FileBytes *file, NiftiBytes *h, VolumeHeader *out,
     out->big_endian = h->big_endian;
     out->slope = float_at(h, AT_SLOPE);
     out->intercept = float_at(h, AT_INTERCEPT);
-    if (out->slope == 0) {   // the format's word for "no scale"
+    if (out->slope == 0) {   // NIfTI's value for "no scaling"
         out->slope = 1;
         out->intercept = 0;
     }
     return read_grid(h, path, out, faults);
 }
 
-// The samples of a .hdr: the file of the same name that ends in .img, or .img.gz.
+// Reads the samples of a .hdr from the file of the same name that ends in .img or .img.gz.
 static Volume *read_pair(const FileBytes *file, VolumeHeader *header, size_t start, Faults *faults)
 {
     const char *slash = strrchr(file->path, '/'), *base = slash ? slash + 1 : file->path;
@@ -198,7 +198,7 @@ static Volume *read_pair(const FileBytes *file, VolumeHeader *header, size_t sta
     Faults first;
     faults_clear(&first);
     snprintf(name, sizeof name, "%.*s.img", (int)(stem < 900 ? stem : 900), base);
-    // as long as either encoding may be
+    // allow the longest file of either encoding
     header->encoding = ENCODING_DEFLATE;
     header->byte_skip = (long)start;
     bool found = file_bytes_read_beside(file->path, 0, name, strlen(name), header, &data, path, &first);

@@ -39,7 +39,7 @@ typedef struct Smoothing {
     bool *failed;            // (jobs)
 } Smoothing;
 
-// One line along x, or the lines along the axis side by side in x: a plane of constant z (axis 1) or y (axis 2).
+// Smooths one line along x, or a plane of lines along the axis that lie side by side in x: a plane of constant z (axis 1) or y (axis 2).
 static void smooth_slab(void *context, long index)
 {
     const Smoothing *s = context;

@@ -1,4 +1,4 @@
-// NRRD, versions 1 to 5 (teem.sourceforge.net/nrrd/format.html): lines `field: value`, `key:=value` and `# comment` up to an empty line, then
+// Reads NRRD, versions 1 to 5 (teem.sourceforge.net/nrrd/format.html): lines `field: value`, `key:=value` and `# comment` up to an empty line, then
 // the samples, or the samples in detached files. Raw, gzip and text encodings.
 //
 // Fields are collected first and parsed afterwards, so their order does not matter. An unknown or repeated field is a fault, as the format demands.
@@ -59,7 +59,7 @@ static const struct FieldName {
     {"centers", CENTERS},
     {"centerings", CENTERS},
     {"units", UNITS},
-    // without meaning for the grid
+    // fields that do not affect the grid
     {"content", IGNORED},
     {"kinds", IGNORED},
     {"labels", IGNORED},
@@ -144,7 +144,7 @@ typedef struct FieldValue {
 typedef struct NrrdHeader {
     FieldValue field[FIELD_COUNT];
     size_t end;              // first byte after the header
-    bool has_end;            // an empty line was there
+    bool has_end;            // the header ended with an empty line
 } NrrdHeader;
 
 bool volume_is_nrrd(const FileBytes *file) { return file->length >= 8 && !memcmp(file->byte, "NRRD000", 7); }
@@ -165,7 +165,7 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
         if (!colon || (size_t)(colon - text) + 1 >= length || (colon[1] != ' ' && colon[1] != '=')) {
             faults_add(faults, file->path, cursor.line, 1,
                        "neither a field, a key nor a comment; expected `field: value`, `key:=value`, or an empty line before the data");
-            return false;   // most likely the data: continuing would only repeat this
+            return false;   // most likely the data: continuing would only repeat this fault
         }
         if (colon[1] == '=')
             continue;
@@ -183,14 +183,14 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
         else
             *value = (FieldValue){colon + 2, length - named - 2, cursor.line};
         if (name && name->field == DATA_FILE && data_names_several(colon + 1, length - named - 1) && !memchr(colon, '%', length - named))
-            break;   // the names of a LIST stand in the header's place
+            break;   // the names of a LIST occupy the rest of the header
     }
     header->has_end = cursor.position < file->length || length == 0;
     header->end = cursor.position;
     return faults->count == before;
 }
 
-// The next "(a,b,c)" or "none" of a list of vectors.
+// Parses the next "(a,b,c)" or "none" of a list of vectors.
 static bool take_vector(FieldValue *value, double out[3], bool *is_none)
 {
     while (value->length > 0 && isspace((unsigned char)*value->text))
@@ -219,7 +219,7 @@ static bool take_vector(FieldValue *value, double out[3], bool *is_none)
     return header_numbers(inner, n, 3, out);
 }
 
-// Millimetres per unit of the quoted units of a field, one for all axes; 0 with a fault where they differ or are unknown.
+// Millimetres per unit, from a field's quoted units, which must be the same for all axes. Returns 0 with a fault if they differ or are unknown.
 static double unit_scale(const FieldValue *value, const char *path, Faults *faults)
 {
     static const struct {
@@ -237,7 +237,7 @@ static double unit_scale(const FieldValue *value, const char *path, Faults *faul
         for (size_t i = 0; i < COUNT(units); i++)
             if (header_text_is(open + 1, (size_t)(close - open - 1), units[i].name))
                 mm = units[i].mm;
-        if (mm <= 0 || (scale > 0 && mm != scale)) {   // == of table entries
+        if (mm <= 0 || (scale > 0 && mm != scale)) {   // exact comparison is safe: both are table entries
             faults_add(faults, path, value->line, 0, "the units are unknown or differ between axes; expected \"mm\" (or \"m\", \"cm\", \"um\") for each");
             return 0;
         }
@@ -247,7 +247,7 @@ static double unit_scale(const FieldValue *value, const char *path, Faults *faul
     return scale > 0 ? scale : 1;
 }
 
-// Which of `dimension` axes are the three of space: axes of one sample that have no direction are left out.
+// Chooses the three spatial axes of `dimension` axes. Axes with one sample and without a direction are omitted.
 static bool choose_axes(const NrrdHeader *h, int dimension, const double *size, const double (*direction)[3], const bool *is_none, int chosen[3],
                         const char *path, Faults *faults)
 {

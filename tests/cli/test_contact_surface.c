@@ -145,14 +145,14 @@ static void a_bad_mesh_is_told_and_mended_or_refused(void **state)
     for (int t = 0; t < bad.count; t += 7)
         turn(bad.triangle[t]);
     pipe_write(&bad, 1);
-    told("face against their neighbours", other);
+    told("oriented against their neighbours", other);
     assert_true(between(tip, other) < 1e-6);
 
     bad = good;
     for (int t = 0; t < bad.count; t++)
         turn(bad.triangle[t]);
     pipe_write(&bad, 1);
-    told("normals point into the lumen: all turned", other);
+    told("normals point into the lumen: all flipped", other);
     assert_true(between(tip, other) < 1e-6);
 
     bad = good;
@@ -174,7 +174,7 @@ static void a_bad_mesh_is_told_and_mended_or_refused(void **state)
     told("edges are open", other);
 
     pipe_write(&good, 0.001);
-    refused("mesh_scale: 1000 takes metres");
+    refused("mesh_scale: 1000 for metres");
     scene_write("mesh: pipe.obj, mesh_scale: 1000", "[0.5, 0, 0]");
     told("", other);
     assert_true(between(tip, other) < 1e-6);

@@ -1,4 +1,4 @@
-// Tiny DICOM files for tests, built byte by byte: elements in any of the three uncompressed encodings.
+// Writes small DICOM files for tests, byte by byte: elements in any of the three uncompressed encodings.
 #ifndef SELDINGER_TESTS_RECON_DICOM_FILE_H
 #define SELDINGER_TESTS_RECON_DICOM_FILE_H
 
@@ -21,7 +21,7 @@ static inline void dicom_bits(DicomBytes *d, uint32_t bits, int size, bool big)
         d->byte[d->length++] = (uint8_t)(bits >> (8 * (big ? size - 1 - i : i)));
 }
 
-// Tag, type and length; the value follows. Length 0xffffffff: until its delimiter.
+// Writes tag, type and length; the value follows. Length 0xffffffff: undefined, ends at its delimiter.
 static inline void dicom_head(DicomBytes *d, uint32_t tag, const char *vr, uint32_t length)
 {
     bool big = d->encoding == EXPLICIT_BIG && tag >> 16 != 2;
@@ -55,7 +55,7 @@ static inline void dicom_short(DicomBytes *d, uint32_t tag, unsigned value)
     dicom_bits(d, value, 2, d->encoding == EXPLICIT_BIG);
 }
 
-// Preamble and group 2, or nothing.
+// Writes the preamble and group 2, or nothing.
 static inline void dicom_begin(DicomBytes *d, DicomEncoding encoding, bool preamble, const char *syntax)
 {
     static const char *const own[] = {"1.2.840.10008.1.2", "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.2"};

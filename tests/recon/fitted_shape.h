@@ -1,4 +1,4 @@
-// What the tests of the fit share: shapes and their models, with the faults in `faults`. Include after cmocka.h.
+// Shapes and their models for the tests of the fit, with the faults in `faults`. Include after cmocka.h.
 #ifndef SELDINGER_TESTS_RECON_FITTED_SHAPE_H
 #define SELDINGER_TESTS_RECON_FITTED_SHAPE_H
 
@@ -6,7 +6,7 @@
 #include "recon/phantom/phantom.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-static const bool is_slow = true;    // the small shapes alone: the figures are the release build's business
+static const bool is_slow = true;    // only the small shapes: accuracy is measured in the release build
 #else
 static const bool is_slow = false;
 #endif

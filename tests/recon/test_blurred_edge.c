@@ -1,5 +1,5 @@
-// Edges of blurred vessels: the closed form against the profile, its inverse, the image's blur found from volumes of known blur, and a tracked tree
-// set right against the vessel itself.
+// Edges of blurred vessels: the closed form against the profile, its inverse, the blur estimated from volumes of known blur, and a tracked tree after
+// correction against the true vessel.
 #include "recon/volume/blurred_edge.h"
 
 #include <setjmp.h>
@@ -15,7 +15,7 @@
 #include "recon/track/rbt_track.h"
 #include "tests/geom/near.h"
 
-// Against the profile itself, P(x) = int phi_b(x - u) erf((R^2 - u^2)^(1/2) / (b sqrt 2)) du, and the two limits.
+// Compares with the steepest point of the profile itself, P(x) = int phi_b(x - u) erf((R^2 - u^2)^(1/2) / (b sqrt 2)) du, and with the two limits.
 static void edge_of_a_blurred_disc(void **state)
 {
     (void)state;
@@ -43,11 +43,11 @@ static void the_inverse(void **state)
     (void)state;
     for (double radius = 1.4; radius < 30; radius *= 1.3)
         assert_near(blurred_edge_undo(blurred_edge_of(radius, 1), 1), radius, 1e-6 * radius);
-    assert_near(blurred_edge_undo(1.2, 1), 1.2, 0);   // could be any small disc
+    assert_near(blurred_edge_undo(1.2, 1), 1.2, 0);   // indeterminate: the edge of any small disc
     assert_near(blurred_edge_undo(0.7, 0), 0.7, 0);
 }
 
-// A tracked helix of radius 1 mm at 0.2 mm voxels, noise 5 %: the blur that is found, the wall's points against the vessel before and after.
+// A tracked helix of radius 1 mm at 0.2 mm voxels, noise 5 %: the estimated blur, and the wall points against the vessel before and after the correction.
 static void wall_of_a_tracked_helix(void **state)
 {
     (void)state;
@@ -66,7 +66,7 @@ static void wall_of_a_tracked_helix(void **state)
         VesselTree *tree = rbt_track(v, &p, &seed, 1, NULL, 0, 0, NULL, NULL, "test", &faults);
         assert_non_null(tree);
         double voxel2 = 0.04, expected = sqrt(psf[k] * psf[k] + voxel2 / 12 + voxel2 / 3), found = blurred_edge_measure(v, tree);
-        double all = sqrt(found * found + voxel2 / 12);   // and the moving average along the rays
+        double all = sqrt(found * found + voxel2 / 12);   // with the moving average along the rays
         double mean[2] = {0, 0};
         int count[2] = {0, 0};
         for (int after = 0; after < 2; after++) {

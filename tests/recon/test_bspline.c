@@ -1,4 +1,5 @@
-// Cubic B-spline approximation: against a plain double reference, and the laws it must obey (reproduces straight lines, smooths by 1/sqrt(3) voxel).
+// Cubic B-spline approximation: against a plain reference in double precision, and the laws that it must obey (it reproduces straight lines and smooths by
+// 1/sqrt(3) voxel).
 #include "base/simd.h"
 #include "recon/track/ransac_cylinder.h"
 #include "recon/volume/bspline.h"
@@ -16,7 +17,7 @@ static double basis(double x)
     return x < 1 ? 2.0 / 3 - x * x + x * x * x / 2 : x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6 : 0;
 }
 
-// Every voxel's contribution, and the background's for those that do not exist.
+// Sums every voxel's contribution, and the background's for voxels outside the grid.
 static double reference(const Volume *v, Vec3 x)
 {
     double sum = 0;
@@ -59,7 +60,7 @@ static void equals_the_reference(void **state)
         Vec3 x = {16 * random_unit(&random) - 4, 15 * random_unit(&random) - 4, 14 * random_unit(&random) - 4};
         assert_true(fabs((double)bspline_sample(v, x) - reference(v, x)) < 2e-6);   // 64 float products of numbers below 1
     }
-    // far away and no number at all: the background
+    // far away, and for NaN: the background
     assert_true(bspline_sample(v, vec3(1e12, 0, 0)) == v->minimum && bspline_sample(v, vec3(0, -1e300, 0)) == v->minimum);
     assert_true(bspline_sample(v, vec3(NAN, 0, 0)) == v->minimum);
     volume_free(v);
@@ -91,7 +92,7 @@ static void smooths_by_a_known_width(void **state)
     volume_free(v);
 }
 
-// Any line, inside, across the border or outside, of any length, on any instruction set: the bits of its samples taken alone.
+// A line's samples have the same bits as single samples: inside, across the border or outside, of any length, on any instruction set.
 static void lines_are_samples(void **state)
 {
     (void)state;
@@ -111,7 +112,7 @@ static void lines_are_samples(void **state)
             bspline_sample_line(v, start, step, count, line);
             for (int i = 0; i < count; i++)
                 assert_true(line[i] == bspline_sample(v, vec3(start.x + i * step.x, start.y + i * step.y, start.z + i * step.z)));
-            assert_true(count == 70 || line[count] == -7);   // nothing written beyond
+            assert_true(count == 70 || line[count] == -7);   // nothing is written after the end
         }
     }
     simd_force(simd_widest());

@@ -1,5 +1,5 @@
-// The whole-tree fit by shared blobs against shapes of known wall: exact and noisy samples, no jumps, no narrow places, links that are lumen and that are none,
-// the same bits for any number of threads and instruction set, refused options.
+// The whole-tree fit by shared blobs against shapes with known walls: exact and noisy samples, no jumps, no narrow places, links that are lumen and links
+// that are not, the same bits for any number of threads and any instruction set, refused options.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -35,11 +35,12 @@ static ModelMeasure measure(const char *name, const VesselTree *model, const Sha
             print_message("; %s rms %.4f bias %+.4f worst %.4f", model_place_name[place], m.wall[place].rms, m.wall[place].bias, m.wall[place].most);
     print_message("; %d ghosts, %d narrow\n", m.ghost_nodes, m.narrow_links);
     for (int place = 0; place < PLACES; place++)
-        assert_true(m.raw[place].gap_most < 1e-6);   // one field
+        assert_true(m.raw[place].gap_most < 1e-6);   // there is only one field, so no jumps
     return m;
 }
 
-// Limits in mm: about twice what the shapes gave when this was written; the phantom's, and its worst at the crotch, are those that the project asks for.
+// Limits in mm: about twice the values measured when this was written; those of the phantom, and its worst value at the crotch, are the project's
+// requirements.
 static void exact_samples_give_the_wall(void **state)
 {
     (void)state;
@@ -94,7 +95,7 @@ static void threads_and_instruction_sets_give_the_same_bits(void **state)
     shape_free(shape);
 }
 
-// Two pieces of a tube on a line, a gap between them: within the sum of the radii it is lumen, beyond it nothing opens.
+// Two pieces of a tube on a line with a gap between them: a gap up to the sum of the radii is lumen, a wider gap stays closed.
 static VesselTree *broken_tube(double gap)
 {
     enum { NODES = 12, AROUND = 24 };

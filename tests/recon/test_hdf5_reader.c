@@ -1,4 +1,4 @@
-// The guarded reader of HDF5: datasets like ours are read; data stored elsewhere, compressed by other filters than deflate, of another type, or
+// The guarded reader of HDF5: datasets like ours are read; data that are stored elsewhere, compressed by filters other than deflate, of another type, or
 // missing in the file are refused with a message.
 #include "recon/hdf5_reader.h"
 
@@ -26,7 +26,7 @@ static const double numbers[ROWS] = {1, 2, 3};
 
 static hid_t new_file(void) { return H5Fcreate(in_folder("a.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT); }
 
-// A dataset of ROWS values, with the numbers unless `data` is NULL; takes `creation`.
+// Writes a dataset of ROWS values, with the numbers unless `data` is NULL; takes ownership of `creation`.
 static void put_with(hid_t file, const char *name, hid_t type, hsize_t rows, hid_t creation, const void *data)
 {
     hid_t space = H5Screate_simple(1, &rows, NULL), set = H5Dcreate2(file, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT);
@@ -56,7 +56,7 @@ static Hdf5Reader *open_file(hid_t file)
     return reader;
 }
 
-// Takes the file.
+// Checks that reading the dataset is refused with these words; closes the file.
 static void refused(hid_t file, Hdf5Dataset dataset, const char *words)
 {
     Hdf5Reader *reader = open_file(file);
@@ -143,9 +143,9 @@ static void data_elsewhere_are_not_read(void **state)
     hdf5_reader_close(reader);
 }
 
-// --- packed chunks ---
+// --- compressed chunks ---
 
-enum { PART = 20 };          // values a chunk: the last of the three ends at ROWS
+enum { PART = 20 };          // values per chunk: the last of the three chunks ends at ROWS
 static hid_t packed(bool is_shuffled)
 {
     hid_t creation = chunks(PART);
@@ -157,7 +157,7 @@ static hid_t packed(bool is_shuffled)
 
 static double wave(int i) { return i % 7 ? 0.1 * i : -1e-300 * i; }
 
-// As the library packs them, in each type, rank and byte order.
+// Datasets compressed by the library, in each type, rank and byte order.
 static void what_is_packed_is_read(void **state)
 {
     (void)state;
@@ -177,7 +177,7 @@ static void what_is_packed_is_read(void **state)
                 H5Pset_deflate(creation, (unsigned)(1 + t));
                 hid_t set = H5Dcreate2(file, "/x", stored[t], space, H5P_DEFAULT, creation, H5P_DEFAULT);
                 assert_true(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
-                double expected[165];        // as the library reads it
+                double expected[165];        // values as read by the library
                 int32_t expected_counts[165];
                 assert_true(H5Dread(set, is_float ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, H5P_DEFAULT,
                                     is_float ? (void *)expected : expected_counts) >= 0);
@@ -218,7 +218,7 @@ static void other_packings_are_refused(void **state)
         if (i == 3 || i == 4)
             H5Pset_deflate(creation, 6);
         if (i == 3)
-            H5Pset_shuffle(creation);            // in the wrong order
+            H5Pset_shuffle(creation);            // filters in the wrong order
         if (i == 4)
             H5Pset_deflate(creation, 6);         // twice
         if (i == 5)
@@ -231,7 +231,7 @@ static void other_packings_are_refused(void **state)
         put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
         refused(file, plain, "is compressed by filters other than deflate");
     }
-    // while it is open no plug-in may be loaded; afterwards the program's own settings hold again
+    // while the file is open no plug-in may be loaded; afterwards the program's own settings apply again
     const unsigned set = H5PL_FILTER_PLUGIN;
     unsigned may_load = 1;
     H5PLset_loading_state(set);
@@ -244,7 +244,7 @@ static void other_packings_are_refused(void **state)
     assert_int_equal(may_load, set);
 }
 
-// A dataset whose first chunk holds these bytes, the others whole ones.
+// A dataset whose first chunk holds these bytes; the other chunks are valid.
 static hid_t with_chunk(const void *bytes, size_t length, unsigned left_out)
 {
     hid_t file = new_file();
@@ -267,7 +267,7 @@ static void damaged_chunks_are_refused(void **state)
         values[i] = (unsigned char)(i * 37 % 251);
     uLongf length = sizeof stream;
     assert_int_equal(compress(stream, &length, values, BYTES), Z_OK);
-    // whole it is read; of each prefix, with a byte behind it, or with a bit turned over it is not
+    // the whole stream is read; any prefix, an extra byte, or a flipped bit is refused
     Hdf5Reader *reader = open_file(with_chunk(stream, length, 0));
     Hdf5Dataset x = plain;
     void *read = hdf5_read(reader, &x);
@@ -283,13 +283,13 @@ static void damaged_chunks_are_refused(void **state)
         refused(with_chunk(stream, length, 0), plain, "damaged or truncated");
         stream[i] ^= 4;
     }
-    // a byte less and a byte more than the chunk has
+    // one byte less and one byte more than the chunk's size
     for (int more = -1; more <= 1; more += 2) {
         length = sizeof stream;
         assert_int_equal(compress(stream, &length, values, (uLong)(BYTES + more)), Z_OK);
         refused(with_chunk(stream, length, 0), plain, "damaged or truncated");
     }
-    // a chunk whose filters were left out holds its plain bytes, no more and no less
+    // a chunk whose filters were skipped must hold exactly its plain bytes
     reader = open_file(with_chunk(values, BYTES, 3));
     x = plain;
     double *same = hdf5_read(reader, &x);
@@ -299,11 +299,11 @@ static void damaged_chunks_are_refused(void **state)
     hdf5_reader_close(reader);
     refused(with_chunk(values, BYTES - 1, 3), plain, "damaged or truncated");
     refused(with_chunk(values, BYTES, 0), plain, "damaged or truncated");
-    // longer than deflate makes any chunk of this size
+    // longer than any chunk of this size compressed by deflate
     refused(with_chunk(stream, sizeof stream, 0), plain, "truncated");
 }
 
-// Little that unpacks to much: deflate gives up to 1032 bytes for one.
+// Decompression bombs: deflate yields up to 1032 bytes per byte.
 static void bombs_are_refused(void **state)
 {
     (void)state;
@@ -317,7 +317,7 @@ static void bombs_are_refused(void **state)
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 40, chunks(1 << 20), NULL);
     refused(file, plain, "more or larger chunks");
-    // chunks that were never written promise as much, and are not there
+    // chunks that were never written imply as many bytes, but are missing
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, ROWS, packed(false), NULL);
     refused(file, plain, "never written");
@@ -339,7 +339,7 @@ static void what_is_not_there_is_refused(void **state)
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 28, chunks((hsize_t)1 << 28), NULL);
     refused(file, plain, "more or larger chunks");
-    // one dataset under many names takes the file's bytes once
+    // one dataset with many names uses the file's bytes only once
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, ROWS, chunks(ROWS), numbers);
     H5Lcreate_hard(file, "/x", file, "/y", H5P_DEFAULT, H5P_DEFAULT);

@@ -1,5 +1,6 @@
-// A surface with its centrelines to a tree: shapes whose truth is known, as they stand, turned and mirrored, in metres, with the curves in the other
-// patient frame, with normals into the lumen, open; curves beside the middle or with wrong radii; what has no centreline; other vessels' curves.
+// Import of a surface with centrelines: shapes whose geometry is known, in various transformations: unchanged, rotated and mirrored, in metres, with the
+// curves in the other patient frame, with normals into the lumen, open; curves beside the middle or with wrong radii; parts without a centreline; curves of
+// another vessel.
 #include "recon/surface/import_surface.h"
 
 #include "base/sort_doubles.h"
@@ -22,7 +23,7 @@ static const char *const variant_name[VARIANTS] = {"plain", "turned", "metres", 
 static Vec3 turned(Vec3 p) { return vec3(17 - (0.8 * p.y - 0.6 * p.z), 5 + 0.6 * p.y + 0.8 * p.z, -3 + p.x); }
 static Vec3 placed(Vec3 p, int variant) { return variant == TURNED ? turned(p) : p; }
 
-// Whether triangle t closes a flat end: square to the vessel at one of the truth's ends, and ahead of it.
+// Returns true if triangle t closes a flat end: perpendicular to the vessel at one of the true ends, and ahead of it.
 static bool is_cap(const VesselTree *truth, const TriangleMesh *mesh, int t)
 {
     Vec3 a = mesh->vertex[mesh->triangle[t][0]], b = mesh->vertex[mesh->triangle[t][1]], c = mesh->vertex[mesh->triangle[t][2]];
@@ -66,7 +67,7 @@ static SurfaceMesh *mesh_of(const Shape *shape, const VesselTree *truth, double 
     return mesh;
 }
 
-// A curve from the root to each end, the trunk in all of them; aside: moved square to itself, by that many radii.
+// A curve from the root to each end, each including the trunk. `aside`: shift perpendicular to the curve, in radii.
 static CurveSet *curves_of(const VesselTree *truth, int variant, double aside, double radius_factor)
 {
     CurveSet *set = curve_set_create();
@@ -102,7 +103,7 @@ static int end_count(const VesselTree *tree)
     return ends;
 }
 
-// Distance to the truth's centreline in its radii, and that radius.
+// Distance to the true centreline in its radii, and that radius.
 static double off_centre(const VesselTree *truth, int variant, Vec3 p, double *radius)
 {
     double least = INFINITY;
@@ -118,7 +119,7 @@ static double off_centre(const VesselTree *truth, int variant, Vec3 p, double *r
     return least / *radius;
 }
 
-// Flat lids' edges are bevelled by the mesh: the wall near ends is no truth.
+// The mesh bevels the edges of flat lids, so the wall near ends is not compared.
 static bool is_near_end(const VesselTree *truth, Vec3 p)
 {
     for (int i = 0; i < truth->node_count; i++) {
@@ -230,7 +231,7 @@ static void test_threads(void **state)
     case_free(&three);
 }
 
-// Points of coarse facets stand where the round wall was, not on the facets.
+// Points on coarse facets are moved to the round wall that the facets approximate.
 static void test_coarse(void **state)
 {
     (void)state;
@@ -272,7 +273,7 @@ static void test_curves_beside(void **state)
     (void)state;
     ImportOptions options = import_default_options();
     Case near = import_case("arc", 0.25, PLAIN, 0.2, 1, &options);
-    // a curve a little beside the middle is taken as it is, but for an end that stands out of the lumen
+    // a curve slightly beside the middle is unchanged, except for an end outside the lumen
     assert_true(near.report.moved_samples <= 1);
     assert_float_equal(mean_off(&near), 0.2, 0.03);
     case_free(&near);
@@ -296,7 +297,7 @@ static void test_wrong_radii(void **state)
     }
 }
 
-// A thin vessel aside of the only one that has a centreline, and a piece far off: both are left out and reported.
+// A thin branch without a centreline beside the only vessel that has one, and a part far away: both are omitted and reported.
 static void test_no_centreline(void **state)
 {
     (void)state;
@@ -317,7 +318,7 @@ static void test_no_centreline(void **state)
     mesh->triangle_count += 4;
     MeshCheck check;
     assert_true(mesh_repair(mesh, &check));
-    // the longest way only
+    // only the longest curve
     CurveSet *all = curves_of(truth, PLAIN, 0, 1), *set = curve_set_create();
     int longest = 0;
     for (int i = 1; i < all->curve_count; i++)

@@ -1,4 +1,4 @@
-// The same box from every surface format, the same curves from every centreline format, and what is said of broken ones.
+// The same box from every surface format, the same curves from every centreline format, and the messages about damaged files.
 #include "recon/surface/centreline_file.h"
 #include "recon/surface/mesh_check.h"
 #include "recon/surface/surface_file.h"
@@ -77,7 +77,7 @@ static void text_obj(Text *t)
         add(t, "f %d//1 %d//1 %d//1\n", face[i][0] + 1, face[i][1] + 1, face[i][2] + 1);
 }
 
-// As VTK 9 writes it: the points' range within their array, and empty arrays, packed, that name the usual size of a block.
+// As VTK 9 writes it: the points' range within their array, and empty compressed arrays, which give the usual block size.
 static void text_vtp(Text *t)
 {
     add(t, "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\" header_type=\"UInt32\" "
@@ -124,7 +124,7 @@ static void test_surfaces(void **state)
     }
 }
 
-// A file that was cut anywhere is either refused with a fault of its own name, or what is left is a whole file with fewer triangles.
+// A file truncated anywhere is either refused with a fault that gives its name, or the remaining part is a valid file with fewer triangles.
 static void test_cut_short(void **state)
 {
     (void)state;
@@ -133,7 +133,7 @@ static void test_cut_short(void **state)
         format[f].write(text);
         int refused = 0;
         for (size_t n = 0; n + 16 < text->length; n++) {
-            char *exact = malloc(n + 1);   // so that reading beyond it shows
+            char *exact = malloc(n + 1);   // so that the sanitizer detects reading past the end
             memcpy(exact, text->byte, n);
             faults_clear(&faults);
             SurfaceMesh *mesh = surface_parse(exact, n, format[f].name, &faults);
@@ -148,7 +148,7 @@ static void test_cut_short(void **state)
             }
             free(exact);
         }
-        // lines of OBJ stand for themselves, the others say what must follow
+        // an OBJ line is complete by itself; the other formats declare what must follow
         print_message("%s: %d of %zu cuts refused\n", format[f].name, refused, text->length - 16);
         assert_true(f == 3 ? refused > 100 : refused + 16 == (int)text->length);
         free(text);
@@ -213,7 +213,7 @@ static void test_curves(void **state)
         char *text = centreline_text(set, name[f], &length, &faults);
         assert_non_null(text);
         assert_true(centreline_parse(text, length, name[f], again, &faults));
-        // SWC knows no curves, only samples and their parents: one that begins on another cuts it there
+        // SWC has no curves, only samples and their parents: a curve that begins on another one divides it there
         assert_int_equal(again->curve_count, f == 2 ? 3 : 2);
         assert_float_equal(total_length(again), total_length(set), 1e-9);
         for (int i = 0; i < again->point_count; i++) {

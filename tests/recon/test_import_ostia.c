@@ -1,4 +1,4 @@
-// Ostia of imported trees against truth: nodes on every link, inside; no point where a tool passes; vessels that touch stay apart.
+// Ostia of imported trees against the exact geometry: every link has nodes, inside the lumen; no point lies in a tool's path; touching vessels stay separate.
 #include "recon/surface/import_surface.h"
 
 #include "recon/phantom/phantom.h"
@@ -92,7 +92,7 @@ static void every_ostium_is_described(void **state)
     static const struct {
         const char *name, option[3][2][64];
         int junctions;
-        double cell, off;    // [mm] of the mesh, and how far its facets lie from the wall at most
+        double cell, off;    // [mm] cells of the mesh, and largest distance of its facets from the wall
     } kinds[] = {{"tree", {{"branches", "15"}, {"radius_mm", "1.4"}, {"seed", "1"}}, 7, 0.3, 0.08},
                  {"twig", {{"twig_radius_mm", "0.4"}, {"radius_mm", "2"}, {"seed", "1"}}, 1, 0.2, 0.05},
                  {"y", {{"angle_deg", "60"}, {"radius_mm", "1"}, {"seed", "1"}}, 1, 0.2, 0.05}};
@@ -113,7 +113,7 @@ static void every_ostium_is_described(void **state)
         check_tree(kinds[k].name, tree, shape, &report, kinds[k].off);
         assert_int_equal(report.junction_count, kinds[k].junctions);
         assert_int_equal(report.junctions_with[IMPORT_SUPPORTED], kinds[k].junctions);
-        assert_true(report.link_nodes > 0 || k == 1);   // a twig's own first nodes reach far enough into the wide vessel
+        assert_true(report.link_nodes > 0 || k == 1);   // the twig's own first nodes reach far enough into the wide vessel
         vessel_tree_free(tree);
         curve_set_free(set);
         free(mesh.vertex);
@@ -123,7 +123,7 @@ static void every_ostium_is_described(void **state)
     }
 }
 
-// Curves that go from one vessel into its neighbour through both walls: the surface says that nothing leads there, however thin the gap.
+// Curves that lead from one vessel into its neighbour through both walls: the surface shows that there is no connection, however thin the gap.
 static void touching_vessels_stay_apart(void **state)
 {
     (void)state;
@@ -143,7 +143,7 @@ static void touching_vessels_stay_apart(void **state)
         add_surface(shape_neighbour(shape), 0.3, &mesh);
         assert_true(mesh_repair(&mesh, &check));
         CurveSet *set = curves_of(truth);
-        // where both are nearest: from the one's axis to the other's, and on along it
+        // where the vessels are nearest: from the axis of one to that of the other, and along it
         int from = 0, to = 0, count = 0;
         for (int i = 0; i < truth->node_count; i++)
             for (int k = 1; k + 4 < other->node_count; k++)

@@ -1,5 +1,5 @@
-// The inlet of a surface alone: open tubes with a stenosis near the inlet, tapered, flared, cut obliquely, turned and mirrored have an open root; a capsule's
-// rounded end is closed.
+// The inlet of a surface without given centrelines: open tubes with a stenosis near the inlet, tapered, flared, cut obliquely, rotated and mirrored have an
+// open root; a capsule's rounded end is closed.
 #include "recon/phantom/phantom.h"
 #include "recon/surface/import_surface.h"
 #include "recon/surface/mesh_centreline.h"
@@ -17,10 +17,10 @@ enum { RING = 28, RINGS = 97 };
 
 typedef struct Tube {
     const char *name;
-    double stenosis_at, stenosis;    // [radii] from the inlet; least radius as a share of 1; 1: none
-    double taper, flare;             // radius at the far end; at the inlet, over the first 1.5 radii
-    double oblique_deg;              // of the inlet's cut
-    int first, last;                 // variants: bit 0 turned, bit 1 mirrored
+    double stenosis_at, stenosis;    // [radii] distance from the inlet; least radius as a fraction of the normal one; 1: no stenosis
+    double taper, flare;             // relative radius at the far end; at the inlet, over the first 1.5 radii
+    double oblique_deg;              // angle of the inlet's cut
+    int first, last;                 // range of variants: bit 0 rotated, bit 1 mirrored
 } Tube;
 
 static Faults faults;
@@ -28,7 +28,7 @@ static Faults faults;
 static Vec3 placed(Vec3 p, int variant)
 {
     if (variant & 1)
-        p = vec3(17 - (0.8 * p.y - 0.6 * p.z), 5 + 0.6 * p.y + 0.8 * p.z, -3 + p.x);   // turned about no axis of the grid
+        p = vec3(17 - (0.8 * p.y - 0.6 * p.z), 5 + 0.6 * p.y + 0.8 * p.z, -3 + p.x);   // rotated about an axis oblique to the grid
     if (variant & 2)
         p.x = -p.x;
     return p;
@@ -42,7 +42,7 @@ static double radius_at(const Tube *t, double s, double length)
     return 2 * r;    // mm
 }
 
-// Along a gentle arc; the inlet at s = 0. Open at both ends.
+// A tube along a gentle arc with the inlet at s = 0, open at both ends.
 static SurfaceMesh *make_tube(const Tube *t, int variant)
 {
     double length = 12, bend = 30, slope = tan(t->oblique_deg * 3.14159265358979 / 180);
@@ -52,7 +52,7 @@ static SurfaceMesh *make_tube(const Tube *t, int variant)
     for (int i = 0; i < RINGS; i++)
         for (int k = 0; k < RING; k++) {
             double s = length * i / (RINGS - 1), a = 2 * 3.14159265358979 * k / RING, r = radius_at(t, s, length);
-            double shift = slope * r / 2 * cos(a) * fmax(0, 1 - s / 4), way = 2 * (s + shift);   // mm; the cut fades out
+            double shift = slope * r / 2 * cos(a) * fmax(0, 1 - s / 4), way = 2 * (s + shift);   // [mm]; the oblique cut fades out along the tube
             double angle = way / bend;
             Vec3 c = vec3(bend * (1 - cos(angle)), 0, bend * sin(angle)), e1 = vec3(cos(angle), 0, -sin(angle));
             mesh->vertex[mesh->vertex_count++] = placed(vec3_add(vec3_add_scaled(c, r * cos(a), e1), vec3(0, r * sin(a), 0)), variant);

@@ -1,4 +1,5 @@
-// Whole trees: neighbouring local models agree as a tool meets them, mirrored and turned trees give the same walls, no voxel gives no scale.
+// Whole trees: neighbouring local models agree where a tool passes between them, mirrored and rotated trees give the same walls, and without a voxel size the
+// fit is independent of scale.
 #include "recon/fit/lim_fit.h"
 
 #include "geom/blobby.h"
@@ -16,19 +17,19 @@
 
 #include "tests/recon/fitted_shape.h"
 
-// As a tool meets the wall, it does not jump where one local model gives way to the next, with noise of 0.05 mm as of an angiogram of 0.2 mm voxels; the
-// bounds are the issue's. No ghosts, nothing narrow, also where a vessel of 0.2 mm leaves one of 1 mm.
+// The wall that a tool touches does not jump where one local model is replaced by the next, with noise of 0.05 mm as in an angiogram of 0.2 mm voxels; the
+// bounds are those of the issue. There are no ghosts and no narrow places, not even where a vessel of 0.2 mm leaves one of 1 mm.
 static void neighbours_agree(void **state)
 {
     (void)state;
     static const char *const names[] = {"y", "twig", "phantom"};
     for (int s = 0; s < (is_slow ? 2 : 3); s++) {
         static const char option[3][2][64] = {{"noise_mm", "0.05"}, {"points", "50"}, {"sac_points", "300"}};
-        bool tiny = !strcmp(names[s], "twig");   // noise of a quarter of the twig's radius is no vessel any more
+        bool tiny = !strcmp(names[s], "twig");   // noise of a quarter of the twig's radius is too much to recognise a vessel
         Shape *shape = make(names[s], tiny ? 0 : s == 2 ? 3 : 1, option);
         LimFitOptions options = lim_fit_default_options();
         options.voxel_mm = shape_voxel_mm(shape);
-        options.max_points = 300;   // for the sanitizers' sake
+        options.max_points = 300;   // to limit the time under the sanitizers
         VesselTree *model = fit_of(shape, options);
         ModelMeasure m;
         assert_true(model_measure(model, shape, 0, &m));
@@ -48,7 +49,7 @@ static void neighbours_agree(void **state)
     }
 }
 
-// Exact points and a loose t_g: few blobs, which bulge where their model is centred. Fitted evenly to all points around they were 0.0099 mm too wide
+// Exact points and a loose t_g give few blobs, which bulge where their model is centred. Fitted evenly to all points around, they were 0.0099 mm too wide
 // there, with 0.014 mm rms.
 static void few_blobs_are_not_too_wide(void **state)
 {
@@ -67,7 +68,7 @@ static void few_blobs_are_not_too_wide(void **state)
     shape_free(shape);
 }
 
-// 0: x mirrored; 1: turned by 0.7 rad about (1, 2, 3), after Rodrigues.
+// `how` 0: mirrored in x; 1: rotated by 0.7 rad about (1, 2, 3), after Rodrigues.
 static Vec3 moved(int how, Vec3 v)
 {
     Vec3 e = vec3_unit(vec3(1, 2, 3));
@@ -77,8 +78,8 @@ static Vec3 moved(int how, Vec3 v)
     return vec3_add_scaled(vec3_add_scaled(vec3_scale(v, c), s, vec3_cross(e, v)), vec3_dot(e, v) * (1 - c), e);
 }
 
-// The tree as seen in a mirror gives the same vessel to the rounding of single precision. Turned, the rounding may choose another blob to split: the two
-// fits then differ as two fits within the target of the same points may, by less than the target, and much less on the whole.
+// The mirrored tree gives the same vessel up to the rounding of single precision. With the rotated tree, rounding may select another blob to split: the two
+// fits then differ like two fits within the target of the same points, by less than the target, and on average by much less.
 static void mirrored_and_turned_trees_give_the_same_wall(void **state)
 {
     (void)state;
@@ -122,7 +123,7 @@ static void mirrored_and_turned_trees_give_the_same_wall(void **state)
     shape_free(shape);
 }
 
-// A tree of no known voxel, in metres or in inches: the model scales with it.
+// A tree without a voxel size, in metres or in inches: the model scales with it.
 static void without_a_voxel_the_fit_has_no_scale(void **state)
 {
     (void)state;

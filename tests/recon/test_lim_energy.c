@@ -1,5 +1,5 @@
-// The fused single-precision loops against a plain double twin written from eq. (3) to (7), and its slopes against central differences of the
-// twin. Single precision sums of some hundred terms: 1e-5 of the energy; slopes 1e-4 of the largest.
+// The fused single-precision loops against a plain double-precision reference written from eq. (3) to (7), and the derivatives against central differences of
+// the reference. Tolerances: sums of some hundred terms in single precision, 1e-5 of the energy; derivatives 1e-4 of the largest.
 #include "recon/fit/lim_energy.h"
 
 #include "base/simd.h"
@@ -29,7 +29,7 @@ static double next_uniform(uint64_t *state)
     return (double)(*state >> 11) / 9007199254740992.0;
 }
 
-// Blobs along a bent line, points about 1 mm around it, guards in and out.
+// Blobs along a bent line, points about 1 mm around it, guards inside and outside.
 static void make_case(Case *c, uint64_t seed)
 {
     assert_true(lim_points_create(&c->points, POINTS));
@@ -57,7 +57,7 @@ static void sums_without(Case *c, int moving)
             lim_points_add(&c->points, &c->blob[j], 1);
 }
 
-// The twin.
+// The reference.
 static void plain_energy(const Case *c, double *distance, double *bend)
 {
     Vec3 center[BLOBS];
@@ -98,7 +98,7 @@ static void the_fused_loop_equals_the_plain_one(void **state)
         lim_energy_total(&c.points, &whole_distance, &whole_bend);
         assert_true(fabs(whole_distance - distance) < 1e-5 * distance);
         assert_true(fabs(whole_bend - bend) < 1e-4 * bend);
-        // one pass over all blobs, the same bits
+        // a single pass over all blobs gives the same bits
         float f = c.points.f[33], h = c.points.h[4][120];
         lim_points_sum(&c.points, c.blob, BLOBS, ISO_LEVEL);
         assert_true(f == c.points.f[33] && h == c.points.h[4][120]);
@@ -106,7 +106,7 @@ static void the_fused_loop_equals_the_plain_one(void **state)
     }
 }
 
-// Against central differences of the twin.
+// Derivatives against central differences of the reference.
 static void slopes_equal_differences(void **state)
 {
     (void)state;
@@ -138,7 +138,7 @@ static void slopes_equal_differences(void **state)
     }
 }
 
-// Columns are the derivatives of the residuals, those of E_a too.
+// Columns are the derivatives of the residuals, including those of E_a.
 static void columns_equal_differences(void **state)
 {
     (void)state;
@@ -163,7 +163,7 @@ static void columns_equal_differences(void **state)
             double bend = ((double)up[n + i] - (double)down[n + i]) / (2 * step);
             bend_scale = fmax(bend_scale, fabs(bend));
             bend_error = fmax(bend_error, fabs(bend - (double)column[k * both + n + i]));
-            if ((up[i] == 0) != (down[i] == 0))   // a guard's bound lies between
+            if ((up[i] == 0) != (down[i] == 0))   // a guard's bound lies between the two values
                 continue;
             double numeric = ((double)up[i] - (double)down[i]) / (2 * step);
             assert_true(fabs(numeric - (double)column[k * both + i]) < 3e-4);
@@ -177,7 +177,7 @@ static void columns_equal_differences(void **state)
     assert_true(fabs(lim_energy_dot(column, column + both, both) - dot) < 1e-5 * (fabs(dot) + 1e-3));
     for (int k = 0; k < 16; k++)
         assert_true(gram[k / 4][k % 4] == lim_energy_dot(column + k / 4 * both, column + k % 4 * both, both));
-    // without E_a the columns of E_d alone, the same bits
+    // without E_a only the columns of E_d are computed, with the same bits
     float *alone = calloc((size_t)(4 * n), sizeof *alone);
     sums_without(&c, -1);
     lim_energy_columns(&c.points, &c.blob[2], 0, alone);
@@ -190,7 +190,7 @@ static void columns_equal_differences(void **state)
     lim_points_free(&c.points);
 }
 
-// Steps towards the foot end on the surface, with the return path to the point along the normal.
+// Steps towards the foot end on the surface, and the line back to the point is along the normal.
 static void feet_are_on_the_surface(void **state)
 {
     (void)state;
@@ -224,7 +224,7 @@ static void feet_are_on_the_surface(void **state)
     lim_points_free(&c.points);
 }
 
-// A system of 20 unknowns, against the product of its matrix with the solution.
+// A system of 20 unknowns: the product of its matrix with the solution must give the right-hand side.
 static void solve_one(double solution[20])
 {
     enum { SIZE = 20, STRIDE = 23 };
@@ -253,7 +253,7 @@ static void solve_one(double solution[20])
     assert_false(lim_solve(factor, SIZE, STRIDE, side));
 }
 
-// One kernel text, three compilations: the same bits from each that the machine has.
+// The three compilations of the kernel give the same bits; those that the machine supports are tested.
 static void every_instruction_set_gives_the_same_bits(void **state)
 {
     (void)state;
@@ -344,7 +344,7 @@ static void cohesion_equals_eq_7(void **state)
     lim_points_free(&c.points);
 }
 
-// Taking a blob out leaves what was there before it came.
+// Adding and then removing a blob restores the previous sums.
 static void adding_and_removing_cancels(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// LIM: the split's table, single spheres, shapes against their truth with and without noise, the paper's preset, threads, bad options.
+// LIM: the table of splits, single spheres, shapes against their exact geometry with and without noise, the paper's preset, threads, invalid options.
 #include "recon/fit/lim_fit.h"
 
 #include "geom/blobby.h"
@@ -19,7 +19,7 @@
 #include "tests/geom/random_numbers.h"
 #include "tests/recon/fitted_shape.h"
 
-// docs/references.md: rho'^2 (sqrt(2 rho'/T) - 1) = rho^2 (sqrt(rho/T) - 1) at T = 0.1; and the level set of any value stays where it was.
+// docs/references.md: rho'^2 (sqrt(2 rho'/T) - 1) = rho^2 (sqrt(rho/T) - 1) at T = 0.1; and the level set of any value is unchanged.
 static void split_is_the_references(void **state)
 {
     (void)state;
@@ -34,7 +34,7 @@ static void split_is_the_references(void **state)
     }
 }
 
-// Points of a sphere: the fit must find the one blob's radius whatever the radius and place.
+// Points on a sphere: the fit must find the radius of the single blob, whatever the radius and position.
 static void spheres_are_found(void **state)
 {
     (void)state;
@@ -67,7 +67,7 @@ static void spheres_are_found(void **state)
     }
 }
 
-// True distances, not Taubin's. Exact samples: everything within a little more than the target of 0.075 mm (0.05 mm voxel).
+// Uses true distances, not Taubin's. Exact samples: all distances are within little more than the target of 0.075 mm (0.05 mm voxel).
 static void shapes_are_fitted_within_the_target(void **state)
 {
     (void)state;
@@ -90,7 +90,7 @@ static void shapes_are_fitted_within_the_target(void **state)
     }
 }
 
-// A tighter target gives a closer surface: mean distance falls with it until samples or single precision end it.
+// A tighter target gives a closer surface: the mean distance decreases with it until the samples or single precision limit it.
 static void distance_follows_the_target(void **state)
 {
     (void)state;
@@ -109,7 +109,7 @@ static void distance_follows_the_target(void **state)
     shape_free(shape);
 }
 
-// The fit averages noise: with 540 points a model the wall is nearer to the truth than the points are. No lobes, no holes.
+// The fit averages noise: with 540 points per model the wall is nearer to the true wall than the points are. There are no lobes and no holes.
 static void noise_is_averaged(void **state)
 {
     (void)state;
@@ -144,7 +144,7 @@ static void capsule_of_table_3(void **state)
             enum { N = 300 };
             Vec3 exact[N], noisy[N], center[101];
             double width[101], far[N];
-            for (int i = 0; i < N; i++) {   // even over the capsule's area: caps 1/3, side 2/3
+            for (int i = 0; i < N; i++) {   // evenly over the capsule's area: caps 1/3, side 2/3
                 Vec3 d = random_unit_vector(&seed), g;
                 double along = random_in(&seed, 0, 4), angle = random_in(&seed, 0, 2 * PI);
                 exact[i] = i % 3 == 0 ? vec3_add(d, vec3(d.x > 0 ? 4 : 0, 0, 0)) : vec3(along, cos(angle), sin(angle));
@@ -174,7 +174,7 @@ static void capsule_of_table_3(void **state)
             most = blobs[run] > most ? blobs[run] : most;
         }
         print_message("sigma %.2f: d mean %.3f mm, at most %d blobs\n", sigma, sum, most);
-        assert_true(sum < sigma);   // about one sigma, since 3 sigma lets a crude model pass
+        assert_true(sum < sigma);   // about one sigma, because a target of 3 sigma accepts a crude model
         assert_true(most <= 15);
     }
     shape_free(shape);
@@ -202,8 +202,8 @@ static void threads_do_not_matter(void **state)
     shape_free(shape);
 }
 
-// The tool comes in through the root's plane: the tube continues at least one radius upstream, as wide as the vessel. The paper's models close there
-// at some point, which shows that the extension does it.
+// A tool enters through the root's plane: the tube must continue at least one radius upstream, as wide as the vessel. The paper's models close there
+// somewhere, which shows that the extension is needed.
 static void inlet_is_tubular(void **state)
 {
     (void)state;
@@ -212,7 +212,7 @@ static void inlet_is_tubular(void **state)
         LimFitOptions options = lim_fit_default_options();
         options.extend_inlet = with;
         options.voxel_mm = 0.05;
-        // a root that has points on its downstream side alone, as tracking leaves it
+        // a root that has points only on its downstream side, as after tracking
         VesselTree *tree = shape_sample(shape, &faults);
         int64_t kept = 0, first = 0;
         for (int n = 0; n < tree->node_count; n++) {
@@ -254,7 +254,7 @@ static void the_papers_preset_works(void **state)
                 options.target_mm == 0.3 && options.max_loops == 5);
     options.max_blobs = 20;
     VesselTree *model = fit_of(shape, options);
-    // what the paper promises: d_a within the target
+    // the paper's criterion: d_a within the target
     int within = 0;
     for (int n = 0; n < model->node_count; n++)
         within += model->error[n] < 0.3;
@@ -288,7 +288,7 @@ static void bad_input_is_a_fault(void **state)
     shape_free(shape);
 }
 
-// Nodes without points look along the tree; all points in one place, or on a line, give a model all the same.
+// Nodes without points search along the tree; points that all coincide or lie on a line still give a model.
 static void poor_points_give_a_model(void **state)
 {
     (void)state;

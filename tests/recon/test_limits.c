@@ -1,5 +1,5 @@
-// Where a tree ends: points that the tracking does not pass, vessels that are not wanted, and the loops that a tree cannot hold. On volumes with truth, mirrored,
-// and with several seeds of the noise.
+// Limits of a tree: points that the tracking does not pass, excluded vessels, and loops, which a tree cannot represent. On volumes of known geometry,
+// mirrored, and with several seeds of the noise.
 #include "recon/track/rbt_track.h"
 
 #include <setjmp.h>
@@ -84,7 +84,7 @@ static void the_tree_ends_at_until(void **state)
                 side = fmax(side, c.z < 12 ? c.x : 0);
             }
             print_message("until: highest node %.2f of 13 mm, furthest of the side branch %.2f of 14 mm\n", top, side);
-            assert_true(top > 11 && top < 14.5);          // the branch to (3, 10, 14) ends there by itself
+            assert_true(top > 11 && top < 14.5);          // the branch to (3, 10, 14) ends there anyway
             assert_true(side > 12.3 && side < 14.6);
             assert_true(nearest_to(tree, placed(vec3(10, 10, 15), variant)) > 1.5);
             assert_true(nearest_to(tree, placed(vec3(10, 17, 20.8), variant)) > 3);
@@ -126,7 +126,7 @@ static void what_is_not_wanted_is_left_out(void **state)
             p.rival_count = 1;
             VesselTree *tree = track(v, &p, placed(vec3(6, 10, 3), variant), &report);
             assert_true(whole && tree);
-            // one click takes both
+            // one click finds both
             assert_true(nearest_to(whole, placed(vec3(14, 10, 26), variant)) < 1);
             double furthest = 0;
             for (int i = 0; i < tree->node_count; i++)
@@ -144,7 +144,7 @@ static void what_is_not_wanted_is_left_out(void **state)
         }
 }
 
-// One lumen that narrows between the start and the point that is not wanted.
+// One lumen that narrows between the start and the excluded point.
 static void one_lumen_is_divided_where_it_is_narrow(void **state)
 {
     (void)state;
@@ -198,7 +198,7 @@ static void unfit_limits_are_refused(void **state)
     volume_free(v);
 }
 
-// A vessel that parts and joins again.
+// A vessel that divides and joins again.
 static void a_ring_is_a_loop(void **state)
 {
     (void)state;
@@ -233,7 +233,7 @@ static void a_ring_is_a_loop(void **state)
             rbt_report_free(&report);
             vessel_tree_free(tree);
             volume_free(v);
-            // and none where there is none
+            // and no loop is found where there is none
             v = trunk_with_branches(variant, seed);
             tree = track(v, &p, placed(vec3(10, 10, 3), variant), &report);
             assert_non_null(tree);

@@ -1,5 +1,5 @@
-// Centrelines computed from surfaces alone, against the shapes' own: as many ends and branches, near them, with their radii; the same when turned and
-// mirrored, and with any number of threads; what encloses nothing is refused.
+// Centrelines computed from surfaces alone, against those of the shapes: as many ends and branches, near the true ones, with their radii; the same when
+// rotated and mirrored, and with any number of threads. A surface that encloses nothing is refused.
 #include "recon/phantom/phantom.h"
 #include "recon/surface/import_surface.h"
 #include "recon/surface/mesh_centreline.h"
@@ -46,7 +46,8 @@ static double to_segment(Vec3 p, Vec3 a, Vec3 b)
     return vec3_distance(p, vec3_add_scaled(a, fmin(fmax(t, 0), 1), ab));
 }
 
-// How much of the truth's nodes lie within half a radius of the curves, and how far the curves' points lie from the truth, in radii (mean).
+// Computes the fraction of the true nodes that lie within half a radius of the curves, and the mean distance of the curves' points from the true centrelines,
+// in radii.
 static void compare(const CurveSet *set, const VesselTree *truth, bool turn, double *found, double *off, double *radius_error)
 {
     int hits = 0, n = 0;
@@ -139,7 +140,7 @@ static void test_tubes(void **state)
 {
     (void)state;
     check_shape("open-capsule", "", "", 0.3, 0.02);
-    for (int k = 0; k < WHOLE_OR_SHORT(2, 0); k++)       // figures alone
+    for (int k = 0; k < WHOLE_OR_SHORT(2, 0); k++)       // only printed
         check_shape(k ? "helix" : "arc", "", "", k ? 0.4 : 0.3, 0.02);
 }
 
@@ -165,7 +166,7 @@ static VesselTree *import_alone(SurfaceMesh *mesh, const char *name, ImportRepor
     return tree;
 }
 
-// A sac gives one branch at most, and hides none.
+// A sac gives at most one branch and hides no other.
 static void test_sacs(void **state)
 {
     (void)state;
@@ -223,7 +224,7 @@ static void test_stenosis(void **state)
         assert_int_equal(report.branch_count, 1);
         assert_int_equal(report.open_end_count, 2);
         assert_true(fabs(report.length - 30) < 0.6);
-        // a polygon of 24 sides: 0.99 of the radius
+        // the inscribed circle of a polygon of 24 sides has 0.99 of the radius
         assert_true(fabs(report.radius_min / (2 * least) - 1) < 0.1);
         vessel_tree_free(tree);
     }

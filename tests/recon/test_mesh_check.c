@@ -1,4 +1,4 @@
-// A closed box of 12 triangles, damaged in one way at a time: the report, and that the repaired mesh has the box's volume again.
+// A closed box of 12 triangles with one kind of damage at a time: the report is right, and the repaired mesh has the box's volume again.
 #include "recon/surface/mesh_check.h"
 
 #include <setjmp.h>
@@ -50,11 +50,11 @@ static void test_whole(void **state)
 static void test_spoilt(void **state)
 {
     (void)state;
-    MeshCheck c = mended(spoilt("f 8 5 1 4\n"));   // the last face turned
+    MeshCheck c = mended(spoilt("f 8 5 1 4\n"));   // the last face is flipped
     assert_int_equal(c.flipped_triangles.count, 2);
     assert_int_equal(c.flipped_triangles.first, 10);
     assert_float_equal(c.volume, 24, 1e-12);
-    c = mended(spoilt(""));                        // the last face left out
+    c = mended(spoilt(""));                        // the last face is missing
     assert_int_equal(c.open_edges.count, 4);
     assert_int_equal(c.opening_count, 1);
     assert_float_equal(c.volume, 24, 1e-12);

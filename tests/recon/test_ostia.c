@@ -1,4 +1,4 @@
-// Ostia of tracked trees against truth: synthetic trees with and without noise, and links that the image must refuse.
+// Ostia of tracked trees against the exact geometry: synthetic trees with and without noise, and links that the image must refuse.
 #include "base/sort_doubles.h"
 #include "bench/track_score.h"
 #include "recon/phantom/phantom.h"
@@ -19,7 +19,7 @@
 static Faults faults;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-static const bool is_slow = true;    // one case of a kind: the figures are the release build's business
+static const bool is_slow = true;    // one case of each kind: accuracy is measured in the release build
 #else
 static const bool is_slow = false;
 #endif
@@ -46,7 +46,7 @@ typedef struct Kind {
 } Kind;
 static const Kind tree_kind = {"tree", {{"branches", "25"}, {"radius_mm", "1.4"}, {"points", "8"}}, 4};
 
-// A synthetic vessel, its angiogram with voxels of 0.25 mm, and what is tracked from the inlet.
+// A synthetic vessel, its angiogram with voxels of 0.25 mm, and the tree tracked from the inlet.
 static Case make_case(const Kind *kind, int seed, double noise, bool track)
 {
     char option[4][2][64];
@@ -80,7 +80,7 @@ static double ratio_of_link(const VesselTree *tree, int i)
 }
 
 typedef struct Figures {
-    double *error;           // [mm] of points, signed, > 0 inside
+    double *error;           // [mm] signed errors of points, > 0 inside
     int count, capacity;
 } Figures;
 
@@ -94,7 +94,7 @@ static void add_error(Figures *f, double error)
     f->error[f->count++] = error;
 }
 
-// Mean, root mean square, 99th percentile of the magnitude.
+// Computes the mean, root mean square, and 99th percentile of the magnitude.
 static void summarise(Figures *f, double *mean, double *rms, double *p99)
 {
     *mean = *rms = *p99 = 0;
@@ -163,7 +163,7 @@ static void check_sum(const char *name, double noise, Sum *sum)
     assert_true(sum->junctions > 0 && sum->longest <= 1);
     assert_int_equal(sum->outside, 0);
     assert_int_equal(sum->doubtful + sum->refused + sum->wrong, 0);
-    // as near to the wall as what was tracked beside, or a quarter of a voxel where the twig is as narrow as the image's blur
+    // as near to the wall as the tracked points nearby, or a quarter of a voxel if the twig is as narrow as the image's blur
     assert_true(rms[0] < fmax(1.5 * rms[1], 0.0625) && p99[0] < fmax(1.5 * p99[1], 0.125));
 }
 
@@ -203,14 +203,14 @@ static double share_of(const Tracker *t, Vec3 from, Vec3 to, double radius)
     return path.share;
 }
 
-// A vessel's axis turned by 90 degrees, at one of eight angles.
+// A vessel's axis rotated by 90 degrees, at one of eight angles.
 static Vec3 turned_aside(Vec3 link, int k)
 {
     Vec3 d = vec3_unit(link), u = vec3_normal_to(d), v = vec3_cross(d, u);
     return vec3_scale(vec3_add(vec3_scale(u, cos(k * PI / 4)), vec3_scale(v, sin(k * PI / 4))), vec3_norm(link));
 }
 
-// From a true branch's axis, two of its radii beyond the parent's wall, a link as long as the true one that leads anywhere else.
+// Links as long as the true one, from a true branch's axis two of its radii outside the parent's wall, in a wrong direction.
 static void links_turned_aside_are_refused(void **state)
 {
     (void)state;
@@ -251,7 +251,7 @@ static void links_turned_aside_are_refused(void **state)
     }
 }
 
-// A link to a neighbour that only touches: a wrong bright vessel is seen as such where the gap is wider than the image's blur.
+// A link to a neighbour that only touches: it is recognised as wrong if the gap is wider than the image's blur.
 static void links_to_a_kissing_neighbour(void **state)
 {
     (void)state;
@@ -283,9 +283,10 @@ static void links_to_a_kissing_neighbour(void **state)
     }
 }
 
-// --- what the trace corrects ---
+// --- corrections in the trace file ---
 
-// Every node but the root's branch hangs on lumen: its link is within both radii, or it leads into a branch that the report names as kept.
+// Checks that every node except those of the root's branch is connected by lumen: its link is shorter than the sum of both radii, or it belongs to a branch
+// that the report lists as kept.
 static void check_hanging(const VesselTree *tree)
 {
     for (int i = 1; i < tree->node_count; i++)
@@ -300,7 +301,8 @@ static int nodes_within(const VesselTree *tree, Vec3 x, double reach)
     return count;
 }
 
-// A twig cut anywhere near its mouth, or forbidden there, goes as a whole; cut further out, its beginning stays and hangs on its parent.
+// A twig that is cut near its ostium, or forbidden there, is removed completely; if it is cut further out, its first part stays and is attached to its
+// parent.
 static void cuts_leave_no_stub(void **state)
 {
     (void)state;
@@ -313,7 +315,7 @@ static void cuts_leave_no_stub(void **state)
         first = c.truth->parent[i] != i - 1 ? i : first;
     assert_int_equal(c.report.branch_count, 2);
     const RbtBranchReport *twig = &c.report.branch[1];
-    // on the link outside the wall, at the first tracked node, and two nodes on
+    // on the link outside the wall, at the first tracked node, and two nodes further
     for (int place = 0; place < 5; place++) {
         RbtParameters p = rbt_default_parameters();
         RbtReport report = {0};
@@ -337,7 +339,7 @@ static void cuts_leave_no_stub(void **state)
             assert_int_equal(report.branch_count, 1);
             assert_int_equal(report.junction_count, 0);
         }
-        // the vessel itself is whole
+        // the vessel itself is complete
         assert_true(nodes_within(tree, c.truth->center[first - 2], 1) > 0);
         rbt_report_free(&report);
         vessel_tree_free(tree);
@@ -345,9 +347,9 @@ static void cuts_leave_no_stub(void **state)
     case_free(&c);
 }
 
-// --- what becomes of refused links ---
+// --- refused links ---
 
-// A tube of brightness 1 with a plain blurred edge.
+// Draws a tube of brightness 1 with a plain blurred edge.
 static void draw_tube(Volume *v, Vec3 a, Vec3 b, double radius)
 {
     double voxel = v->axis[0].x;
@@ -363,7 +365,7 @@ static void draw_tube(Volume *v, Vec3 a, Vec3 b, double radius)
     v->maximum = 1;
 }
 
-// Nodes from a to b as a branch (or the rest of one) that hangs on `parent`.
+// Adds nodes from a to b as a branch (or the rest of one) attached to `parent`.
 static void add_nodes(Track *tree, Vec3 a, Vec3 b, double radius, int branch, int parent)
 {
     double length = vec3_distance(a, b);
@@ -388,8 +390,8 @@ static int nearest_node(const Track *tree, Vec3 x)
     return nearest;
 }
 
-// A branch of one vessel that was hung on its neighbour goes back to the vessel that it comes from, though that one stands behind it; a branch that hangs
-// on nothing goes with what hangs on it; one that the trace names stays, its link shut.
+// A branch that was attached to the neighbour of its vessel is attached to its own vessel, although that comes later in the list; a branch that is connected
+// to nothing is removed with its subtree; one given in the trace file stays, with its link closed.
 static void refused_links(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-// The shapes' truth: closed forms for capsule and arc, |grad f| <= 1, projection, samples, the phantom's promises, mesh and volume against each other.
+// The exact geometry of the shapes: closed forms for capsule and arc, |grad f| <= 1, projection, samples, the phantom's properties, mesh and volume against
+// each other.
 #include "recon/phantom/phantom.h"
 #include "recon/phantom/phantom_measure.h"
 
@@ -66,7 +67,7 @@ static void arc_is_a_torus(void **state)
     shape_free(shape);
 }
 
-// Marching relies on |grad f| <= 1; the gradient is that of the field; the closest point is no further than any sample.
+// Marching requires |grad f| <= 1; the gradient is that of the field; the closest point is no further than any sample.
 static void field_and_distance_agree(void **state)
 {
     (void)state;
@@ -112,7 +113,7 @@ static void samples_lie_on_the_surface(void **state)
         assert_non_null(tree);
         assert_true(vessel_tree_validate(tree, names[s], &faults));
         for (int64_t i = 0; i < tree->point_count; i++)
-            assert_near(shape_field(shape, tree->point[i], NULL), 0, 1e-9);   // so none is inside another part
+            assert_near(shape_field(shape, tree->point[i], NULL), 0, 1e-9);   // so no point is inside another part
         for (int n = 0; n < tree->node_count; n++) {
             assert_true(tree->point_offset[n + 1] - tree->point_offset[n] >= 20);
             assert_true(shape_field(shape, tree->center[n], NULL) > 0.99 * tree->radius[n]);
@@ -136,7 +137,7 @@ static void noise_has_its_size_and_seed(void **state)
         sum += d / n;
         square += d * d / n;
     }
-    // 2,800 samples: the mean within 3 sigma / sqrt(n), sigma within 3 / sqrt(2 n)
+    // 2,800 samples: the mean must be within 3 sigma / sqrt(n), sigma within 3 / sqrt(2 n)
     assert_near(sum, 0, 3 * 0.1 / sqrt(n));
     assert_near(sqrt(square), 0.1, 0.1 * 3 / sqrt(2 * n));
     assert_memory_equal(tree->point, again->point, (size_t)tree->point_count * sizeof(Vec3));
@@ -166,7 +167,8 @@ static void spiral_is_the_papers(void **state)
     vessel_tree_free(tree);
 }
 
-// About 150 mm of vessel, radii 0.6 to 2.5 mm, one sac, three dimensions, a kissing pair that does not touch, bends no tighter than the tube.
+// The phantom has about 150 mm of vessel, radii 0.6 to 2.5 mm, one sac, a three-dimensional course, a pair of vessels that come close but do not touch, and
+// no bends tighter than the tube.
 static void phantom_keeps_its_promises(void **state)
 {
     (void)state;
@@ -192,7 +194,7 @@ static void phantom_keeps_its_promises(void **state)
             double turn = vec3_norm(vec3_sub(vec3_unit(v), vec3_unit(u))), bend = 0.5 * (vec3_norm(u) + vec3_norm(v)) / fmax(turn, 1e-12);
             assert_true(bend > 1.3 * tree->radius[a]);
         }
-        // side branches come closest to each other beyond their first nodes
+        // side branches come closest to each other after their first nodes
         int branch = n, other_end;
         while (branch > 0 && tree->parent[branch] == branch - 1)
             branch--;
@@ -224,7 +226,8 @@ static double mesh_volume(const TriangleMesh *mesh)
     return sum;
 }
 
-// Closed capsule: volume known; error of the mesh falls fourfold per halving of the cell. Every edge has two faces that run it both ways.
+// A closed capsule, whose volume is known: the mesh's error decreases fourfold when the cell is halved. Every edge has two faces, which traverse it in
+// opposite directions.
 static void surface_is_closed_and_converges(void **state)
 {
     (void)state;
@@ -259,7 +262,7 @@ static void volume_holds_the_shape(void **state)
         sum += (double)volume->value[i] * 0.008;
         square += pow((double)(noisy->value[i] - volume->value[i]), 2) / (double)count;
     }
-    // partial voxels by the field are right to second order in voxel / radius
+    // partial voxels from the field are accurate to second order in voxel / radius
     assert_near(sum, PI * 4 + 4.0 / 3 * PI, 0.01 * sum);
     assert_near(sqrt(square), 0.05, 0.001);
     shape_free(shape);

@@ -1,5 +1,5 @@
-// The pieces of an estimation step: directions on the sphere, random numbers, RANSAC circles among outliers, least squares (Gauss-Newton against
-// Powell's method), spheres.
+// The parts of an estimation step: directions on the sphere, random numbers, RANSAC circles with outliers, least squares (Gauss-Newton against Powell's
+// method), spheres.
 #include "recon/track/cast_rays.h"
 #include "recon/track/ransac_cylinder.h"
 
@@ -61,7 +61,7 @@ static void random_numbers_repeat_and_differ(void **state)
         assert_true(abs(bin[i] - 1000) < 5 * 30);   // five standard deviations of a binomial
 }
 
-// Points on a cylinder with normal noise, then outliers in a box around it.
+// Creates points on a cylinder with normal noise, then outliers in a box around it.
 static int make_points(Random *random, const Cylinder *c, int inliers, int outliers, double noise, Vec3 *point)
 {
     Vec3 e1 = vec3_normal_to(c->axis), e2 = vec3_cross(c->axis, e1);
@@ -90,7 +90,7 @@ static void finds_the_circle_among_outliers(void **state)
         Vec3 origin = vec3_add(truth.center, vec3(0.3, 0.2, -0.1));
         double rate = ransac_circle(point, n, origin, truth.axis, &options, &random, &found);
         int inlier[162], inliers = cylinder_inliers(&found, point, n, 0.1, inlier);
-        assert_true(fabs(rate - (double)inliers / n) < 2.5 / n);   // floats against doubles at the edge of the ring
+        assert_true(fabs(rate - (double)inliers / n) < 2.5 / n);   // the float and double tests may differ at the edge of the ring
         assert_true(rate > 90.0 / 162 * 0.95);
         bool good;
         for (int i = 0; i < 3; i++) {
@@ -120,7 +120,7 @@ static void nothing_is_found_in_nothing(void **state)
     assert_true(ransac_circle(line, 2, vec3(0, 0, 0), vec3(0, 0, 1), &options, &random, &found) <= 0);
 }
 
-// Both reach the same minimum from the same start: the fast form against the paper's.
+// Both methods reach the same minimum from the same start: our fast one and the paper's.
 static void gauss_newton_equals_powell(void **state)
 {
     (void)state;

@@ -1,7 +1,6 @@
-// Tracking on volumes with known truth, and on the real angiogram if present.
-//
-// A disc of radius R blurred by a Gaussian of standard deviation b has its steepest edge at R - b^2 / (2 R) (docs/references.md). The image's own blur and the
-// spline's (1/sqrt(3) voxel) add up in squares, and so does the moving average along the rays (w^2 / 12) for rays across the axis.
+// Tracking on volumes of known geometry, and on the real angiogram if it is present.
+// A disc of radius R blurred by a Gaussian of standard deviation b has its steepest edge at R - b^2 / (2 R) (docs/references.md). The squares of the image's
+// own blur and of the spline's (1/sqrt(3) voxel) add up, and so does the moving average along the rays (w^2 / 12) for rays perpendicular to the axis.
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_track.h"
 #include "recon/volume/volume_file.h"
@@ -54,7 +53,7 @@ static double disc_value(const Disc *d, double x)
 
 typedef struct Phantom {
     Volume *volume;
-    float *depth;            // signed distance to the wall, > 0 inside
+    float *depth;            // [mm] signed distance to the wall, > 0 inside
 } Phantom;
 
 static Phantom phantom_create(const int size[3], Vec3 origin, const Vec3 axis[3])
@@ -78,7 +77,7 @@ static void phantom_free(Phantom *p)
     free(p->depth);
 }
 
-// A ball of the union; dense balls along a curve make a tube.
+// Adds a ball to the union; closely spaced balls along a curve make a tube.
 static void add_ball(Phantom *p, Vec3 center, double radius)
 {
     const Volume *v = p->volume;
@@ -86,7 +85,7 @@ static void add_ball(Phantom *p, Vec3 center, double radius)
     double at[3] = {c.x, c.y, c.z};
     int low[3], high[3];
     for (int i = 0; i < 3; i++) {
-        // axes of these phantoms are at most mildly oblique
+        // the grids of these phantoms are only slightly oblique
         double reach = 1.5 * (radius + 1.2) / vec3_norm(v->axis[i]);
         low[i] = (int)fmax(0, floor(at[i] - reach));
         high[i] = (int)fmin(v->size[i] - 1, ceil(at[i] + reach));
@@ -107,7 +106,7 @@ static void add_line(Phantom *p, Vec3 a, Vec3 b, double radius)
         add_ball(p, vec3_mix(a, b, (double)i / n), radius);
 }
 
-// Depth to brightness: the blurred disc's profile (NULL: a plain blurred edge), 0 to 1, and noise.
+// Converts depth to brightness, 0 to 1, by the blurred disc's profile (NULL: a plain blurred edge), and adds noise.
 static void develop(Phantom *p, const Disc *disc, double blur, double noise, uint64_t seed)
 {
     Volume *v = p->volume;
@@ -144,15 +143,15 @@ static void assert_valid(const VesselTree *tree)
 
 // --- accuracy ---
 
-// Straight oblique cylinder: radius against the closed form, centre, axis.
+// A straight oblique cylinder: radius against the closed form, centre, axis.
 static void straight_cylinder(void **state)
 {
     (void)state;
     static const struct {
         double radius, blur, noise;
         bool paper;
-        double tolerance;    // of the mean radius over nodes and seeds; its own scatter is about 0.002
-        double center_mean;  // [mm] allowed
+        double tolerance;    // of the mean radius over nodes and seeds, whose own scatter is about 0.002
+        double center_mean;  // [mm] largest allowed mean error of the centre
     } cases[] = {{1, 0.2, 0, true, 0.003, 0.005},
                  {1, 0.2, 0.05, true, 0.006, 0.012},
                  {1, 0.2, 0.05, false, 0.006, 0.012},
@@ -178,7 +177,7 @@ static void straight_cylinder(void **state)
             assert_true(vec3_dot(vec3_sub(tree->center[tree->node_count - 1], start), axis) > 5);
             for (int i = 0; i < tree->node_count; i++) {
                 Vec3 q = vec3_sub(tree->center[i], a);
-                // near the border the volume ends within the rays
+                // near the border the rays leave the volume
                 if (tree->center[i].z > 12 - 2.5 * r)
                     continue;
                 center += vec3_norm(vec3_add_scaled(q, -vec3_dot(q, axis), axis));
@@ -200,7 +199,7 @@ static void straight_cylinder(void **state)
 
 static Vec3 helix(double t) { return vec3(8 + 5 * cos(t), 8 + 5 * sin(t), 3 + 1.6 * t); }
 
-// A curved vessel, to its end: one and a third turns of a helix of curvature 0.18 / mm.
+// A curved vessel is tracked to its end: one and a third turns of a helix of curvature 0.18 / mm.
 static void helix_to_its_end(void **state)
 {
     (void)state;
@@ -241,7 +240,7 @@ static void helix_to_its_end(void **state)
         vessel_tree_free(tree);
     }
     double spline = 0.2 / sqrt(3.0), bias = -(blur * blur + spline * spline + 0.04 / 12) / (2 * r);
-    // a straight cylinder of height h in a curve of curvature k is off by k h^2 / 24; h is about 2 r, and some inliers lie further out
+    // a straight cylinder of height h in a curve of curvature k is off by k h^2 / 24; h is about 2 r, and some inliers lie further away
     print_message("helix: %d of %d to the end, radius %+.4f (closed form %+.4f), centre %.4f mm (curve alone %.4f), worst %.3f\n", done, WHOLE_OR_SHORT(4, 1),
                   error / nodes, bias, center / nodes, curvature * 4 * r * r / 24, worst);
     assert_int_equal(done, WHOLE_OR_SHORT(4, 1));
@@ -250,7 +249,7 @@ static void helix_to_its_end(void **state)
     phantom_free(&p);
 }
 
-// The same cylinder on a rotated grid of unlike voxels: the answer is in millimetres.
+// The same cylinder on a rotated grid of anisotropic voxels: the result is in millimetres.
 static void oblique_grid(void **state)
 {
     (void)state;
@@ -280,7 +279,7 @@ static void oblique_grid(void **state)
 
 // --- topology ---
 
-// A symmetric bifurcation: the paper's tracking stalls there, ours takes one daughter; a click gives the other, joined at the fork.
+// A symmetric bifurcation: the paper's tracking stalls there, ours follows one daughter; a click adds the other, joined at the fork.
 static void symmetric_bifurcation(void **state)
 {
     (void)state;
@@ -311,7 +310,7 @@ static void symmetric_bifurcation(void **state)
         const RbtBranchReport *second = &report.branch[1];
         Vec3 tip = tree->center[second->first_node + second->node_count - 1], foot = tree->center[tree->parent[second->first_node]];
         both += tip.z > 18 && (tip.x < 11) != went_left;
-        // attached near the fork, and by a link that stays inside
+        // attached near the fork, by a link that stays inside the lumen
         assert_true(vec3_distance(foot, fork) < 3.5);
         for (int i = 1; i < tree->node_count; i++)
             assert_true(vec3_distance(tree->center[i], tree->center[tree->parent[i]]) < 3);
@@ -324,7 +323,7 @@ static void symmetric_bifurcation(void **state)
     phantom_free(&p);
 }
 
-// A vessel that enters a wide sac and leaves it at a right angle: straight on is the sac's bottom.
+// A vessel that enters a wide sac and leaves it at a right angle; straight ahead is the sac's bottom.
 static void past_a_sac(void **state)
 {
     (void)state;
@@ -349,7 +348,7 @@ static void past_a_sac(void **state)
         int last = tree->node_count - 1;
         assert_int_equal(tree->kind[last], NODE_ANEURYSM);
         past += tree->center[last - 1].x > 27;
-        // the sac: its radius, its points on the sphere, its node hangs near the neck
+        // the sac: its radius, its points on the sphere, its node attached near the neck
         assert_true(fabs(tree->radius[last] - 4.2) < 0.25);
         for (int64_t k = tree->point_offset[last]; k < tree->point_offset[last + 1]; k++)
             assert_true(fabs(vec3_distance(tree->point[k], sac) - 4.2) < 0.8);
@@ -398,7 +397,7 @@ static void the_same_for_any_number_of_threads(void **state)
     }
     assert_same_tree(tree[0], tree[1]);
     assert_same_tree(tree[0], tree[2]);
-    // another seed gives another tree: the comparison sees differences
+    // another seed gives another tree, so the comparison can detect differences
     parameters.seed = 2;
     VesselTree *other = rbt_track(p.volume, &parameters, &seed, 1, &aneurysm, 1, 1, NULL, NULL, "test", &faults);
     assert_non_null(other);
@@ -428,7 +427,7 @@ static void unfit_seeds(void **state)
     cases[1].seed.start = vec3(1, 1, 2);
     cases[2].seed.toward = good.start;
     cases[3].seed.radius = 50;
-    cases[4].seed.radius = 0.05;   // twenty times too thin: no wall within the rays
+    cases[4].seed.radius = 0.05;   // twenty times too thin: the rays reach no wall
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         faults_clear(&faults);
         VesselTree *tree = rbt_track(p.volume, &parameters, &cases[i].seed, 1, NULL, 0, 1, NULL, NULL, "t.yaml", &faults);
@@ -446,7 +445,7 @@ static void unfit_seeds(void **state)
     phantom_free(&p);
 }
 
-// An open end at the volume's border and a dead end inside: no branch is invented beyond either.
+// An open end at the volume's border and a blind end inside: no branch is invented beyond either.
 static void nothing_beyond_the_end(void **state)
 {
     (void)state;
@@ -470,7 +469,8 @@ static void nothing_beyond_the_end(void **state)
     phantom_free(&p);
 }
 
-// A start alone, half a radius off the axis, half-way along a curved vessel that fades into the volume's border at one end: all of the vessel, root first.
+// A start without direction or radius, half a radius off the axis, halfway along a curved vessel that reaches the volume's border at one end: the whole
+// vessel is found, root first.
 static void a_click_is_enough(void **state)
 {
     (void)state;
@@ -498,10 +498,10 @@ static void a_click_is_enough(void **state)
         }
         assert_true(ends[0] < 0.6 && ends[1] < 0.6);
         assert_int_equal(report.branch_count, 1);
-        assert_non_null(strstr(report.start, "both ways"));
+        assert_non_null(strstr(report.start, "both directions"));
         rbt_report_free(&report);
         vessel_tree_free(tree);
-        // one of the two alone: the other is kept, the root is the start
+        // only one of the two is given: it is kept, and with a direction the root is the start
         for (int given = 0; given < 2; given++) {
             RbtSeed half = seed;
             half.has_toward = given == 0;
@@ -511,7 +511,7 @@ static void a_click_is_enough(void **state)
             assert_non_null(tree);
             assert_true(given ? strstr(report.start, "direction") && !strstr(report.start, "radius")
                               : strstr(report.start, "radius") && !strstr(report.start, "direction"));
-            if (given == 0)   // the end that way is a hemisphere
+            if (given == 0)   // the end in that direction is a hemisphere
                 assert_true(vec3_distance(tree->center[0], helix(middle)) < 0.5 && vec3_distance(tree->center[tree->node_count - 1], helix(0)) < 3);
             rbt_report_free(&report);
             vessel_tree_free(tree);
@@ -523,7 +523,7 @@ static void a_click_is_enough(void **state)
 // The real carotid, past the giant aneurysm into the middle cerebral artery: at least 19 of 20 seeds.
 typedef struct CarotidJob {
     const Volume *volume;
-    double nearest[20], way[20];   // to M1 at voxel (150, 131, 185); beyond the neck near voxel (130, 118, 165)
+    double nearest[20], way[20];   // [mm] distance to M1 at voxel (150, 131, 185); path length after the neck near voxel (130, 118, 165)
 } CarotidJob;
 
 static void track_carotid(void *context, long index)
@@ -535,7 +535,7 @@ static void track_carotid(void *context, long index)
     RbtParameters parameters = rbt_default_parameters();
     RbtSeed seed = {.start = {187, 32, 152}, .toward = {182, 40, 154}, .start_is_voxel = true, .toward_is_voxel = true, .has_toward = true, .radius = 2};
     parameters.seed = (double)(index + 1);
-    parameters.max_length_mm = 120;   // M1 comes after 92 mm
+    parameters.max_length_mm = 120;   // M1 is reached after 92 mm
     VesselTree *tree = rbt_track(volume, &parameters, &seed, 1, NULL, 0, 1, NULL, NULL, "test", &own);
     Vec3 neck = volume_point_of(volume, vec3(130, 118, 165)), m1 = volume_point_of(volume, vec3(150, 131, 185));
     int at = 0;
@@ -561,7 +561,7 @@ static void past_the_giant_aneurysm(void **state)
     CarotidJob job = {.volume = volume_load(path, &faults)};
     assert_non_null(job.volume);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    int count = 3, needed = 3;   // the rate is the release build's business
+    int count = 3, needed = 3;   // the rate is measured in the release build
 #else
     int count = 20, needed = 19;
 #endif

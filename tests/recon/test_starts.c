@@ -1,5 +1,5 @@
-// Honest starts: noise is measured, a vessel in noise is found where it can be seen and refused where it cannot, clear volumes are not warned of. Rates over
-// several seeds; `bench track --only-starts` has more of them.
+// Checks of the first start: noise is measured, a vessel in noise is found if it can be seen and refused if it cannot, and clear volumes cause no warning.
+// Rates over several seeds; `bench track --only-starts` tests more.
 #include "recon/phantom/phantom.h"
 #include "recon/track/rbt_scan.h"
 #include "recon/track/rbt_track.h"
@@ -29,7 +29,7 @@ typedef struct Angiogram {
     Volume *volume;
 } Angiogram;
 
-// A random tree in whole grey values, 1 mm voxels.
+// A random tree in integer grey values, 1 mm voxels.
 static Angiogram make(int seed, double radius, double contrast, double noise, double band, double rotate_deg)
 {
     char option[4][2][64] = {{"points", "8"}, {"branches", "9"}, {"seed", ""}, {"radius_mm", ""}};
@@ -69,7 +69,7 @@ static VesselTree *click(const Angiogram *a, Vec3 x, RbtReport *report)
     return rbt_track(a->volume, &p, &seed, 1, NULL, 0, 0, NULL, report, "t.yaml", &faults);
 }
 
-// The first nodes of the truth run along the trunk.
+// Returns a point in the trunk: the first nodes of the exact tree lie along it.
 static Vec3 in_trunk(const Angiogram *a, double *radius)
 {
     *radius = a->truth->radius[6];
@@ -93,7 +93,7 @@ static void noise_is_measured(void **state)
     for (int i = 0; i < 3; i++) {
         double noise = i == 0 ? 2 : i == 1 ? 11 : 21, band = i == 2 ? 60 : 0;
         Angiogram a = make(i + 1, 4, 13, noise, band, 20.0 * i);
-        double found = volume_noise(a.volume, 3), exact = sqrt(noise * noise + 1.0 / 12);   // and what rounding adds
+        double found = volume_noise(a.volume, 3), exact = sqrt(noise * noise + 1.0 / 12);   // with the variance of rounding
         Volume *one = volume_smoothed(a.volume, 2, 1), *three = volume_smoothed(a.volume, 2, 3);
         assert_true(one && three);
         size_t voxels = (size_t)one->size[0] * (size_t)one->size[1] * (size_t)one->size[2];
@@ -105,7 +105,7 @@ static void noise_is_measured(void **state)
         print_message("noise %.2f: found %.2f; smoothed by 2 voxels %.3f (white noise %.3f); mean %.3f and %.3f\n", exact, found, smooth, expected, before,
                       after);
         assert_true(fabs(found / exact - 1) < 0.05);
-        assert_true(band > 0 || (smooth > 0.9 * expected && smooth < 1.5 * expected));   // the vessels remain
+        assert_true(band > 0 || (smooth > 0.9 * expected && smooth < 1.5 * expected));   // the smoothing keeps the vessels
         assert_true(fabs(after - before) < 0.2);
         assert_memory_equal(one->value, three->value, voxels * sizeof(float));
         volume_free(one);
@@ -114,7 +114,7 @@ static void noise_is_measured(void **state)
     }
 }
 
-// No word where nothing is to be said.
+// Clear volumes cause no warning.
 static void clear_volumes_are_not_warned_of(void **state)
 {
     (void)state;
@@ -185,7 +185,7 @@ static void hidden_vessels_are_refused(void **state)
             double radius;
             Angiogram a = k ? make(seed, 4, 13, 16, 40, 0) : make(seed, 2, 4, 40, 0, 0);
             Vec3 x = in_trunk(&a, &radius);
-            if (k)   // beside all vessels: away from the trunk's root
+            if (k)   // a place outside all vessels, away from the trunk's root
                 x = vec3_add_scaled(a.truth->center[0], 3.2 * radius, vec3_normal_to(a.truth->direction[0]));
             RbtReport report;
             VesselTree *tree = click(&a, x, &report);
@@ -203,7 +203,7 @@ static void hidden_vessels_are_refused(void **state)
         }
 }
 
-// A tube is even all round, a slab is bright on two sides.
+// A tube has the same contrast all around, a slab is bright on two sides.
 static void a_slab_is_no_tube(void **state)
 {
     (void)state;

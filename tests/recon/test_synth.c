@@ -1,4 +1,5 @@
-// The angiogram shapes and their volumes: closed forms, promises of the random tree, the octree against all parts, partial volume, noise, threads, frames.
+// The shapes for angiograms and their volumes: closed forms, properties of the random tree, the octree against all parts, partial volume, noise, threads,
+// frames.
 #include "bench/track_score.h"
 #include "recon/phantom/phantom_parts.h"
 
@@ -31,7 +32,7 @@ static Shape *make(const char *name, const char *text)
     return shape;
 }
 
-// Distance to the helix by search along it, radius 4, rise 12, two turns.
+// Compares with the distance to the helix by search along it: radius 4, rise 12, two turns.
 static void helix_is_a_helix(void **state)
 {
     (void)state;
@@ -63,7 +64,7 @@ static void y_is_symmetric_and_murrays(void **state)
         Vec3 x = random_in_box(&seed, 7);
         double f = shape_field(shape, x, NULL);
         if (fabs(f) > 0.5)
-            continue;        // far outside the trunk's half of a part is seen past the fork
+            continue;        // far outside, the trunk's half of a part is visible past the fork
         assert_near(f, shape_field(shape, vec3(x.x, -x.y, -x.z), NULL), 2e-3);
         seen++;
     }
@@ -71,12 +72,12 @@ static void y_is_symmetric_and_murrays(void **state)
     double least = 1;
     for (int i = 0; i < tree->node_count; i++)
         least = fmin(least, tree->radius[i]);
-    assert_near(2 * least * least * least, 1, 5e-3);   // the spline undershoots where the taper ends
+    assert_near(2 * least * least * least, 1, 5e-3);   // the spline undershoots at the end of the taper
     vessel_tree_free(tree);
     shape_free(shape);
 }
 
-// The least distance of the two walls is the gap, whatever the angle; measured on the nodes, and between them along the links.
+// The least distance of the two walls is the gap, at any angle; measured at the nodes, and between them along the links.
 static void kissing_vessels_keep_their_gap(void **state)
 {
     (void)state;
@@ -123,7 +124,7 @@ static void bone_touches(void **state)
 static double way_between(const VesselTree *tree, const double *arc, int a, int b)
 {
     int i = a, k = b;
-    while (i != k) {         // parents stand before children
+    while (i != k) {         // parents precede children
         if (i > k)
             i = tree->parent[i];
         else
@@ -132,7 +133,8 @@ static double way_between(const VesselTree *tree, const double *arc, int a, int 
     return arc[a] + arc[b] - 2 * arc[i];
 }
 
-// So many branches, Murray's law at each bifurcation, bends wider than the tube, and no contact of vessels that are not neighbours in the tree.
+// The random tree has the requested number of branches, follows Murray's law at each bifurcation, has bends wider than the tube, and no contact between
+// vessels that are not neighbours in the tree.
 static void random_tree_keeps_its_promises(void **state)
 {
     (void)state;
@@ -167,7 +169,7 @@ static void random_tree_keeps_its_promises(void **state)
                     continue;
                 assert_true(way_between(tree, arc, i, k) < 8 * fmax(tree->radius[i], tree->radius[k]) + 2);
             }
-        for (int b = 0; b < plan.branch_count; b++) {   // a parent and its two daughters, at their far ends
+        for (int b = 0; b < plan.branch_count; b++) {   // a parent and its two daughters, at their distal ends
             double cubes = 0;
             int daughters = 0;
             for (int c = 0; c < plan.branch_count; c++)
@@ -175,7 +177,7 @@ static void random_tree_keeps_its_promises(void **state)
                     cubes += pow(tree->radius[plan.branch[c].last_node], 3), daughters++;
             assert_true(daughters == 0 || daughters == 2);
             if (daughters == 2) {
-                // the wider daughter's radius is reached three radii on; its own last node may already stand in the next bifurcation
+                // the wider daughter's radius is reached after three radii; its own last node may already lie in the next bifurcation
                 double parent = tree->radius[plan.branch[b].last_node];
                 assert_near(cbrt(cubes) / parent, 1, 0.12);
             }
@@ -204,7 +206,7 @@ static void the_seed_makes_the_tree(void **state)
     shape_free(c);
 }
 
-// The parts that a cell leaves out cannot matter: the same bits as from all parts.
+// The parts that a cell omits have no effect: the bits are the same as with all parts.
 static void octree_changes_no_bit(void **state)
 {
     (void)state;
@@ -260,7 +262,7 @@ static Vec3 place_of(const Volume *v, size_t i)
     return volume_point_of(v, vec3((double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)));
 }
 
-// Voxels without blur against the share of 8^3 points inside; cubic and anisotropic, turned.
+// Voxels without blur against the fraction of 8^3 points inside; cubic and anisotropic grids, rotated.
 static void voxels_hold_their_share(void **state)
 {
     (void)state;
@@ -291,7 +293,7 @@ static void voxels_hold_their_share(void **state)
             widest = fmax(widest, fabs(error));
             seen++;
         }
-        // the box stands for the cube's projection, which is rounder: 0.07 at most, nothing on the mean
+        // the box filter approximates the cube's projection, which is rounder: errors up to 0.07, none on average
         assert_true(seen > 300);
         assert_near(sum / seen, 0, 0.01);
         assert_true(sqrt(square / seen) < 0.04 && widest < 0.15);
@@ -399,7 +401,7 @@ static double value_at(const Volume *v, Vec3 x)
     return sum;
 }
 
-// On a turned grid the tree stays where it is: 1 on the centreline, half-way on the wall; fading along the way, neighbours and bone seen.
+// On a rotated grid the tree does not move: brightness 1 on the centreline, halfway on the wall; fading along the path; neighbours and bone are visible.
 static void brightness_is_where_it_should_be(void **state)
 {
     (void)state;
@@ -426,7 +428,7 @@ static void brightness_is_where_it_should_be(void **state)
             for (int64_t p = tree->point_offset[i]; p < tree->point_offset[i + 1]; p++)
                 wall += value_at(v, tree->point[p]) / (double)(tree->point_offset[i + 1] - tree->point_offset[i]);
             if (i < tree->node_count - 3)
-                assert_near(wall, 0.5 * bright, 0.06);   // a convex wall has less than half
+                assert_near(wall, 0.5 * bright, 0.06);   // at a convex wall it is less than half
             seen++;
         }
         assert_true(seen > 20);
@@ -458,7 +460,7 @@ static void bad_options_are_faults(void **state)
     shape_free(shape);
 }
 
-// Whole grey values, vessels and band brighter by what was asked for, the noise in grey values; the band goes through the trunk.
+// Integer grey values, vessels and band brighter by the requested contrast, the noise in grey values; the band crosses the trunk.
 static void grey_values_and_a_band(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// Trace files: what is read, and that every fault is reported with its line and column in one pass.
+// Trace files: their contents are read, and every fault is reported with its line and column in one pass.
 #include "recon/track/trace.h"
 
 #include <setjmp.h>
@@ -33,7 +33,7 @@ static void full_file(void **state)
     assert_true(t->branch[1].start_is_voxel && !t->branch[1].has_toward && t->branch[1].line == 3 && t->branch[1].column == 5);
     assert_int_equal(t->aneurysm_count, 2);
     assert_true(t->aneurysm[0].center_count == 2 && t->aneurysm[0].center[1].x == 3 && !t->aneurysm[0].is_voxel && t->aneurysm[1].is_voxel);
-    // the set first, then single ones, wherever they stand
+    // the parameter set first, then single parameters, in any order in the file
     RbtParameters p = rbt_paper_parameters();
     assert_true(t->parameters.p_inl == 0.6 && t->parameters.seed == 7 && t->parameters.n_r == 642 && t->parameters.n_p == p.n_p &&
                 t->parameters.look_ahead == 0);
@@ -50,7 +50,7 @@ static void a_start_is_enough(void **state)
     trace_free(t);
 }
 
-// One start alone asks for the whole tree; a second one, or a word, does not.
+// A single start selects automatic tracking of the whole tree; a second start, or the key, switches it off.
 static void automatic_and_corrections(void **state)
 {
     (void)state;
@@ -77,7 +77,7 @@ static void automatic_and_corrections(void **state)
     trace_free(t);
 }
 
-// Points that the tree does not pass, and points in vessels that are not wanted; the command line adds to both.
+// Points that the tree does not pass, and points in excluded vessels; the command line adds to both.
 static void where_the_tree_ends(void **state)
 {
     (void)state;
@@ -114,7 +114,7 @@ static void every_parameter_by_name(void **state)
         assert_null(parse(text));
         assert_non_null(strstr(faults.text[0], "t.yaml:2:"));
     }
-    // the defaults pass their own ranges
+    // the defaults lie within their own ranges
     RbtParameters d = rbt_default_parameters(), p = rbt_paper_parameters();
     for (int i = 0; i < rbt_parameter_count; i++) {
         double a = *(double *)(void *)((char *)&d + rbt_parameter_table[i].offset), b = *(double *)(void *)((char *)&p + rbt_parameter_table[i].offset);
@@ -186,7 +186,7 @@ static void faults_with_their_place(void **state)
     // all in one pass
     assert_null(parse("branches: [{start_mm: [1, 2], toward_mm: 3, radius_mm: -1}]\nseed: x\nwhat: 1\n"));
     assert_int_equal(faults.count, 5);
-    // an anchor that holds itself
+    // an anchor that contains itself
     assert_null(parse("branches: &a [*a]\n"));
 }
 

@@ -1,4 +1,4 @@
-// Tree files: what is saved is loaded again, the same content gives the same bytes, and every broken rule is named.
+// Tree files: a saved tree is loaded unchanged, the same content gives the same bytes, and every violated rule is reported.
 #include "base/whole_file.h"
 #include "recon/tree_file.h"
 
@@ -34,7 +34,7 @@ static VesselTree *make_tree(bool model)
         tree->height[i] = 2.5;
         tree->parent[i] = parent[i];
         tree->kind[i] = i == 3 ? NODE_ANEURYSM : NODE_VESSEL;
-        tree->point_offset[i + 1] = i == 3 ? 10 : 3 * (i + 1) - (i == 2 ? 3 : 0);   // node 2 has none
+        tree->point_offset[i + 1] = i == 3 ? 10 : 3 * (i + 1) - (i == 2 ? 3 : 0);   // node 2 has no points
     }
     for (int i = 0; i < 10; i++)
         tree->point[i] = vec3(sin(i), cos(i), 1.0 / (i + 1));
@@ -178,7 +178,7 @@ static void missing_datasets_are_named(void **state)
         H5Fclose(file);
         expect_fault(in_folder("m.h5"), names[i]);
     }
-    // all at once, in one pass
+    // all faults in one pass
     hid_t file = fresh_file(in_folder("m.h5"));
     H5Ldelete(file, "/nodes", H5P_DEFAULT);
     H5Ldelete(file, "/points", H5P_DEFAULT);
@@ -217,11 +217,11 @@ static void lies_are_found(void **state)
     }
 }
 
-// A chunk that unpacks to less than its shape needs: the library would read what lies behind it in memory.
+// A chunk that decompresses to less than its shape needs: the library would read the memory after it.
 static void what_unpacks_to_less_is_refused(void **state)
 {
     (void)state;
-    static const unsigned char stream[] = {0x78, 0x9c, 0x63, 0x60, 0x80, 0x00, 0x00, 0x00, 0x08, 0x00, 0x01};     // eight zero bytes, of 32
+    static const unsigned char stream[] = {0x78, 0x9c, 0x63, 0x60, 0x80, 0x00, 0x00, 0x00, 0x08, 0x00, 0x01};     // eight zero bytes instead of 32
     const hsize_t rows = 4;
     hid_t file = fresh_file(in_folder("packed.h5")), space = H5Screate_simple(1, &rows, NULL), creation = H5Pcreate(H5P_DATASET_CREATE);
     H5Pset_chunk(creation, 1, &rows);

@@ -1,5 +1,5 @@
-// Volume readers and the writer: every sample type in both byte orders, every placement of the grid, every way to skip and to be detached;
-// truncated and lying headers. The truth is the file that the test builds itself, byte by byte.
+// Volume readers and the writer: every sample type in both byte orders, every grid geometry, every kind of skip and of detached data; truncated files and
+// wrong headers. The expected values come from the file that the test builds itself, byte by byte.
 #include "recon/volume/volume_file.h"
 
 #include <setjmp.h>
@@ -58,7 +58,7 @@ static bool has_fault(const char *words)
     return false;
 }
 
-// No volume, and a fault with these words.
+// Checks that no volume is read and that a fault contains these words.
 static void refused(const Bytes *b, const char *words)
 {
     Volume *volume = parse(b);
@@ -127,8 +127,8 @@ static void every_type_in_both_orders(void **state)
     static const struct {
         const char *name;
         size_t size;
-        double low, high;    // values that the type holds, in turn
-        int kind;            // 0 whole, 1 float, 2 double
+        double low, high;    // values within the type's range, alternating
+        int kind;            // 0: integer, 1: float, 2: double
     } types[] = {{"signed char", 1, -128, 127, 0},         {"uchar", 1, 0, 255, 0},
                  {"int16", 2, -32768, 32767, 0},           {"unsigned short", 2, 0, 65535, 0},
                  {"int", 4, -2147483648.0, 16777216, 0},   {"uint32_t", 4, 0, 4294967040.0, 0},
@@ -189,7 +189,7 @@ static void nrrd_grids(void **state)
     assert_string_equal(v->frame, "LPS");
     assert_near(volume_point_of(v, vec3(1, 1, 1)), vec3(0.4, 0.5, 1.6));
     volume_free(v);
-    // an axis that is none of space, of one sample; lines end as in DOS
+    // a non-spatial axis of one sample; lines end with CR LF
     b.length = 0;
     put_text(&b,
              "NRRD0005\r\ntype: uint8\r\ndimension: 4\r\nsizes: 1 2 3 4\r\nspace dimension: 3\r\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\r\nkey:=any\r\n"
@@ -212,7 +212,7 @@ static void encodings_and_skips(void **state)
     Volume *v = parse(&b);
     assert_counting(v);
     volume_free(v);
-    // the byte skip counts in the inflated data
+    // the byte skip applies to the decompressed data
     with.length = 0;
     put(&with, "headerless", 10);
     put(&with, data.byte, data.length);
@@ -303,14 +303,14 @@ static void metaimage(void **state)
     volume_free(v);
     b.length = 0;
     put_text(&b, start, "False", "False", "MET_FLOAT");
-    put(&b, data.byte, data.length);   // half of what floats need
+    put(&b, data.byte, data.length);   // half of the bytes that floats need
     refused(&b, "ends after 48 of 96 bytes");
     b.length = 0;
     put_text(&b, start, "False", "False", "MET_OTHER");
     refused(&b, "ElementType is missing or not valid");
 }
 
-// A NIfTI-1 header with the fields that matter.
+// Writes a NIfTI-1 header with the relevant fields.
 static void nifti_header(Bytes *b, bool big, int code, int bits, int sform, int qform, const char *magic, float offset)
 {
     static const float srow[12] = {0, -0.5f, 0, 1, 0.4f, 0, 0, 2, 0, 0, 0.6f, 3}, pixdim[4] = {-1, 0.4f, 0.5f, 0.6f};
@@ -341,7 +341,7 @@ static void nifti_header(Bytes *b, bool big, int code, int bits, int sform, int 
     memcpy(b->byte + 344, magic, 4);
 }
 
-// Stored x is read as 2 x - 1.
+// Checks that a stored x is read as 2 x - 1.
 static void assert_scaled(const Volume *v)
 {
     assert_non_null(v);
@@ -368,7 +368,7 @@ static void nifti(void **state)
     Volume *v = parse(&packed);
     assert_scaled(v);
     volume_free(v);
-    // qform: a quarter turn about z, and qfac -1 turns the third axis round
+    // qform: a quarter turn about z; qfac -1 reverses the third axis
     nifti_header(&b, false, 512, 16, 0, 1, "n+1", 352);
     b.length = 352;
     shorts(&b, false);
@@ -376,7 +376,7 @@ static void nifti(void **state)
     assert_scaled(v);
     assert_near(volume_point_of(v, vec3(1, 2, 3)), vec3(1 - 1, 2 + 0.4, 3 - 1.8));
     volume_free(v);
-    // a pair, opened by either name
+    // a pair, opened by the name of either file
     nifti_header(&b, false, 4, 16, 1, 0, "ni1", 0);
     data.length = 0;
     shorts(&data, false);
@@ -437,7 +437,7 @@ static void lies(void **state)
         header(&b, "short", cases[i].more);
         refused(&b, cases[i].words);
     }
-    // sizes that would ask for the memory of a data centre
+    // sizes that would need far too much memory
     static const char *sizes[] = {"100000 100000 100000", "2147483647 1 1", "0 3 4", "-1 3 4", "2.5 3 4", "1e30 1 1", "99999999999999999999 1 1"};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         b.length = 0;
@@ -490,7 +490,7 @@ static void saved_volumes_load_equal(void **state)
         assert_string_equal(w->frame, "LPS");
         volume_free(w);
     }
-    // what does not fit is refused, and the old file stays
+    // values that do not fit are refused, and the old file stays
     assert_false(volume_save_nrrd(v, path, "uint8", &faults));
     assert_true(has_fault("uint8 cannot hold"));
     faults_clear(&faults);
@@ -498,7 +498,7 @@ static void saved_volumes_load_equal(void **state)
     assert_non_null(w);
     volume_free(w);
     assert_false(volume_save_nrrd(v, "/nowhere/saved.nrrd", "float", &faults));
-    // a disk that is full after 200 bytes: a fault, the old file whole, nothing half written beside it
+    // a disk that is full after 200 bytes: a fault, the old file is unchanged, no partial file remains
     struct rlimit kept, tight = {200, RLIM_INFINITY};
     getrlimit(RLIMIT_FSIZE, &kept);
     tight.rlim_max = kept.rlim_max;

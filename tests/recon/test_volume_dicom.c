@@ -1,5 +1,5 @@
-// DICOM series, from files that the test builds byte by byte: encodings, sample layouts, places, what is refused. A volume's truth is a function of the
-// point in space, so that order, orientation and spacing are checked at once.
+// DICOM series, from files that the test builds byte by byte: encodings, sample layouts, positions, refused files. The expected value is a function of the
+// point in space, so order, orientation and spacing are checked at once.
 #include "base/process.h"
 #include "recon/volume/volume_file.h"
 #include "tests/recon/dicom_file.h"
@@ -16,16 +16,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { NX = 33, NY = 32, NZ = 6 };     // JPEG 2000 as gdcmconv writes it takes no less
+enum { NX = 33, NY = 32, NZ = 6 };     // JPEG 2000 as written by gdcmconv does not allow smaller images
 
 typedef struct Setting {
     DicomEncoding encoding;
     bool no_preamble;
     unsigned allocated, stored, high_bit, is_signed;
     const char *photometric, *series, *syntax, *sop;
-    double gap;              // [mm] extra, before slice 3
-    double shear;            // [mm] along x, each slice
-    int copies_of;           // number of the slice whose place this one takes, or -1
+    double gap;              // [mm] extra distance before slice 3
+    double shear;            // [mm] shift along x per slice
+    int copies_of;           // number of the slice whose position this one has, or -1
     bool no_position, in_sequence, per_slice_scale;
 } Setting;
 
@@ -49,7 +49,7 @@ static Vec3 place_of(const Setting *s, int i, int j, int k)
     return vec3_add_scaled(vec3_add_scaled(p, k * dz + (k >= 3 ? s->gap : 0), w), k * s->shear, u);
 }
 
-// A whole number from 0 to 230 that differs from all neighbours.
+// An integer from 0 to 230 that differs from those of all neighbours.
 static int truth(int i, int j, int k) { return 10 + i + 3 * j + 17 * k; }
 
 static void decimals(DicomBytes *d, uint32_t tag, int count, const double *x)
@@ -86,7 +86,7 @@ static void put_layout(DicomBytes *d, const Setting *s, int frames)
     dicom_short(d, 0x00280103, s->is_signed);
 }
 
-// Samples such that slope * sample + intercept is the truth; rubbish in the bits that are not stored.
+// Writes samples with slope * sample + intercept equal to the expected value, and random bits where none are stored.
 static void put_samples(DicomBytes *d, const Setting *s, int k, double slope, double intercept)
 {
     bool big = d->encoding == EXPLICIT_BIG;
@@ -100,7 +100,7 @@ static void put_samples(DicomBytes *d, const Setting *s, int k, double slope, do
             bits |= ~((range - 1) << shift) & 0xa5a5u;
             dicom_bits(d, bits, (int)s->allocated / 8, big);
         }
-    if (big && s->allocated == 8)   // words
+    if (big && s->allocated == 8)   // stored in words
         for (size_t i = d->length - NX * NY; i < d->length; i += 2) {
             uint8_t kept = d->byte[i];
             d->byte[i] = d->byte[i + 1];
@@ -115,7 +115,7 @@ static void build_slice(DicomBytes *d, const Setting *s, int k)
     dicom_begin(d, s->encoding, !s->no_preamble, s->syntax);
     dicom_text(d, 0x00080018, "UI", s->sop ? s->sop : sop);
     dicom_text(d, 0x00080060, "CS", "CT");
-    if (s->in_sequence) {   // an icon of its own, with pixels and sizes that are none of the image's
+    if (s->in_sequence) {   // an icon with its own pixels and sizes, which do not belong to the image
         dicom_head(d, 0x00081140, "SQ", 0xffffffffu);
         dicom_head(d, 0xfffee000u, "", 0xffffffffu);
         dicom_short(d, 0x00280010, 999);
@@ -127,7 +127,7 @@ static void build_slice(DicomBytes *d, const Setting *s, int k)
         dicom_head(d, 0xfffee00du, "", 0);
         dicom_head(d, 0xfffee0ddu, "", 0);
     }
-    dicom_text(d, 0x00180050, "DS", "9");   // a thickness that lies
+    dicom_text(d, 0x00180050, "DS", "9");   // a wrong slice thickness
     dicom_text(d, 0x0020000e, "UI", s->series);
     if (!s->no_position)
         put_position(d, s, s->copies_of >= 0 ? s->copies_of : k);
@@ -179,7 +179,7 @@ static void empty_folder(void)
     closedir(directory);
 }
 
-// File names in an order that is not that of the places.
+// Writes a series with file names in another order than the positions.
 static void write_series(const Setting *s, const char *prefix)
 {
     for (int k = 0; k < NZ; k++) {
@@ -252,7 +252,7 @@ static void encodings_and_layouts(void **state)
         }
 }
 
-// Enhanced objects: places in functional groups, for all frames and for each, in sequences with and without length.
+// Enhanced objects: positions in functional groups, for all frames and for each, in sequences of defined and undefined length.
 static void build_multi_frame(DicomBytes *d, const Setting *s, bool open, int places)
 {
     size_t length_at, item_at;
@@ -340,7 +340,7 @@ static void what_is_refused(void **state)
     write_series(&s, "im");
     assert_null(load(""));
     assert_true(has_fault("frame 1 lies 1.5 mm behind frame 1"));
-    // the same image twice is one; another image at the same place is a fault
+    // a duplicate of an image counts once; another image at the same position is a fault
     s = plain;
     empty_folder();
     write_series(&s, "im");
@@ -352,7 +352,7 @@ static void what_is_refused(void **state)
     write_slice("again", &s, 2);
     assert_null(load("im1"));
     assert_true(has_fault("has the same position as frame 1 of"));
-    // two series: the folder is refused with a list, a file names one; other files do not matter
+    // two series: the folder is refused with a list, a file selects its series; other files are ignored
     s = plain;
     empty_folder();
     write_series(&s, "im");
@@ -363,7 +363,7 @@ static void what_is_refused(void **state)
     volume = load("other4");
     assert_true_volume(volume, &s);
     volume_free(volume);
-    // a damaged file of the series is reported, one of another series is not
+    // a damaged file of the series is reported, that of another series is not
     build_slice(&d, &s, 3);
     write_file("other1", &d, d.length - 1);
     assert_null(load("other0"));
@@ -371,7 +371,7 @@ static void what_is_refused(void **state)
     volume = load("im0");
     assert_true_volume(volume, &plain);
     volume_free(volume);
-    // a lone slice, a projection, a folder without images
+    // a single slice, a projection, a folder without images
     s = plain;
     empty_folder();
     write_slice("im0", &s, 0);
@@ -384,7 +384,7 @@ static void what_is_refused(void **state)
     empty_folder();
     assert_null(load(""));
     assert_true(has_fault("has no DICOM images"));
-    // compressed, deflated, colour, odd layouts
+    // compressed, deflated, colour, unsupported layouts
     s = plain;
     build_slice(&d, &s, 0);
     d.length -= NX * NY * 2 + 12;
@@ -429,7 +429,7 @@ static bool can_unpack(void)
 
 static const char *const compressed[] = {"--jpeg", "--jpegls", "--j2k", "--rle"};
 
-// Lossless: the same values, of 8 to 16 bits, signed too, by series and by frames.
+// Lossless compression: the same values, of 8 to 16 bits, signed too, as a series and as frames.
 static void what_is_compressed_is_the_same(void **state)
 {
     (void)state;
@@ -460,7 +460,7 @@ static void what_is_compressed_is_the_same(void **state)
         }
 }
 
-// Frames of one file, whose places are in functional groups.
+// Frames of one file, with positions in functional groups.
 static void compressed_frames(void **state)
 {
     (void)state;
@@ -477,7 +477,7 @@ static void compressed_frames(void **state)
     volume_free(volume);
 }
 
-// Damaged in any byte: a fault or a volume, never more.
+// A file damaged in any byte gives a fault or a volume, and no crash.
 static void what_is_damaged_is_refused(void **state)
 {
     (void)state;
@@ -509,7 +509,7 @@ static void what_is_damaged_is_refused(void **state)
             read += volume != NULL, refused += !volume;
             volume_free(volume);
         }
-        assert_int_equal(glob(in_folder("gdcm*"), 0, NULL, &left), GLOB_NOMATCH);       // GDCM's own temporary files
+        assert_int_equal(glob(in_folder("gdcm*"), 0, NULL, &left), GLOB_NOMATCH);       // no temporary files of GDCM remain
         globfree(&left);
     }
     unsetenv("TMPDIR");

@@ -1,5 +1,4 @@
-// Oblique, anisotropic and left-handed grids: whatever the file's format, the same point in space has the same brightness, and the same vessel gives the
-// same tree.
+// Oblique, anisotropic and left-handed grids: in every file format the same point in space has the same brightness, and the same vessel gives the same tree.
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_track.h"
 #include "recon/volume/bspline.h"
@@ -31,7 +30,7 @@ enum { NX = 9, NY = 8, NZ = 7, COUNT = NX * NY * NZ };
 static Faults faults;
 static char folder[64];
 
-// Quaternion (b, c, d) to axes by the words of nifti1.h.
+// Converts a quaternion (b, c, d) to axes by the definition in nifti1.h.
 static const double qb = 0.3, qc = -0.2, qd = 0.45, pixdim[3] = {0.3, 0.4, 0.65};
 
 static Grid grid_of(bool left_handed)
@@ -51,7 +50,7 @@ static Vec3 point_of(const Grid *g, double i, double j, double k)
     return vec3_add_scaled(vec3_add_scaled(vec3_add_scaled(g->origin, i, g->axis[0]), j, g->axis[1]), k, g->axis[2]);
 }
 
-// Cubic B-splines reproduce planes, so that values between voxels are known too.
+// Cubic B-splines reproduce linear functions, so values between voxels are known too.
 static double brightness(Vec3 x) { return 200 + 3 * x.x - 2 * x.y + 5 * x.z; }
 
 static void put_text(Bytes *b, const char *format, ...)
@@ -108,7 +107,7 @@ static void check(Volume *v, const Grid *g, const char *frame)
     Random random = random_from_seed(5, 0);
     for (int n = 0; n < 200; n++) {
         Vec3 x = point_of(g, 1 + (NX - 3) * random_unit(&random), 1 + (NY - 3) * random_unit(&random), 1 + (NZ - 3) * random_unit(&random));
-        assert_true(fabs((double)bspline_sample(v, volume_voxel_of(v, x)) - brightness(x)) < 1e-3);   // floats near 200, places of 7 digits
+        assert_true(fabs((double)bspline_sample(v, volume_voxel_of(v, x)) - brightness(x)) < 1e-3);   // floats near 200, positions with 7 digits
     }
     volume_free(v);
 }
@@ -224,7 +223,7 @@ static void nifti(void **state)
         put_at(&b, 112, by_sform ? slope : 0, true, big);
         put_at(&b, 116, intercept, true, big);
         b.byte[123] = 2;
-        put_at(&b, 252, 1, false, big);   // both are there: the sform counts
+        put_at(&b, 252, 1, false, big);   // both are given: the sform takes precedence
         put_at(&b, 254, by_sform, false, big);
         const double q[6] = {by_sform ? 0.1 : qb, by_sform ? 0.2 : qc, by_sform ? 0 : qd, g.origin.x, g.origin.y, g.origin.z};
         for (size_t i = 0; i < 6; i++)
@@ -264,7 +263,7 @@ static double from_arc(Vec3 x)
 
 static VesselTree *track_on(const Vec3 axis[3])
 {
-    // a grid that holds the arc's box, whatever its axes
+    // a grid that contains the arc's box, for any axes
     const Vec3 low = {-14, -3, -4}, high = {15, 15, 4};
     Volume *probe = volume_create((int[3]){1, 1, 1}, vec3(0, 0, 0), axis);
     double least[3] = {1e9, 1e9, 1e9}, most[3] = {-1e9, -1e9, -1e9};
@@ -334,7 +333,7 @@ static void one_vessel_on_any_grid(void **state)
         Figures f = figures_of(track_on(grids[n]));
         print_message("%s: centre %.3f mm, radius %.3f +- %.3f mm, to %.1f degrees\n", names[n], f.centre, f.radius, f.radius_spread, f.reach * 180 / PI);
         first = n ? first : f;
-        // 0.15 voxel (mean edge 0.4 mm), and half as much between grids: what tracking must do on straight grids. A cylinder on a bent vessel lies off its
+        // 0.15 voxel (mean edge 0.4 mm), and half as much between grids, as required of tracking on straight grids. A cylinder on a bent vessel is off its
         // axis by about height^2 / (24 bend) = 0.03 mm by itself
         assert_true(f.centre < 0.06 && fabs(f.radius - lumen) < 0.06 && fabs(f.radius - first.radius) < 0.03 && f.radius_spread < 0.15);
         assert_true(fabs(f.reach - 150 * PI / 180) < lumen / bend);   // all end at the arc's end, within a radius

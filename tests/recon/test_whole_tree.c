@@ -83,7 +83,7 @@ static void every_branch_from_one_start(void **state)
         assert_non_null(tree);
         for (int i = 0; i < 6; i++)
             assert_true(nearest_to(tree, tip[i]) < 1.3);
-        // no link through background, and every branch hangs on one that was there before
+        // no link passes through background, and every branch is attached to an earlier one
         for (int i = 1; i < tree->node_count; i++)
             for (double s = 0; s <= 1; s += 0.125)
                 assert_true(value_at(v, vec3_mix(tree->center[i], tree->center[tree->parent[i]], s)) > 0.3f);
@@ -99,7 +99,7 @@ static void every_branch_from_one_start(void **state)
     volume_free(v);
 }
 
-// A neighbour that passes by, half a voxel to two voxels from the wall, is no branch.
+// A neighbour that passes by, half a voxel to two voxels from the wall, is not a branch.
 static void kissing_vessel_is_refused(void **state)
 {
     (void)state;
@@ -125,7 +125,7 @@ static void kissing_vessel_is_refused(void **state)
     }
 }
 
-// Bone in contact, and a thin neighbour that crosses two voxels away: nothing outside the vessel.
+// Bone in contact, and a thin neighbour that crosses at a distance of two voxels: nothing outside the vessel is tracked.
 static void dense_and_near_neighbours_are_refused(void **state)
 {
     (void)state;
@@ -138,7 +138,7 @@ static void dense_and_near_neighbours_are_refused(void **state)
                   {"kissing", 13, {{"gap_mm", "0.4"}, {"radius_mm", "0.6"}, {"crossing_deg", "90"}}}};
     for (size_t k = WHOLE_OR_SHORT(0, 1); k < sizeof shapes / sizeof shapes[0]; k++) {
         VolumeOptions options = volume_default_options();
-        options.seed = shapes[k].seed;   // as `synth` has it: of the places and of the noise
+        options.seed = shapes[k].seed;   // as in `synth`: seed of the positions and of the noise
         Shape *shape = shape_create(shapes[k].name, 3, shapes[k].option, "test", &faults);
         assert_non_null(shape);
         VesselTree *truth = shape_sample(shape, &faults);
@@ -198,7 +198,7 @@ static void a_sac_is_found(void **state)
     volume_free(v);
 }
 
-// A sac with a lobe is one sac of several centres, one of them in the lobe; each stands in the lumen and has the walls around it.
+// A sac with a lobe is one sac with several centres, one of them in the lobe; each lies in the lumen and has wall points around it.
 static void a_lobed_sac_has_several_centers(void **state)
 {
     (void)state;
@@ -237,7 +237,7 @@ static void a_lobed_sac_has_several_centers(void **state)
     volume_free(v);
 }
 
-// One click anywhere in a random tree, half a radius off the axis, without direction or radius.
+// A click anywhere in a random tree, half a radius off the axis, without direction or radius.
 static void a_click_anywhere(void **state)
 {
     (void)state;
@@ -273,8 +273,8 @@ static void a_click_anywhere(void **state)
 
 // --- corrections ---
 
-// Every node of `part` further than `radius` from `around` stands in `whole` with the same bits, points and parent's place included; returns how
-// many of the whole's are missing.
+// Checks that every node of `part` further than `radius` from `around` is in `whole` with the same bits, including its points and its parent's position.
+// Returns how many nodes of `whole` are missing.
 static int missing_beside(const VesselTree *whole, const VesselTree *part, Vec3 around, double radius)
 {
     int found = 0, needed = 0;
@@ -315,7 +315,7 @@ static void corrections_leave_the_rest(void **state)
     RbtSeed seed[2] = {trunk(), {.start = {6, 10, 12.4}, .radius = 0.6}};
     VesselTree *whole = track(v, &p, seed, 1, 0, NULL);
     assert_non_null(whole);
-    // a cut: the forked branch goes with both daughters, no other; the trunk's points in a mouth are no wall while the branch is there
+    // a cut removes the forked branch with both daughters and no other; the trunk's points in an ostium are not wall while the branch exists
     RbtRegion cut = {.center = {12, 8.3, 17.2}, .line = 3, .column = 7};
     p.cut = &cut;
     p.cut_count = 1;
@@ -327,7 +327,7 @@ static void corrections_leave_the_rest(void **state)
         assert_true(nearest_to(tree, tip[i]) < 1.3);
     vessel_tree_free(tree);
     p.cut_count = 0;
-    // a forbidden region on the branch to tip 2: the others are the same, it ends in front of it
+    // a forbidden region on the branch to tip 2: that branch ends in front of it, the others are unchanged
     RbtRegion forbid = {.center = {31.5, 50, 62}, .is_voxel = true, .radius = 1.2, .line = 2, .column = 5};
     p.forbid = &forbid;
     p.forbid_count = 1;
@@ -336,9 +336,9 @@ static void corrections_leave_the_rest(void **state)
     Vec3 middle = volume_point_of(v, forbid.center);
     assert_true(nearest_to(without, middle) >= 1.2 && nearest_to(without, tip[2]) > 2);
     Vec3 stump = {6.8, 10, 12};
-    assert_true(missing_beside(whole, without, stump, 4.2) > 5);   // its link is measured by its own first nodes
+    assert_true(missing_beside(whole, without, stump, 4.2) > 5);   // its link depends on its own first nodes
     missing_beside(without, whole, vec3(5.6, 10, 12.9), 5.6);   // the branch itself with its link
-    // a branch that a start adds to the tree that was cut: nothing else moves
+    // a start adds a branch to the tree after a cut: nothing else changes
     p.forbid_count = 0;
     cut.center = vec3(7.5, 10, 11.1);
     p.cut_count = 1;
@@ -349,13 +349,13 @@ static void corrections_leave_the_rest(void **state)
     missing_beside(more, less, vec3(9.3, 10, 9.6), 1.5);
     vessel_tree_free(less);
     vessel_tree_free(more);
-    // the start of what was found already adds nothing
+    // a start on a branch that was already found adds nothing
     p.cut_count = 0;
     more = track(v, &p, seed, 2, 0, NULL);
     assert_non_null(more);
     assert_int_equal(missing_nodes(whole, more), 0);
     vessel_tree_free(more);
-    // a cut beside everything is a fault with its place
+    // a cut away from all branches is a fault with its position
     cut.center = vec3(2, 2, 2);
     p.cut_count = 1;
     faults_clear(&faults);

@@ -1,10 +1,10 @@
-// Volumes of tubes for the tests of tracking. After cmocka's headers.
+// Creates volumes of tubes for the tests of tracking. Include after cmocka's headers.
 #ifndef SELDINGER_TESTS_RECON_TUBE_VOLUME_H
 #define SELDINGER_TESTS_RECON_TUBE_VOLUME_H
 
 #include "recon/volume/volume.h"
 
-// A union of tubes of brightness 1 on background 0, with a plain blurred edge and noise from the voxels' numbers.
+// A union of tubes of brightness 1 on background 0, with a plain blurred edge, and noise that depends on the voxels' numbers.
 static inline Volume *dark_volume(int nx, int ny, int nz, double voxel)
 {
     Volume *v = volume_create((int[3]){nx, ny, nz}, vec3(0, 0, 0), (Vec3[3]){{voxel, 0, 0}, {0, voxel, 0}, {0, 0, voxel}});
