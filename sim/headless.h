@@ -3,13 +3,13 @@
 #define SELDINGER_SIM_HEADLESS_H
 
 #include "sim/drive.h"
-#include "sim/lesson.h"
 #include "sim/moments.h"
 #include "sim/open_vessel.h"
+#include "sim/session_tracker.h"
 
 typedef struct HeadlessOptions {
     const char *record;              // NULL: no recording
-    bool scores;                     // a lesson beside the tool
+    bool scores;                     // also keep the score
     bool has_moments;
     int moment_count;                // 0: the end alone
     double moment_s[MOMENTS_MOST];
@@ -22,7 +22,7 @@ typedef struct HeadlessRun {         // zeroed by whoever opens it
     const HeadlessOptions *options;
     Simulator *simulator;
     NodeReport *node;                // of the last state
-    Lesson *lesson;
+    SessionTracker *tracker;
     Moments moments;
     Recording *recording;            // while it runs
     DriveReport report;

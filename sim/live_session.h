@@ -3,14 +3,14 @@
 #ifndef SELDINGER_SIM_LIVE_SESSION_H
 #define SELDINGER_SIM_LIVE_SESSION_H
 
-#include "sim/lesson.h"
 #include "sim/open_vessel.h"
 #include "sim/realtime.h"
+#include "sim/session_tracker.h"
 
 typedef struct LiveSession {
     const Scene *scene;
     Simulator *simulator;
-    Lesson *lesson;
+    SessionTracker *tracker;
     Recording *recording;        // NULL: not recorded
     Realtime *realtime;
     char record_path[4096];      // "" where not recorded
@@ -35,7 +35,7 @@ typedef struct LiveSessionOptions {
 
 // False with faults; then nothing is left open. A resumed recording that does not reproduce its own states is refused.
 bool live_session_open(LiveSession *session, const Scene *scene, const OpenVessel *open, const LiveSessionOptions *options, Faults *faults);
-// Stops the thread and closes the recording; simulator and lesson stay available. False with a fault if the recording is incomplete.
+// Stops the thread and closes the recording; simulator and tracker stay available. False with a fault if the recording is incomplete.
 bool live_session_stop(LiveSession *session, RealtimeFigures *figures, Faults *faults);
 void live_session_free(LiveSession *session);   // after stop, or if it never opened
 
