@@ -1,8 +1,8 @@
 #include "sim/score.h"
 
 #include "geom/geom.h"
+#include "sim/score_path.h"
 #include "sim/score_tool.h"
-#include "sim/score_way.h"
 
 #include <stdlib.h>
 
@@ -29,7 +29,7 @@ struct Score {
     const Scene *scene;
     Exercise exercise;           // the scene's, or the default; its text is the scene's
     ScoreFigures figures;
-    ScoreWay way;
+    ScorePath path;
     int tool_count;
     ScoreTool tool[TOOLS_MOST];
     double dt;                   // [ms]
@@ -80,8 +80,8 @@ static double lumen_radius(const Scene *scene, Simulator *simulator, const Vesse
 // The next node towards the target, past it or without one into the widest branch; -1 at an end.
 static int follow(const Score *score, const VesselTree *tree, int node)
 {
-    if (score->exercise.target >= 0 && node != score->way.goal)
-        return score->way.toward[node];
+    if (score->exercise.target >= 0 && node != score->path.goal)
+        return score->path.toward[node];
     int next = -1;
     for (int i = node + 1; i < tree->node_count; i++)
         if (tree->parent[i] == node && (next < 0 || tree->radius[i] > tree->radius[next]))
@@ -139,14 +139,14 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     Vec3 tip = stepper_tool_place(simulator_stepper(simulator), led, stepper_tool_length(simulator_stepper(simulator), led)).position;
     Vec3 target = at >= 0 ? scene->target[at].point : tip;
     // the path first: the vessel's turn behind the mouth is measured along it
-    if (!score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0) || !create_tools(score, simulator, tree)) {
+    if (!score_path_create(&score->path, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0) || !create_tools(score, simulator, tree)) {
         score_free(score);
         return NULL;
     }
     ScoreFigures *f = &score->figures;
     f->has_exercise = scene->exercise != NULL;
     f->tip_node = f->tool[led].tip_node;
-    f->way_mm = f->remaining_mm = f->least_remaining_mm = score_way_left(&score->way, tip, f->tip_node);
+    f->way_mm = f->remaining_mm = f->least_remaining_mm = score_path_left(&score->path, tip, f->tip_node);
     f->target_distance_mm = vec3_distance(tip, target);
     for (int i = 0; i < PART_COUNT; i++)
         f->part[i] = 1;
@@ -158,7 +158,7 @@ void score_free(Score *score)
 {
     if (!score)
         return;
-    score_way_destroy(&score->way);
+    score_path_destroy(&score->path);
     free(score);
 }
 
@@ -339,15 +339,15 @@ static void look(Score *score, const Stepper *stepper, int led, double now_s)
     for (int k = 0; k < score->tool_count; k++) {
         ScoreToolFigures *own = &f->tool[k];
         score_sheath_look(&score->tool[k].sheath, stepper, k);
-        if (!score->way.tree)
+        if (!score->path.tree)
             continue;
-        own->tip_node = find_node(score->way.tree, place_in_vessel(score, stepper, k), own->tip_node);
-        own->off_way_mm = score->exercise.target >= 0 ? score->way.off[own->tip_node] : 0;
+        own->tip_node = find_node(score->path.tree, place_in_vessel(score, stepper, k), own->tip_node);
+        own->off_way_mm = score->exercise.target >= 0 ? score->path.off[own->tip_node] : 0;
     }
     f->tip_node = f->tool[led].tip_node;
     if (score->exercise.target < 0)
         return;
-    f->remaining_mm = score_way_left(&score->way, place_in_vessel(score, stepper, led), f->tip_node);
+    f->remaining_mm = score_path_left(&score->path, place_in_vessel(score, stepper, led), f->tip_node);
     f->least_remaining_mm = fmin(f->least_remaining_mm, f->remaining_mm);
     for (int k = 0; k < score->tool_count; k++)
         judge_limit(score, ERROR_WRONG_BRANCH, k, f->tool[k].off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);
@@ -461,7 +461,7 @@ const ScoreEvent *score_events(const Score *score, int *count)
 
 void score_copy(Score *to, const Score *from)
 {
-    ScoreWay way = to->way;
+    ScorePath path = to->path;
     *to = *from;
-    to->way = way;
+    to->path = path;
 }
