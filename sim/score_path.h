@@ -14,11 +14,11 @@ typedef struct ScorePath {
     int *toward;                 // (N) next node towards the target; itself for the target's node
 } ScorePath;
 
-// `tree` may be NULL. A branch's mouth lies one radius of the path's vessel from its centreline; what continues past the target begins
-// `target_radius` or the vessel's radius behind it, whichever is more. False if out of memory.
+// `tree` may be NULL. A branch's mouth lies one radius of the path's vessel from its centreline; a vessel that continues past the target begins `target_radius`
+// or the vessel's radius behind it, whichever is more. Returns false if out of memory.
 bool score_path_create(ScorePath *path, const VesselTree *tree, Vec3 mouth, Vec3 target, double target_radius);
 void score_path_destroy(ScorePath *path);
-// [mm] from x, whose node is `node`, to the target; straight without tree.
+// [mm] from x, whose node is `node`, to the target; straight without a tree.
 double score_path_left(const ScorePath *path, Vec3 x, int node);
 
 #endif
