@@ -1,5 +1,5 @@
-// Cell i meets the ball (c, R) only if the ball reaches, for each near node k, the half space in which i's power distance is the lesser. The test of each
-// half space alone lets a few more cells pass than the ball meets; for the agreement of near cells more is as good.
+// Cell i meets the ball (c, R) only if, for each near node k, the ball reaches the half space in which node i has the lesser power distance. Testing each half
+// space separately accepts slightly more cells than the ball meets; extra cells do no harm to the agreement between near cells.
 #include "geom/blob_flood.h"
 
 #include "base/base.h"
@@ -63,14 +63,14 @@ int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 c
     return count;
 }
 
-// All pairs of a blob and a node that sees it, blob by blob.
+// All pairs of a blob and a node that sees it, ordered by blob.
 typedef struct Sightings {
     int64_t count, capacity;
     int32_t *node;
     int64_t *offset;         // (B+1)
 } Sightings;
 
-// A fitted tree has some ten a blob; a broken file's blobs as large as the tree would take hours and all memory.
+// A fitted tree has about ten per blob. Without a limit, a corrupt file with blobs as large as the tree would take hours and all memory.
 static const int64_t SIGHTINGS_MAX = (int64_t)1 << 28;
 
 static bool add_sightings(Sightings *s, const int *node, int count)
@@ -113,7 +113,7 @@ bool blob_flood_list(VesselTree *tree)
     int32_t *seen = NULL;
     bool good = s.offset && offset && flood_all(tree, &s) && (seen = calloc((size_t)s.count + 1, sizeof *seen));
     if (good) {
-        // counting sort by node: offset[i + 1] is node i's count, then where its next entry goes, at last its end
+        // counting sort by node: offset[i + 1] is node i's count, then the position of its next entry, finally its end
         for (int64_t k = 0; k < s.count; k++)
             offset[s.node[k] + 1]++;
         int64_t sum = 0;

@@ -32,9 +32,9 @@ static const double REACH_MOST = 3;
 
 typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
     int node, ball, first_row;
-    double low;              // its field is at least that
+    double low;              // a node that reaches the current block, whose field may be above 0 there and that no other node beats in all of it
     Blobby model;
-    double reach;            // [mm] no point of the model's surface lies further from the node's centre
+    double reach;            // lower bound of its field
     int rivals, rival[RIVALS_MAX];           // near nodes that beat it somewhere in the block
 } Candidate;
 
@@ -45,7 +45,7 @@ typedef struct States {      // of a lattice point
 
 typedef struct Way {         // to a node whose ball may hold points that a node's model reaches
     int node, from;
-    double length;           // [mm] through the tree
+    double length;           // path to a node whose ball may hold points that another node's model reaches
 } Way;
 
 typedef struct SheetPoint {  // a corner of a cube that is not plain
@@ -60,9 +60,9 @@ typedef struct SheetMarch {
     const VesselTree *tree;
     int alone;               // the one node whose model is meshed; -1: the tree
     bool by_power;           // a point goes to any near node that is better by power distance: no further rules
-    int ball_count, *node;   // the march's balls: their nodes …
-    double *reach;           // … and reaches
-    int *way_offset, way_capacity;           // (balls + 1) of each …
+    int ball_count, *node;   // the only node whose model is meshed; -1: the whole tree
+    double *reach;           // a point goes to any near node with a lesser power distance, without further conditions
+    int *way_offset, way_capacity;           // the march's balls: their nodes …
     Way *way;                // … the ways that look_around of power_walk.c would find, at most WAYS_MAX
     int candidate_count, candidate_capacity, out_count, out_capacity;
     Candidate *candidate;
@@ -82,7 +82,7 @@ typedef struct SheetMarch {
     int *same, same_capacity;                // disjoint sets of states that are one
 } SheetMarch;
 
-// --- Where models reach ---
+// disjoint sets of identical states
 
 // f > 0 needs a blob that alone gives T / n: rho (1 + x^2 / (5 rho^2))^-2 > T / n, or of compact blobs the support of one that adds.
 static double reach_of_model(const Blobby *m, Vec3 center)
@@ -122,7 +122,7 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
     }
 }
 
-// Breadth first through the tree, as far as a point at the end of the ball's reach would look.
+// Breadth-first search through the tree, as far as a point at the end of the ball's reach would search.
 static bool list_ways(SheetMarch *job, int ball)
 {
     const VesselTree *tree = job->tree;
@@ -177,8 +177,8 @@ static bool find_blocks(SheetMarch *job, int first, int end)
     return true;
 }
 
-// Whether all points of the ball (x, h) that stand clearly outside their node's ball look around and go to a node whose ball they are in
-// (power_walk.h). The list of ways does not depend on the point, so that what holds for a block holds for its points.
+// Returns whether all points of the ball (x, h) lie clearly outside their node's ball and move to a node whose ball holds them (power_walk.h). The list of
+// paths does not depend on the point, so what holds for a block holds for its points.
 static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
 {
     const VesselTree *tree = job->tree;
@@ -196,8 +196,8 @@ static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
 
 // --- Candidates of a block ---
 
-// A walk moves to a better node only within two radii of it, or where that is nearer in radii (power_walk.h). The difference of two power distances is
-// linear, so its ends over the cube around `middle` (h: its circumscribed radius) follow from its slope.
+// A walk moves to a better node only within two radii of it, or if the point is closer to it relative to the radii (power_walk.h). The difference of two power
+// distances is linear, so its range over the cube around `middle` (h: circumscribed radius) follows from its slope.
 static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double h)
 {
     const VesselTree *tree = job->tree;
@@ -232,7 +232,7 @@ static bool grow_by(void **array, int count, int *capacity, int more, size_t siz
     return true;
 }
 
-// Of compact blobs only those that reach the ball (middle, h): the others' terms are 0 there. Their rows start at c->first_row.
+// For compact blobs, keeps only those that reach the ball (middle, h), because the others' terms are 0 there. Their rows start at c->first_row.
 static bool narrow_model(SheetMarch *job, Candidate *c, Vec3 middle, double h)
 {
     const Blobby *all = &c->model;
@@ -291,7 +291,7 @@ static bool is_near(const VesselTree *tree, int node, int other)
     return false;
 }
 
-// Whether a walk from a candidate may lead to a node that says outside.
+// Returns whether a walk from a candidate may lead to a node whose field is below 0.
 static bool may_lead_out(const SheetMarch *job)
 {
     for (int k = 0; k < job->candidate_count; k++)
@@ -301,7 +301,8 @@ static bool may_lead_out(const SheetMarch *job)
     return false;
 }
 
-// Whether the block is certainly without surface: no model may be above 0 in it, or all are and in one of them a walk stays all over it.
+// Returns whether the block certainly contains no surface: either no model can be above 0 in it, or all are above 0 and a walk from one of them does not leave
+// it anywhere in the block.
 static bool block_is_plain(const SheetMarch *job, const MarchBlock *b)
 {
     double h;
@@ -350,8 +351,8 @@ static bool is_beaten(const SheetMarch *job, const Candidate *c, Vec3 x)
     return false;
 }
 
-// A node that is further from x than 1.2 of its radii does not answer for it where another one's ball holds x in its lumen: the cell of a vessel beside a
-// sac reaches all across it, and sees some of its blobs.
+// Removes nodes that are further from x than 1.2 of their radii if another node's ball holds x in its lumen: the cell of a vessel beside a sac extends all
+// across the sac and sees some of its blobs.
 static void drop_distant(const SheetMarch *job, Vec3 x, States *states)
 {
     const VesselTree *tree = job->tree;
@@ -388,7 +389,7 @@ static void find_states(SheetMarch *job, Vec3 x, States *states)
         drop_distant(job, x, states);
 }
 
-// Whether a tool point that moves between x, where it is at node a, and y comes to node b, or back.
+// Returns whether a tool point that moves from x, where its node is a, to y arrives at node b, or the reverse.
 static bool is_linked(const SheetMarch *job, Vec3 x, int a, Vec3 y, int b)
 {
     return a == b || is_near(job->tree, a, b) || is_near(job->tree, b, a) || walk_on(job, y, a) == b || walk_on(job, x, b) == a;
@@ -396,7 +397,7 @@ static bool is_linked(const SheetMarch *job, Vec3 x, int a, Vec3 y, int b)
 
 // --- Vertices ---
 
-// Onto the model's surface, by at most three quarters of a cell: where neighbouring models disagree there may be none near, and p stays.
+// Moves p onto the model's surface, by at most three quarters of a cell: where neighbouring models disagree there may be no surface near, and p stays.
 static Vec3 settle(const SheetMarch *job, const Blobby *m, Vec3 p, Vec3 *normal)
 {
     Vec3 g, x = p;
@@ -422,7 +423,7 @@ static Vec3 lattice_point(const SheetMarch *job, const int at[3]) { return vec3(
 
 static uint64_t lattice_key(const int at[3]) { return march_key(at[0], at[1], at[2]); }
 
-// The vertex on the edge from the inside point `at` along axis, up or down. `key` in `map`: what it is known by.
+// The vertex on the edge from the inside point `at` along axis, up or down, stored in `map` under `key`.
 static bool add_vertex(SheetMarch *job, KeyMap *map, uint64_t key, const int at[3], int axis, bool up, int node, double field, int *index)
 {
     TriangleMesh *mesh = job->march.mesh;
@@ -493,7 +494,7 @@ static bool march_plain_cube(SheetMarch *job, const MarchBlock *b, int i, int j,
     return true;
 }
 
-// The point's number; new points bring their states. -1: no memory.
+// The point's index; a new point is added with its states. Returns -1 if out of memory.
 static int keep_point(SheetMarch *job, const int at[3], const States *states)
 {
     bool is_new;
@@ -547,7 +548,7 @@ static bool march_cubes(SheetMarch *job, const MarchBlock *b)
 
 // --- Cubes that are not plain ---
 
-typedef struct CubeSheets {  // the states at a cube's corners; sheet[s]: the lowest of those it hangs together with
+typedef struct CubeSheets {  // the states at a cube's corners; sheet[s]: the lowest of the states that are connected with s
     int count, state[CUBE_STATES_MAX], corner[CUBE_STATES_MAX], sheet[CUBE_STATES_MAX];
 } CubeSheets;
 
@@ -586,7 +587,8 @@ static void find_sheets(SheetMarch *job, const SheetCube *cube, CubeSheets *shee
         sheets->sheet[a] = disjoint_root(sheets->sheet, a);
 }
 
-// What hangs together in a cube must do so wherever its points and edges are met again. True where that was new.
+// Applies the two rules to a cube: states connected in it must be identical or linked wherever their points and edges occur again. Returns true if that changed
+// anything.
 static bool unify(SheetMarch *job, const CubeSheets *sheets, bool *failed)
 {
     bool changed = false;

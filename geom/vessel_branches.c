@@ -1,15 +1,15 @@
-// The width of a child is the mean radius of its next few nodes: one node alone, just off the fork, says little.
+// The width of a child is the mean radius of its next few nodes, because a single node just beyond the fork is not representative.
 #include "geom/vessel_branches.h"
 
 #include <stdlib.h>
 
 enum { LOOK = 5 };
 
-// next[i]: the child through which node i's branch goes on, -1 at its end.
+// next[i]: the child through which node i's branch continues; -1 at its end.
 static bool choose_next(const VesselTree *tree, int *next)
 {
     int n = tree->node_count;
-    int *first = malloc((size_t)n * sizeof *first);   // lowest vessel child
+    int *first = malloc((size_t)n * sizeof *first);   // (N) child of kind vessel with the lowest index
     double *width = malloc((size_t)n * sizeof *width);
     if (!first || !width) {
         free(first);

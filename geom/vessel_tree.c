@@ -1,13 +1,13 @@
-// The tree's arrays, its rules and its neighbour lists. See vessel_tree.h; names in messages are those of the model file.
+// The tree's arrays, their validation and the tree's length. See vessel_tree.h; names in messages are those of the model file.
 #include "geom/vessel_tree.h"
 
 #include <limits.h>
 #include <stdlib.h>
 
-// More than a machine of ours has: a count that wants it comes from a broken file. (The sanitizers' allocator aborts above twice this.)
+// More memory than the intended machines have: a count that needs it comes from a corrupt file. (The sanitizers' allocator aborts above twice this.)
 static const uint64_t BYTES_MAX = (uint64_t)1 << 39;
 
-// An array of no entries still gets an address, so that NULL means "no memory".
+// An empty array also gets an address, so that NULL means "out of memory".
 static void *array(int64_t count, size_t size)
 {
     if (count < 0 || (uint64_t)count > BYTES_MAX / size)
@@ -107,7 +107,7 @@ static void check_offsets(const int64_t *offset, int node_count, int64_t total, 
                    (long long)total);
 }
 
-#define MOST_MM 1e9   // squares and products of lengths stay far from overflow
+#define MOST_MM 1e9   // squares and products of lengths do not overflow
 
 static void check_vectors(const Vec3 *v, int64_t count, const char *name, const char *file, Faults *faults)
 {

@@ -1,4 +1,4 @@
-// The tree's derived lists: neighbours, near nodes, who sees which blob. See vessel_tree.h.
+// The tree's derived lists: neighbours, near nodes, the blobs that each node sees. See vessel_tree.h.
 #include "geom/vessel_tree.h"
 #include "base/base.h"
 
@@ -12,7 +12,7 @@ static void link_neighbours(VesselTree *tree)
     int n = tree->node_count, *offset = tree->neighbour_offset;
     for (int i = 0; i <= n; i++)
         offset[i] = 0;
-    // count, sum, fill, as in counting sort; offset[i + 1] serves as node i's fill position and ends as its end
+    // counting sort: count, sum, fill; offset[i + 1] is node i's fill position and finally its end
     for (int i = 1; i < n; i++) {
         int p = tree->parent[i];
         if (p >= 0 && p < i) {
@@ -27,7 +27,7 @@ static void link_neighbours(VesselTree *tree)
         sum += own;
     }
     SEL_REQUIRE(sum <= 2 * (n - 1), "each node but the root has one link up, so the list of 2 (N - 1) neighbours holds all");
-    // a node's own parent comes before any of its children do, because parents stand before children
+    // a node's parent is listed before its children, because parents come before children
     for (int i = 1; i < n; i++) {
         int p = tree->parent[i];
         if (p >= 0 && p < i) {
@@ -37,7 +37,7 @@ static void link_neighbours(VesselTree *tree)
     }
 }
 
-// A way through the tree from a node, as far as it has been followed.
+// The end of a path through the tree from a node.
 typedef struct Way {
     int node, from, top;     // top: the common ancestor of both ends
 } Way;
@@ -45,15 +45,15 @@ typedef struct Way {
 typedef struct NearSearch {
     const VesselTree *tree;
     double *along;           // (N) [mm] from the root
-    double largest;          // radius
-    double part;             // of the distances that count as near: 1, or less where a tree is too crowded
-    Way *way;                // (N) a tree has one way to each node
+    double largest;          // largest radius
+    double part;             // factor for the distances that count as near: 1, or less if the tree is too crowded
+    Way *way;                // (N) a tree has one path to each node
     int64_t visits;
-    int *near;               // all nodes' lists
+    int *near;               // the lists of all nodes
     size_t count, capacity;
 } NearSearch;
 
-// More than any vessel has; a broken file's nodes, all in one place, would be near each other in pairs.
+// More than any vessel needs; in a corrupt file with all nodes in one place, every pair would be near.
 static const int64_t VISITS_MAX = (int64_t)1 << 27;
 static const size_t NEAR_MAX = (size_t)1 << 24;
 
@@ -72,10 +72,10 @@ static bool add_near(NearSearch *s, int node)
     return true;
 }
 
-// The length of a way is the same from both of its ends, to the bit: so is who is near whom.
+// The length of a path is the same from both of its ends, bit for bit; so "near" is symmetric.
 static double way_length(const NearSearch *s, int from, Way way) { return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]); }
 
-// How long a way and how far apart near nodes are at most, in sums of their radii: see vessel_tree_link.
+// Largest length of a path and largest distance between near nodes, relative to the sum of their radii: see vessel_tree_link.
 typedef struct NearLimits {
     double way, apart;
 } NearLimits;
@@ -91,8 +91,8 @@ static NearLimits near_limits(const VesselTree *tree, int a, int b)
     return at_sac ? near_local_sac : near_local;
 }
 
-// The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices. False where there is
-// no memory.
+// Collects the nodes near `node`, including its neighbours. Breadth first, so that the order is by number of links, then by index. Returns false if out of
+// memory.
 static bool collect_near(NearSearch *s, int node)
 {
     const VesselTree *tree = s->tree;

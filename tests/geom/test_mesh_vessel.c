@@ -710,7 +710,7 @@ static void bad_meshes_are_refused(void **state)
     refused(&m, "no area");
     memcpy(t, kept, sizeof kept);
     t[1] = kept[2], t[2] = kept[1];
-    refused(&m, "face opposite ways");
+    refused(&m, "face opposite sides");
     memcpy(t, kept, sizeof kept);
     // three corners in line
     Vec3 place = m.vertex[t[2]];
