@@ -1,19 +1,19 @@
 // The surface of a fitted tree as sheets: marching cubes in which a lattice point may lie in several lumens at once.
 //
-// A state is a lattice point x and a node at which a tool point that stands there may be, whose field at x is above 0: of local models one that power_walk
-// does not leave; of shared blobs one that no near node beats by power distance, because only within those cells a node sees all blobs.
-// Where vessels kiss, x has a state for each of them; where they overlap both lumens hold it. Two states at the ends of an edge of the lattice are linked
-// where a tool point that moves from one to the other goes from one node to the other, in either direction. In each cube the states that hang together over
-// edges make a sheet, and each sheet gives the triangles of its own case. Neighbouring cubes give the same segments on their common face, because a
-// case cuts off each run of corners on a face by itself (cube_triangles.h), and runs follow from the edges of that face. So the surface is closed,
-// and lumens that only kiss neither merge nor cut each other open.
+// A state is a lattice point x and a node at which a tool point at x may be, whose field at x is above 0. For local models it must be a node that power_walk
+// does not leave; for shared blobs, a node that no near node beats by power distance, because only within such cells does a node see all blobs. Where vessels
+// touch, x has a state for each of them; where they overlap, both lumens contain it. Two states at the ends of a lattice edge are linked if a tool point that
+// moves from one end to the other, in either direction, goes from one node to the other. In each cube, the states connected by linked edges make a sheet, and
+// each sheet gives the triangles of its own case. Neighbouring cubes give the same segments on their common face, because a case cuts off each run of corners
+// on a face separately (cube_triangles.h), and runs follow from the edges of that face. So the surface is closed, and lumens that only touch neither merge nor
+// cut each other open.
 //
-// Two rules make that hold where walks are not symmetric: states of one point in one sheet of some cube are one state everywhere, and two states at the
-// ends of an edge in one sheet are linked. Both are repeated until nothing changes, over the cubes in which some point has two states or some edge's states
-// are not linked; all other cubes are plain marching cubes.
+// Two rules ensure this although walks are not symmetric: states of one point that are in one sheet of some cube are one state everywhere, and two states at
+// the ends of an edge that are in one sheet are linked. Both rules are repeated until nothing changes, over the cubes in which some point has two states or the
+// states of some edge are not linked; all other cubes are plain marching cubes.
 //
-// A block of the lattice (sparse_march.h) is touched only where some model reaches it, and left again where bounds of the kernels say that it is all outside
-// or all inside: work and memory grow with the surface. The lattice point (i, j, k) lies at cell * (i, j, k), for every tree the same.
+// A block of the lattice (sparse_march.h) is visited only if some model reaches it, and skipped if bounds of the kernels show that it is all outside or all
+// inside: work and memory grow with the surface. The lattice point (i, j, k) lies at cell * (i, j, k), for every tree.
 #include "base/base.h"
 #include "geom/blobby.h"
 #include "geom/isosurface.h"
@@ -26,15 +26,15 @@
 
 enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, WAYS_MAX = 256, PASSES_MAX = 100 };
 
-// A node answers for no lumen further from its centre [its radii]: other nodes lie nearer to that. Blobs of a sac reach far into all cells around it. The
-// root, upstream of which nothing follows, answers for twice as much.
+// A node has no lumen further from its centre than this [its radii], because other nodes are closer there; the blobs of a sac reach far into all cells around
+// it. For the root, upstream of which there is no node, the limit is twice as large.
 static const double REACH_MOST = 3;
 
-typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
+typedef struct Candidate {   // a node that reaches the current block, whose field may be above 0 there and that no other node beats in all of it
     int node, ball, first_row;
-    double low;              // a node that reaches the current block, whose field may be above 0 there and that no other node beats in all of it
+    double low;              // lower bound of its field
     Blobby model;
-    double reach;            // lower bound of its field
+    double reach;            // [mm] upper bound of the distance of the model's surface from the node's centre
     int rivals, rival[RIVALS_MAX];           // near nodes that beat it somewhere in the block
 } Candidate;
 
@@ -43,9 +43,9 @@ typedef struct States {      // of a lattice point
     double field[STATES_MAX];
 } States;
 
-typedef struct Way {         // to a node whose ball may hold points that a node's model reaches
+typedef struct Way {         // path to a node whose ball may hold points that another node's model reaches
     int node, from;
-    double length;           // path to a node whose ball may hold points that another node's model reaches
+    double length;           // [mm] through the tree
 } Way;
 
 typedef struct SheetPoint {  // a corner of a cube that is not plain
@@ -58,19 +58,19 @@ typedef struct SheetCube {
 typedef struct SheetMarch {
     March march;
     const VesselTree *tree;
-    int alone;               // the one node whose model is meshed; -1: the tree
-    bool by_power;           // a point goes to any near node that is better by power distance: no further rules
-    int ball_count, *node;   // the only node whose model is meshed; -1: the whole tree
-    double *reach;           // a point goes to any near node with a lesser power distance, without further conditions
-    int *way_offset, way_capacity;           // the march's balls: their nodes …
-    Way *way;                // … the ways that look_around of power_walk.c would find, at most WAYS_MAX
+    int alone;               // the only node whose model is meshed; -1: the whole tree
+    bool by_power;           // a point goes to any near node with a lesser power distance, without further conditions
+    int ball_count, *node;   // the march's balls: their nodes …
+    double *reach;           // … and reaches
+    int *way_offset, way_capacity;           // (balls + 1) offset of the paths of each ball …
+    Way *way;                // … the paths that look_around of power_walk.c would find, at most WAYS_MAX
     int candidate_count, candidate_capacity, out_count, out_capacity;
     Candidate *candidate;
-    int *out;                // nodes that would be candidates, were their field not below 0 all over the block
+    int *out;                // nodes excluded as candidates only because their field is below 0 all over the block
     int32_t *row;            // blobs of candidates that reach the block
     int row_count, row_capacity;
-    States states[MARCH_POINTS];             // of the block at hand
-    // of cubes that are not plain
+    States states[MARCH_POINTS];             // of the current block
+    // for cubes that are not plain
     KeyMap point_of, link_of, vertex_of_state;
     int point_count, point_capacity, cube_count, cube_capacity, state_count, state_capacity;
     SheetPoint *point;
@@ -79,12 +79,12 @@ typedef struct SheetMarch {
         int node, point;
         double field;
     } * state;
-    int *same, same_capacity;                // disjoint sets of states that are one
+    int *same, same_capacity;                // disjoint sets of identical states
 } SheetMarch;
 
-// disjoint sets of identical states
+// --- Extent of the models ---
 
-// f > 0 needs a blob that alone gives T / n: rho (1 + x^2 / (5 rho^2))^-2 > T / n, or of compact blobs the support of one that adds.
+// f > 0 requires one blob that alone contributes T / n, rho (1 + x^2 / (5 rho^2))^-2 > T / n; or, for compact blobs, the support of one with a > 0.
 static double reach_of_model(const Blobby *m, Vec3 center)
 {
     double reach = 0;
@@ -101,7 +101,7 @@ static double reach_of_model(const Blobby *m, Vec3 center)
     return reach;
 }
 
-// Bounds of a model's field over the ball of radius h about x.
+// Bounds of a model's field in the ball of radius h about x.
 static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double *high)
 {
     *low = *high = -m->iso_level;
