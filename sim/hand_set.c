@@ -62,7 +62,7 @@ void hand_set_grip(HandSet *set, const HandGrip *grip)
 ToolCommands hand_set_command(HandSet *set, double dt)
 {
     double seconds = dt / 1000, most_mm = set->fastest_mm_s * seconds, most_deg = set->fastest_deg_s * seconds;
-    double moved_mm[TOOLS_MOST] = {0}, turned_deg[TOOLS_MOST] = {0};     // of the outermost of the tools that move together
+    double moved_mm[TOOLS_MOST] = {0}, turned_deg[TOOLS_MOST] = {0};     // of the outermost of the tools locked together
     const HandGrip *grip = &set->grip;
     bool is_stopped = hand_set_buttons(set) & HAND_STOP;
     for (int i = 0; i < set->count; i++) {

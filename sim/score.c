@@ -16,13 +16,13 @@ const char *const score_error_words[ERROR_COUNT] = {"wrong branch",
                                                     "too much contrast agent",
                                                     "wire lost in the catheter",
                                                     "tip jumped while its hand rested",
-                                                    "tip left the place that it should keep"};
+                                                    "tip left its required place"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
-static const double LOOK_MS = 10;            // between looks at where in the tree the tip is
+static const double LOOK_MS = 10;            // interval between locations of the tips in the tree
 static const double CHORD_MM = 0.2;          // of the tip's path
-static const double QUIET_MS = 500;          // until an episode is over
-static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // fraction of a limit below which a measure counts as back
+static const double QUIET_MS = 500;          // duration after which an episode is over
+static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // fraction of a limit below which an episode may end
 enum { HOPS = 8 };
 
 struct Score {
@@ -34,14 +34,14 @@ struct Score {
     ScoreTool tool[TOOLS_MOST];
     double dt;                   // [ms]
     double since_look;           // [ms]
-    Vec3 path_from;              // where the last chord of the tip's path ended
+    Vec3 path_from;              // end of the last chord of the tip's path
     double wall_force;           // [N] mean
-    ScoreEpisode episode[ERROR_COUNT];       // of what concerns no single tool
-    double pulse_phase;          // of the next X-ray pulse, 1: now
+    ScoreEpisode episode[ERROR_COUNT];       // of errors that belong to no single tool
+    double pulse_phase;          // phase of the next X-ray pulse; 1: due now
     bool had_pedal;
-    int64_t held_steps, stood_steps;         // within the target; the tool that stays within its own
-    bool stands;                 // it has come to stay …
-    Vec3 stood_at;               // … there
+    int64_t held_steps, stood_steps;         // within the target; of the tool that must stay, within its own target
+    bool stands;                 // the tool has reached the target in which it must stay …
+    Vec3 stood_at;               // … at this place
     int event_count;
     ScoreEvent event[SCORE_EVENTS_MOST];
 };
@@ -58,7 +58,7 @@ static int leader(const Score *score, const Stepper *stepper)
     return foremost;
 }
 
-// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has; HUGE_VAL if unknown.
+// The lumen's radius at the mouth: that of the tree or the tube, else the free space around the first free node; HUGE_VAL if unknown.
 static double lumen_radius(const Scene *scene, Simulator *simulator, const VesselTree *tree)
 {
     if (scene->source == SOURCE_TUBE)
@@ -77,7 +77,7 @@ static double lumen_radius(const Scene *scene, Simulator *simulator, const Vesse
     return radius;
 }
 
-// The next node towards the target, past it or without one into the widest branch; -1 at an end.
+// The next node towards the target; past the target or without one, the next node into the widest branch; -1 at an end.
 static int follow(const Score *score, const VesselTree *tree, int node)
 {
     if (score->exercise.target >= 0 && node != score->path.goal)
@@ -89,7 +89,7 @@ static int follow(const Score *score, const VesselTree *tree, int node)
     return next;
 }
 
-// By how much the vessel turns behind the mouth, which is where a tube begins. False if out of memory.
+// Determines the vessel's turn behind the mouth, which is where a tube begins. Returns false if out of memory.
 static bool find_turn(Score *score, ScoreSheath *sheath, const VesselTree *tree)
 {
     const TubeOptions *tube = &score->scene->tube;
@@ -162,7 +162,7 @@ void score_free(Score *score)
     free(score);
 }
 
-// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`. By `tool`, or by no single tool (-1).
+// An episode of `kind` begins when the measure is `over` its limit and ends once it was `back` for `quiet_ms`. Caused by `tool`, or by no single tool (-1).
 static void judge(Score *score, ScoreError kind, int tool, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
 {
     ScoreEpisode *episode = tool < 0 ? &score->episode[kind] : &score->tool[tool].episode[kind];
@@ -241,7 +241,7 @@ static bool has_its_devices(const Score *score)
     return true;
 }
 
-// The tool that must stay: once its tip has reached its target, whether it remains there.
+// For the tool that must stay: once its tip has reached its target, checks whether it remains there.
 static void watch_stay(Score *score, double now_s)
 {
     int k = score->exercise.stays;
@@ -301,7 +301,7 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
         judge_limit(score, ERROR_KICK, k, own->kick_mm_s, rules->kick_mm_s, AGAIN, score->dt, now_s);
         if (k == 0)
             continue;
-        // an exchangeable tool comes out on purpose; the error is advancing the tool around it without it
+        // an exchangeable tool is withdrawn on purpose; the error is to advance the tool around it without it
         bool judged = rules->wire_behind_mm > 0 &&
                       (scene_device_count(score->scene, k) == 1 || tool->episode[ERROR_WIRE_LOST].is_on || commands->tool[k - 1].push_mm_s > 0);
         judge(score, ERROR_WIRE_LOST, k, own->spare_mm < tool->hub_limit || (judged && own->behind_mm > rules->wire_behind_mm),
@@ -310,8 +310,8 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
     f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
 }
 
-// The tip's node, from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two looks: it is
-// outside that node's ball then by half the radius, and inside another's.
+// The tip's node, starting from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two locations: it is
+// then outside that node's ball by half the radius, and inside another's.
 static int find_node(const VesselTree *tree, Vec3 tip, int node)
 {
     if (!tree->near)
@@ -323,14 +323,14 @@ static int find_node(const VesselTree *tree, Vec3 tip, int node)
     return vec3_distance(tip, tree->center[nearest]) < tree->radius[nearest] ? nearest : node;
 }
 
-// Where a tool's tip is in the vessel: a withdrawn tool is at the sheath's mouth.
+// Position of a tool's tip in the vessel; a withdrawn tool is at the sheath's mouth.
 static Vec3 place_in_vessel(const Score *score, const Stepper *stepper, int k)
 {
     const WireOptions *wire = &score->scene->wire;
     return wire->has_sheath && stepper_tool_inserted(stepper, k) < 0 ? wire->start : score->tool[k].at;
 }
 
-// Where in the tree the tips are, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
+// Locates the tips in the tree, every 10 ms: a tool at 100 mm/s moves 1 mm in that time.
 static void look(Score *score, const Stepper *stepper, int led, double now_s)
 {
     ScoreFigures *f = &score->figures;
@@ -406,7 +406,7 @@ static bool is_moved(const Score *score, const ToolCommands *commands)
     return moves;
 }
 
-// A tool exchanged in this step is another device, and the other hubs have moved.
+// A tool exchanged in this step is a different device, and the other tools' hubs have moved.
 static void refit_tools(Score *score, Simulator *simulator)
 {
     bool was_exchanged = false;
@@ -430,7 +430,7 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
     }
     refit_tools(score, simulator);
     double moved = watch_sheath(score, stepper, commands, now_s);
-    if (f->state == SCORE_WAITING)       // initial settling of the tools is not an error of the trainee
+    if (f->state == SCORE_WAITING)       // while waiting, initial settling of the tools is not an error of the trainee
         return;
     int led = leader(score, stepper);
     f->time_s = now_s - f->start_s;

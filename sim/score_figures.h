@@ -40,7 +40,7 @@ typedef struct ScoreToolFigures {
     double lost_mm, lost_limit_mm;       // length lost next to the mouth, and its limit (buckling); limit 0: not yet known
     double behind_mm;            // distance of its tip behind the tip of the tool around it, >= 0
     double spare_mm;             // distance of its proximal end behind that tool's hub, >= 0
-    double strayed_mm;           // for the tool that must stay: largest distance of its tip from its target
+    double strayed_mm;           // for the tool that must stay: largest distance of its tip from where it had reached its target
     int tip_node;                // node of the tree at which its tip is; -1 without tree
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the path
 } ScoreToolFigures;

@@ -1,5 +1,5 @@
-// Parents stand before children, so one pass in index order reaches every node from its parent; nodes upstream of the path or the target are filled
-// in first by climbing from there to the root.
+// Parents come before children, so one pass in index order reaches every node from its parent; nodes upstream of the path or the target are filled in first by
+// climbing from there to the root.
 #include "sim/score_path.h"
 
 #include "geom/geom.h"
@@ -9,7 +9,7 @@
 
 static double link_length(const VesselTree *tree, int child) { return vec3_distance(tree->center[child], tree->center[tree->parent[child]]); }
 
-// left and toward: up from the goal to the root, then down everywhere else.
+// Sets left and toward: first from the goal up to the root, then down to all other nodes.
 static void measure_left(ScorePath *path)
 {
     const VesselTree *tree = path->tree;
@@ -49,7 +49,7 @@ static void mark_path(const ScorePath *path, uint8_t *on)
         on[i] = 1;
     if (tree->kind[path->goal] != NODE_ANEURYSM)
         return;
-    int top = path->goal;        // of the sac that holds the target: all of it is at the target
+    int top = path->goal;        // the first node of the sac that holds the target; the whole sac counts as the target
     while (tree->parent[top] >= 0 && tree->kind[tree->parent[top]] == NODE_ANEURYSM)
         top = tree->parent[top];
     on[top] = 2;
@@ -58,7 +58,7 @@ static void mark_path(const ScorePath *path, uint8_t *on)
             on[i] = 2;
 }
 
-// off, with the radius of where each branch begins taken off; `base` (N) is that radius.
+// Sets off: the distance from the path, minus the radius at which the branch begins; `base` (N) is that radius.
 static void measure_off(ScorePath *path, uint8_t *on, double *base, double target_radius)
 {
     const VesselTree *tree = path->tree;

@@ -82,7 +82,7 @@ void session_tracker_step(void *context, Simulator *simulator, const ToolCommand
     for (int k = 0; k < tracker->tool_count; k++)
         fitted[k] = stepper_fitted(stepper, k);
     contrast_injection_fit(tracker->injection, fitted);
-    XrayControl flowing = xray ? *xray : (XrayControl){0};   // agent that the lumen does not pass is not counted as used
+    XrayControl flowing = xray ? *xray : (XrayControl){0};   // agent that the lumen does not let through does not count as used
     if (flowing.contrast_ml_s > 0) {
         double inserted[TOOLS_MOST] = {0};
         for (int k = 0; k < tracker->tool_count; k++)

@@ -26,11 +26,11 @@ struct SelSimulator {
     Simulator *simulator;
     SessionTracker *tracker; // NULL: no score
     Recording *recording;    // NULL: none
-    bool has_lost_rows;      // of the recording: its file cannot be written
+    bool has_lost_rows;      // the recording's file cannot be written
     int script_cursor;
     int node_capacity;       // of the shared centreline
     NodeReport *node;        // (node_capacity) scratch
-    int own_capacity;        // of the tool with the most nodes
+    int own_capacity;        // for the tool with the most nodes
     ToolNode *own;           // (own_capacity) scratch
 };
 
