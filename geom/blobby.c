@@ -306,11 +306,11 @@ static void keep_closer(const Blobby *model, Vec3 x, Vec3 start, double scale, S
 // If the normal of a foot puts x on the other side than f does, the foot lies behind a nearer wall (reached from a distant start): moves the foot to that wall.
 static void pull_to_own_side(const Blobby *model, Vec3 x, double f, double scale, SurfaceFrame *best, double *least)
 {
-    static const double way[] = {1e-3, 1e-2, 0.1, 0.3};
-    enum { WAYS = sizeof way / sizeof way[0], WALLS = 4 };
+    static const double fraction[] = {1e-3, 1e-2, 0.1, 0.3};
+    enum { FRACTIONS = sizeof fraction / sizeof fraction[0], WALLS = 4 };
     for (int wall = 0; wall < WALLS && (best->gap > 0) != (f > 0) && fabs(best->gap) > 1e-9; wall++) {
-        for (int k = 0; k < WAYS; k++) {
-            Vec3 beyond = vec3_mix(best->foot, x, way[k]);
+        for (int k = 0; k < FRACTIONS; k++) {
+            Vec3 beyond = vec3_mix(best->foot, x, fraction[k]);
             double there = blobby_field(model, beyond);
             if ((there > 0) == (f > 0))
                 continue;
@@ -351,9 +351,9 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
     Vec3 to_foot = vec3_unit_or(vec3_sub(best.foot, x), vec3(0, 0, 0));
     double reach = 1.25 * fabs(best.gap);
     for (int k = 0; k < 14 && !warm && f > 0; k++) {
-        static const Vec3 way[14] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
+        static const Vec3 ray[14] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
                                      {1, 1, -1}, {1, -1, 1}, {1, -1, -1}, {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
-        Vec3 d = vec3_unit(way[k]);
+        Vec3 d = vec3_unit(ray[k]);
         if (vec3_dot(d, to_foot) < 0.8 && march_out(model, x, f, d, scale, reach, &other))
             keep_closer(model, x, other, scale, &best, &least);
     }

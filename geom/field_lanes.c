@@ -18,12 +18,12 @@ _Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(Ves
                "memories are rows of doubles");
 _Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
 
-void field_directions(Vec3 *way, int count)
+void field_directions(Vec3 *direction, int count)
 {
     SEL_ASSERT(count > 0, "at least one direction is asked for");
     for (int k = 0; k < count; k++) {
         double z = 1 - (2 * k + 1) / (double)count, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
-        way[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
+        direction[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
     }
 }
 
@@ -38,12 +38,12 @@ void field_clear_points(ClearPoints *points)
 {
     static const int count[] = {CLEAR_ON_OUTER, CLEAR_ON_INNER};
     static const double sphere[] = {CLEAR_OUTER, CLEAR_INNER};
-    Vec3 way[CLEAR_ON_OUTER];
+    Vec3 direction[CLEAR_ON_OUTER];
     points->count = 0;
     for (int s = 0; s < 2; s++) {
-        field_directions(way, count[s]);
+        field_directions(direction, count[s]);
         for (int k = 0; k < count[s]; k++)
-            add_clear_point(points, vec3_scale(way[k], sphere[s]));
+            add_clear_point(points, vec3_scale(direction[k], sphere[s]));
     }
 }
 

@@ -88,7 +88,7 @@ typedef struct FieldKernels {
     void (*look)(const FieldRow *row, const int32_t *list, int count, const double *x, const double *y, const double *z, double *f);
 } FieldKernels;
 // `count` directions over the unit sphere: a spiral from pole to pole.
-void field_directions(Vec3 *way, int count);
+void field_directions(Vec3 *direction, int count);
 void field_clear_points(ClearPoints *points);
 void field_clear_rings(ClearPoints *points);
 // The same points rotated so that the z axis becomes `axis` (unit).

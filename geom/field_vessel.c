@@ -35,7 +35,7 @@ typedef struct FieldNode {
     bool carried;            // near the inlet: the wall continues upstream
 } FieldNode;
 
-enum { WAYS = 64 };
+enum { SEARCH_DIRECTIONS = 64 };
 typedef struct FieldVessel {
     Vessel vessel;           // first: a Vessel * points to its FieldVessel
     const VesselTree *tree;
@@ -44,7 +44,7 @@ typedef struct FieldVessel {
     FieldNode *node;         // (N)
     PowerBlocks blocks;      // to locate points without a node
     bool inlet_open;         // the root is an open end of the tree
-    Vec3 way[WAYS];          // unit directions over the sphere
+    Vec3 search_direction[SEARCH_DIRECTIONS]; // unit directions over the sphere
     ClearPoints clear_points, clear_rings;
 } FieldVessel;
 
@@ -217,10 +217,10 @@ static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, const 
 {
     SEL_ASSERT(m->node >= 0 && m->node < field->tree->node_count, "a memory that holds blobs has a node");
     double skin = field->node[m->node].skin;
-    Vec3 way = vec3_unit_or(m->step, vec3(0, 0, 0));
+    Vec3 heading = vec3_unit_or(m->step, vec3(0, 0, 0));
     int count = VESSEL_BLOBS + 1;
     for (int shrink = 0; shrink < 3 && count > VESSEL_BLOBS; shrink++, skin *= 0.4) {
-        m->held_at = vec3_add_scaled(q, AHEAD * skin, way);
+        m->held_at = vec3_add_scaled(q, AHEAD * skin, heading);
         m->held_for2 = skin * skin;
         count = pick_blobs(field, list->blob, list->count, m->held_at, skin, VESSEL_BLOBS, m->blob);
     }
@@ -496,16 +496,16 @@ static bool is_known_there(const FieldVessel *field, const Foot *foot)
 
 // For each direction from a point, where the wall may be.
 typedef struct Looks {
-    double at[WAYS];         // [mm] distance from the point at which the direction crosses the wall or comes nearest to it
-    double order[WAYS];      // [mm] estimated distance of the wall; +HUGE_VAL: none
-    double before[WAYS];     // f at the last distance …
+    double at[SEARCH_DIRECTIONS]; // [mm] distance from the point at which the direction crosses the wall or comes nearest to it
+    double order[SEARCH_DIRECTIONS]; // [mm] estimated distance of the wall; +HUGE_VAL: none
+    double before[SEARCH_DIRECTIONS]; // f at the last distance …
     double far;              // … and that distance [mm]
 } Looks;
 
 static void start_looks(Looks *looks, double here)
 {
     looks->far = 0;
-    for (int k = 0; k < WAYS; k++)
+    for (int k = 0; k < SEARCH_DIRECTIONS; k++)
         looks->before[k] = here, looks->order[k] = looks->at[k] = HUGE_VAL;
 }
 
@@ -514,14 +514,14 @@ static void start_looks(Looks *looks, double here)
 static void look_farther(const FieldVessel *field, Vec3 x, int node, const BlobList *list, double side, double far, double slope, Looks *looks)
 {
     static const double LOW = 0.3;           // more than half the angle between directions
-    double f[WAYS], near = looks->far;
-    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
+    double f[SEARCH_DIRECTIONS], near = looks->far;
+    for (int k = 0; k < SEARCH_DIRECTIONS; k += FOOT_BLOCK) {
         Vec3 to[FOOT_BLOCK];
         for (int i = 0; i < FOOT_BLOCK; i++)
-            to[i] = vec3_add_scaled(x, far, field->way[k + i]);
+            to[i] = vec3_add_scaled(x, far, field->search_direction[k + i]);
         look(field, node, list, to, f + k);
     }
-    for (int k = 0; k < WAYS; k++) {
+    for (int k = 0; k < SEARCH_DIRECTIONS; k++) {
         double h = side * f[k], before = side * looks->before[k], at = far, order = HUGE_VAL;
         if (h <= 0 && before > 0)
             order = at = near + (far - near) * before / (before - h);
@@ -543,14 +543,14 @@ static void settle_looks(const FieldVessel *field, Vec3 x, int node, double side
     int count = 0;
     while (count < FOOT_BLOCK) {
         int best = 0;
-        for (int k = 1; k < WAYS; k++)
+        for (int k = 1; k < SEARCH_DIRECTIONS; k++)
             best = looks->order[k] < looks->order[best] ? k : best;
         if (looks->order[best] == HUGE_VAL)
             break;
-        Vec3 way = field->way[best];
-        start[count++] = vec3_add_scaled(x, looks->at[best], way);
-        for (int k = 0; k < WAYS; k++)
-            if (vec3_dot(field->way[k], way) > ASIDE)
+        Vec3 chosen = field->search_direction[best];
+        start[count++] = vec3_add_scaled(x, looks->at[best], chosen);
+        for (int k = 0; k < SEARCH_DIRECTIONS; k++)
+            if (vec3_dot(field->search_direction[k], chosen) > ASIDE)
                 looks->order[k] = HUGE_VAL;
     }
     int found = count > 0 ? settle(field, x, node, start, count, ROUNDS, foot) : 0;
@@ -722,9 +722,9 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const Blo
 static void compare_gaps(VesselMemory *m, double before, double travel, VesselHit *hit)
 {
     SEL_ASSERT(travel >= 0, "a travel is a length");
-    static const double GIVES_WAY = 0.2;     // change of the returned gap per mm of travel
+    static const double APPROACH = 0.2;      // change of the returned gap per mm of travel
     if (m->contradicted) {
-        m->credible -= GIVES_WAY * travel;
+        m->credible -= APPROACH * travel;
     } else if (fabs(hit->gap - before) > travel + APART) {
         hit->flags |= VESSEL_DISAGREE;
         m->contradicted = true;
@@ -1193,7 +1193,7 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     for (int level = 0; level < field->blocks.levels; level++)
         field->vessel.bytes += (size_t)field->blocks.count[level] * sizeof(PowerBox);
     field->inlet_open = vessel_tree_root_is_open(tree);
-    field_directions(field->way, WAYS);
+    field_directions(field->search_direction, SEARCH_DIRECTIONS);
     field_clear_points(&field->clear_points);
     field_clear_rings(&field->clear_rings);
     fill_rows(field);

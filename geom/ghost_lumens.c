@@ -65,7 +65,7 @@ static bool grow(void **array, int count, int *capacity, size_t size)
 
 // --- Straight lines to the tree ---
 
-static bool way_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, double step)
+static bool line_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, double step)
 {
     double pieces = ceil(vec3_distance(x, to) / step);
     int count = pieces > 400 ? 400 : pieces < 1 ? 1 : (int)pieces;
@@ -77,10 +77,10 @@ static bool way_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, doubl
 
 static bool is_held(const VesselTree *tree, Vec3 x, int node)
 {
-    if (way_is_open(tree, x, node, tree->center[node], 0.15 * tree->radius[node]))
+    if (line_is_open(tree, x, node, tree->center[node], 0.15 * tree->radius[node]))
         return true;
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
-        if (way_is_open(tree, x, node, tree->center[tree->near[k]], 0.15 * tree->radius[tree->near[k]]))
+        if (line_is_open(tree, x, node, tree->center[tree->near[k]], 0.15 * tree->radius[tree->near[k]]))
             return true;
     return false;
 }
@@ -115,7 +115,7 @@ static bool flood_from(Search *s, Vec3 x, int node, bool *failed)
         int beside[3] = {at[0], at[1], at[2]}, of = node;
         if (c >= 0)
             beside[c / 2] += c & 1 ? 1 : -1;
-        if (reach_field(s->tree, lattice_point(s, beside), &of) > 0 && way_is_open(s->tree, x, node, lattice_point(s, beside), 0.5 * s->cell))
+        if (reach_field(s->tree, lattice_point(s, beside), &of) > 0 && line_is_open(s->tree, x, node, lattice_point(s, beside), 0.5 * s->cell))
             add_point(s, beside, of, &held, failed);
     }
     for (int i = 0; i < s->count && !held && !*failed; i++) {

@@ -8,32 +8,32 @@
 
 #include "base/base.h"
 
-enum { WAYS_MAX = 64 };
+enum { PATHS_MAX = 64 };
 
-typedef struct Way {
+typedef struct TreePath {
     int node, from;
     double length;
-} Way;
+} TreePath;
 
 static int look_around(const VesselTree *tree, Vec3 x, int node)
 {
-    SEL_ASSERT(node >= 0 && node < tree->node_count, "ways start at a node of the tree");
-    Way way[WAYS_MAX] = {{node, -1, 0}};
+    SEL_ASSERT(node >= 0 && node < tree->node_count, "paths start at a node of the tree");
+    TreePath path[PATHS_MAX] = {{node, -1, 0}};
     int known = 1, best_node = node;
     double longest = 2.5 * vec3_distance(x, tree->center[node]), best = 0;   // only nodes whose ball holds x improve on 0
     for (int w = 0; w < known; w++) {
-        Way at = way[w];
+        TreePath at = path[w];
         double d = power_distance(x, tree->center[at.node], tree->radius[at.node]);
         if (d < best) {
             best = d;
             best_node = at.node;
         }
-        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < PATHS_MAX; k++) {
             int next = tree->neighbour[k];
             SEL_ASSERT(next >= 0 && next < tree->node_count, "neighbours are nodes of the tree");
             double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
             if (next != at.from && length < longest)
-                way[known++] = (Way){next, at.node, length};
+                path[known++] = (TreePath){next, at.node, length};
         }
     }
     return best_node;

@@ -217,7 +217,7 @@ static double tool_share(const Flood *f, const Link *l)
 }
 
 // Returns whether the ball is free between a and b; the two ends are not tested.
-static bool way_is_free(const Flood *f, Vec3 a, Vec3 b, int node)
+static bool path_is_free(const Flood *f, Vec3 a, Vec3 b, int node)
 {
     double pieces = ceil(vec3_distance(a, b) / (0.5 * f->options->tool_radius));
     int count = pieces > 100 ? 100 : (int)pieces;
@@ -256,7 +256,7 @@ static void try_place(Search *s, Vec3 from, int station, int place)
 {
     if (station < 0 || station > s->l->coarse || s->state[station][place] == 3 || !place_is_free(s, station, place))
         return;
-    if (way_is_free(s->f, from, link_place(s->f, s->l, station, place), 2 * station < s->l->coarse ? s->l->parent : s->l->node))
+    if (path_is_free(s->f, from, link_place(s->f, s->l, station, place), 2 * station < s->l->coarse ? s->l->parent : s->l->node))
         reach_place(s, station, place);
 }
 

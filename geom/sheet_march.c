@@ -24,7 +24,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, WAYS_MAX = 256, PASSES_MAX = 100 };
+enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, PATHS_MAX = 256, PASSES_MAX = 100 };
 
 // A node has no lumen further from its centre than this [its radii], because other nodes are closer there; the blobs of a sac reach far into all cells around
 // it. For the root, upstream of which there is no node, the limit is twice as large.
@@ -43,10 +43,10 @@ typedef struct States {      // of a lattice point
     double field[STATES_MAX];
 } States;
 
-typedef struct Way {         // path to a node whose ball may hold points that another node's model reaches
+typedef struct TreePath {    // path to a node whose ball may hold points that another node's model reaches
     int node, from;
     double length;           // [mm] through the tree
-} Way;
+} TreePath;
 
 typedef struct SheetPoint {  // a corner of a cube that is not plain
     int at[3], first, count;
@@ -62,8 +62,8 @@ typedef struct SheetMarch {
     bool by_power;           // a point goes to any near node with a lesser power distance, without further conditions
     int ball_count, *node;   // the march's balls: their nodes …
     double *reach;           // … and reaches
-    int *way_offset, way_capacity;           // (balls + 1) offset of the paths of each ball …
-    Way *way;                // … the paths that look_around of power_walk.c would find, at most WAYS_MAX
+    int *path_offset, path_capacity;         // (balls + 1) offset of the paths of each ball …
+    TreePath *path;          // … the paths that look_around of power_walk.c would find, at most PATHS_MAX
     int candidate_count, candidate_capacity, out_count, out_capacity;
     Candidate *candidate;
     int *out;                // nodes excluded as candidates only because their field is below 0 all over the block
@@ -123,32 +123,32 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
 }
 
 // Breadth-first search through the tree, as far as a point at the end of the ball's reach would search.
-static bool list_ways(SheetMarch *job, int ball)
+static bool list_paths(SheetMarch *job, int ball)
 {
     const VesselTree *tree = job->tree;
     int node = job->node[ball], known = 1;
-    Way way[WAYS_MAX] = {{node, -1, 0}};
-    job->way_offset[ball + 1] = job->way_offset[ball];
+    TreePath path[PATHS_MAX] = {{node, -1, 0}};
+    job->path_offset[ball + 1] = job->path_offset[ball];
     for (int w = 0; w < known; w++) {
-        Way at = way[w];
-        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
+        TreePath at = path[w];
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < PATHS_MAX; k++) {
             int next = tree->neighbour[k];
             double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
             if (next != at.from && length < 2.5 * job->reach[ball])
-                way[known++] = (Way){next, at.node, length};
+                path[known++] = (TreePath){next, at.node, length};
         }
-        int *count = &job->way_offset[ball + 1];
+        int *count = &job->path_offset[ball + 1];
         if (w == 0 || vec3_distance(tree->center[at.node], tree->center[node]) - tree->radius[at.node] > job->reach[ball])
             continue;
-        if (*count == job->way_capacity) {
-            int capacity = 2 * job->way_capacity + 4096;
-            Way *more = realloc(job->way, (size_t)capacity * sizeof *more);
+        if (*count == job->path_capacity) {
+            int capacity = 2 * job->path_capacity + 4096;
+            TreePath *more = realloc(job->path, (size_t)capacity * sizeof *more);
             if (!more)
                 return false;
-            job->way = more;
-            job->way_capacity = capacity;
+            job->path = more;
+            job->path_capacity = capacity;
         }
-        job->way[(*count)++] = at;
+        job->path[(*count)++] = at;
     }
     return true;
 }
@@ -158,8 +158,8 @@ static bool find_blocks(SheetMarch *job, int first, int end)
     const VesselTree *tree = job->tree;
     job->node = malloc((size_t)(end - first) * sizeof *job->node);
     job->reach = malloc((size_t)(end - first) * sizeof *job->reach);
-    job->way_offset = calloc((size_t)(end - first) + 1, sizeof *job->way_offset);
-    if (!job->node || !job->reach || !job->way_offset)
+    job->path_offset = calloc((size_t)(end - first) + 1, sizeof *job->path_offset);
+    if (!job->node || !job->reach || !job->path_offset)
         return false;
     for (int i = first; i < end; i++) {
         Blobby model = blobby_of(tree, i);
@@ -172,7 +172,7 @@ static bool find_blocks(SheetMarch *job, int first, int end)
         job->reach[job->ball_count++] = reach + 2 * job->march.cell;
     }
     for (int n = 0; n < job->ball_count; n++)
-        if ((job->alone < 0 && !list_ways(job, n)) || !march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
+        if ((job->alone < 0 && !list_paths(job, n)) || !march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
             return false;
     return true;
 }
@@ -185,10 +185,10 @@ static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
     double near = vec3_distance(x, tree->center[job->node[ball]]) - h;
     if (job->alone >= 0 || !(near > 1.2 * tree->radius[job->node[ball]]))
         return false;
-    for (int k = job->way_offset[ball]; k < job->way_offset[ball + 1]; k++) {
-        const Way *way = &job->way[k];
-        double r = tree->radius[way->node] - h;
-        if (way->length < 2.5 * near && r > 0 && vec3_norm2(vec3_sub(x, tree->center[way->node])) < r * r)
+    for (int k = job->path_offset[ball]; k < job->path_offset[ball + 1]; k++) {
+        const TreePath *path = &job->path[k];
+        double r = tree->radius[path->node] - h;
+        if (path->length < 2.5 * near && r > 0 && vec3_norm2(vec3_sub(x, tree->center[path->node])) < r * r)
             return true;
     }
     return false;
@@ -688,8 +688,8 @@ static void free_march(SheetMarch *job)
     key_map_free(&job->vertex_of_state);
     free(job->node);
     free(job->reach);
-    free(job->way_offset);
-    free(job->way);
+    free(job->path_offset);
+    free(job->path);
     free(job->candidate);
     free(job->out);
     free(job->row);

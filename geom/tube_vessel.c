@@ -88,9 +88,9 @@ static int walk(const TubeVessel *tube, Vec3 x, int segment, CentrePoint *closes
     SEL_ASSERT(segment >= 0 && segment < tube->count, "a walk starts on a segment of the tube");
     const Segment *s = tube->segment;
     *closest = closest_on_segment(&s[segment], x);
-    for (int way = -1; way <= 1; way += 2)
-        for (int next = segment + way; next >= 0 && next < tube->count; next += way) {
-            bool on = way > 0 ? closest->end > 0 || is_past(&s[segment], x) : closest->end < 0 || !is_past(&s[next], x);
+    for (int step = -1; step <= 1; step += 2)
+        for (int next = segment + step; next >= 0 && next < tube->count; next += step) {
+            bool on = step > 0 ? closest->end > 0 || is_past(&s[segment], x) : closest->end < 0 || !is_past(&s[next], x);
             if (!on)
                 break;
             CentrePoint c = closest_on_segment(&s[next], x);

@@ -94,14 +94,14 @@ static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double lon
         return 0;
     for (int i = 0; i < RAYS; i++) {
         double angle = 2 * PI * i / RAYS, step = longest / 64, low = 0, high = step;
-        Vec3 way = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
-        while (high < longest && blobby_field(model, vec3_add_scaled(at, high, way)) > 0)
+        Vec3 ray = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
+        while (high < longest && blobby_field(model, vec3_add_scaled(at, high, ray)) > 0)
             low = high, high += step;
         if (!(high < longest))
             return HUGE_VAL;
         for (int k = 0; k < 30; k++) {
             double middle = 0.5 * (low + high);
-            *(blobby_field(model, vec3_add_scaled(at, middle, way)) > 0 ? &low : &high) = middle;
+            *(blobby_field(model, vec3_add_scaled(at, middle, ray)) > 0 ? &low : &high) = middle;
         }
         sum += low * low / RAYS;
     }
@@ -114,12 +114,12 @@ static double neck_width(const VesselTree *tree, int sac, int vessel)
     enum { SECTIONS = 40 };
     Blobby model = blobby_of(tree, sac);
     Vec3 to = vec3_sub(tree->center[sac], tree->center[vessel]);
-    double way = vec3_norm(to), start = 0.7 * tree->radius[vessel], least = HUGE_VAL;
-    if (model.count < 1 || !(way > start))
+    double distance = vec3_norm(to), start = 0.7 * tree->radius[vessel], least = HUGE_VAL;
+    if (model.count < 1 || !(distance > start))
         return NAN;
-    Vec3 axis = vec3_scale(to, 1 / way);
+    Vec3 axis = vec3_scale(to, 1 / distance);
     for (int i = 0; i <= SECTIONS; i++) {
-        double s = start + (way - start) * i / SECTIONS,
+        double s = start + (distance - start) * i / SECTIONS,
                r = section_radius(&model, vec3_add_scaled(tree->center[vessel], s, axis), axis, 3 * tree->radius[sac]);
         least = r > 0 ? fmin(least, r) : least;
     }

@@ -38,16 +38,16 @@ static void link_neighbours(VesselTree *tree)
 }
 
 // The end of a path through the tree from a node.
-typedef struct Way {
+typedef struct TreePath {
     int node, from, top;     // top: the common ancestor of both ends
-} Way;
+} TreePath;
 
 typedef struct NearSearch {
     const VesselTree *tree;
     double *along;           // (N) [mm] from the root
     double largest;          // largest radius
     double part;             // factor for the distances that count as near: 1, or less if the tree is too crowded
-    Way *way;                // (N) a tree has one path to each node
+    TreePath *path;          // (N) a tree has one path to each node
     int64_t visits;
     int *near;               // the lists of all nodes
     size_t count, capacity;
@@ -73,11 +73,14 @@ static bool add_near(NearSearch *s, int node)
 }
 
 // The length of a path is the same from both of its ends, bit for bit; so "near" is symmetric.
-static double way_length(const NearSearch *s, int from, Way way) { return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]); }
+static double path_length(const NearSearch *s, int from, TreePath path)
+{
+    return (s->along[from] - s->along[path.top]) + (s->along[path.node] - s->along[path.top]);
+}
 
 // Largest length of a path and largest distance between near nodes, relative to the sum of their radii: see vessel_tree_link.
 typedef struct NearLimits {
-    double way, apart;
+    double path, apart;
 } NearLimits;
 
 static const NearLimits near_most = {3, 1.5}, near_local_sac = {2, 1.5}, near_local = {1.5, 1.2};
@@ -97,21 +100,21 @@ static bool collect_near(NearSearch *s, int node)
 {
     const VesselTree *tree = s->tree;
     int known = 1;
-    double farthest = s->part * near_most.way * (tree->radius[node] + s->largest);
-    s->way[0] = (Way){node, -1, node};
+    double farthest = s->part * near_most.path * (tree->radius[node] + s->largest);
+    s->path[0] = (TreePath){node, -1, node};
     for (int w = 0; w < known; w++, s->visits++) {
-        Way at = s->way[w];
+        TreePath at = s->path[w];
         double reach = s->part * (tree->radius[node] + tree->radius[at.node]);
         NearLimits most = near_limits(tree, node, at.node);
-        bool is_near = way_length(s, node, at) < most.way * reach && vec3_distance(tree->center[node], tree->center[at.node]) < most.apart * reach;
+        bool is_near = path_length(s, node, at) < most.path * reach && vec3_distance(tree->center[node], tree->center[at.node]) < most.apart * reach;
         if (w > 0 && (at.from == node || is_near) && !add_near(s, at.node))
             return false;
         for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1]; k++) {
             int next = tree->neighbour[k];
-            Way way = {next, at.node, next < at.node ? next : at.top};
-            if (next != at.from && (w == 0 || way_length(s, node, way) < farthest)) {
-                SEL_REQUIRE(known < tree->node_count, "a tree has one way to each node");
-                s->way[known++] = way;
+            TreePath path = {next, at.node, next < at.node ? next : at.top};
+            if (next != at.from && (w == 0 || path_length(s, node, path) < farthest)) {
+                SEL_REQUIRE(known < tree->node_count, "a tree has one path to each node");
+                s->path[known++] = path;
             }
         }
     }
@@ -151,10 +154,10 @@ bool vessel_tree_link(VesselTree *tree)
     free(tree->near);
     tree->near = NULL;
     tree->near_offset = calloc(n + 1, sizeof *tree->near_offset);
-    NearSearch search = {.tree = tree, .along = calloc(n, sizeof *search.along), .way = calloc(n, sizeof *search.way)};
-    bool good = tree->near_offset && search.along && search.way && link_near(tree, &search);
+    NearSearch search = {.tree = tree, .along = calloc(n, sizeof *search.along), .path = calloc(n, sizeof *search.path)};
+    bool good = tree->near_offset && search.along && search.path && link_near(tree, &search);
     free(search.along);
-    free(search.way);
+    free(search.path);
     if (search.near)
         tree->near = realloc(search.near, search.count * sizeof *search.near);
     else

@@ -30,7 +30,7 @@ struct Contrast {
     double *sac;             // (sacs)
     double *outlet;          // (branches) concentration that leaves its downstream end in this sweep
     double *back;            // (branches) volume entering its downstream end backwards, 0 outside the sweep
-    bool *on_way;            // (branches) between inlet and tip, false outside the sweep
+    bool *runs_to_tip;       // (branches) between inlet and tip, false outside the sweep
     float *node;             // (nodes) concentration
 };
 
@@ -63,10 +63,10 @@ Contrast *contrast_create(const VesselTree *tree, const ContrastOptions *options
         contrast->sac = calloc((size_t)network->sac_count + 1, sizeof *contrast->sac);
         contrast->outlet = calloc(branches, sizeof *contrast->outlet);
         contrast->back = calloc(branches, sizeof *contrast->back);
-        contrast->on_way = calloc(branches, sizeof *contrast->on_way);
+        contrast->runs_to_tip = calloc(branches, sizeof *contrast->runs_to_tip);
         contrast->node = calloc((size_t)network->node_count, sizeof *contrast->node);
     }
-    if (contrast->cell && contrast->sac && contrast->outlet && contrast->back && contrast->on_way && contrast->node)
+    if (contrast->cell && contrast->sac && contrast->outlet && contrast->back && contrast->runs_to_tip && contrast->node)
         return contrast;
     contrast_free(contrast);
     return NULL;
@@ -81,7 +81,7 @@ void contrast_free(Contrast *contrast)
     free(contrast->sac);
     free(contrast->outlet);
     free(contrast->back);
-    free(contrast->on_way);
+    free(contrast->runs_to_tip);
     free(contrast->node);
     free(contrast);
 }
@@ -106,7 +106,7 @@ void contrast_copy(Contrast *to, const Contrast *from)
     const FlowNetwork *network = &to->network;
     *to = *from;
     to->network = own.network;
-    to->cell = own.cell, to->sac = own.sac, to->outlet = own.outlet, to->back = own.back, to->on_way = own.on_way, to->node = own.node;
+    to->cell = own.cell, to->sac = own.sac, to->outlet = own.outlet, to->back = own.back, to->runs_to_tip = own.runs_to_tip, to->node = own.node;
     if (network->node_count == 0)
         return;
     memcpy(to->cell, from->cell, (size_t)network->cell_count * sizeof *to->cell);
@@ -236,7 +236,7 @@ static void sweep_branch(Contrast *contrast, int index, const Injection *injecti
     const FlowBranch *branch = &network->branch[index];
     int end = branch->first_cell + branch->cell_count;
     bool has_tip = index == injection->branch;
-    double full = swept_volume(contrast, branch), through = contrast->on_way[index] ? full - injection->volume : full;
+    double full = swept_volume(contrast, branch), through = contrast->runs_to_tip[index] ? full - injection->volume : full;
     double mean = branch->parent >= 0 ? contrast->outlet[branch->parent] : 0;
     if (through < 0) {
         if (!has_tip)
@@ -279,13 +279,13 @@ static void sweep(Contrast *contrast, int tip_node, double volume)
     Injection injection = inject(contrast, tip_node, volume);
     double tip_mean = 0;
     for (int i = injection.branch; i >= 0; i = network->branch[i].parent)
-        contrast->on_way[i] = true;
+        contrast->runs_to_tip[i] = true;
     if (injection.branch >= 0 && injection.volume > swept_volume(contrast, &network->branch[injection.branch]))
         tip_mean = sweep_back(contrast, &injection);
     for (int i = 0; i < network->branch_count; i++)
         sweep_branch(contrast, i, &injection, tip_mean);
     for (int i = injection.branch; i >= 0; i = network->branch[i].parent) {
-        contrast->on_way[i] = false;
+        contrast->runs_to_tip[i] = false;
         contrast->back[i] = 0;
     }
 }
