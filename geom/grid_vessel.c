@@ -188,25 +188,25 @@ static bool check_options(const GridVesselOptions *o, const TriangleMesh *surfac
     int before = faults->count;
     bool cell = isfinite(o->cell_mm) && o->cell_mm > 0;
     if (!cell)
-        faults_add(faults, name, 0, 0, "grid: cell_mm is %g; a number above 0 is valid", o->cell_mm);
+        faults_add(faults, name, 0, 0, "grid: cell_mm is %g; expected a number above 0", o->cell_mm);
     else if (!isfinite(o->band_mm) || !(o->band_mm >= 2 * o->cell_mm))
-        faults_add(faults, name, 0, 0, "grid: band_mm is %g; at least two cells, %g mm, are valid", o->band_mm, 2 * o->cell_mm);
+        faults_add(faults, name, 0, 0, "grid: band_mm is %g; expected at least two cells, %g mm", o->band_mm, 2 * o->cell_mm);
     if (o->has_inlet && (!vec3_is_finite(o->inlet) || !(fabs(vec3_norm(o->direction) - 1) < 1e-6)))
-        faults_add(faults, name, 0, 0, "grid: the inlet (%g, %g, %g), direction (%g, %g, %g); finite mm and a unit vector are valid", o->inlet.x, o->inlet.y,
+        faults_add(faults, name, 0, 0, "grid: the inlet (%g, %g, %g), direction (%g, %g, %g); expected finite mm and a unit vector", o->inlet.x, o->inlet.y,
                    o->inlet.z, o->direction.x, o->direction.y, o->direction.z);
     if (surface->triangle_count < 1)
-        faults_add(faults, name, 0, 0, "grid: the surface has no triangles; at least one is valid");
+        faults_add(faults, name, 0, 0, "grid: the surface has no triangles; expected at least one");
     double most = cell ? (double)BLOCK_MAX * BLOCK * o->cell_mm - 2 * o->band_mm : 0;
     for (int v = 0; v < surface->vertex_count && faults->count == before; v++) {
         Vec3 p = surface->vertex[v];
         if (!(vec3_is_finite(p) && fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))) < most))
-            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y, p.z,
+            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; expected coordinates below %g mm with cells of %g mm", v, p.x, p.y, p.z,
                        most, o->cell_mm);
     }
     for (int t = 0; t < surface->triangle_count && faults->count == before; t++)
         for (int k = 0; k < 3; k++)
             if (surface->triangle[t][k] < 0 || surface->triangle[t][k] >= surface->vertex_count)
-                faults_add(faults, name, 0, 0, "grid: triangle %d has vertex %d of %d; 0 to %d are valid", t, surface->triangle[t][k], surface->vertex_count,
+                faults_add(faults, name, 0, 0, "grid: triangle %d has vertex %d of %d; expected 0 to %d", t, surface->triangle[t][k], surface->vertex_count,
                            surface->vertex_count - 1);
     return faults->count == before;
 }
@@ -493,7 +493,7 @@ Vessel *grid_vessel_create(const Vessel *exact, const TriangleMesh *surface, con
         free(m);
     }
     if (!good) {
-        faults_add(faults, name, 0, 0, "grid: cells of %g mm with a band of %g mm need more memory than there is, or over %d blocks; larger cells are valid",
+        faults_add(faults, name, 0, 0, "grid: cells of %g mm with a band of %g mm need more memory than available, or more than %d blocks; use larger cells",
                    options->cell_mm, options->band_mm, (int)BLOCKS_MAX);
         if (grid)
             grid_destroy(&grid->vessel);

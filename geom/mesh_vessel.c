@@ -431,27 +431,27 @@ static bool has_area(const TriangleMesh *mesh, int triangle)
 static bool check_triangles(const TriangleMesh *mesh, const char *name, Faults *faults)
 {
     if (!mesh || mesh->triangle_count <= 0 || mesh->vertex_count <= 0) {
-        faults_add(faults, name, 0, 0, "the mesh has no triangle; a vessel's wall in triangles is valid");
+        faults_add(faults, name, 0, 0, "the mesh has no triangle; expected a vessel's wall");
         return false;
     }
     int before = faults->count, flat = 0, first_flat = 0;
     for (int v = 0; v < mesh->vertex_count && faults->count == before; v++) {
         Vec3 p = mesh->vertex[v];
         if (!(fabs(p.x) < COORDINATE_MAX && fabs(p.y) < COORDINATE_MAX && fabs(p.z) < COORDINATE_MAX))
-            faults_add(faults, name, 0, 0, "vertex %d of the mesh is (%g, %g, %g); numbers below %g mm are valid", v, p.x, p.y, p.z, COORDINATE_MAX);
+            faults_add(faults, name, 0, 0, "vertex %d of the mesh is (%g, %g, %g); expected numbers below %g mm", v, p.x, p.y, p.z, COORDINATE_MAX);
     }
     for (int t = 0; t < mesh->triangle_count && faults->count == before; t++)
         for (int k = 0; k < 3; k++)
             if (mesh->triangle[t][k] < 0 || mesh->triangle[t][k] >= mesh->vertex_count) {
-                faults_add(faults, name, 0, 0, "triangle %d of the mesh has vertex %d; 0 to %d are valid", t, mesh->triangle[t][k], mesh->vertex_count - 1);
+                faults_add(faults, name, 0, 0, "triangle %d of the mesh has vertex %d; expected 0 to %d", t, mesh->triangle[t][k], mesh->vertex_count - 1);
                 break;
             }
     for (int t = 0; t < mesh->triangle_count && faults->count == before; t++)
         if (!has_area(mesh, t) && flat++ == 0)
             first_flat = t;
     if (flat > 0)
-        faults_add(faults, name, 0, 0, "%d of the mesh's %d triangles have no area, triangle %d first; three corners apart and not in line are valid", flat,
-                   mesh->triangle_count, first_flat);
+        faults_add(faults, name, 0, 0, "%d of the mesh's %d triangles have no area, triangle %d first; expected three distinct corners that are not collinear",
+                   flat, mesh->triangle_count, first_flat);
     return faults->count == before;
 }
 
@@ -464,10 +464,10 @@ static bool check_edges(const TriangleMesh *mesh, const char *name, Faults *faul
         return false;
     }
     if (census.non_manifold_edges > 0)
-        faults_add(faults, name, 0, 0, "%lld edges of the mesh are shared by three triangles or more; edges of two, or of one at an open end, are valid",
+        faults_add(faults, name, 0, 0, "%lld edges of the mesh are shared by three triangles or more; expected two, or one at an open end",
                    (long long)census.non_manifold_edges);
     if (census.turned_edges > 0)
-        faults_add(faults, name, 0, 0, "at %lld edges of the mesh two neighbours face opposite sides; triangles that all face out of the lumen are valid",
+        faults_add(faults, name, 0, 0, "at %lld edges of the mesh two neighbours face opposite sides; expected triangles that all face out of the lumen",
                    (long long)census.turned_edges);
     return faults->count == before;
 }
@@ -849,7 +849,7 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
     if (!good)
         faults_add(faults, name, 0, 0, "not enough memory for a mesh of %d triangles", mesh->triangle_count);
     else if (!faces_out)
-        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); triangles that face out of it are valid", hull.volume);
+        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); expected triangles that face out of it", hull.volume);
     good = good && faces_out && build_tree(m, name, faults);
     if (good && options->search == MESH_SEARCH_CACHED && !set_surroundings(m)) {
         faults_add(faults, name, 0, 0, "not enough memory for a mesh of %d triangles", mesh->triangle_count);

@@ -243,34 +243,33 @@ static void check_pieces(const TubeOptions *o, const char *file, Faults *faults)
     for (int i = 0; i < o->piece_count; i++) {
         const TubePiece *p = &o->piece[i];
         if (!isfinite(p->angle) || p->angle < 0)
-            faults_add(faults, file, 0, 0, "tube: path[%d] turns by %g deg; an arc's angle is above 0", i, p->angle * 180 / PI);
+            faults_add(faults, file, 0, 0, "tube: path[%d] turns by %g deg; expected an arc's angle above 0", i, p->angle * 180 / PI);
         else if (p->angle == 0 && (!isfinite(p->length) || !(p->length > 0)))
-            faults_add(faults, file, 0, 0, "tube: path[%d] is %g mm long; a line's length is above 0 (and an arc's angle)", i, p->length);
+            faults_add(faults, file, 0, 0, "tube: path[%d] is %g mm long; expected a line's length above 0 (or an arc's angle)", i, p->length);
         else if (p->angle > 0 && (!isfinite(p->arc_radius) || !(p->arc_radius > o->radius)))
             faults_add(faults, file, 0, 0, "tube: path[%d] has an arc of radius %g mm; it must be larger than the lumen's radius, %g mm", i, p->arc_radius,
                        o->radius);
         if (!isfinite(p->plane))
-            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc's plane that is no number; degrees are valid", i);
+            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc's plane that is not a number; expected degrees", i);
         parts += p->angle > 0 ? 1 + p->angle / (PI / 2) : 1;
     }
     if (!(parts < SEGMENTS_MAX))
-        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; fewer than %d lines and quarter turns are valid", parts, (int)SEGMENTS_MAX);
+        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; expected fewer than %d lines and quarter turns", parts, (int)SEGMENTS_MAX);
 }
 
 static void check_polyline(const TubeOptions *o, const char *file, Faults *faults)
 {
     if (o->point_count < 2 || o->point_count > SEGMENTS_MAX) {
-        faults_add(faults, file, 0, 0, "tube: the centreline has %d points; 2 to %d are valid", o->point_count, (int)SEGMENTS_MAX);
+        faults_add(faults, file, 0, 0, "tube: the centreline has %d points; expected 2 to %d", o->point_count, (int)SEGMENTS_MAX);
         return;
     }
     for (int i = 0; i < o->point_count; i++) {
         if (!vec3_is_finite(o->point[i])) {
-            faults_add(faults, file, 0, 0, "tube: point %d is (%g, %g, %g); finite coordinates in mm are valid", i, o->point[i].x, o->point[i].y,
-                       o->point[i].z);
+            faults_add(faults, file, 0, 0, "tube: point %d is (%g, %g, %g); expected finite coordinates in mm", i, o->point[i].x, o->point[i].y, o->point[i].z);
             return;
         }
         if (i > 0 && !(vec3_distance(o->point[i - 1], o->point[i]) > 1e-9)) {
-            faults_add(faults, file, 0, 0, "tube: points %d and %d coincide; neighbouring points differ", i - 1, i);
+            faults_add(faults, file, 0, 0, "tube: points %d and %d coincide; expected distinct neighbours", i - 1, i);
             return;
         }
     }
@@ -281,9 +280,9 @@ static bool check_options(const TubeOptions *o, const char *file, Faults *faults
     int before = faults->count;
     bool pieces = o->piece_count > 0 && o->piece, points = o->point_count > 0 && o->point;
     if (!isfinite(o->radius) || !(o->radius > 0))
-        faults_add(faults, file, 0, 0, "tube: radius_mm is %g; a number above 0 is valid", o->radius);
+        faults_add(faults, file, 0, 0, "tube: radius_mm is %g; expected a number above 0", o->radius);
     if (pieces == points)
-        faults_add(faults, file, 0, 0, "tube: %s; exactly one of `path` and `points` is valid",
+        faults_add(faults, file, 0, 0, "tube: %s; expected exactly one of `path` and `points`",
                    pieces ? "both a path and points are given" : "neither a path nor points are given");
     else if (points)
         check_polyline(o, file, faults);
@@ -294,11 +293,11 @@ static bool check_options(const TubeOptions *o, const char *file, Faults *faults
         for (int i = 0; i < o->piece_count; i++)
             turns = turns || o->piece[i].angle > 0;
         if (!vec3_is_finite(o->start))
-            faults_add(faults, file, 0, 0, "tube: start_mm is not finite; coordinates in mm are valid");
+            faults_add(faults, file, 0, 0, "tube: start_mm is not finite; expected coordinates in mm");
         if (!isfinite(length) || !(length > 1e-12))
-            faults_add(faults, file, 0, 0, "tube: direction has no length; a vector into the tube is valid");
+            faults_add(faults, file, 0, 0, "tube: direction has no length; expected a vector into the tube");
         else if (turns && !(across > 1e-9 * length * vec3_norm(o->normal)))
-            faults_add(faults, file, 0, 0, "tube: normal is zero or along direction; arcs turn towards it, a vector across direction is valid");
+            faults_add(faults, file, 0, 0, "tube: normal is zero or along direction; arcs turn towards it, so expected a vector across direction");
     }
     return faults->count == before;
 }
@@ -386,7 +385,7 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
     TubeVessel *tube = calloc(1, sizeof *tube);
     Segment *segment = calloc(capacity, sizeof *segment);
     if (!tube || !segment) {
-        faults_add(faults, file, 0, 0, "tube: no memory for %zu segments", capacity);
+        faults_add(faults, file, 0, 0, "tube: not enough memory for %zu segments", capacity);
         free(tube);
         free(segment);
         return NULL;

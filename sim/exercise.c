@@ -82,7 +82,7 @@ static void read_texts(const YamlMap *map, Exercise *exercise)
     }
     exercise->instructions = strdup(text);
     if (!exercise->instructions)
-        yaml_fault(map->value, "no memory");
+        yaml_fault(map->value, "out of memory");
 }
 
 static void read_rules(YamlValue value, ExerciseRules *rules)

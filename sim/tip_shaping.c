@@ -83,7 +83,7 @@ WireSection *tip_shaped_sections(const WireSection *section, int count, const Ti
     }
     WireSection *out = calloc(2 * (size_t)count + 1, sizeof *out);
     if (!out) {
-        snprintf(why, capacity, "no memory");
+        snprintf(why, capacity, "out of memory");
         return NULL;
     }
     for (int i = 0; i < count; begin += section[i++].length) {

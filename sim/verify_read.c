@@ -179,7 +179,7 @@ void verify_read(YamlValue value, const VerifyTools *tools, bool has_script, Ver
     count = yaml_count(list, 1, VERIFY_MOST_CASES);
     plan->cases = count > 0 ? calloc((size_t)count, sizeof *plan->cases) : NULL;
     if (count > 0 && !plan->cases)
-        yaml_fault(list, "no memory");
+        yaml_fault(list, "out of memory");
     plan->case_count = plan->cases ? count : 0;
     for (int i = 0; i < plan->case_count; i++)
         read_case(yaml_item(list, i), tools, plan, &plan->cases[i]);
