@@ -43,7 +43,7 @@ static bool meets_cell(const VesselTree *tree, int node, Vec3 c, double reach)
 int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 center, double reach)
 {
     int count = 1, stamp = ++flood->stamp;
-    SEL_REQUIRE(flood->node_count == tree->node_count, "the flood has room for each node once");
+    SEL_REQUIRE(flood->node_count == tree->node_count, "the flood has capacity for each node once");
     SEL_ASSERT(owner >= 0 && owner < tree->node_count, "a blob belongs to a node of the tree");
     SEL_ASSERT(reach > 0, "a blob has a radius of support");
     flood->node[0] = owner;
@@ -107,7 +107,7 @@ static bool flood_all(const VesselTree *tree, Sightings *s)
 bool blob_flood_list(VesselTree *tree)
 {
     SEL_ASSERT(tree->near_offset && tree->near, "near nodes are known before blobs are listed");
-    SEL_ASSERT(tree->blob_count <= INT32_MAX, "lists name blobs by 32 bits");
+    SEL_ASSERT(tree->blob_count <= INT32_MAX, "lists index blobs by 32 bits");
     Sightings s = {.offset = calloc((size_t)tree->blob_count + 1, sizeof *s.offset)};
     int64_t *offset = calloc((size_t)tree->node_count + 1, sizeof *offset);
     int32_t *seen = NULL;
@@ -122,7 +122,7 @@ bool blob_flood_list(VesselTree *tree)
             offset[i + 1] = sum;
             sum += own;
         }
-        SEL_REQUIRE(sum == s.count, "each sighting is of a node of the tree");
+        SEL_REQUIRE(sum == s.count, "each pair's node is one of the tree");
         for (int64_t b = 0; b < tree->blob_count; b++)
             for (int64_t k = s.offset[b]; k < s.offset[b + 1]; k++)
                 seen[offset[s.node[k] + 1]++] = (int32_t)b;

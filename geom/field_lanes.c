@@ -16,11 +16,11 @@ _Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(Ves
                    offsetof(VesselMemory, bound_at) == 8 * MEMORY_BOUND_AT && offsetof(VesselMemory, bound_for) == 8 * MEMORY_BOUND_FOR &&
                    offsetof(VesselMemory, down) == 8 * MEMORY_DOWN && offsetof(VesselMemory, up) == 8 * MEMORY_UP,
                "memories are rows of doubles");
-_Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
+_Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "and so are hits");
 
 void field_directions(Vec3 *direction, int count)
 {
-    SEL_ASSERT(count > 0, "at least one direction is asked for");
+    SEL_ASSERT(count > 0, "at least one direction is requested");
     for (int k = 0; k < count; k++) {
         double z = 1 - (2 * k + 1) / (double)count, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
         direction[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
@@ -57,7 +57,7 @@ void field_clear_rings(ClearPoints *points)
             double angle = 2 * PI * (k + 0.5 * (r % 2)) / count[r], out = same_sin(from_axis[r]);
             add_clear_point(points, vec3(out * same_cos(angle), out * same_sin(angle), same_cos(from_axis[r])));
         }
-    SEL_ASSERT(points->count == CLEAR_ON_RINGS, "rings fill whole strips of lanes");
+    SEL_ASSERT(points->count == CLEAR_ON_RINGS, "the rings' points are a multiple of the lanes");
 }
 
 void field_turn_points(const ClearPoints *points, Vec3 axis, ClearPoints *turned)

@@ -174,7 +174,7 @@ typedef struct BlobList {
 // Lists the blobs that reach to within `skin` of q. Returns their number, of which at most `most` are listed.
 static int pick_blobs(const FieldVessel *field, const int32_t *seen_blob, int seen_count, Vec3 q, double skin, int most, int32_t *list)
 {
-    SEL_ASSERT(seen_count >= 0 && most > 0 && skin >= 0, "a list, room for some of it and a distance");
+    SEL_ASSERT(seen_count >= 0 && most > 0 && skin >= 0, "the list has a length, the output has capacity, and the skin is a distance");
     enum { PART = 512 };
     uint8_t bits[PART / FOOT_BLOCK];
     int count = 0;
@@ -236,7 +236,7 @@ static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec
     m->bound_at = x;
     m->bound_for = fabs(gap) + fmin(BOUND * n->radius, BOUND_MOST);
     field->kernels->bends(field->row, list->blob, list->count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
-    SEL_ASSERT(m->down >= 0 && m->up >= 0, "bounds of bends are no less than 0");
+    SEL_ASSERT(m->down >= 0 && m->up >= 0, "bounds of second derivatives are at least 0");
 }
 
 // The field of a list at q, and its gradient.
@@ -281,7 +281,7 @@ typedef struct Foot {
 static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node, bool carried)
 {
     SEL_ASSERT(i >= 0 && i < FOOT_BLOCK, "a lane is one of the block");
-    SEL_ASSERT(node >= 0 && node < field->tree->node_count, "a lane asks a node of the tree");
+    SEL_ASSERT(node >= 0 && node < field->tree->node_count, "a lane's node is one of the tree");
     const FieldNode *n = &field->node[node];
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
     b->foot.at.carried[i] = carried, b->foot.at.any_carried |= carried;
@@ -721,7 +721,7 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const Blo
 // A gap is the length of the shortest line to the wall: it changes by no more than x moves, or it belongs to another wall. `before`: the gap at the last place.
 static void compare_gaps(VesselMemory *m, double before, double travel, VesselHit *hit)
 {
-    SEL_ASSERT(travel >= 0, "a travel is a length");
+    SEL_ASSERT(travel >= 0, "the travel is a length");
     static const double APPROACH = 0.2;      // change of the returned gap per mm of travel
     if (m->contradicted) {
         m->credible -= APPROACH * travel;
@@ -931,7 +931,7 @@ typedef struct Batch {
 
 static void put(Queue *queue, int point, Vec3 start)
 {
-    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point waits in a queue once");
+    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point is in a queue at most once");
     queue->start[queue->count] = start;
     queue->point[queue->count++] = point;
 }
@@ -947,7 +947,7 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
     static const double REACH = 1.25;        // relative to the radius: 0.2 for the prediction and two steps of 0.5
     VesselMemory *m = &batch->memory[point];
     const FieldNode *n = &field->node[m->node];
-    SEL_ASSERT(m->blobs <= VESSEL_BLOBS, "a memory holds no more blobs than it has room for");
+    SEL_ASSERT(m->blobs <= VESSEL_BLOBS, "a memory holds no more blobs than its capacity");
     set_lane(field, b, i, m->node, n->carried && (seek || inlet_height(field, m->foot) < inlet_zone(field) + REACH * n->radius));
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
@@ -1158,7 +1158,7 @@ static void fill_nodes(FieldVessel *field)
         n->skin = fmin(SKIN * n->radius, SKIN_MOST);
         n->seen = tree->seen + tree->seen_offset[i];
         n->seen_count = (int)(tree->seen_offset[i + 1] - tree->seen_offset[i]);
-        SEL_ASSERT(n->seen_count >= 0, "offsets never fall");
+        SEL_ASSERT(n->seen_count >= 0, "offsets do not decrease");
     }
     for (int k = tree->near_offset[0] - 1; k < tree->near_offset[1] && field->inlet_open; k++) {
         int node = k < tree->near_offset[0] ? 0 : tree->near[k];
@@ -1175,7 +1175,7 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     if (!field)
         return NULL;
     SEL_ASSERT(tree->near_offset && tree->near && tree->seen_offset, "the tree is linked (vessel_tree_link)");
-    SEL_ASSERT(tree->blob_count < INT32_MAX, "memories name blobs by 32 bits, and the one without weight");
+    SEL_ASSERT(tree->blob_count < INT32_MAX, "memories index blobs by 32 bits, including the one of amplitude 0");
     field->vessel =
         (Vessel){.kind = "field", .query = field_query, .locate = field_locate, .inlet = field_inlet, .destroy = field_destroy, .primitives = tree->blob_count};
     field->tree = tree;

@@ -229,7 +229,7 @@ static bool hold_block(Making *m, int i, int j, int k, int vertex)
             return false;
         m->capacity = capacity;
     }
-    SEL_REQUIRE(grid->block_count < m->capacity, "the list of blocks was made longer");
+    SEL_REQUIRE(grid->block_count < m->capacity, "the list of blocks was enlarged before");
     memcpy(m->base[grid->block_count], (int[3]){i, j, k}, sizeof *m->base);
     m->vertex[grid->block_count++] = vertex;
     return grid->block_count < BLOCKS_MAX;
@@ -303,7 +303,7 @@ static bool push_near(Making *m, int count, int v)
         m->near = near;
         m->near_capacity = capacity;
     }
-    SEL_ASSERT(count >= 0 && count < m->near_capacity, "the list was made longer");
+    SEL_ASSERT(count >= 0 && count < m->near_capacity, "the list was enlarged before");
     m->near[count] = v;
     return true;
 }
@@ -416,7 +416,7 @@ static bool learn_block(Making *m, const int at[3], int vertex)
             return false;
         m->sought_capacity = capacity;
     }
-    SEL_REQUIRE(m->sought_count < m->sought_capacity, "the list of blocks was made longer");
+    SEL_REQUIRE(m->sought_count < m->sought_capacity, "the list of blocks was enlarged before");
     memcpy(m->sought[m->sought_count], at, sizeof *m->sought);
     m->sought_vertex[m->sought_count++] = vertex;
     return true;

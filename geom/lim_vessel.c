@@ -152,7 +152,7 @@ static void sample(const LimVessel *lim, FootSample *s, const int *lane, int cou
 
 static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec3 x)
 {
-    SEL_ASSERT(node >= 0 && node < lim->tree->node_count, "a lane asks a node of the tree");
+    SEL_ASSERT(node >= 0 && node < lim->tree->node_count, "a lane's node is one of the tree");
     SEL_ASSERT(i >= 0 && i < FOOT_BATCH, "a lane is one of the batch");
     const NodeModel *m = &lim->model[node];
     s->group[i] = m->group;
@@ -170,7 +170,7 @@ static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9;
 // Lanes are computed in whole blocks: fills the lanes after the last one in use with numbers.
 static void fill_block(FootBatch *b, int count)
 {
-    SEL_ASSERT(count > 0 && count <= FOOT_BATCH, "a batch has no more lanes than room");
+    SEL_ASSERT(count > 0 && count <= FOOT_BATCH, "a batch has no more lanes than its capacity");
     for (int i = count; i % FOOT_BLOCK != 0; i++) {
         FootSample *s = &b->at;
         s->x[i] = s->y[i] = s->z[i] = s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
@@ -592,7 +592,7 @@ static bool collect_partners(const LimVessel *lim, const NodeModel *m, int group
         own &= better == 0;
         for (in = mixed ? in : 0; in != 0 && found < PARTNERS_MAX; in &= in - 1) {
             int k = __builtin_ctz(in);
-            SEL_ASSERT(m->near[g].node[k] >= 0, "an empty plane has no mixed zone");
+            SEL_ASSERT(m->near[g].node[k] >= 0, "an empty plane has no blending zone");
             of->partner[found] = m->near[g].node[k];
             of->weight[found++] = better >> k & 1 ? 1 : weight[k];
         }
@@ -659,7 +659,7 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
 // Loads a lane with its point, its model and the remembered foot; kernels->predict computes its start from these.
 static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, const VesselMemory *memory)
 {
-    SEL_ASSERT(i >= 0 && i < FOOT_BATCH && node >= 0 && node < lim->tree->node_count, "a lane of the batch asks a node of the tree");
+    SEL_ASSERT(i >= 0 && i < FOOT_BATCH && node >= 0 && node < lim->tree->node_count, "the lane is one of the batch and its node one of the tree");
     const NodeModel *m = &lim->model[node];
     b->at.group[i] = m->group, b->at.groups[i] = m->groups;
     b->at.carried[i] = m->carried, b->at.any_carried |= m->carried;
@@ -706,7 +706,7 @@ static void order_lanes(LaneBatch *batch, const int *with)
         place[k] = at;
         at += with[k];
     }
-    SEL_REQUIRE(at == batch->count, "each lane is counted once by its partners");
+    SEL_REQUIRE(at == batch->count, "the counts by number of partners include each lane once");
     for (int i = 0; i < batch->count; i++)
         batch->of[place[batch->lane[i].partners]++] = &batch->lane[i];
 }
@@ -802,7 +802,7 @@ static void choose_sources(const VesselTree *tree, NodeModel *model)
         first++;
     for (int i = 0; i < tree->node_count; i++) {
         bool own = tree->blob_offset[i + 1] > tree->blob_offset[i];
-        SEL_ASSERT(tree->parent[i] < i, "parents stand before children");
+        SEL_ASSERT(tree->parent[i] < i, "parents come before children");
         model[i].source = own ? i : i > 0 ? model[tree->parent[i]].source : first;
     }
 }
@@ -870,7 +870,7 @@ static int fill_near(const VesselTree *tree, int i, double ball, NearGroup *grou
         g->node[lane] = -1;
         g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // never within its band
     }
-    SEL_ASSERT(kept <= count, "the planes that count are some of all");
+    SEL_ASSERT(kept <= count, "the planes that matter are a subset of all");
     return (kept + NEAR_GROUP - 1) / NEAR_GROUP;
 }
 

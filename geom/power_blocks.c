@@ -42,7 +42,7 @@ bool power_blocks_create(PowerBlocks *blocks, const VesselTree *tree)
             *box++ = b;
         }
     }
-    SEL_REQUIRE(blocks->levels == 0 || (size_t)(box - blocks->box[0]) == all, "the boxes of all levels are one piece");
+    SEL_REQUIRE(blocks->levels == 0 || (size_t)(box - blocks->box[0]) == all, "the boxes of all levels fill one allocation");
     return true;
 }
 

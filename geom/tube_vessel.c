@@ -395,7 +395,7 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
     tube->closed_ends = options->closed_ends;
     tube->segment = segment;
     tube->count = pieces ? lay_pieces(options, segment) : lay_polyline(options, segment);
-    SEL_REQUIRE(tube->count > 0 && (size_t)tube->count <= capacity, "lines and parts of arcs fit into what was counted");
+    SEL_REQUIRE(tube->count > 0 && (size_t)tube->count <= capacity, "the lines and parts of arcs fit into the counted capacity");
     tube->vessel.primitives = tube->count;
     tube->vessel.bytes = sizeof *tube + (size_t)tube->count * sizeof *segment;
     for (int i = 0; i + 1 < tube->count; i++)

@@ -76,7 +76,7 @@ bool vessel_hit_is_sound(const VesselHit *hit);
 
 static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    SEL_ASSERT(count >= 0 && !isnan(reach), "a vessel is asked about a number of points, as far as a reach");
+    SEL_ASSERT(count >= 0 && !isnan(reach), "the number of points is not negative and the reach is a number");
     v->query(v, count, point, reach, memory, hit);
     for (int i = 0; SELDINGER_ASSERTS && i < count; i++)
         SEL_ASSERT(vessel_hit_is_sound(&hit[i]), "a gap is a number and a wall's normal a unit vector");

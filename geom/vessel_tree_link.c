@@ -137,7 +137,7 @@ static bool link_near(VesselTree *tree, NearSearch *s)
         for (; i < n && (s->part == 0 || (s->visits < VISITS_MAX && s->count < NEAR_MAX)); i++) {
             if (!collect_near(s, i))
                 return false;
-            SEL_REQUIRE(s->count <= INT_MAX, "entries of the near list are counted by int");
+            SEL_REQUIRE(s->count <= INT_MAX, "the number of entries of the near list fits an int");
             tree->near_offset[i + 1] = (int)s->count;
         }
         if (i == n)

@@ -388,7 +388,7 @@ static bool write_scene(Recording *recording, const Scene *scene)
     for (int i = 0; i < scene->exchange_count; i++)
         if (scene->exchange[i].device.device_path)
             file[count++] = scene->exchange[i].device.device_path;
-    SEL_REQUIRE(count <= MOST_FILES, "there is room for the files that a scene names");
+    SEL_REQUIRE(count <= MOST_FILES, "there is room for the files that a scene refers to");
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
         file[count++] = recording->options.file[i];
     char *paths = NULL, *sums = NULL, *path = whole_path(scene->path);
@@ -582,7 +582,7 @@ static int32_t in_units(const Column *column, const unsigned char *row, size_t i
 static bool take_motion(Recording *recording, const Column *from, Column *to, const unsigned char *row)
 {
     uint32_t *change = (uint32_t *)(void *)next_row(to);
-    SEL_ASSERT(to->row_bytes / to->value_bytes == from->row_bytes / from->value_bytes, "motion has a value for each of the frame's");
+    SEL_ASSERT(to->row_bytes / to->value_bytes == from->row_bytes / from->value_bytes, "motion has one value for each value of the frame");
     size_t parts = from->rank == 2 ? from->shape[1] : 1, nodes = from->rank == 0 ? 1 : from->shape[0];
     for (size_t part = 0; part < parts; part++) {
         uint32_t neighbours = 0;
@@ -811,7 +811,7 @@ static bool push_frame(Recording *recording, Simulator *simulator)
     int nodes = state->node_count;
     SEL_REQUIRE(nodes <= recording->node_count, "a frame has room for all nodes");
     int64_t row = simulator_totals(simulator)->steps - 1;
-    SEL_ASSERT(row >= 0 && row > recording->last_frame_step, "frames follow steps, in their order");
+    SEL_ASSERT(row >= 0 && row > recording->last_frame_step, "frames are added after steps, in the order of steps");
     stepper_node_report(stepper, recording->node);
     put(ring, FRAME_STEP, &row);
     Vec3 *position = slot_of(ring, POSITION);
@@ -843,7 +843,7 @@ static void put_exchange(Recording *recording, const Stepper *stepper, const Too
 {
     uint8_t *row = slot_of(&recording->steps, exchange_column(recording));
     for (int k = 0; k < recording->tool_count; k++) {
-        SEL_ASSERT(commands->fitted[k] >= 0 && commands->fitted[k] <= UINT8_MAX, "a device has a number of one byte");
+        SEL_ASSERT(commands->fitted[k] >= 0 && commands->fitted[k] <= UINT8_MAX, "the index of a device fits one byte");
         row[2 * k] = (uint8_t)commands->fitted[k];
         row[2 * k + 1] = (uint8_t)stepper_fitted(stepper, k);
     }
