@@ -22,42 +22,42 @@ typedef struct Studio {
     Panel *panel;
     OperatorControls controls;
     TrainerPanel shown;
-    LessonView *lesson;              // (MOMENTS, stride)
+    TrackerView *tracked;            // (MOMENTS, stride)
     size_t stride;
     Pose *pose[MOMENTS];
     uint32_t pulse;
 } Studio;
 
-static LessonView *lesson_of(const Studio *studio, int moment) { return (LessonView *)(void *)((char *)studio->lesson + (size_t)moment * studio->stride); }
+static TrackerView *tracked_at(const Studio *studio, int moment) { return (TrackerView *)(void *)((char *)studio->tracked + (size_t)moment * studio->stride); }
 
 // Moments 33 ms apart, the last ones of the script where it is that long; contrast flows all the while.
 static bool take_moments(Studio *studio, Faults *faults)
 {
     const Scene *scene = studio->scene.scene;
     Simulator *simulator = simulator_create(scene, studio->scene.open.vessel, faults);
-    Lesson *lesson = simulator ? lesson_create(simulator, studio->scene.open.tree) : NULL;
+    SessionTracker *tracker = simulator ? session_tracker_create(simulator, studio->scene.open.tree) : NULL;
     XrayControl xray = studio->controls.xray;
     int cursor = 0;
     xray.pedal = 1;
     xray.contrast_ml_s = 3;
-    studio->stride = lesson ? (lesson_view_bytes(lesson) + 63) / 64 * 64 : 0;
-    studio->lesson = lesson ? calloc(MOMENTS, studio->stride) : NULL;
-    bool good = studio->lesson != NULL;
+    studio->stride = tracker ? (session_tracker_view_bytes(tracker) + 63) / 64 * 64 : 0;
+    studio->tracked = tracker ? calloc(MOMENTS, studio->stride) : NULL;
+    bool good = studio->tracked != NULL;
     int64_t steps = bench_steps(scene, 6000), first = steps > MOMENTS * 33 ? steps - MOMENTS * 33 : 0;
     for (int64_t i = 0, taken = 0; good && taken < MOMENTS; i++) {
         ToolCommands commands = scene->script ? script_tools_at(scene->script, (double)i * scene->dt / 1000, &cursor) : (ToolCommands){0};
         simulator_step(simulator, &commands);
-        lesson_step(lesson, simulator, &commands, &xray);
+        session_tracker_step(tracker, simulator, &commands, &xray);
         if (i < first || (i - first) % 33 != 0)
             continue;
         good = (studio->pose[taken] = pose_create_for(simulator)) != NULL;
         if (good) {
             pose_take(studio->pose[taken], simulator, &commands, &xray);
-            lesson_publish(lesson, lesson_of(studio, (int)taken));
+            session_tracker_publish(tracker, tracked_at(studio, (int)taken));
         }
         taken++;
     }
-    lesson_free(lesson);
+    session_tracker_free(tracker);
     simulator_destroy(simulator);
     return good;
 }
@@ -95,7 +95,7 @@ static void draw(Studio *studio, const Case *what, int frame)
 {
     int at = frame % (2 * MOMENTS - 2), moment = at < MOMENTS ? at : 2 * MOMENTS - 2 - at;   // back and forth
     const Pose *pose = studio->pose[moment];
-    LessonView *lesson = lesson_of(studio, moment);
+    TrackerView *tracked = tracked_at(studio, moment);
     XrayControl xray = pose->xray;
     xray.lao_deg = what->arm_turns ? (float)(frame % 60) : 0;
     if (what->camera_turns)
@@ -103,8 +103,8 @@ static void draw(Studio *studio, const Case *what, int frame)
     PanelLayout layout = panel_layout(what->width, what->height, 1, what->view, true);
     ViewsFrame views = {.pose = pose,
                         .xray = &xray,
-                        .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL,
-                        .filling = what->flows ? lesson->concentration + lesson->node_count : NULL,
+                        .contrast = what->flows && tracked->node_count ? tracked->concentration : NULL,
+                        .filling = what->flows ? tracked->concentration + tracked->node_count : NULL,
                         .pulse = ++studio->pulse,
                         .look = &studio->controls.look};
     WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
@@ -112,7 +112,7 @@ static void draw(Studio *studio, const Case *what, int frame)
         if (what->only != 1 + i)
             layout.view[i].width = 0;
     views_draw(studio->views, &views, &layout, what->width, what->height, studio->canvas.framebuffer);
-    trainer_panel_show(&studio->shown, studio->scene.scene, pose, &lesson->score, NULL, &xray);
+    trainer_panel_show(&studio->shown, studio->scene.scene, pose, &tracked->score, NULL, &xray);
     studio->shown.state.now_s = studio->shown.state.time_s = frame / 30.0;
     studio->controls.view = what->view;
     trainer_panel_views(&studio->shown, &studio->controls, studio->views, &xray);
@@ -288,7 +288,7 @@ static int call(void *options, Faults *faults)
     cJSON_Delete(root);
     for (int i = 0; i < MOMENTS; i++)
         pose_free(studio.pose[i]);
-    free(studio.lesson);
+    free(studio.tracked);
     views_destroy(studio.views);
     if (studio.panel)
         panel_destroy(studio.panel);

@@ -3,13 +3,13 @@
 #define SELDINGER_CLI_FIT_OPTIONS_H
 
 #include "base/base.h"
-#include "cli/junction_sheets.h"
+#include "cli/junction_pages.h"
 #include "recon/recon.h"
 
 typedef struct FitCommand {
     const char *tree, *output, *json, *picture;
     TreeFitOptions fit;
-    JunctionSheets junctions;    // and the radius of the tool that is led through the model
+    JunctionPages junctions;    // and the radius of the tool that is led through the model
     bool has_alpha, has_beta, has_max_blobs, has_max_points, quiet, measure;
 } FitCommand;
 extern const OptionTable fit_options;

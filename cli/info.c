@@ -3,7 +3,7 @@
 
 #include "base/base.h"
 #include "cli/file_kind.h"
-#include "cli/junction_sheets.h"
+#include "cli/junction_pages.h"
 #include "cli/output_plan.h"
 #include "recon/recon.h"
 #include "render/render.h"
@@ -15,7 +15,7 @@
 
 typedef struct InfoCommand {
     const char *file, *report, *picture;
-    JunctionSheets junctions;    // and the radius of the tool that is led through the model
+    JunctionPages junctions;    // and the radius of the tool that is led through the model
     char *reach;                 // comes out: where a tool gets to, as text
     bool json, quiet;
 } InfoCommand;
@@ -86,7 +86,7 @@ static bool describe_tree_file(cJSON *object, InfoCommand *command, Faults *faul
         describe_tree(object, tree, &info);
     bool good = tree && add_reach(object, tree, command, faults);
     good = good && (!command->report || tree_page_write(command->report, command->file, tree, &info, faults));
-    good = good && junction_sheets_draw(&command->junctions, command->file, tree, faults) && draw(command, tree, &info, faults);
+    good = good && junction_pages_draw(&command->junctions, command->file, tree, faults) && draw(command, tree, &info, faults);
     tree_file_info_free(&info);
     vessel_tree_free(tree);
     return good;
@@ -114,7 +114,7 @@ static bool describe(cJSON *object, FileKind kind, InfoCommand *command, Faults 
 
 static void plan_files(const InfoCommand *command, FileKind kind, Faults *faults)
 {
-    const JunctionSheets *junctions = &command->junctions;
+    const JunctionPages *junctions = &command->junctions;
     if ((command->report || command->picture || junctions->picture) && kind != FILE_TREE && kind != FILE_MISSING)
         faults_add(faults, command->file, 0, 0, "is no tree or model; %s is made of those",
                    command->report    ? "--report"

@@ -24,7 +24,7 @@ void run_files_plan(const RunFiles *files, OutputPlan *plan)
 
 static bool write_score(const char *path, const HeadlessRun *run, Faults *faults)
 {
-    ScoreFigures figures = score_figures(lesson_score(run->lesson));
+    ScoreFigures figures = score_figures(session_tracker_score(run->tracker));
     char *text = score_json(&figures, simulator_scene(run->simulator));
     bool good = text && output_write(path, text, strlen(text), faults);
     free(text);

@@ -1,5 +1,5 @@
-// Cell i meets the ball (c, R) only if the ball reaches, for each near node k, the half space in which i's power distance is the lesser. The test of each
-// half space alone lets a few more cells pass than the ball meets; for the agreement of near cells more is as good.
+// Cell i meets the ball (c, R) only if, for each near node k, the ball reaches the half space in which node i has the lesser power distance. Testing each half
+// space separately accepts slightly more cells than the ball meets; extra cells do no harm to the agreement between near cells.
 #include "geom/blob_flood.h"
 
 #include "base/base.h"
@@ -43,7 +43,7 @@ static bool meets_cell(const VesselTree *tree, int node, Vec3 c, double reach)
 int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 center, double reach)
 {
     int count = 1, stamp = ++flood->stamp;
-    SEL_REQUIRE(flood->node_count == tree->node_count, "the flood has room for each node once");
+    SEL_REQUIRE(flood->node_count == tree->node_count, "the flood has capacity for each node once");
     SEL_ASSERT(owner >= 0 && owner < tree->node_count, "a blob belongs to a node of the tree");
     SEL_ASSERT(reach > 0, "a blob has a radius of support");
     flood->node[0] = owner;
@@ -63,14 +63,14 @@ int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 c
     return count;
 }
 
-// All pairs of a blob and a node that sees it, blob by blob.
+// All pairs of a blob and a node that sees it, ordered by blob.
 typedef struct Sightings {
     int64_t count, capacity;
     int32_t *node;
     int64_t *offset;         // (B+1)
 } Sightings;
 
-// A fitted tree has some ten a blob; a broken file's blobs as large as the tree would take hours and all memory.
+// A fitted tree has about ten per blob. Without a limit, a corrupt file with blobs as large as the tree would take hours and all memory.
 static const int64_t SIGHTINGS_MAX = (int64_t)1 << 28;
 
 static bool add_sightings(Sightings *s, const int *node, int count)
@@ -107,13 +107,13 @@ static bool flood_all(const VesselTree *tree, Sightings *s)
 bool blob_flood_list(VesselTree *tree)
 {
     SEL_ASSERT(tree->near_offset && tree->near, "near nodes are known before blobs are listed");
-    SEL_ASSERT(tree->blob_count <= INT32_MAX, "lists name blobs by 32 bits");
+    SEL_ASSERT(tree->blob_count <= INT32_MAX, "lists index blobs by 32 bits");
     Sightings s = {.offset = calloc((size_t)tree->blob_count + 1, sizeof *s.offset)};
     int64_t *offset = calloc((size_t)tree->node_count + 1, sizeof *offset);
     int32_t *seen = NULL;
     bool good = s.offset && offset && flood_all(tree, &s) && (seen = calloc((size_t)s.count + 1, sizeof *seen));
     if (good) {
-        // counting sort by node: offset[i + 1] is node i's count, then where its next entry goes, at last its end
+        // counting sort by node: offset[i + 1] is node i's count, then the position of its next entry, finally its end
         for (int64_t k = 0; k < s.count; k++)
             offset[s.node[k] + 1]++;
         int64_t sum = 0;
@@ -122,7 +122,7 @@ bool blob_flood_list(VesselTree *tree)
             offset[i + 1] = sum;
             sum += own;
         }
-        SEL_REQUIRE(sum == s.count, "each sighting is of a node of the tree");
+        SEL_REQUIRE(sum == s.count, "each pair's node is one of the tree");
         for (int64_t b = 0; b < tree->blob_count; b++)
             for (int64_t k = s.offset[b]; k < s.offset[b + 1]; k++)
                 seen[offset[s.node[k] + 1]++] = (int32_t)b;

@@ -1,13 +1,13 @@
-// Which nodes see a shared blob: the flood from its owner over near nodes whose power cells, widened by a margin, meet the blob's support.
-// A point that stands up to the margin beyond its node's cell is therefore still answered by the whole field.
+// Computes which nodes evaluate ("see") a shared blob: a flood from its owner over near nodes whose power cells, widened by a margin, meet the blob's support.
+// Because of the margin, the field is complete also for a point that lies up to the margin beyond its node's cell.
 #ifndef SELDINGER_GEOM_BLOB_FLOOD_H
 #define SELDINGER_GEOM_BLOB_FLOOD_H
 
 #include "geom/vessel_tree.h"
 
-#define BLOB_FLOOD_MARGIN 0.3    // of a cell's node's radius
+#define BLOB_FLOOD_MARGIN 0.3    // relative to the radius of the cell's node
 
-typedef struct BlobFlood {   // memory of a flood; one a thread
+typedef struct BlobFlood {   // work memory of a flood; one per thread
     int node_count;          // N
     int stamp;
     int *mark;               // (N)
@@ -16,9 +16,9 @@ typedef struct BlobFlood {   // memory of a flood; one a thread
 
 bool blob_flood_create(BlobFlood *flood, int node_count);
 void blob_flood_free(BlobFlood *flood);
-// The nodes that see a blob of `owner` at `center` with radius of support `reach` [mm], to flood->node; returns their number, at least 1.
+// Writes the nodes that see a blob of `owner` at `center` with radius of support `reach` [mm] to flood->node. Returns their number, at least 1.
 int blob_flood_nodes(BlobFlood *flood, const VesselTree *tree, int owner, Vec3 center, double reach);
-// Makes tree->seen_offset and tree->seen; needs the near lists. False where there is no memory for them.
+// Builds tree->seen_offset and tree->seen; requires the near lists. Returns false if out of memory.
 bool blob_flood_list(VesselTree *tree);
 
 #endif

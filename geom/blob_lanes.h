@@ -1,10 +1,10 @@
-// The hot form of a blobby model: groups of four blobs, one blob a lane, evaluated by one kernel compiled for SSE2, AVX2 and AVX-512
-// (foot_lanes.h has the table of kernels).
+// A blobby model laid out for SIMD: groups of four blobs, one blob per lane, evaluated by one kernel compiled for SSE2, AVX2 and AVX-512 (foot_lanes.h has the
+// table of kernels).
 //
-// Layout: a model is `count` groups, each five vectors of four doubles; unused lanes hold a blob of no weight. Every lane sums its blobs in the order
-// of the groups, and the lanes are added by one fixed tree, so that every instruction set gives the same bits (no fused multiply-add:
-// -ffp-contract=off). Lanes are blobs and not query points because each point has a model of its own. Four, because a fitted tree has four blobs a
-// node at the median: groups of eight left half of the lanes idle. With AVX-512 two points' groups stand abreast in a vector.
+// Layout: a model is `count` groups of five vectors of four doubles; unused lanes hold a blob of weight 0. Every lane sums its blobs in the order of the
+// groups, and the lanes are added in one fixed tree, so that every instruction set gives the same bits (no fused multiply-add: -ffp-contract=off). Lanes are
+// blobs and not query points because each point has its own model. Four, because the median node of a fitted tree has four blobs: groups of eight left half of
+// the lanes idle. With AVX-512, the groups of two points share a vector.
 #ifndef SELDINGER_GEOM_BLOB_LANES_H
 #define SELDINGER_GEOM_BLOB_LANES_H
 

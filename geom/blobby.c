@@ -5,16 +5,15 @@
 // and for compact blobs with u = max(0, 1 - |d|^2 / R^2):
 //   f = sum a u^3 - T,  grad f = sum A u^2 d,  H = sum A u^2 I + B u d d',  A = -6 a / R^2,  B = 24 a / R^4
 //
-// The closest point minimises |p - X|^2 / 2 on f = 0: a Newton method on the surface. At p with unit normal n and the shape operator
-// S = P H P / |g| the gradient of the distance's half square along the surface is P (p - X) and its Hessian there I + gap S, gap = (X - p).n.
-// Each step moves by -(I + gap S)^-1 P (p - X) in the tangent plane and falls back onto the surface along the gradient; it is taken only when it
-// brings p closer to X, else halved. Plain alternation of Taubin steps and tangential projections was tried first: it diverges beyond the focal
-// points, and one Taubin step is up to 2.3 times too long.
+// The closest point minimises |p - X|^2 / 2 on f = 0, by a Newton method on the surface. At p with unit normal n and shape operator S = P H P / |g|, the
+// gradient of the half squared distance along the surface is P (p - X) and its Hessian is I + gap S, gap = (X - p).n. Each step moves by -(I + gap S)^-1 P (p -
+// X) in the tangent plane and returns to the surface along the gradient; a step that does not bring p closer to X is halved. Alternating Taubin steps and
+// tangential projections was tried first and rejected: it diverges beyond the focal points, and one Taubin step is up to 2.3 times too long.
 #include "geom/blobby.h"
 
 #include "base/base.h"
 
-// A blob's share of the field f, its gradient slope * d and its Hessian slope * I + bend * d d', d = x - centre.
+// The contribution of a blob: field f, gradient slope * d and Hessian slope * I + bend * d d', with d = x - centre.
 typedef struct BlobTerm {
     Vec3 d;
     double f, slope, bend;
@@ -86,8 +85,8 @@ double blobby_curvature(Vec3 gradient, const Sym3 *hessian)
 
 double blob_radius(double width, double iso_level) { return width > iso_level ? width * sqrt(5 * (sqrt(width / iso_level) - 1)) : 0; }
 
-// With s = sqrt(rho / T): s^5 - s^4 = r^2 / (5 T^2) = c. Convex for s > 1; both 1 + c and 1 + c^(1/5) lie above the root, from where
-// Newton comes down monotonously.
+// With s = sqrt(rho / T): s^5 - s^4 = r^2 / (5 T^2) = c. The function is convex for s > 1, and both 1 + c and 1 + c^(1/5) lie above the root, so Newton
+// descends from there monotonically.
 double blob_width_for_radius(double radius, double iso_level)
 {
     double c = radius * radius / (5 * iso_level * iso_level), fifth = same_pow(c, 0.2);
@@ -131,7 +130,7 @@ static Vec3 cross_between(const Blobby *model, Vec3 in, double f_in, Vec3 out, d
     return vec3_mix(in, out, 0.5 * (a + b));
 }
 
-// From x inside, out along unit d to the first crossing found with growing strides (the field falls to -T at infinity). False where there is none
+// From x inside, marches outwards along unit d with growing strides to the first crossing (the field falls to -T at infinity). Returns false if there is none
 // within `reach`.
 static bool march_out(const Blobby *model, Vec3 x, double f, Vec3 d, double scale, double reach, Vec3 *start)
 {
@@ -150,7 +149,7 @@ static bool march_out(const Blobby *model, Vec3 x, double f, Vec3 d, double scal
     return false;
 }
 
-// From x outside, the nearest crossing on the way to a blob whose centre is inside. False where no centre is.
+// From x outside, finds the nearest crossing on the lines to blobs whose centre is inside. Returns false if no centre is inside.
 static bool cross_towards_blobs(const Blobby *model, Vec3 x, double f, Vec3 *start)
 {
     double best = HUGE_VAL;
@@ -169,7 +168,7 @@ static bool cross_towards_blobs(const Blobby *model, Vec3 x, double f, Vec3 *sta
     return best < HUGE_VAL;
 }
 
-// Falls from p onto f = 0 along the gradient, by steps f/|g| no longer than `longest`; false where it does not arrive.
+// Moves p onto f = 0 along the gradient, in steps f/|g| no longer than `longest`. Returns false if it does not converge.
 static bool fall_onto_surface(const Blobby *model, Vec3 *p, double longest)
 {
     double before = HUGE_VAL;
@@ -179,7 +178,7 @@ static bool fall_onto_surface(const Blobby *model, Vec3 *p, double longest)
         if (!(g2 > 1e-200) || !isfinite(f))
             return false;
         double taubin = f / sqrt(g2), size = fabs(taubin);
-        // done when the step is rounding, or no longer falls (one more would only jitter)
+        // converged if the step is of the size of rounding, or no longer shrinks (another step would only jitter)
         if (size < 1e-14 || (size < 1e-10 && size >= before))
             return true;
         before = size;
@@ -221,17 +220,17 @@ static bool surface_frame(const Blobby *model, Vec3 x, Vec3 foot, SurfaceFrame *
     return true;
 }
 
-// Beyond the focal point the distance is concave along the surface; its size still scales a step downhill (saddle-free Newton). Near the
-// centre of a sphere both are tiny: a fixed floor made the way round too slow.
+// Beyond the focal point the distance is concave along the surface; the absolute eigenvalue still scales a descent step (saddle-free Newton). Near the centre
+// of a sphere both eigenvalues are tiny: a fixed lower bound made convergence too slow.
 static double descent_divisor(double eigenvalue) { return fmax(fabs(eigenvalue), 1e-6); }
 
-// The tangential Newton step -(I + gap S)^-1 P (foot - x). `least` gets the smallest eigenvalue of I + gap S, `weak` its direction.
+// The tangential Newton step -(I + gap S)^-1 P (foot - x). Sets `least` to the smallest eigenvalue of I + gap S and `weak` to its direction.
 static Vec3 tangential_step(const SurfaceFrame *frame, double *least, Vec3 *weak)
 {
     Vec3 t1 = vec3_normal_to(frame->normal), t2 = vec3_cross(frame->normal, t1), s1 = sym3_mul_vec(&frame->shape, t1);
     double a = 1 + frame->gap * vec3_dot(t1, s1), b = frame->gap * vec3_dot(t2, s1), c = 1 + frame->gap * sym3_quadratic(&frame->shape, t2);
     double mean = 0.5 * (a + c), spread = sqrt(0.25 * (a - c) * (a - c) + b * b), low = mean - spread, high = mean + spread;
-    double angle = 0.5 * same_atan2(2 * b, a - c), cs = same_cos(angle), sn = same_sin(angle);   // of the higher eigenvalue's direction
+    double angle = 0.5 * same_atan2(2 * b, a - c), cs = same_cos(angle), sn = same_sin(angle);   // direction of the larger eigenvalue
     Vec3 e_high = vec3_add_scaled(vec3_scale(t1, cs), sn, t2), e_low = vec3_add_scaled(vec3_scale(t1, -sn), cs, t2);
     *least = low;
     *weak = e_low;
@@ -240,7 +239,7 @@ static Vec3 tangential_step(const SurfaceFrame *frame, double *least, Vec3 *weak
     return vec3_add_scaled(vec3_scale(e_high, y_high), y_low, e_low);
 }
 
-// Slides a foot on the surface to the locally closest point. False where the surface is lost at once.
+// Slides a foot on the surface to the locally closest point. Returns false if the first step does not return to the surface.
 static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scale, SurfaceFrame *best, double *least)
 {
     enum { STEPS = 60, KICKS = 2 };
@@ -253,7 +252,7 @@ static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scal
         Vec3 step = tangential_step(best, least, &weak);
         double length = vec3_norm(step), size = vec3_distance(x, best->foot);
         if (vec3_norm(best->tangent) <= 1e-13 * (1 + size)) {
-            // a point where the distance has a maximum along the surface (x beyond its focal point): leave it sideways, the same way always
+            // the distance has a maximum along the surface here (x beyond its focal point): leave it sideways, always in the same direction
             if (*least > -1e-3 || kicks == KICKS)
                 break;
             kicks++;
@@ -266,7 +265,7 @@ static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scal
             Vec3 p = vec3_add_scaled(best->foot, shrink, step);
             if (!fall_onto_surface(model, &p, scale) || !surface_frame(model, x, p, &next))
                 continue;
-            // within rounding of the same distance the smaller tangential rest decides
+            // if the distances are equal to within rounding, the smaller tangential residual decides
             double there = vec3_distance(x, p);
             taken = there < size - 1e-13 * (1 + size) || (there <= size + 1e-13 * (1 + size) && vec3_norm(next.tangent) < 0.9 * vec3_norm(best->tangent));
         }
@@ -281,10 +280,10 @@ static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scal
 static bool start_on_surface(const Blobby *model, Vec3 x, double f, Vec3 g, double scale, Vec3 *start)
 {
     if (f > 0) {
-        // the closest wall lies more or less where the field falls fastest; where it is flat any direction is as good, the same one always
+        // The closest wall lies roughly where the field falls fastest. Where the gradient vanishes any direction will do, but always the same one.
         return march_out(model, x, f, vec3_unit_or(vec3_negate(g), vec3(1, 0, 0)), scale, HUGE_VAL, start);
     }
-    // near the surface fall onto it; from afar the field is no distance and the crossings towards the blobs are better starts
+    // Near the surface, project onto it; far away the field is no distance, and the crossings towards the blobs are better starts.
     Vec3 near = x;
     double slope = vec3_norm(g);
     if (slope > 1e-100 && -f / slope < scale && fall_onto_surface(model, &near, scale)) {
@@ -304,14 +303,14 @@ static void keep_closer(const Blobby *model, Vec3 x, Vec3 start, double scale, S
     }
 }
 
-// A foot whose normal says that x is on the other side than f says lies behind a nearer wall (a start far off led there): down to that one.
+// If the normal of a foot puts x on the other side than f does, the foot lies behind a nearer wall (reached from a distant start): moves the foot to that wall.
 static void pull_to_own_side(const Blobby *model, Vec3 x, double f, double scale, SurfaceFrame *best, double *least)
 {
-    static const double way[] = {1e-3, 1e-2, 0.1, 0.3};
-    enum { WAYS = sizeof way / sizeof way[0], WALLS = 4 };
+    static const double fraction[] = {1e-3, 1e-2, 0.1, 0.3};
+    enum { FRACTIONS = sizeof fraction / sizeof fraction[0], WALLS = 4 };
     for (int wall = 0; wall < WALLS && (best->gap > 0) != (f > 0) && fabs(best->gap) > 1e-9; wall++) {
-        for (int k = 0; k < WAYS; k++) {
-            Vec3 beyond = vec3_mix(best->foot, x, way[k]);
+        for (int k = 0; k < FRACTIONS; k++) {
+            Vec3 beyond = vec3_mix(best->foot, x, fraction[k]);
             double there = blobby_field(model, beyond);
             if ((there > 0) == (f > 0))
                 continue;
@@ -332,7 +331,7 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
     bool warm = vec3_is_finite(start) && vec3_norm2(vec3_sub(start, x)) > 0 && fall_onto_surface(model, &foot, scale);
     SurfaceFrame best;
     if ((!warm && !start_on_surface(model, x, f, g, scale, &foot)) || !slide_to_closest(model, x, foot, scale, &best, &least)) {
-        // no surface in reach: the distance to the nearest centre is all that can be said
+        // no surface was found: the distance to the first blob's centre is the only information
         Vec3 c = model->center[blobby_row(model, 0)];
         for (int j = 1; j < model->count; j++) {
             Vec3 other = model->center[blobby_row(model, j)];
@@ -344,16 +343,17 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
         lost.distance = -vec3_distance(x, c);
         return lost;
     }
-    // Without a last contact: from inside, whatever wall a few rays find nearer than the foot; from outside, near a focal point, the blobs' lobes.
-    // (On a vessel's axis the field may fall fastest along it, and the first foot was the far end's.)
+    // Without a last contact, check for closer walls: from inside, along a few rays; from outside, near a focal point, at the blobs' lobes. (On a vessel's axis
+    // the field may fall fastest along it, and the first foot would be at the far end.)
     Vec3 other;
-    // Rays beyond the foot too, by as much as a flat wall between them seems further off; not those that would only find the same foot again.
+    // Rays may also be longer than the distance of the foot, by as much as a flat wall between two rays seems further away. Rays that would only find the same
+    // foot again are skipped.
     Vec3 to_foot = vec3_unit_or(vec3_sub(best.foot, x), vec3(0, 0, 0));
     double reach = 1.25 * fabs(best.gap);
     for (int k = 0; k < 14 && !warm && f > 0; k++) {
-        static const Vec3 way[14] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
+        static const Vec3 ray[14] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
                                      {1, 1, -1}, {1, -1, 1}, {1, -1, -1}, {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
-        Vec3 d = vec3_unit(way[k]);
+        Vec3 d = vec3_unit(ray[k]);
         if (vec3_dot(d, to_foot) < 0.8 && march_out(model, x, f, d, scale, reach, &other))
             keep_closer(model, x, other, scale, &best, &least);
     }

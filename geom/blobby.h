@@ -1,4 +1,4 @@
-// A blobby model: a sum of kernels about centres less a level, f > 0 inside. Two kernels:
+// A blobby model: a sum of kernels around centres minus a level, f > 0 inside. Two kernels:
 // Cauchy (local models): f(X) = sum_j rho_j phi(|X - C_j| / rho_j) - T, phi(x) = (1 + x^2/5)^-2. Kerrien et al. 2017, eq. (3), alpha_j = rho_j.
 //   With q = |X-C|^2 / (5 rho^2):
 //   grad f = sum -(4/(5 rho)) (1+q)^-3 (X-C)
@@ -17,13 +17,13 @@ typedef struct Blobby {
     const Vec3 *center;      // (count) [mm]
     const double *width;     // (count) rho, or R, > 0 [mm]
     double iso_level;        // T
-    const double *amplitude; // a of compact blobs; NULL: the kernel is Cauchy's
-    const int32_t *index;    // (count) which rows of center, width and amplitude the blobs are; NULL: the first ones
+    const double *amplitude; // a of compact blobs; NULL: Cauchy kernel
+    const int32_t *index;    // (count) the rows of center, width and amplitude that hold the blobs; NULL: the first `count` rows
 } Blobby;
 
 static inline int blobby_row(const Blobby *model, int j) { return model->index ? model->index[j] : j; }
 
-// What a node of a fitted tree answers with: its local model, or the shared blobs that it sees. Borrows the tree's arrays.
+// The model of a node of a fitted tree: its local model, or the shared blobs that it sees. Borrows the tree's arrays.
 static inline Blobby blobby_of(const VesselTree *tree, int node)
 {
     if (vessel_tree_is_shared(tree)) {
@@ -38,24 +38,23 @@ static inline Blobby blobby_of(const VesselTree *tree, int node)
 double blobby_field(const Blobby *model, Vec3 x);
 double blobby_gradient(const Blobby *model, Vec3 x, Vec3 *gradient);
 double blobby_hessian(const Blobby *model, Vec3 x, Vec3 *gradient, Sym3 *hessian);
-// Mean curvature by eq. (5); +1/r on a sphere with f > 0 inside.
+// Mean curvature by Kerrien et al. 2017, eq. (5); +1/r on a sphere with f > 0 inside.
 double blobby_curvature(Vec3 gradient, const Sym3 *hessian);
 
 // Radius of a single blob's surface, rho sqrt(5 (sqrt(rho/T) - 1)); 0 for rho <= T.
 double blob_radius(double width, double iso_level);
-// Its inverse: the width whose surface is a sphere of radius r > 0.
+// Inverse of blob_radius: the width of the blob whose surface is a sphere of radius r > 0.
 double blob_width_for_radius(double radius, double iso_level);
 
 typedef struct SurfacePoint {
-    Vec3 foot;               // on f = 0, the (locally) closest to the query
+    Vec3 foot;               // the point on f = 0 that is (locally) closest to the query
     Vec3 normal;             // grad f / |grad f| at the foot: into the lumen
     Sym3 shape;              // Hessian of the signed distance at the foot: P H P / |grad f| [1/mm]
     double distance;         // signed, > 0 inside: (x - foot) . normal, the true distance once converged
     bool converged;          // |f|/|grad f| < 1e-9 mm and x - foot parallel to the normal to 1e-4 (or |x - foot| < 1e-6)
 } SurfacePoint;
-// The closest surface point by Newton steps on (f = 0, x - foot parallel to grad f), started at `start` (x itself, or the last
-// contact). Survives points where grad f vanishes or the field is no distance: falls back to a bracketed search towards the
-// nearest blob, never returns NaN.
+// The closest surface point, by Newton steps on (f = 0, x - foot parallel to grad f) from `start` (x itself, or the last contact). Where grad f vanishes or the
+// field is not close to a distance, falls back to a bracketed search towards the nearest blob. Never returns NaN.
 SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start);
 
 #endif

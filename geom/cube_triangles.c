@@ -1,4 +1,4 @@
-// See cube_triangles.h. Segments run so that the inside lies to their right on a face seen from outside; triangles turn them round.
+// See cube_triangles.h. Segments run so that the inside lies to their right on a face seen from outside; triangles reverse that direction.
 #include "geom/cube_triangles.h"
 
 #include <stdbool.h>
@@ -21,7 +21,7 @@ static void face_corners(int face, int corner[4])
         corner[k] = order[side ? k : (4 - k) % 4];
 }
 
-// next[e]: the edge to which the segment that starts at edge e leads, -1 where e has none.
+// next[e]: the edge to which the segment that starts at edge e leads; -1 if no segment starts there.
 static void face_segments(int mask, int next[12])
 {
     for (int e = 0; e < 12; e++)
@@ -33,7 +33,7 @@ static void face_segments(int mask, int next[12])
             bool here = mask >> c[k] & 1, before = mask >> c[(k + 3) % 4] & 1;
             if (!here || before)
                 continue;
-            // a run of inside corners starts at k; it ends before the next outside one
+            // a run of inside corners starts at k and ends before the next outside corner
             int last = k;
             while (mask >> c[(last + 1) % 4] & 1)
                 last = (last + 1) % 4;
@@ -54,7 +54,7 @@ static bool is_flat(const int *loop, int count, int i, int j)
     return !side && share_a_face(loop[i], loop[j]);
 }
 
-// The triangulation of a loop with the fewest diagonals in a face (dynamic programme over ranges i … j).
+// Triangulates a loop with the fewest diagonals in a face (dynamic programming over ranges i … j).
 static void cut_loop(const int *loop, int count, CubeCase *out, int *flat)
 {
     int cost[LOOP_MAX][LOOP_MAX] = {{0}}, split[LOOP_MAX][LOOP_MAX] = {{0}};

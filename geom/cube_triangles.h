@@ -1,9 +1,9 @@
-// The 256 cases of marching cubes, derived instead of typed in.
+// The 256 cases of marching cubes, derived by the program instead of listed by hand.
 //
-// Corner c sits at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge axis * 4 + (u | v << 1) runs along `axis` at (u, v) on the two axes after it (cyclic).
-// On each face every run of inside corners is cut off by its own segment, whatever the rest of the cube: both cubes at a face agree, so the surface
-// is closed. The segments form loops; a loop is cut into triangles without a diagonal between two edges of one face, which could coincide with the
-// neighbour's segment there: so no edge has more than two triangles.
+// Corner c sits at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge axis * 4 + (u | v << 1) runs along `axis` at (u, v) on the next two axes (cyclic). On each face, one
+// segment cuts off each run of inside corners, whatever the rest of the cube: the two cubes at a face agree, so the surface is closed. The segments form loops.
+// A loop is triangulated without a diagonal between two edges of one face, because such a diagonal could coincide with the neighbour's segment; so no edge has
+// more than two triangles.
 #ifndef SELDINGER_GEOM_CUBE_TRIANGLES_H
 #define SELDINGER_GEOM_CUBE_TRIANGLES_H
 
@@ -11,12 +11,12 @@ enum { CUBE_TRIANGLES_MAX = 10 };
 
 typedef struct CubeCase {
     int count;
-    int edge[CUBE_TRIANGLES_MAX][3];   // counter-clockwise seen from outside (the side of corners that are not in the case's mask)
+    int edge[CUBE_TRIANGLES_MAX][3];   // counter-clockwise seen from outside (the side of the corners that are not in the case's mask)
 } CubeCase;
 
 typedef struct CubeTable {
-    CubeCase of[256];                  // index: bit c set where corner c is inside
-    int flat_diagonals;                // diagonals in a face that could not be avoided: 0
+    CubeCase of[256];                  // index: bit c is set if corner c is inside
+    int flat_diagonals;                // number of diagonals that lie in a face; expected 0
 } CubeTable;
 
 void cube_table_fill(CubeTable *table);

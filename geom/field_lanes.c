@@ -1,5 +1,5 @@
-// One kernel text, compiled for each instruction set. See field_lanes.h for the layouts and why the bits agree, blobby.h for the equations.
-// Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
+// One kernel source, compiled for each instruction set. See field_lanes.h for the layouts and for why all give the same bits, blobby.h for the equations.
+// Compiled with -fno-math-errno and -fno-trapping-math, which change no result but allow square roots and selects to be vectorised.
 #include "geom/field_lanes.h"
 
 #include "base/base.h"
@@ -16,14 +16,14 @@ _Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(Ves
                    offsetof(VesselMemory, bound_at) == 8 * MEMORY_BOUND_AT && offsetof(VesselMemory, bound_for) == 8 * MEMORY_BOUND_FOR &&
                    offsetof(VesselMemory, down) == 8 * MEMORY_DOWN && offsetof(VesselMemory, up) == 8 * MEMORY_UP,
                "memories are rows of doubles");
-_Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
+_Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "and so are hits");
 
-void field_directions(Vec3 *way, int count)
+void field_directions(Vec3 *direction, int count)
 {
-    SEL_ASSERT(count > 0, "at least one direction is asked for");
+    SEL_ASSERT(count > 0, "at least one direction is requested");
     for (int k = 0; k < count; k++) {
         double z = 1 - (2 * k + 1) / (double)count, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
-        way[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
+        direction[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
     }
 }
 
@@ -38,12 +38,12 @@ void field_clear_points(ClearPoints *points)
 {
     static const int count[] = {CLEAR_ON_OUTER, CLEAR_ON_INNER};
     static const double sphere[] = {CLEAR_OUTER, CLEAR_INNER};
-    Vec3 way[CLEAR_ON_OUTER];
+    Vec3 direction[CLEAR_ON_OUTER];
     points->count = 0;
     for (int s = 0; s < 2; s++) {
-        field_directions(way, count[s]);
+        field_directions(direction, count[s]);
         for (int k = 0; k < count[s]; k++)
-            add_clear_point(points, vec3_scale(way[k], sphere[s]));
+            add_clear_point(points, vec3_scale(direction[k], sphere[s]));
     }
 }
 
@@ -57,7 +57,7 @@ void field_clear_rings(ClearPoints *points)
             double angle = 2 * PI * (k + 0.5 * (r % 2)) / count[r], out = same_sin(from_axis[r]);
             add_clear_point(points, vec3(out * same_cos(angle), out * same_sin(angle), same_cos(from_axis[r])));
         }
-    SEL_ASSERT(points->count == CLEAR_ON_RINGS, "rings fill whole strips of lanes");
+    SEL_ASSERT(points->count == CLEAR_ON_RINGS, "the rings' points are a multiple of the lanes");
 }
 
 void field_turn_points(const ClearPoints *points, Vec3 axis, ClearPoints *turned)

@@ -1,18 +1,18 @@
-// Contact with a field of shared blobs: the closest point of f = 0, by Newton from where the remembered foot should have moved to.
+// Contact with a field of shared blobs: the closest point of f = 0 (the foot), by Newton from the predicted position of the remembered foot.
 //
-// A point's node is that in whose power cell its foot lies. Within a margin about the cell the node sees all blobs that reach there (blob_flood.h), so
-// what is asked at the foot is the whole field, and two near cells give the same bits where they meet. Its blobs within a skin of the foot are held in the
-// point's memory; when the foot has moved by the skin, and only then, they are looked for anew, and the cell with them.
+// A point's node is the one in whose power cell its foot lies. Within a margin around the cell the node sees all blobs that reach there (blob_flood.h), so the
+// field evaluated at the foot is complete, and two near cells give the same bits where they meet. The blobs within a skin of the foot are held in the point's
+// memory; only when the foot has moved by the skin are they and the cell searched for again.
 //
-// The closest wall. Let f bend down by no more than M about a foot p with gap g > 0: f(p + s n + t) >= |grad f| s - M (s^2 + |t|^2) / 2. In the ball of
-// radius g about X s^2 + |t|^2 <= 2 g s, so that with M g < |grad f| it is all lumen and p the closest: nothing else needs to be asked. The same with the
-// bend up for points outside. M comes with the list: over a ball, a blob bends down by at most 6 a u^2 / R^2 (a > 0) or 6 |a| u (4 - 5u) / R^2 (a < 0).
-// Where that does not tell, M is taken over the ball about X itself; else the foot is compared with a projection from scratch, and then trusted for
-// a part of the radius of travel.
+// The closest wall. Let M bound the downward second derivative of f around a foot p with gap g > 0: f(p + s n + t) >= |grad f| s - M (s^2 + |t|^2) / 2. In the
+// ball of radius g about X, s^2 + |t|^2 <= 2 g s. So if M g < |grad f|, the ball is all lumen and p is the closest point, without further evaluation. For
+// points outside, the same holds with the upward second derivative. M is computed with the list of blobs: over a ball, a blob contributes at most 6 a u^2 / R^2
+// (a > 0) or 6 |a| u (4 - 5u) / R^2 (a < 0). If this bound does not suffice, M is computed over the ball about X itself; otherwise the foot is compared with a
+// projection from scratch, and then trusted for a fraction of the radius of travel.
 //
-// The inlet. Blobs close upstream of the root, the vessel does not. With z the height over the root's plane along its direction d, nodes near it are
-// asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
-// section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
+// The inlet. Blobs close upstream of the root, the vessel does not. With z the height over the root's plane along its direction d, the field of nodes near it
+// is evaluated at X + (zeta(z) - z) d instead of X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
+// section at the root continues upstream as a cylinder without end, and wall, normal and Hessian are smooth across the plane.
 #include "geom/blob_flood.h"
 #include "base/base.h"
 #include "geom/blobby.h"
@@ -27,36 +27,37 @@
 
 typedef struct FieldNode {
     Vec3 center;
-    double radius, bend;     // [mm], and its inverse
-    double skin;             // [mm] about the foot in which blobs are held
-    double clear;            // [mm] the wall is certainly at least this far from the centre; < 0: not known
-    const int32_t *seen;     // its blobs
+    double radius, bend;     // [mm]; bend: its inverse
+    double skin;             // [mm] distance from the foot within which blobs are held
+    double clear;            // [mm] lower bound of the distance from the centre to the wall; < 0: unknown
+    const int32_t *seen;     // blobs that the node sees
     int seen_count;
-    bool carried;            // near the inlet: goes on upstream
+    bool carried;            // near the inlet: the wall continues upstream
 } FieldNode;
 
-enum { WAYS = 64 };
+enum { SEARCH_DIRECTIONS = 64 };
 typedef struct FieldVessel {
-    Vessel vessel;           // first: a Vessel * to us is a FieldVessel *
+    Vessel vessel;           // first: a Vessel * points to its FieldVessel
     const VesselTree *tree;
     const FieldKernels *kernels;
-    FieldRow *row;           // (B+1) the last one without weight
+    FieldRow *row;           // (B+1) the last one has amplitude 0
     FieldNode *node;         // (N)
-    PowerBlocks blocks;      // for points without a node
-    bool inlet_open;         // the root is an end of the tree
-    Vec3 way[WAYS];          // directions all around
+    PowerBlocks blocks;      // to locate points without a node
+    bool inlet_open;         // the root is an open end of the tree
+    Vec3 search_direction[SEARCH_DIRECTIONS]; // unit directions over the sphere
     ClearPoints clear_points, clear_rings;
 } FieldVessel;
 
-static const double SKIN = 0.2, SKIN_MOST = 0.3;    // of the radius, (1 + AHEAD) SKIN < BLOB_FLOOD_MARGIN; [mm]
-static const double AHEAD = 0.45;            // of the skin
-static const double BOUND = 0.1, BOUND_MOST = 0.15;  // what bounds are wider than the gap: of the radius; [mm]
-static const double TRUST = 0.05;            // of the radius: a foot is followed over this much of travel, beside one rival; with more rivals over less, at least …
+static const double SKIN = 0.2, SKIN_MOST = 0.3;    // relative to the radius, (1 + AHEAD) SKIN < BLOB_FLOOD_MARGIN; [mm]
+static const double AHEAD = 0.45;            // relative to the skin
+static const double BOUND = 0.1, BOUND_MOST = 0.15;  // by how much the ball of a bound is larger than the gap: relative to the radius; [mm]
+static const double TRUST = 0.05;            // relative to the radius: a foot is followed over this travel with one rival; with more rivals over less, but at
+                                             // least …
 static const double TRUST_LEAST = 0.01;      // … this
-static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] what Newton may leave of the gap: of a foot that is followed, of one from scratch
-// Feet on two nodes' walls that are closer together than this [mm] are the same.
+static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] error of the gap that Newton may leave: for a foot that is followed, for one found from scratch
+// Feet on two nodes' walls are the same if they are closer together than this [mm].
 static const double AGREE = 1e-3;
-// Walls that are further apart than this [mm] contradict each other: less than any tool's radius.
+// Walls that are further apart than this [mm], which is less than any tool's radius, contradict each other.
 static const double APART = 0.1;
 
 // --- The inlet ---
@@ -77,7 +78,7 @@ static double carried_height(double z, double h, double *slope, double *bend)
     return h * u * u * u * (2 - u);
 }
 
-// Where a node's field is asked for the wall at x.
+// The point at which a node's field is evaluated for the wall at x.
 static Vec3 asked_at(const FieldVessel *field, const FieldNode *node, Vec3 x)
 {
     if (!node->carried)
@@ -86,13 +87,13 @@ static Vec3 asked_at(const FieldVessel *field, const FieldNode *node, Vec3 x)
     return vec3_add_scaled(x, carried_height(z, inlet_zone(field), &slope, &bend) - z, field->tree->direction[0]);
 }
 
-// Is anything of a ball where the inlet bends the node's field?
+// Returns whether part of a ball lies where the inlet changes the node's field.
 static bool is_at_inlet(const FieldVessel *field, const FieldNode *node, Vec3 middle, double ball)
 {
     return node->carried && inlet_height(field, middle) - ball < inlet_zone(field);
 }
 
-// The field at the running feet of a block, near the inlet as it goes on upstream.
+// The field at a block's current feet; near the inlet, the field that continues upstream.
 static void sample(const FieldVessel *field, FieldBlock *b)
 {
     FootSample *s = &b->foot.at;
@@ -129,7 +130,7 @@ static void sample(const FieldVessel *field, FieldBlock *b)
 
 // --- Cells and lists ---
 
-// The node in whose cell q lies, from `node` downhill over near nodes.
+// The node in whose cell q lies, by descent from `node` over near nodes.
 static int cell_of(const FieldVessel *field, Vec3 q, int node)
 {
     const VesselTree *tree = field->tree;
@@ -148,7 +149,7 @@ static int cell_of(const FieldVessel *field, Vec3 q, int node)
     return node;
 }
 
-// Does the node see all blobs that reach q? That holds to within a margin of its cell.
+// Returns whether the node sees all blobs that reach q. True within a margin of its cell.
 static bool sees_all(const FieldVessel *field, Vec3 q, int node)
 {
     const VesselTree *tree = field->tree;
@@ -162,7 +163,7 @@ static bool sees_all(const FieldVessel *field, Vec3 q, int node)
     return true;
 }
 
-// A list of blobs: all that a node sees, or those of them that reach into a ball.
+// A list of blobs: all that a node sees, or those of them that reach a ball.
 enum { NEAR_BLOBS = 64 };
 typedef struct BlobList {
     const int32_t *blob;
@@ -170,10 +171,10 @@ typedef struct BlobList {
     int32_t own[NEAR_BLOBS];
 } BlobList;
 
-// Those of a list that reach to within `skin` of q; returns their number, of which at most `most` are listed.
+// Lists the blobs that reach to within `skin` of q. Returns their number, of which at most `most` are listed.
 static int pick_blobs(const FieldVessel *field, const int32_t *seen_blob, int seen_count, Vec3 q, double skin, int most, int32_t *list)
 {
-    SEL_ASSERT(seen_count >= 0 && most > 0 && skin >= 0, "a list, room for some of it and a distance");
+    SEL_ASSERT(seen_count >= 0 && most > 0 && skin >= 0, "the list has a length, the output has capacity, and the skin is a distance");
     enum { PART = 512 };
     uint8_t bits[PART / FOOT_BLOCK];
     int count = 0;
@@ -191,7 +192,7 @@ static int pick_blobs(const FieldVessel *field, const int32_t *seen_blob, int se
     return count;
 }
 
-// The same as a list of its own; all where that has no room for them.
+// The same as a BlobList with its own array; if that has too little space, all of `seen`.
 static void pick_list(const FieldVessel *field, const int32_t *seen, int seen_count, Vec3 q, double skin, BlobList *list)
 {
     list->blob = list->own;
@@ -200,7 +201,7 @@ static void pick_list(const FieldVessel *field, const int32_t *seen, int seen_co
         list->blob = seen, list->count = seen_count;
 }
 
-// A node's blobs that reach to within `far` of x. Near the inlet all: the field is asked elsewhere there.
+// A node's blobs that reach to within `far` of x. Near the inlet all of them, because the field is evaluated elsewhere there.
 static void list_blobs(const FieldVessel *field, int node, Vec3 x, double far, BlobList *list)
 {
     SEL_ASSERT(node >= 0 && node < field->tree->node_count, "lists belong to nodes of the tree");
@@ -208,18 +209,18 @@ static void list_blobs(const FieldVessel *field, int node, Vec3 x, double far, B
     pick_list(field, n->seen, n->seen_count, x, n->carried ? HUGE_VAL : far, list);
 }
 
-// How far about a point whoever looks for its closest wall asks, beyond the gap, in radii.
+// How far beyond the gap the search for the closest wall evaluates the field, in radii.
 static const double LOOK = 0.5;
 
-// Makes the list of a memory for feet about q, of those that reach there: a little ahead, where the last motion is going.
+// Fills a memory's list with the blobs that reach feet around q, or rather a point slightly ahead of q in the direction of the last motion.
 static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, const BlobList *list)
 {
     SEL_ASSERT(m->node >= 0 && m->node < field->tree->node_count, "a memory that holds blobs has a node");
     double skin = field->node[m->node].skin;
-    Vec3 way = vec3_unit_or(m->step, vec3(0, 0, 0));
+    Vec3 heading = vec3_unit_or(m->step, vec3(0, 0, 0));
     int count = VESSEL_BLOBS + 1;
     for (int shrink = 0; shrink < 3 && count > VESSEL_BLOBS; shrink++, skin *= 0.4) {
-        m->held_at = vec3_add_scaled(q, AHEAD * skin, way);
+        m->held_at = vec3_add_scaled(q, AHEAD * skin, heading);
         m->held_for2 = skin * skin;
         count = pick_blobs(field, list->blob, list->count, m->held_at, skin, VESSEL_BLOBS, m->blob);
     }
@@ -228,14 +229,14 @@ static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, const 
         m->blob[k] = (int32_t)field->tree->blob_count;
 }
 
-// Bounds of how f bends in a ball a little wider than the gap.
+// Computes the bounds of the second derivative of f in a ball slightly larger than the gap.
 static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec3 x, double gap, const BlobList *list)
 {
     const FieldNode *n = &field->node[node];
     m->bound_at = x;
     m->bound_for = fabs(gap) + fmin(BOUND * n->radius, BOUND_MOST);
     field->kernels->bends(field->row, list->blob, list->count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
-    SEL_ASSERT(m->down >= 0 && m->up >= 0, "bounds of bends are no less than 0");
+    SEL_ASSERT(m->down >= 0 && m->up >= 0, "bounds of second derivatives are at least 0");
 }
 
 // The field of a list at q, and its gradient.
@@ -254,7 +255,7 @@ static double field_at(const FieldVessel *field, const BlobList *list, Vec3 q, V
     return f;
 }
 
-// [mm] by which the walls of two nodes about a foot q differ: not where both see the same blobs there.
+// [mm] distance between the walls of two nodes around a foot q; 0 if both see the same blobs there.
 static double walls_apart(const FieldVessel *field, int a, int b, Vec3 q)
 {
     BlobList list_a, list_b;
@@ -271,8 +272,8 @@ static double walls_apart(const FieldVessel *field, int a, int b, Vec3 q)
 
 typedef struct Foot {
     Vec3 at, normal;
-    Sym3 hessian;            // of the gap at X
-    double gap, slope;       // slope: |grad f| at the foot, or hardly aside
+    Sym3 hessian;            // Hessian of the gap at X
+    double gap, slope;       // slope: |grad f| at the foot or very close to it
     int node;
     bool sure;
 } Foot;
@@ -280,7 +281,7 @@ typedef struct Foot {
 static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node, bool carried)
 {
     SEL_ASSERT(i >= 0 && i < FOOT_BLOCK, "a lane is one of the block");
-    SEL_ASSERT(node >= 0 && node < field->tree->node_count, "a lane asks a node of the tree");
+    SEL_ASSERT(node >= 0 && node < field->tree->node_count, "a lane's node is one of the tree");
     const FieldNode *n = &field->node[node];
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
     b->foot.at.carried[i] = carried, b->foot.at.any_carried |= carried;
@@ -303,7 +304,7 @@ static Foot lane_foot(const FieldBlock *b, int i, int node)
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
 
-// The blobs near each lane's running foot, for places within a skin of where they were picked.
+// The blobs near each lane's current foot, valid within a skin of the point where they were picked.
 typedef struct NearLists {
     Vec3 at[FOOT_BLOCK];
     BlobList list[FOOT_BLOCK];
@@ -311,7 +312,7 @@ typedef struct NearLists {
 
 static void list_near(const FieldVessel *field, FieldBlock *b, int i, int node, NearLists *lists, bool fresh)
 {
-    static const double SETTLE_SKIN = 0.25;      // of the radius
+    static const double SETTLE_SKIN = 0.25;      // relative to the radius
     const FieldNode *n = &field->node[node];
     Vec3 q = asked_at(field, n, vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
     double skin = SETTLE_SKIN * n->radius;
@@ -323,13 +324,13 @@ static void list_near(const FieldVessel *field, FieldBlock *b, int i, int node, 
 }
 
 enum { ROUNDS = 16, FEW_ROUNDS = 8 };
-// Careful Newton steps of one point from up to eight starts: the feet that arrive. On the axis of a round vessel all feet around
-// are equally near and Newton's steps go round for ever: any of them is right to second order in what is left along the wall.
+// Careful Newton steps of one point from up to eight starts; collects the feet that converge. On the axis of a round vessel all feet around are equally near
+// and Newton does not converge: any of them is correct to second order in the remaining tangential distance.
 static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, int rounds, Foot *foot)
 {
     SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "starts fit into a block");
-    static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
-    static const double LONGEST = 0.25;              // of the start's distance: longer steps leave a near ridge for a farther wall
+    static const double LEFT = 1e-4, OFF = 1e-5;     // relative to the radius: tangential and normal residual
+    static const double LONGEST = 0.25;              // relative to the start's distance: longer steps would leave a near ridge for a farther wall
     FieldBlock b;
     NearLists lists;
     FootBatch *f = &b.foot;
@@ -381,7 +382,7 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
     return found;
 }
 
-// --- Looking around ---
+// --- Search in all directions ---
 
 static int walk(const FieldVessel *field, Vec3 x, int from, int hops)
 {
@@ -411,8 +412,8 @@ static void look(const FieldVessel *field, int node, const BlobList *list, const
     field->kernels->look(field->row, list->blob, list->count, at_x, at_y, at_z, f);
 }
 
-// Near the foot, which the ball touches, the spheres' points say nothing of a wall that leans by less than 50 degrees: there rings of the ball itself are
-// looked at.
+// Near the foot, where the ball touches the wall, the points of the spheres do not detect a wall that is inclined by less than 50 degrees: there, points on
+// rings of the ball itself are tested.
 static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle, double ball, double side, Vec3 to_foot)
 {
     BlobList in;
@@ -424,14 +425,14 @@ static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle
     return field->kernels->is_clear(&rings, field->row, in.blob, in.count, middle, ball, side);
 }
 
-// [mm] A sharply bent wall has other feet close by: the foot is not trusted over more than this of travel.
+// [mm] A sharply bent wall has other feet close by: the foot is not trusted over more travel than this.
 static double bend_radius(const Foot *foot) { return 0.15 / fmax(sqrt(sym3_norm2(&foot->hessian)), 1e-3); }
 
-// Does the wall at a foot bend no more than a round vessel's does? Only there do the few points of room_about tell of its surroundings. In the lumen h is
-// the bend of the wall's offset through X, h / (1 - g h) that of the wall.
+// Returns whether the wall at a foot bends no more than that of a round vessel. Only then are the few points of room_about enough to test its surroundings. In
+// the lumen, h is the curvature of the wall's offset surface through X, and h / (1 - g h) that of the wall.
 static bool bends_gently(const Foot *foot, double radius)
 {
-    static const double HOLLOW = 1.3, BULGE = 0.3;       // of the inverse radius
+    static const double HOLLOW = 1.3, BULGE = 0.3;       // relative to the inverse radius
     const Sym3 *h = &foot->hessian;
     double half = 0.5 * sym3_trace(h), apart = sqrt(fmax(0, 0.5 * sym3_norm2(h) - half * half)), most = half + apart, least = half - apart;
     if (!(foot->gap * most < 1) || !(foot->gap * least < 1))
@@ -439,9 +440,9 @@ static bool bends_gently(const Foot *foot, double radius)
     return least / (1 - foot->gap * least) > -HOLLOW / radius && most / (1 - foot->gap * most) < BULGE / radius;
 }
 
-// Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks at points on two spheres in it: a
-// flat wall that comes nearer to the middle than 0.92 of the ball's radius shows at one of 80. Returns how far x may go [mm] until another wall than the
-// foot's could be the closest; 0: no such ball.
+// Tests whether a ball that touches the wall at the foot, larger than the gap by up to half a radius, lies all on x's side, at points on two spheres in it: a
+// flat wall that comes closer to the centre than 0.92 of the ball's radius is detected by one of 80 points. Returns how far x may move [mm] until a wall other
+// than the foot's could be the closest; 0: there is no such ball.
 static double room_about(const FieldVessel *field, double side, const Foot *foot, const BlobList *list)
 {
     static const double wider[] = {0.25, 0.1};
@@ -461,17 +462,17 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
     return 0;
 }
 
-// What is found of a point's feet.
+// The feet found for a point, on different sheets of the wall.
 enum { SHEETS = 3 };
 typedef struct Sheets {
     int count;
-    Foot foot[SHEETS];       // the closest first
+    Foot foot[SHEETS];       // closest first
 } Sheets;
 
 static void add_sheet(Sheets *s, const Foot *foot)
 {
     SEL_ASSERT(isfinite(foot->gap), "a foot that was found has a distance");
-    static const double SAME = 1e-4;         // [mm]
+    static const double SAME = 1e-4;         // [mm] feet closer together are the same
     int at = 0;
     for (int i = 0; i < s->count; i++) {
         if (vec3_distance(foot->at, s->foot[i].at) <= SAME)
@@ -485,7 +486,7 @@ static void add_sheet(Sheets *s, const Foot *foot)
     s->foot[at] = *foot;
 }
 
-// Is the foot on the vessel's wall? Far from its cell a node does not see all lumen, and its field ends where there is no wall.
+// Returns whether the foot lies on the vessel's wall. Far from its cell a node does not see all of the lumen, so its field may end where there is no wall.
 static bool is_known_there(const FieldVessel *field, const Foot *foot)
 {
     Vec3 q = asked_at(field, &field->node[foot->node], foot->at);
@@ -493,34 +494,34 @@ static bool is_known_there(const FieldVessel *field, const Foot *foot)
     return cell == foot->node || sees_all(field, q, foot->node) || walls_apart(field, foot->node, cell, q) <= AGREE;
 }
 
-// Where the wall may be in each direction from a point.
+// For each direction from a point, where the wall may be.
 typedef struct Looks {
-    double at[WAYS];         // [mm] from the point: where a direction crosses the wall, or is nearest to it
-    double order[WAYS];      // [mm] how far the wall may be; +HUGE_VAL: none
-    double before[WAYS];     // f at the last distance
-    double far;              // [mm] that distance
+    double at[SEARCH_DIRECTIONS]; // [mm] distance from the point at which the direction crosses the wall or comes nearest to it
+    double order[SEARCH_DIRECTIONS]; // [mm] estimated distance of the wall; +HUGE_VAL: none
+    double before[SEARCH_DIRECTIONS]; // f at the last distance …
+    double far;              // … and that distance [mm]
 } Looks;
 
 static void start_looks(Looks *looks, double here)
 {
     looks->far = 0;
-    for (int k = 0; k < WAYS; k++)
+    for (int k = 0; k < SEARCH_DIRECTIONS; k++)
         looks->before[k] = here, looks->order[k] = looks->at[k] = HUGE_VAL;
 }
 
-// Looks in all directions at a distance. Where the wall is crossed since the last one, it is there; where f is below LOW far slope, a ridge or septum may lie
-// between two directions. slope: |grad f| at a wall; 0: only crossings.
+// Evaluates f in all directions at distance `far`. Where the sign changed since the last distance, the wall is crossed; where f is below LOW far slope, a ridge
+// or septum may lie between two directions. slope: |grad f| at a wall; 0: crossings only.
 static void look_farther(const FieldVessel *field, Vec3 x, int node, const BlobList *list, double side, double far, double slope, Looks *looks)
 {
     static const double LOW = 0.3;           // more than half the angle between directions
-    double f[WAYS], near = looks->far;
-    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
+    double f[SEARCH_DIRECTIONS], near = looks->far;
+    for (int k = 0; k < SEARCH_DIRECTIONS; k += FOOT_BLOCK) {
         Vec3 to[FOOT_BLOCK];
         for (int i = 0; i < FOOT_BLOCK; i++)
-            to[i] = vec3_add_scaled(x, far, field->way[k + i]);
+            to[i] = vec3_add_scaled(x, far, field->search_direction[k + i]);
         look(field, node, list, to, f + k);
     }
-    for (int k = 0; k < WAYS; k++) {
+    for (int k = 0; k < SEARCH_DIRECTIONS; k++) {
         double h = side * f[k], before = side * looks->before[k], at = far, order = HUGE_VAL;
         if (h <= 0 && before > 0)
             order = at = near + (far - near) * before / (before - h);
@@ -533,23 +534,23 @@ static void look_farther(const FieldVessel *field, Vec3 x, int node, const BlobL
     looks->far = far;
 }
 
-// Feet from what was looked at, the nearest starts first and none beside one that is taken.
+// Finds feet from the directions, the nearest starts first, skipping starts next to one already used.
 static void settle_looks(const FieldVessel *field, Vec3 x, int node, double side, Looks *looks, Sheets *sheets)
 {
-    static const double ASIDE = 0.9;         // cosine
+    static const double ASIDE = 0.9;         // cosine of the angle between two starts
     Vec3 start[FOOT_BLOCK];
     Foot foot[FOOT_BLOCK];
     int count = 0;
     while (count < FOOT_BLOCK) {
         int best = 0;
-        for (int k = 1; k < WAYS; k++)
+        for (int k = 1; k < SEARCH_DIRECTIONS; k++)
             best = looks->order[k] < looks->order[best] ? k : best;
         if (looks->order[best] == HUGE_VAL)
             break;
-        Vec3 way = field->way[best];
-        start[count++] = vec3_add_scaled(x, looks->at[best], way);
-        for (int k = 0; k < WAYS; k++)
-            if (vec3_dot(field->way[k], way) > ASIDE)
+        Vec3 chosen = field->search_direction[best];
+        start[count++] = vec3_add_scaled(x, looks->at[best], chosen);
+        for (int k = 0; k < SEARCH_DIRECTIONS; k++)
+            if (vec3_dot(field->search_direction[k], chosen) > ASIDE)
                 looks->order[k] = HUGE_VAL;
     }
     int found = count > 0 ? settle(field, x, node, start, count, ROUNDS, foot) : 0;
@@ -558,7 +559,7 @@ static void settle_looks(const FieldVessel *field, Vec3 x, int node, double side
             add_sheet(sheets, &foot[i]);
 }
 
-// Looks on one node's wall for feet nearer than `gap`, or hardly farther.
+// Searches one node's wall for feet closer than `gap`, or only slightly farther.
 static void look_on_node(const FieldVessel *field, Vec3 x, int node, double side, double gap, Sheets *sheets)
 {
     const double all[] = {0.5 * gap, gap, gap + 2 * TRUST * field->node[node].radius};
@@ -572,7 +573,7 @@ static void look_on_node(const FieldVessel *field, Vec3 x, int node, double side
     settle_looks(field, x, node, side, &looks, sheets);
 }
 
-// Looks for walls nearer than the foot, or hardly farther: those that the foot's node sees, and those that the node of x sees.
+// Searches for walls closer than the foot, or only slightly farther: those that the foot's node sees, and those that the node of x sees.
 static void look_for_rivals(const FieldVessel *field, Vec3 x, double side, Sheets *sheets)
 {
     int node = sheets->foot[0].node, own = walk(field, x, node, 4);
@@ -605,7 +606,7 @@ static Sheets find_sheets(const FieldVessel *field, Vec3 x, int node)
     return sheets;
 }
 
-// A foot belongs to the wall of the cell in which it lies: over to that. A node whose field there contradicts the own one is not taken.
+// A foot belongs to the wall of the cell in which it lies: moves it to that wall, unless the field of the cell's node contradicts its own there.
 static void move_to_cell(const FieldVessel *field, Vec3 x, Foot *foot)
 {
     enum { CELLS = 4 };
@@ -620,7 +621,8 @@ static void move_to_cell(const FieldVessel *field, Vec3 x, Foot *foot)
     }
 }
 
-// A foot of x from scratch, the closest of those about the vessel's axis: where that does not lead to a foot on the right side, all around x.
+// The foot of x from scratch: the closest of those found around the vessel's axis; if these lead to no foot on the right side, a search in all directions from
+// x.
 static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
 {
     enum { AROUND = 6 };
@@ -654,7 +656,8 @@ static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
 
 // --- Queries ---
 
-// A ball about x of at most `most` that is certainly lumen, f(x + v) >= f(x) - |grad f| |v| - M |v|^2 / 2 > 0; 0: none. Not where the inlet bends the field.
+// Radius, at most `most`, of a ball about x that is certainly lumen, f(x + v) >= f(x) - |grad f| |v| - M |v|^2 / 2 > 0; 0: none. Also 0 where the inlet changes
+// the field.
 static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x, double most, const BlobList *list)
 {
     static const double part[] = {0.9, 0.65, 0.4};
@@ -678,7 +681,7 @@ static void set_clearance(VesselMemory *m, Vec3 x, double clearance)
     m->clear_place = x;
 }
 
-// Are bounds and foot such that the foot is certainly the closest?
+// Returns whether the bounds prove that the foot is the closest.
 static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const VesselMemory *m)
 {
     double size = fabs(foot->gap);
@@ -688,13 +691,13 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
     return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
 }
 
-// The blobs that whoever makes sure of a foot asks for.
+// Lists the blobs needed to verify that a foot is the closest.
 static void list_about(const FieldVessel *field, Vec3 x, const Foot *foot, BlobList *list)
 {
     list_blobs(field, foot->node, x, fabs(foot->gap) + LOOK * field->node[foot->node].radius, list);
 }
 
-// What is remembered and answered where lanes do not say it; `list`: as list_about says, or NULL where the foot is not sure.
+// Fills memory and hit outside the lanes; `list`: from list_about, or NULL if the foot is not sure.
 static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const BlobList *list, VesselMemory *m, VesselHit *hit)
 {
     const FieldNode *node = &field->node[foot->node];
@@ -715,13 +718,13 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const Blo
     hold_bounds(field, m, foot->node, x, foot->gap, list);
 }
 
-// A gap is as long as the shortest way to the wall: it changes by no more than x moves, or the wall is another. `before`: the gap at the last place.
+// A gap is the length of the shortest line to the wall: it changes by no more than x moves, or it belongs to another wall. `before`: the gap at the last place.
 static void compare_gaps(VesselMemory *m, double before, double travel, VesselHit *hit)
 {
-    SEL_ASSERT(travel >= 0, "a travel is a length");
-    static const double GIVES_WAY = 0.2;     // per mm of travel
+    SEL_ASSERT(travel >= 0, "the travel is a length");
+    static const double APPROACH = 0.2;      // change of the returned gap per mm of travel
     if (m->contradicted) {
-        m->credible -= GIVES_WAY * travel;
+        m->credible -= APPROACH * travel;
     } else if (fabs(hit->gap - before) > travel + APART) {
         hit->flags |= VESSEL_DISAGREE;
         m->contradicted = true;
@@ -740,7 +743,7 @@ static void set_flags(const FieldVessel *field, Vec3 x, int node, VesselHit *hit
         hit->flags |= VESSEL_BEYOND;
 }
 
-// Where no foot is found: Taubin's distance along the gradient, or that to the nearest node's wall, as if it were round.
+// If no foot is found: Taubin's distance along the gradient, or the distance to the nearest node's wall as if that were round.
 static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
 {
     const FieldNode *n = &field->node[node];
@@ -755,7 +758,7 @@ static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
     return (Foot){.at = vec3_add_scaled(x, -gap, normal), .normal = normal, .gap = gap, .node = node};
 }
 
-// Makes sure that a foot is the closest, or finds that which is, and answers; `list`: of the foot's list_about, used up.
+// Verifies that a foot is the closest, or finds the closest, and fills memory and hit; `list`: from list_about for that foot, overwritten.
 static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets sheets, BlobList *list, VesselMemory *m, VesselHit *hit)
 {
     double radius = field->node[sheets.foot[0].node].radius;
@@ -792,7 +795,7 @@ static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Vesse
     double side = field_here(field, node, x) > 0 ? 1 : -1;
     Sheets sheets = project(field, x, node, side);
     if (m->has_foot && m->node != node) {
-        // a foot follows its wall where the cell of X is another's: the remembered node's wall may be the closer one
+        // a foot follows its wall even where the cell of X is another node's: the remembered node's wall may be the closer one
         double other_side = field_here(field, m->node, x) > 0 ? 1 : -1;
         Sheets other = project(field, x, m->node, other_side);
         if (other.count > 0 && (sheets.count == 0 || fabs(other.foot[0].gap) < fabs(sheets.foot[0].gap))) {
@@ -820,14 +823,14 @@ static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Ves
     find_afresh(field, x, m, hit);
     if (!known || hit->flags & VESSEL_UNSURE)
         return;
-    // a foot that was not followed well is no fault of the model's: only where the former node knows of no wall here is it one
+    // a gap that changes because a foot was followed badly is no defect of the model: only if the former node has no wall here is it one
     bool other = hit->node != from && travel < BLOB_FLOOD_MARGIN * field->node[from].radius &&
                  walls_apart(field, from, hit->node, asked_at(field, &field->node[hit->node], m->foot)) > APART;
     if (other || m->contradicted)
         compare_gaps(m, before, travel, hit);
 }
 
-// A foot that was followed, but may not be the closest any more.
+// A foot that was followed, but may no longer be the closest.
 static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMemory *m, VesselHit *hit)
 {
     BlobList list;
@@ -843,7 +846,7 @@ static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, Ve
         compare_gaps(m, 0, travel, hit);
 }
 
-// A foot that is trusted but for its rival, which has moved, too.
+// A foot that is trusted, with a rival, which has moved too.
 static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, VesselMemory *m, VesselHit *hit)
 {
     Foot rival;
@@ -866,7 +869,7 @@ static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, Ves
         compare_gaps(m, 0, travel, hit);
 }
 
-// Answers where no field is needed; false where one is.
+// Returns true if the hit can be filled without evaluating the field.
 static bool answer_cheaply(const FieldVessel *field, Vec3 x, double reach, VesselMemory *m, VesselHit *hit)
 {
     if (!(vec3_norm2(x) < 1e100)) {
@@ -895,8 +898,8 @@ static bool answer_cheaply(const FieldVessel *field, Vec3 x, double reach, Vesse
     return true;
 }
 
-// The foot has left what its memory holds: the cell and the list about q. False where q is too far from the cell for that. A node whose field there
-// contradicts the own one is not taken.
+// The foot has left the region of its held blobs: determines the cell and the list around q. Returns false if q is too far from the cell. A node whose field
+// contradicts the own one there is not adopted.
 static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
 {
     int cell = cell_of(field, q, m->node);
@@ -911,7 +914,7 @@ static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
     return true;
 }
 
-// Points of a batch that wait for the same, and from where their feet start.
+// Points of a batch that wait for the same treatment, and the starts of their feet.
 typedef struct Queue {
     int count, point[FOOT_BATCH];
     Vec3 start[FOOT_BATCH];
@@ -922,29 +925,29 @@ typedef struct Batch {
     VesselMemory *memory;
     VesselHit *hit;
     Queue followed;          // feet that are followed by one or two steps …
-    Queue sought;            // … by careful steps from where those stopped …
-    Queue afresh;            // … and from scratch
+    Queue sought;            // … then searched by careful steps from where those stopped …
+    Queue afresh;            // … and finally from scratch
 } Batch;
 
 static void put(Queue *queue, int point, Vec3 start)
 {
-    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point waits in a queue once");
+    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point is in a queue at most once");
     queue->start[queue->count] = start;
     queue->point[queue->count++] = point;
 }
 
-// Steps that follow a foot, and careful ones that seek it; these no longer [of the radius] than lets them see what reaches there.
+// Steps that follow a foot, and careful steps that search for it; the latter are no longer [of the radius] than the held blobs allow.
 enum { FOLLOW_ROUNDS = 2, SEEK_ROUNDS = 8 };
 static const double LONGEST_SOUGHT = 0.25;
-static const double FOLLOWED = 1;            // of the radius: a point that has moved further has no foot to follow
+static const double FOLLOWED = 1;            // relative to the radius: a point that has moved further has no foot to follow
 
-// A followed foot goes no further than the prediction and its steps may: one that is far from the inlet needs not be asked about it.
+// A followed foot moves no further than the prediction and its steps: if it is far enough from the inlet, it needs no evaluation near the inlet.
 static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batch *batch, int point, bool seek)
 {
-    static const double REACH = 1.25;        // of the radius: 0.2 and two steps of a half
+    static const double REACH = 1.25;        // relative to the radius: 0.2 for the prediction and two steps of 0.5
     VesselMemory *m = &batch->memory[point];
     const FieldNode *n = &field->node[m->node];
-    SEL_ASSERT(m->blobs <= VESSEL_BLOBS, "a memory holds no more blobs than it has room for");
+    SEL_ASSERT(m->blobs <= VESSEL_BLOBS, "a memory holds no more blobs than its capacity");
     set_lane(field, b, i, m->node, n->carried && (seek || inlet_height(field, m->foot) < inlet_zone(field) + REACH * n->radius));
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
@@ -953,7 +956,7 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
         set_whole_list(field, b, i, m->node);
 }
 
-// Lanes that have left what they hold; those of which that is no small step are lost.
+// Renews the lists of lanes that have left the region of their held blobs; a lane that has moved too far for that is lost.
 static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned lanes, const Batch *batch, const int *point, bool seek)
 {
     for (; lanes != 0; lanes &= lanes - 1) {
@@ -969,7 +972,7 @@ static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned la
     }
 }
 
-// Near the inlet lists are about where the field is asked for the foot.
+// Near the inlet, a list is centred on the point at which the field is evaluated for the foot.
 static unsigned moved_lanes(const FieldVessel *field, const FieldBlock *b, unsigned moved, const Batch *batch, const int *point, int count, bool all)
 {
     for (int i = 0; i < count; i++) {
@@ -982,7 +985,7 @@ static unsigned moved_lanes(const FieldVessel *field, const FieldBlock *b, unsig
     return moved;
 }
 
-// Near the inlet the bounds are those of the field as it is asked, which the change of place bends further: (g.d) zeta'', zeta'' <= 0.75 / h.
+// Near the inlet the bounds apply to the field at the transformed point; the transformation adds (g.d) zeta'' to the second derivative, zeta'' <= 0.75 / h.
 static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, unsigned sure, int count)
 {
     Vec3 d = field->tree->direction[0];
@@ -1000,7 +1003,7 @@ static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, u
     return sure;
 }
 
-// The feet of up to eight points of a queue, from its starts where they are sought.
+// Follows the feet of up to eight points of a queue; for the queue `sought`, from its starts.
 static void follow_block(const FieldVessel *field, Batch *batch, const Queue *queue, int first)
 {
     FieldBlock b;
@@ -1119,7 +1122,7 @@ static void field_destroy(Vessel *vessel)
     free(field);
 }
 
-// --- Making one ---
+// --- Creation ---
 
 static void fill_rows(FieldVessel *field)
 {
@@ -1133,7 +1136,7 @@ static void fill_rows(FieldVessel *field)
     field->row[tree->blob_count] = (FieldRow){0};
 }
 
-// From the node's centre no wall can be nearer than this.
+// Lower bound of the distance of any wall from the node's centre.
 static double clear_about_center(const FieldVessel *field, int i)
 {
     const FieldNode *n = &field->node[i];
@@ -1155,7 +1158,7 @@ static void fill_nodes(FieldVessel *field)
         n->skin = fmin(SKIN * n->radius, SKIN_MOST);
         n->seen = tree->seen + tree->seen_offset[i];
         n->seen_count = (int)(tree->seen_offset[i + 1] - tree->seen_offset[i]);
-        SEL_ASSERT(n->seen_count >= 0, "offsets never fall");
+        SEL_ASSERT(n->seen_count >= 0, "offsets do not decrease");
     }
     for (int k = tree->near_offset[0] - 1; k < tree->near_offset[1] && field->inlet_open; k++) {
         int node = k < tree->near_offset[0] ? 0 : tree->near[k];
@@ -1172,7 +1175,7 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     if (!field)
         return NULL;
     SEL_ASSERT(tree->near_offset && tree->near && tree->seen_offset, "the tree is linked (vessel_tree_link)");
-    SEL_ASSERT(tree->blob_count < INT32_MAX, "memories name blobs by 32 bits, and the one without weight");
+    SEL_ASSERT(tree->blob_count < INT32_MAX, "memories index blobs by 32 bits, including the one of amplitude 0");
     field->vessel =
         (Vessel){.kind = "field", .query = field_query, .locate = field_locate, .inlet = field_inlet, .destroy = field_destroy, .primitives = tree->blob_count};
     field->tree = tree;
@@ -1190,7 +1193,7 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     for (int level = 0; level < field->blocks.levels; level++)
         field->vessel.bytes += (size_t)field->blocks.count[level] * sizeof(PowerBox);
     field->inlet_open = vessel_tree_root_is_open(tree);
-    field_directions(field->way, WAYS);
+    field_directions(field->search_direction, SEARCH_DIRECTIONS);
     field_clear_points(&field->clear_points);
     field_clear_rings(&field->clear_rings);
     fill_rows(field);

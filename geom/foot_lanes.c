@@ -1,5 +1,5 @@
-// One kernel text, compiled for each instruction set. See blob_lanes.h and foot_lanes.h for the layouts and why the bits agree, blobby.c for the equations.
-// Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
+// One kernel source, compiled for each instruction set. See blob_lanes.h and foot_lanes.h for the layouts and for why all give the same bits, blobby.c for the
+// equations. Compiled with -fno-math-errno and -fno-trapping-math, which change no result but allow square roots and selects to be vectorised.
 #include "geom/foot_lanes.h"
 
 #include "base/base.h"

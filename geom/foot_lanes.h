@@ -1,18 +1,19 @@
-// Newton on feet, in lanes of points: the arithmetic between two evaluations of blob_lanes.h, for a batch at a time.
+// Newton iteration for feet (closest wall points), in lanes of points: the arithmetic between two evaluations of blob_lanes.h, one batch at a time.
 //
 // The foot p of X minimises |p - X| on f = 0. With n = g/|g|, P = I - n n', S = P H P/|g|, gap = (X - p).n, r = P (p - X), one step is
 //   p += t + nu n,  t = -(I + gap S)^-1 r,  nu = -(f/|g| + t'S t / 2);
 // the quadratic term makes one step from a predicted foot nearly always enough. S has two eigenvalues across n, so that with T = tr S, D = k1 k2
 //   (I + gap S)^-1 = ((1 + gap T) P - gap S) / (1 + gap T + gap^2 D),   S (I + gap S)^-1 = (S + gap D P) / (1 + gap T + gap^2 D)
-// and neither step nor answer needs a tangent frame or a root (and a mirrored or turned scene gets the mirrored or turned answer).
+// and neither step nor result needs a tangent frame or a square root (and a mirrored or rotated scene gets the mirrored or rotated result).
 //
-// Another model's wall, the partner's, is asked at the own foot p (or a better place q), not from a foot of its own. With u = g_k/|g_k| there,
-// d = X - q, e = d - (d.u) u and the own gap's Hessian A, the distance of X to it and that distance's gradient are, to second order in e,
+// The wall of another model, the partner, is evaluated at the point's own foot p (or a better point q), not at a foot of its own. With u = g_k/|g_k| there, d =
+// X - q, e = d - (d.u) u and A the Hessian of the own gap, the distance of X from the partner's wall and the gradient of that distance are, to second order in
+// e,
 //   gap_k = s + d.u + e'A e / 2,   n_k = u + A e,   s = t / (1 - t n'H n / (2 |g|)),   t = f_k/|g_k|.
-// Where the walls differ much, f_k is asked once more, at q = X - gap_k n_k.
+// Where the walls differ much, f_k is evaluated a second time, at q = X - gap_k n_k.
 //
-// Layout: one array of BATCH doubles for each quantity, a lane for each point. Lanes do not see each other. Compiled for each instruction set; only
-// IEEE operations, so that all give the same bits.
+// Layout: one array of FOOT_BATCH doubles per quantity, one lane per point. Lanes are independent. Compiled for each instruction set, with IEEE operations
+// only, so that all give the same bits.
 #ifndef SELDINGER_GEOM_FOOT_LANES_H
 #define SELDINGER_GEOM_FOOT_LANES_H
 
@@ -20,26 +21,26 @@
 
 #include <stdbool.h>
 
-enum { FOOT_BATCH = 80, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are computed together
-// A partner is looked at twice where its wall is further from the own than this part of the radius, or its normal differs by more than this, squared.
+enum { FOOT_BATCH = 80, FOOT_BLOCK = 8 };   // lanes per batch, and lanes computed together
+// A partner is evaluated twice where its wall is further from the own wall than this fraction of the radius, or its normal differs by more than this, squared.
 #define FOOT_LOOK_WALL 0.05
 #define FOOT_LOOK_TURN 0.02
-// Walls that differ by more than this part of the radius, or this [mm], are not mixed.
+// Walls that differ by more than this fraction of the radius, or by this [mm], are not blended.
 #define FOOT_AGREE_RADII 0.5
 #define FOOT_AGREE 0.8
 
-// What an exact step leaves of the gap is taken to be the root of this times its length cubed in units of the curvature: see test_field_vessel.c.
+// An exact step leaves about sqrt(FOOT_THIRD) times its length cubed, in units of the curvature, of the gap: see test_field_vessel.c.
 #define FOOT_THIRD 25.0
 
-// State of a lane, as a double so that it lives in the same vectors.
+// State of a lane; a double, so that it is kept in the same vectors.
 #define FOOT_PENDING 0.0
 #define FOOT_DONE 1.0
-#define FOOT_DEEP 2.0        // X is near or beyond a focal point of this foot: careful steps lead to where the distance is least, or to another side
+#define FOOT_DEEP 2.0        // X is near or beyond a focal point of this foot; careful steps continue to a local minimum of the distance, or to the other side
 #define FOOT_LOST 3.0
 
 typedef double FootLane[FOOT_BATCH];
 
-// A field's value and derivatives at places, each lane with its own model.
+// Value and derivatives of the field at the lanes' points, each lane with its own model.
 typedef struct FootSample {
     const BlobGroup *group[FOOT_BATCH];
     int groups[FOOT_BATCH];
@@ -49,18 +50,17 @@ typedef struct FootSample {
 } FootSample;
 
 typedef struct FootBatch {
-    // in
+    // input
     FootLane xx, xy, xz;             // X [mm]
-    FootLane radius, bend;           // of the node [mm], the scale of the problem, and its inverse
-    FootLane room;                   // [mm] nearer feet in the node's cell are the closest
-    FootLane longest;                // [mm] bound of a step; where not careful a longer one makes the lane FOOT_LOST
-    FootLane allowed;                // [mm] rest of |f|/|g| with which a foot is good enough; its place may be off by a hundred times that
-    FootSample at;                   // the running foot
-    // remembered, for foot_predict: in at.x.. the foot, in at.gx.. the X that it is of, in nx.. the normal, in axx.. the gap's Hessian
-    // the field at X
-    FootLane inside;                 // 1 or 0; after foot_predict: the start is near, and has room
+    FootLane radius, bend;           // of the node [mm], the length scale of the problem; and its inverse
+    FootLane room;                   // [mm] a foot closer than this, in the node's cell, is the closest
+    FootLane longest;                // [mm] upper bound of a step; unless careful, a longer step makes the lane FOOT_LOST
+    FootLane allowed;                // [mm] |f|/|g| at which a foot is accepted; its position may be off by a hundred times that
+    FootSample at;                   // the current foot
+    // Remembered, for foot_predict: at.x.. holds the foot, at.gx.. the X that it belongs to, nx.. the normal, axx.. the Hessian of the gap.
+    FootLane inside;                 // 1 or 0; after foot_predict: the start is near, and closer than `room`
     FootLane estimate;               // see foot_estimate
-    // out
+    // output
     FootLane state;
     FootLane nx, ny, nz, gap;        // unit normal, signed distance
     FootLane half;                   // n'H n / (2 |g|) [1/mm]
@@ -68,22 +68,22 @@ typedef struct FootBatch {
     FootLane axx, axy, axz, ayy, ayz, azz;   // … and the gap's Hessian at X
 } FootBatch;
 
-// A partner's answers for the lanes of a batch.
+// Results of a partner for the lanes of a batch.
 typedef struct FootPartner {
-    FootSample at;                   // at the own feet, or moved from there
+    FootSample at;                   // at the own feet, or at points moved from there
     FootLane weight;                 // 0: none
     FootLane gap, nx, ny, nz;        // at X
-    FootLane move;                   // > 0 where a second look from a better place is due, and how much that counts …
-    FootLane tox, toy, toz;          // … from here
+    FootLane move;                   // > 0 where a second evaluation at a better point is due; the weight of that evaluation …
+    FootLane tox, toy, toz;          // … and its point
 } FootPartner;
 
-// Weighted sums of what partners' answers differ by from the own one, and then the mixed wall.
+// Weighted sums of the differences between the partners' results and the own result, then the blended wall.
 typedef struct FootMixture {
     FootLane total, gap, nx, ny, nz;
 } FootMixture;
 
-// Where Newton starts: where a block's feet should be now, t = (I + gap S)^-1 P dx = P dx - gap A dx along the wall, A the gap's Hessian then, and
-// t'S t / 2 = t'A dx / 2 down with it.
+// Predicts where a block's feet are now, as the start of Newton: t = (I + gap S)^-1 P dx = P dx - gap A dx along the wall, A the earlier Hessian of the gap,
+// and down by t'S t / 2 = t'A dx / 2.
 static inline __attribute__((always_inline)) void foot_predict(FootBatch *restrict b, int block, double allowed)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
@@ -104,10 +104,10 @@ static inline __attribute__((always_inline)) void foot_predict(FootBatch *restri
     }
 }
 
-// One step of a block's pending lanes from their samples. `careful`: goes on near focal points, with bounded steps. `exact`: takes along what the step
-// down to the wall turns the normal by, w = P H n / |g| a millimetre, and the field's bend on the way down:
+// One step of a block's pending lanes from their samples. `careful`: continues near focal points, with bounded steps. `exact`: also accounts for the rotation
+// of the normal by the step down to the wall, w = P H n / |g| per millimetre, and for the bend of the field on that step:
 //   t = -(I + g S)^-1 (r + g nu w), g = gap - nu, nu = -f/|g|;   nu = -q / (1 + w.t - n'H n q / (2 |g|)), q = f/|g| + t'S t / 2.
-// What then remains of the gap is of third order in the step.
+// The remaining error of the gap is of third order in the step.
 static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block, const bool careful, const bool exact)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
@@ -130,7 +130,7 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         if (exact) {
             double down = taubin < longest ? taubin : longest;
             down = down > -longest ? down : -longest;
-            wx = vx - half * nx, wy = vy - half * ny, wz = vz - half * nz;   // v is H n / |g| less half of its part along n by now
+            wx = vx - half * nx, wy = vy - half * ny, wz = vz - half * nz;   // by now v is H n / |g| minus half of its component along n
             gap += down;
             rx -= gap * down * wx, ry -= gap * down * wy, rz -= gap * down * wz;
         }
@@ -138,13 +138,13 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         double deep = 0.81 + gap * (0.9 * trace + gap * product) > 0 && 1.8 + gap * trace > 0 ? 0.0 : 1.0;
         double c0, c1;
         if (careful) {
-            // phi = 1 / (1 + gap k), beyond focal points by its size
+            // phi = 1 / (1 + gap k); beyond focal points, by absolute value
             double spread = sqrt(0.5 * size2 - 0.25 * trace * trace > 0 ? 0.5 * size2 - 0.25 * trace * trace : 0.0);
             double k1 = 0.5 * trace + spread, k2 = 0.5 * trace - spread, a1 = fabs(1 + gap * k1), a2 = fabs(1 + gap * k2);
             double phi1 = 1 / (a1 > 1e-3 ? a1 : 1e-3), phi2 = 1 / (a2 > 1e-3 ? a2 : 1e-3);
             c1 = spread > 1e-9 * fabs(trace) ? (phi1 - phi2) / (2 * (spread > 1e-300 ? spread : 1.0)) : 0.0, c0 = phi1 - c1 * k1;
         } else {
-            // where that is no step to take the foot stays beside its place: careful steps go on from there
+            // where that step is not allowed the foot keeps its tangential position, and careful steps continue from there
             double all = deep > 0 ? 0.0 : 1 / (deep > 0 ? 1.0 : 1 + gap * (trace + gap * product));
             c0 = all * (1 + gap * trace), c1 = -all * gap;
         }
@@ -167,16 +167,16 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         }
         double step2 = nu * nu;
         px += tx + nu * nx, py += ty + nu * ny, pz += tz + nu * nz;
-        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature; all squared
+        // What the step leaves, squared: in the foot's position (hence the normal) second order, in f/|g| third order, in units of the curvature.
         double allowed = b->allowed[i] * b->allowed[i], curl = 2 * (size2 + b->bend[i] * b->bend[i]), left = curl * along2 * along2;
         double done;
         if (exact) {
-            double all2 = along2 + step2, whole = curl * all2 * all2, tilt = gap * curl * whole;   // of X's distance, by the normal's error
+            double all2 = along2 + step2, whole = curl * all2 * all2, tilt = gap * curl * whole;   // tilt: error of X's distance due to the normal's error
             done = whole < 1e4 * allowed && FOOT_THIRD * curl * all2 * whole < allowed && tilt * tilt < allowed ? 1.0 : 0.0;
         } else {
             done = left < 1e4 * allowed && 4 * curl * (along2 + step2) * (left + step2) < allowed ? 1.0 : 0.0;
         }
-        // the normal turns by S t along the step; what that adds to its length is small where the step is the last
+        // The normal rotates by S t along the step; the change of its length is small if this is the last step.
         double turn2 = sx * sx + sy * sy + sz * sz, unit = 1 - turn2 * (0.5 - 0.375 * turn2);
         nx = (nx + sx) * unit, ny = (ny + sy) * unit, nz = (nz + sz) * unit;
         double state = done > 0 ? FOOT_DONE : FOOT_PENDING;
@@ -196,14 +196,14 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
     }
 }
 
-// Gap and Hessian at X of a block from foot, normal and S. Near focal points the gap in the Hessian is held so that both 1 + gap k are at least 0.1.
+// Gap and Hessian at X of a block from foot, normal and S. Near focal points the gap in the Hessian is limited so that both 1 + gap k are at least 0.1.
 static inline __attribute__((always_inline)) void foot_finish(FootBatch *restrict b, int block)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
         double nx = b->nx[i], ny = b->ny[i], nz = b->nz[i];
         double gap = (b->xx[i] - b->at.x[i]) * nx + (b->xy[i] - b->at.y[i]) * ny + (b->xz[i] - b->at.z[i]) * nz;
         b->gap[i] = gap;
-        // S is that of the last evaluation, the normal has turned a little since: across the new one
+        // S is that of the last evaluation, and the normal has rotated slightly since: project S across the new normal.
         double xx = b->sxx[i], xy = b->sxy[i], xz = b->sxz[i], yy = b->syy[i], yz = b->syz[i], zz = b->szz[i];
         double vx = xx * nx + xy * ny + xz * nz, vy = xy * nx + yy * ny + yz * nz, vz = xz * nx + yz * ny + zz * nz;
         double half = 0.5 * (nx * vx + ny * vy + nz * vz);
@@ -219,7 +219,7 @@ static inline __attribute__((always_inline)) void foot_finish(FootBatch *restric
     }
 }
 
-// A block's Newton steps on W, see lim_vessel.c: inside one blob never below the distance.
+// A block's Newton steps on W, see lim_vessel.c: inside a single blob, never below the distance.
 static inline __attribute__((always_inline)) void foot_estimate(const FootSample *restrict s, double *restrict estimate, int block, double iso_level)
 {
     double level = 1 / sqrt(iso_level);
@@ -230,7 +230,7 @@ static inline __attribute__((always_inline)) void foot_estimate(const FootSample
     }
 }
 
-// A partner's answers in a block, from its samples at `s->at`; those of a `second` look replace the first ones as far as `move` says.
+// A partner's results in a block, from its samples at `s->at`. With `second`, they replace the first ones in proportion to `move`.
 static inline __attribute__((always_inline)) void foot_partner(const FootBatch *restrict b, FootPartner *restrict s, int block, const bool second)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
@@ -254,7 +254,7 @@ static inline __attribute__((always_inline)) void foot_partner(const FootBatch *
             double far = away * b->bend[i] / FOOT_LOOK_WALL, most = far * far > turn ? far * far : turn, part = most - 1;
             part = part > 0 ? part : 0.0, part = part < 1 ? part : 1.0;
             s->gap[i] = gap, s->nx[i] = nx, s->ny[i] = ny, s->nz[i] = nz;
-            // X's foot there, as well as can be said from here
+            // best available estimate of X's foot on the partner's wall
             s->tox[i] = b->xx[i] - gap * nx, s->toy[i] = b->xy[i] - gap * ny, s->toz[i] = b->xz[i] - gap * nz;
             s->move[i] = slope2 > 1e-200 ? part * part * (3 - 2 * part) : 0.0;
         }
@@ -262,7 +262,7 @@ static inline __attribute__((always_inline)) void foot_partner(const FootBatch *
     }
 }
 
-// Adds a partner's answers to the mixture: less the more they differ from the own, nothing where they say something else altogether.
+// Adds a partner's results to the mixture, with a weight that falls with their difference from the own result and is 0 where they disagree altogether.
 static inline __attribute__((always_inline)) void foot_mix(const FootBatch *restrict b, const FootPartner *restrict s, FootMixture *restrict m, int block)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
@@ -278,7 +278,7 @@ static inline __attribute__((always_inline)) void foot_mix(const FootBatch *rest
     }
 }
 
-// The mixed walls of a block from the sums.
+// The blended walls of a block from the sums.
 static inline __attribute__((always_inline)) void foot_settle(const FootBatch *restrict b, FootMixture *restrict m, int block)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
@@ -289,36 +289,37 @@ static inline __attribute__((always_inline)) void foot_settle(const FootBatch *r
     }
 }
 
-// Nodes near a node, eight at a time, as planes: with y = X - C_i and e = C_j - C_i, node j's power distance exceeds i's by
-// |e|^2 + r_i^2 - r_j^2 - 2 e.y. In single precision, which moves a weight by 1e-6.
+// Nodes near a node, eight at a time, as planes: with y = X - C_i and e = C_j - C_i, the power distance of node j exceeds that of i by |e|^2 + r_i^2 - r_j^2 -
+// 2 e.y. In single precision, which changes a weight by 1e-6.
 enum { NEAR_GROUP = 8 };
 typedef struct NearGroup {
     float base[NEAR_GROUP] __attribute__((aligned(32)));
     float ex[NEAR_GROUP], ey[NEAR_GROUP], ez[NEAR_GROUP];    // 2 e
-    float band[NEAR_GROUP];          // 1 / width of the mixed zone [1/mm^2]
+    float band[NEAR_GROUP];          // 1 / width of the blending zone [1/mm^2]
     int node[NEAR_GROUP];            // -1: none
 } NearGroup;
 
 // The kernels of foot_lanes.h and blob_lanes.h for one instruction set.
 typedef struct LaneKernels {
     const char *isa;
-    // Field and gradient (and Hessian) of `count` lanes. Many at a time: one evaluation alone waits 35 ns for its own division and sums, others fit into
+    // Field and gradient (and Hessian) of `count` lanes. Many at a time: a single evaluation waits 35 ns for its own division and sums, and others fit into
     // that gap.
     void (*gradient)(FootSample *sample, const int *lane, int count, double iso_level);
     void (*hessian)(FootSample *sample, const int *lane, int count, double iso_level);
-    // Of the first `count` lanes, in whole blocks: the rest of the last block must hold numbers. newton leaves blocks alone where all are
-    // done, and returns whether some lane is not.
-    void (*predict)(FootBatch *batch, int count, double allowed);   // leaves all pending, the rest of the last block done
+    // The following work on the first `count` lanes, in whole blocks: the rest of the last block must hold numbers. `newton` skips blocks whose lanes are all
+    // done, and returns whether some lane is not done.
+    void (*predict)(FootBatch *batch, int count, double allowed);   // leaves the lanes pending, and the rest of the last block done
     bool (*newton)(FootBatch *batch, int count, bool careful);
     void (*finish)(FootBatch *batch, int count);
     void (*estimate)(const FootSample *at_x, double *estimate, int count, double iso_level);
     void (*partner)(const FootBatch *batch, FootPartner *partner, int count, bool second);
     void (*mix)(const FootBatch *batch, const FootPartner *partner, FootMixture *mixture, int count);
     void (*settle)(const FootBatch *batch, FootMixture *mixture, int count);
-    // Bits of a group's nodes in whose mixed zone y lies (see NearGroup), their weights, and bits added to `better` where y lies in the node's own cell.
+    // Returns the bits of the group's nodes in whose blending zone y lies (see NearGroup), their weights, and sets bits in `better` where y lies in that node's
+    // own cell.
     unsigned (*near)(const NearGroup *group, const float y[3], float weight[NEAR_GROUP], unsigned *better);
 } LaneKernels;
-// isa: 0 what simd_level() says, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
+// isa: 0: the widest that simd_level() allows, 1 SSE2, 2 AVX2, 3 AVX-512; if absent, the next narrower one.
 const LaneKernels *lane_kernels(int isa);
 
 #endif

@@ -13,20 +13,20 @@
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 
-// vessels: the wall as the solver asks for it
+// vessels: the wall as the solver queries it
 #include "geom/vessel.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
 #include "geom/tube_mesh.h"
 
-// their surfaces as triangles
+// surfaces as triangles
 #include "geom/isosurface.h"
 #include "geom/tree_surface.h"
 #include "geom/mesh_closure.h"
 #include "geom/mesh_decimate.h"
 #include "geom/surface_parts.h"
 
-// what a tool can reach, and what looks wrong
+// what a tool can reach, and likely defects of the model
 #include "geom/ghost_lumens.h"
 #include "geom/reach.h"
 #include "geom/vessel_branches.h"

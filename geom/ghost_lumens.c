@@ -1,6 +1,6 @@
-// From each blob's centre, moved uphill where the field is below 0 there, straight to the centres of the node that answers and of those near it. Only where
-// all these ways leave the lumen the place is flooded, over a lattice, until some point of it has such a way: then it is lumen of the tree. What ends
-// without is a ghost.
+// The search starts at each blob's centre, moved uphill if the field is below 0 there, and tests straight lines to the centres of the node found there and of
+// its near nodes. If every line leaves the lumen, the place is flooded over a lattice until a point of it has an open line: then it belongs to the tree's
+// lumen. If the flood ends without one, it is a ghost.
 #include "geom/ghost_lumens.h"
 
 #include "geom/blobby.h"
@@ -13,7 +13,7 @@
 #include <string.h>
 
 enum { POINTS_MOST = 100000, STEPS_UP = 12, LATTICE_BITS = 20, LOOK_EVERY = 16 };
-static const double CELL = 0.3;              // of the least radius
+static const double CELL = 0.3;              // relative to the least radius
 
 typedef struct GhostPoint {
     int at[3], node;
@@ -22,14 +22,14 @@ typedef struct GhostPoint {
 typedef struct Search {
     const VesselTree *tree;
     double cell;
-    KeyMap known;            // lattice points: the place they were flooded from
+    KeyMap known;            // lattice points: the place from which they were flooded
     int place_count, place_capacity;
-    bool *is_held;           // by the tree, of each place that was flooded from
-    int count, capacity;     // points of the flood at hand
+    bool *is_held;           // for each place that was flooded from: connected to the tree
+    int count, capacity;     // points of the current flood
     GhostPoint *point;
     int ghost_capacity;
     bool *drops;             // (B)
-    int *tested;             // (B) the last place that was flooded from, plus 1, for which the blob was looked at
+    int *tested;             // (B) 1 + the last place for which the blob was tested
     GhostLumens *out;
 } Search;
 
@@ -63,9 +63,9 @@ static bool grow(void **array, int count, int *capacity, size_t size)
     return true;
 }
 
-// --- Ways to the tree ---
+// --- Straight lines to the tree ---
 
-static bool way_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, double step)
+static bool line_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, double step)
 {
     double pieces = ceil(vec3_distance(x, to) / step);
     int count = pieces > 400 ? 400 : pieces < 1 ? 1 : (int)pieces;
@@ -77,17 +77,17 @@ static bool way_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, doubl
 
 static bool is_held(const VesselTree *tree, Vec3 x, int node)
 {
-    if (way_is_open(tree, x, node, tree->center[node], 0.15 * tree->radius[node]))
+    if (line_is_open(tree, x, node, tree->center[node], 0.15 * tree->radius[node]))
         return true;
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
-        if (way_is_open(tree, x, node, tree->center[tree->near[k]], 0.15 * tree->radius[tree->near[k]]))
+        if (line_is_open(tree, x, node, tree->center[tree->near[k]], 0.15 * tree->radius[tree->near[k]]))
             return true;
     return false;
 }
 
 // --- The flood ---
 
-// Whether x, which is of lattice point `at` or beside it, may be gone on to; adds it. *held: it is known to hang on the tree.
+// Adds lattice point `at` unless it is known; returns whether the flood continues from it. *held: the point is known to be connected to the tree.
 static bool add_point(Search *s, const int at[3], int node, bool *held, bool *failed)
 {
     bool is_new;
@@ -104,18 +104,18 @@ static bool add_point(Search *s, const int at[3], int node, bool *held, bool *fa
     return true;
 }
 
-// Fills s->point. True where the place hangs on the tree, or is too large to be a ghost.
+// Fills s->point. Returns true if the place is connected to the tree, or is too large to be a ghost.
 static bool flood_from(Search *s, Vec3 x, int node, bool *failed)
 {
     int at[3];
     bool held = false;
     s->count = 0;
     nearest_lattice_point(s, x, at);
-    for (int c = -1; c < 6 && !held && !*failed; c++) {      // the nearest, or one beside it
+    for (int c = -1; c < 6 && !held && !*failed; c++) {      // the nearest lattice point, and its neighbours
         int beside[3] = {at[0], at[1], at[2]}, of = node;
         if (c >= 0)
             beside[c / 2] += c & 1 ? 1 : -1;
-        if (reach_field(s->tree, lattice_point(s, beside), &of) > 0 && way_is_open(s->tree, x, node, lattice_point(s, beside), 0.5 * s->cell))
+        if (reach_field(s->tree, lattice_point(s, beside), &of) > 0 && line_is_open(s->tree, x, node, lattice_point(s, beside), 0.5 * s->cell))
             add_point(s, beside, of, &held, failed);
     }
     for (int i = 0; i < s->count && !held && !*failed; i++) {
@@ -128,12 +128,12 @@ static bool flood_from(Search *s, Vec3 x, int node, bool *failed)
                 add_point(s, beside, of, &held, failed);
         }
     }
-    for (int i = 0; i < s->count && !held && !*failed; i++)   // what was passed over
+    for (int i = 0; i < s->count && !held && !*failed; i++)   // the points skipped above
         held = i % LOOK_EVERY != 0 && is_held(s->tree, lattice_point(s, s->point[i].at), s->point[i].node);
     return held;
 }
 
-// --- What can be left out ---
+// --- Which blobs can be removed ---
 
 static bool is_point_of_ghost(const Search *s, Vec3 x)
 {
@@ -171,13 +171,13 @@ static double blob_at(const VesselTree *tree, int blob, Vec3 x)
     return u > 0 ? tree->blob_amplitude[blob] * u * u * u : 0;
 }
 
-// Marks the blobs of the flood at hand that can go. True where then nothing is left of it.
+// Marks the blobs of the current flood that can be removed. Returns true if nothing of the ghost remains without them.
 static bool mark_drops(Search *s, Vec3 x, int node)
 {
     const VesselTree *tree = s->tree;
     bool dissolves = true;
     if (s->count == 0)
-        s->point[s->count++] = (GhostPoint){.node = node};   // smaller than a cell: its place alone
+        s->point[s->count++] = (GhostPoint){.node = node};   // smaller than a cell: only the place itself
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < s->count; i++) {
             bool is_place = s->count == 1 && s->point[0].at[0] == 0 && s->point[0].at[1] == 0 && s->point[0].at[2] == 0;
@@ -200,7 +200,7 @@ static bool mark_drops(Search *s, Vec3 x, int node)
 
 // --- The whole tree ---
 
-// Uphill from x until the field is above 0. False where it does not get there.
+// Moves x uphill until the field is above 0. Returns false if it does not become so.
 static bool climb(const VesselTree *tree, Vec3 *x, int *node, double step)
 {
     for (int i = 0; i < STEPS_UP; i++) {
@@ -224,7 +224,7 @@ static bool look_from(Search *s, int owner, int64_t blob)
     int node = owner, at[3];
     if (shared && !(tree->blob_amplitude[blob] > 0))
         return true;
-    if (!shared && power_walk(tree, x, owner, 4) != owner)   // the model is not asked there
+    if (!shared && power_walk(tree, x, owner, 4) != owner)   // a tool point there does not use this model
         return true;
     if (!climb(tree, &x, &node, 0.1 * tree->blob_width[blob]) || is_held(tree, x, node))
         return true;

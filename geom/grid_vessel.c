@@ -1,9 +1,9 @@
-// See grid_vessel.h. The lattice point (i, j, k) lies at cell * (i, j, k). A block holds 9 x 9 x 9 of them, those of its faces once more than its
-// neighbours, so that a query reads one block. A map finds the block; it also knows the blocks inside and beyond open ends, which hold nothing: they are
-// flooded from those that do, each asked once at its middle. What the map does not know is outside.
+// See grid_vessel.h. The lattice point (i, j, k) lies at cell * (i, j, k). A block holds 9 x 9 x 9 points, repeating those on its faces from its neighbours, so
+// that a query reads one block. A map finds the block. It also holds the blocks inside and beyond open ends, which store no values: they are flooded from the
+// blocks that do, with one query each at the middle. A block that the map does not hold is outside.
 //
-// A lattice point is asked from the node of the surface's vertex next to it (of one vertex a lattice cell). Vertices are found by halving, or rather by
-// thirds: those that may be next to a block, of those the ones that may be next to each 3 x 3 x 3 of its points, of those the next.
+// A lattice point is queried from the node of the closest vertex of the surface (among one vertex per lattice cell). The closest vertex is found by successive
+// subdivision: the candidates for a block, of these the candidates for each 3 x 3 x 3 of its points, of these the closest.
 #include "geom/grid_vessel.h"
 
 #include "base/base.h"
@@ -18,8 +18,8 @@ enum {
     SIDE = BLOCK + 1,
     POINTS = SIDE * SIDE * SIDE,
     KEY_BITS = 20,
-    BLOCK_MAX = (1 << (KEY_BITS - 1)) - 2,   // a block's number along an axis; a lattice point's is 8 times that
-    BLOCKS_MAX = 4000000,                    // held: 12 GB
+    BLOCK_MAX = (1 << (KEY_BITS - 1)) - 2,   // number of a block along an axis; that of a lattice point is 8 times larger
+    BLOCKS_MAX = 4000000,                    // blocks with values: 12 GB
     IS_OUTSIDE = 0,
     IS_INSIDE,
     IS_OPEN,
@@ -32,9 +32,9 @@ typedef struct GridBlock {
 } GridBlock;
 
 typedef struct GridVessel {
-    Vessel vessel;           // first: a Vessel * to us is a GridVessel *
+    Vessel vessel;           // first: a Vessel * points to its GridVessel
     GridVesselOptions options;
-    int low[3], high[3];     // blocks that are known lie between, high included
+    int low[3], high[3];     // bounds of the known blocks, high included
     KeyMap state_of;
     int block_count;
     GridBlock *block;
@@ -67,7 +67,7 @@ static double interpolate(const float *value, double u, double v, double w, Vec3
     return low + u * (high - low);
 }
 
-// Beyond all blocks: what is next to there goes on.
+// State of a block beyond all known blocks: that of the nearest known block continues.
 static int state_beside(const GridVessel *grid, const int block[3])
 {
     int at[3];
@@ -79,7 +79,7 @@ static int state_beside(const GridVessel *grid, const int block[3])
 
 static VesselHit hit_outside(const GridVessel *grid, VesselMemory *memory)
 {
-    // back along the last normal, where there is one
+    // along the last normal, if there is one
     VesselHit hit = {.gap = -grid->options.band_mm, .normal = memory->has_foot ? memory->normal : vec3(0, 0, 0), .flags = VESSEL_UNSURE};
     memory->clearance = 0;
     return hit;
@@ -96,12 +96,12 @@ static VesselHit hit_at(const GridVessel *grid, Vec3 x, double reach, VesselMemo
     int block[3];
     bool beyond = false;
     for (int a = 0; a < 3; a++) {
-        // rounds down, without a call
+        // rounds down without a function call
         double in = at[a] > -BLOCK_MAX ? at[a] < BLOCK_MAX ? at[a] : BLOCK_MAX : -BLOCK_MAX;
         block[a] = (int)in - (in < (int)in);
         beyond = beyond || block[a] < grid->low[a] || block[a] > grid->high[a];
     }
-    int state = IS_HELD + memory->node;      // mostly the block of before
+    int state = IS_HELD + memory->node;      // usually the same block as before
     if (memory->node < 0 || memory->node >= grid->block_count || memcmp(grid->block[memory->node].base, block, sizeof block) != 0)
         state = beyond ? state_beside(grid, block) : key_map_find(&grid->state_of, key_of(block[0], block[1], block[2]));
     if (state == IS_OPEN) {
@@ -120,7 +120,7 @@ static VesselHit hit_at(const GridVessel *grid, Vec3 x, double reach, VesselMemo
     double gap = interpolate(grid->block[memory->node].value, BLOCK * (at[0] - block[0]), BLOCK * (at[1] - block[1]), BLOCK * (at[2] - block[2]), &gradient);
     if (gap < -grid->options.band_mm)
         return hit_outside(grid, memory);
-    memory->clearance = 0.7 * gap;           // interpolated distances may fall a little faster than the way
+    memory->clearance = 0.7 * gap;           // interpolated distances may fall slightly faster than the distance travelled
     memory->clear_place = x;
     if (gap > reach)
         return (VesselHit){.gap = gap, .flags = VESSEL_FAR};
@@ -162,21 +162,21 @@ static void grid_destroy(Vessel *vessel)
     free(grid);
 }
 
-// --- Making one ---
+// --- Creation ---
 
 typedef struct Making {
     GridVessel *grid;
     const Vessel *exact;
     const TriangleMesh *surface;
     KeyMap list_of;          // block to the first vertex of its list
-    int *next;               // (V) the next one in the list, -1 at its end
+    int *next;               // (V) the next one in the list; -1 at its end
     int capacity;
-    int (*base)[3];          // of each held block …
-    int *vertex;             // … and a vertex near it, of each known one
+    int (*base)[3];          // of each block with values …
+    int *vertex;             // … and a nearby vertex, for each known block
     int near_capacity;
-    int *near;               // vertices that may be next to the block at hand, and behind them to a part of it
+    int *near;               // candidate vertices for the current block, followed by those for a part of it
     int sought_count, sought_capacity;
-    int (*sought)[3];        // known blocks that hold nothing, in the order found
+    int (*sought)[3];        // known blocks without values, in the order found
     int *sought_vertex;
     Vec3 point[POINTS];
     VesselMemory memory[POINTS];
@@ -188,25 +188,25 @@ static bool check_options(const GridVesselOptions *o, const TriangleMesh *surfac
     int before = faults->count;
     bool cell = isfinite(o->cell_mm) && o->cell_mm > 0;
     if (!cell)
-        faults_add(faults, name, 0, 0, "grid: cell_mm is %g; a number above 0 is valid", o->cell_mm);
+        faults_add(faults, name, 0, 0, "grid: cell_mm is %g; expected a number above 0", o->cell_mm);
     else if (!isfinite(o->band_mm) || !(o->band_mm >= 2 * o->cell_mm))
-        faults_add(faults, name, 0, 0, "grid: band_mm is %g; at least two cells, %g mm, are valid", o->band_mm, 2 * o->cell_mm);
+        faults_add(faults, name, 0, 0, "grid: band_mm is %g; expected at least two cells, %g mm", o->band_mm, 2 * o->cell_mm);
     if (o->has_inlet && (!vec3_is_finite(o->inlet) || !(fabs(vec3_norm(o->direction) - 1) < 1e-6)))
-        faults_add(faults, name, 0, 0, "grid: the inlet (%g, %g, %g), direction (%g, %g, %g); finite mm and a unit vector are valid", o->inlet.x, o->inlet.y,
+        faults_add(faults, name, 0, 0, "grid: the inlet (%g, %g, %g), direction (%g, %g, %g); expected finite mm and a unit vector", o->inlet.x, o->inlet.y,
                    o->inlet.z, o->direction.x, o->direction.y, o->direction.z);
     if (surface->triangle_count < 1)
-        faults_add(faults, name, 0, 0, "grid: the surface has no triangles; at least one is valid");
+        faults_add(faults, name, 0, 0, "grid: the surface has no triangles; expected at least one");
     double most = cell ? (double)BLOCK_MAX * BLOCK * o->cell_mm - 2 * o->band_mm : 0;
     for (int v = 0; v < surface->vertex_count && faults->count == before; v++) {
         Vec3 p = surface->vertex[v];
         if (!(vec3_is_finite(p) && fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))) < most))
-            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y, p.z,
+            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; expected coordinates below %g mm with cells of %g mm", v, p.x, p.y, p.z,
                        most, o->cell_mm);
     }
     for (int t = 0; t < surface->triangle_count && faults->count == before; t++)
         for (int k = 0; k < 3; k++)
             if (surface->triangle[t][k] < 0 || surface->triangle[t][k] >= surface->vertex_count)
-                faults_add(faults, name, 0, 0, "grid: triangle %d has vertex %d of %d; 0 to %d are valid", t, surface->triangle[t][k], surface->vertex_count,
+                faults_add(faults, name, 0, 0, "grid: triangle %d has vertex %d of %d; expected 0 to %d", t, surface->triangle[t][k], surface->vertex_count,
                            surface->vertex_count - 1);
     return faults->count == before;
 }
@@ -229,13 +229,13 @@ static bool hold_block(Making *m, int i, int j, int k, int vertex)
             return false;
         m->capacity = capacity;
     }
-    SEL_REQUIRE(grid->block_count < m->capacity, "the list of blocks was made longer");
+    SEL_REQUIRE(grid->block_count < m->capacity, "the list of blocks was enlarged before");
     memcpy(m->base[grid->block_count], (int[3]){i, j, k}, sizeof *m->base);
     m->vertex[grid->block_count++] = vertex;
     return grid->block_count < BLOCKS_MAX;
 }
 
-// Blocks within the band of a triangle's box.
+// Creates the blocks within the band of each triangle's box.
 static bool hold_blocks(Making *m)
 {
     const TriangleMesh *mesh = m->surface;
@@ -260,14 +260,14 @@ static bool hold_blocks(Making *m)
     return true;
 }
 
-// Lattice cells may lie eight times further out than blocks: a key of its own.
+// Lattice cells may have coordinates eight times larger than blocks, so they need a separate key.
 static uint64_t cell_key(const int at[3])
 {
     uint64_t mask = (1u << 21) - 1;
     return ((uint64_t)(int64_t)at[0] & mask) << 42 | ((uint64_t)(int64_t)at[1] & mask) << 21 | ((uint64_t)(int64_t)at[2] & mask);
 }
 
-// Lists of vertices by block, one a lattice cell.
+// Lists the vertices by block, one per lattice cell.
 static bool list_vertices(Making *m)
 {
     const TriangleMesh *mesh = m->surface;
@@ -303,12 +303,13 @@ static bool push_near(Making *m, int count, int v)
         m->near = near;
         m->near_capacity = capacity;
     }
-    SEL_ASSERT(count >= 0 && count < m->near_capacity, "the list was made longer");
+    SEL_ASSERT(count >= 0 && count < m->near_capacity, "the list was enlarged before");
     m->near[count] = v;
     return true;
 }
 
-// Of the vertices near[first … first + count) those that are next to some point of the ball, put behind them. Returns how many, -1 where memory lacks.
+// Selects, from the vertices near[first … first + count), those that may be closest to some point of the ball, and appends them. Returns how many; -1 if out of
+// memory.
 static int narrow(Making *m, int first, int count, Vec3 middle, double radius)
 {
     double least = HUGE_VAL;
@@ -325,7 +326,7 @@ static int narrow(Making *m, int first, int count, Vec3 middle, double radius)
     return kept;
 }
 
-// Vertices in block b and the blocks around as far as the band and the vertices' triangles reach. Returns how many, -1 where memory lacks.
+// Collects the vertices in block b and in the surrounding blocks as far as the band and the vertices' triangles reach. Returns how many; -1 if out of memory.
 static int gather_vertices(Making *m, int b)
 {
     int around = (int)ceil(m->grid->options.band_mm / (BLOCK * m->grid->options.cell_mm)), count = 0;
@@ -352,7 +353,7 @@ static int next_to(const Making *m, int first, int count, Vec3 x)
     return best;
 }
 
-// Where each lattice point of block b is asked from.
+// Determines the vertex from which each lattice point of block b is queried.
 static bool ask_from(Making *m, int b)
 {
     double cell = m->grid->options.cell_mm;
@@ -386,7 +387,7 @@ static bool sample_block(Making *m, int b)
     return true;
 }
 
-// A block that holds nothing becomes known; inside and open ones are gone on from.
+// Adds a block without values to the map; the flood continues from it if it is inside or open.
 static bool learn_block(Making *m, const int at[3], int vertex)
 {
     GridVessel *grid = m->grid;
@@ -415,7 +416,7 @@ static bool learn_block(Making *m, const int at[3], int vertex)
             return false;
         m->sought_capacity = capacity;
     }
-    SEL_REQUIRE(m->sought_count < m->sought_capacity, "the list of blocks was made longer");
+    SEL_REQUIRE(m->sought_count < m->sought_capacity, "the list of blocks was enlarged before");
     memcpy(m->sought[m->sought_count], at, sizeof *m->sought);
     m->sought_vertex[m->sought_count++] = vertex;
     return true;
@@ -492,7 +493,7 @@ Vessel *grid_vessel_create(const Vessel *exact, const TriangleMesh *surface, con
         free(m);
     }
     if (!good) {
-        faults_add(faults, name, 0, 0, "grid: cells of %g mm with a band of %g mm need more memory than there is, or over %d blocks; larger cells are valid",
+        faults_add(faults, name, 0, 0, "grid: cells of %g mm with a band of %g mm need more memory than available, or more than %d blocks; use larger cells",
                    options->cell_mm, options->band_mm, (int)BLOCKS_MAX);
         if (grid)
             grid_destroy(&grid->vessel);

@@ -1,13 +1,14 @@
-// A sampled signed distance as a vessel: the gap of another vessel on a cubic lattice, trilinear between its points, as peers' collision models keep it.
-// Only blocks of the lattice near the wall hold values (a narrow band); those deeper inside say so, those outside too.
+// A sampled signed distance as a vessel: the gap of another vessel on a cubic lattice, with trilinear interpolation, as in the collision models of comparable
+// simulators. Only blocks of the lattice near the wall hold values (a narrow band); blocks deeper inside or outside only hold which side they are on.
 //
-// gap: the interpolated distance, of second order in the cell. (Over the length of its gradient, as for other fields: of first order, eight times the error at
-// cells of r / 10.) normal: the gradient's direction, of first order, which steps at the faces of cells. hessian: 0. node: 0, and so says locate; what a
-// point remembers as its node is its block.
-// Further inside than the blocks near the wall: VESSEL_FAR, with the band as a bound even where `reach` is more. Further outside than the band:
-// VESSEL_UNSURE, gap minus the band, the last normal the point had (0 where it had none).
-// Open ends: where `exact` says so at the middle of a block, VESSEL_OPEN_END; beyond the lattice a point is out of an open end where the block next to it is
-// inside or open, else outside.
+// gap: the interpolated distance, of second order in the cell. (Dividing by the length of its gradient, as for other fields, gives first order: eight times the
+// error with cells of r / 10.)
+// normal: the direction of the gradient, of first order, discontinuous at the faces of cells. hessian: 0. node: 0, also from `locate`; a point's memory stores
+// its block as the node.
+// Further inside than the blocks near the wall: VESSEL_FAR, with the band as a lower bound even where `reach` is more. Further outside than the band:
+// VESSEL_UNSURE, gap minus the band, and the point's last normal (0 if it had none).
+// Open ends: VESSEL_OPEN_END in a block at whose middle `exact` returns it. A point beyond the lattice is beyond an open end if the adjacent block is inside or
+// open; otherwise it is outside.
 #ifndef SELDINGER_GEOM_GRID_VESSEL_H
 #define SELDINGER_GEOM_GRID_VESSEL_H
 
@@ -20,8 +21,9 @@ typedef struct GridVesselOptions {
     Vec3 inlet, direction;
 } GridVesselOptions;
 
-// Samples `exact` about `surface` (its triangles say where the wall is, its nodes where `exact` is asked from); keeps neither. primitives: values held.
-// NULL with a fault where an option is out of range, the surface is empty or broken, memory lacks or 4 million blocks of 9 x 9 x 9 values would not do.
+// Samples `exact` around `surface` (its triangles locate the wall, its nodes are the nodes from which `exact` is queried); keeps neither. primitives: number of
+// values held. Returns NULL with a fault if an option is out of range, the surface is empty or broken, out of memory, or more than 4 million blocks of 9 x 9 x
+// 9 values are needed.
 Vessel *grid_vessel_create(const Vessel *exact, const TriangleMesh *surface, const GridVesselOptions *options, const char *name, Faults *faults);
 
 #endif

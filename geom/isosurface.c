@@ -1,4 +1,4 @@
-// What every surface of triangles needs: parts kept, memory, a cell for looking.
+// Functions common to all triangle surfaces: keeping some of the triangles, memory, a cell size for display.
 #include "geom/isosurface.h"
 
 #include <stdlib.h>
@@ -53,7 +53,7 @@ double isosurface_cell_for(const VesselTree *tree)
         least = fmin(least, tree->radius[i]);
         area += parent < 0 ? 0 : 2 * PI * tree->radius[i] * vec3_distance(tree->center[i], tree->center[parent]);
     }
-    // marching cubes cut a cell's face in 2.3 triangles on the average
+    // marching cubes give 2.3 triangles per cell face on average
     double wanted = sqrt(2.3 * area / 300000);
     return fmax(fmin(fmax(wanted, 0.3 * least), 0.6 * least), 0.02);
 }

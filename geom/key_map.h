@@ -1,4 +1,4 @@
-// A map from 64-bit keys to indices >= 0: open addressing, at most half full. Zero-initialised it is empty. Not thread-safe while keys are added.
+// A hash map from 64-bit keys to indices >= 0: open addressing, at most half full. A zero-initialised map is empty. Not thread-safe while keys are added.
 #ifndef SELDINGER_GEOM_KEY_MAP_H
 #define SELDINGER_GEOM_KEY_MAP_H
 
@@ -12,16 +12,16 @@ typedef struct KeyMap {
     int *value;                      // -1: free
 } KeyMap;
 
-// Room for `count` keys without growing. False, with the map as it was, where memory lacks.
+// Makes room for `count` keys without growing. Returns false, with the map unchanged, if out of memory.
 bool key_map_reserve(KeyMap *map, size_t count);
-// The place of a key's value; a new key gets `fresh` and *is_new. NULL: no memory.
+// Returns a pointer to the key's value; a new key gets `fresh` and sets *is_new. Returns NULL if out of memory.
 int *key_map_find_or_add(KeyMap *map, uint64_t key, int fresh, bool *is_new);
 void key_map_free(KeyMap *map);
 
-// Where a key's search begins.
+// Slot where the search for a key begins.
 static inline size_t key_map_slot(const KeyMap *map, uint64_t key) { return (key * 0x9e3779b97f4a7c15u) >> 20 & (map->capacity - 1); }
 
-// The value of a key, -1 where there is none.
+// The value of a key; -1 if the map does not hold it.
 static inline int key_map_find(const KeyMap *map, uint64_t key)
 {
     if (map->count == 0)

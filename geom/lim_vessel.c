@@ -1,27 +1,27 @@
-// Contact with a fitted tree: topological tracking by power distance (Kerrien 2017, 6.2.1) and Newton projection onto the local model of the
-// point's node (6.2.2, iterated: a single step is Taubin's distance, up to 2.3 times too long).
+// Contact with a fitted tree: topological tracking by power distance (Kerrien et al. 2017, 6.2.1) and Newton projection onto the local model of the point's
+// node (6.2.2, iterated: a single step is Taubin's distance, up to 2.3 times too long).
 //
-// A point goes through
-//   1. the planes between its node's cell and those near (NearGroup); where another is better, power_walk;
-//   2. bounds that cost no field: the distance is 1-Lipschitz, so gap(X) >= gap(C) - |X - C| for the node's centre C, and
-//      gap(X) >= clearance - |X - X_then| for the place where that was last made sure of;
+// A point goes through these stages:
+//   1. the planes between its node's cell and the near cells (NearGroup); if another cell is better, power_walk;
+//   2. bounds that need no field: the distance is 1-Lipschitz, so gap(X) >= gap(C) - |X - C| for the node's centre C, and
+//      gap(X) >= clearance - |X - X_then| for the last point where the clearance was verified;
 //   3. one value of the field at X: its sign, and an estimate that shows when another wall has come closer than the remembered one;
-//   4. Newton (foot_lanes.h) from where the remembered foot should have moved to: p + (I + gap S)^-1 P (X - X_then); near focal points with bounded
+//   4. Newton (foot_lanes.h) from the predicted position of the remembered foot, p + (I + gap S)^-1 P (X - X_then); near focal points with bounded
 //      steps of |I + gap S|^-1;
-//   5. where that fails, a march from X along the gradient, then again 4; where that fails, blobby_project (slow, robust);
-//   6. near the wall, the partners: models of the cells that are close, asked at the own foot, and mixed in.
-// The march works on W = (f + T)^(-1/2) - T^(-1/2), which for one blob is a paraboloid |X - C|^2 - r^2 up to scale: Newton on it from outside never
-// overshoots and arrives from any distance, where f itself is flat.
+//   5. if that fails, a march from X along the gradient, then stage 4 again; if that fails, blobby_project (slow, robust);
+//   6. near the wall, the partners: models of adjacent cells, evaluated at the own foot and blended in.
+// The march works on W = (f + T)^(-1/2) - T^(-1/2), which for one blob is a paraboloid |X - C|^2 - r^2 up to scale: Newton on it from outside never overshoots
+// and converges from any distance, where f itself is flat.
 //
-// The inlet. Blobs close upstream of the root, the vessel does not. With z the height over the root's plane along its direction d, models near it are
-// asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
-// section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
+// The inlet. Blobs close upstream of the root, the vessel does not. With z the height over the root's plane along its direction d, models near it are evaluated
+// at X + (zeta(z) - z) d instead of X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the section at the
+// root continues upstream as a cylinder without end, and wall, normal and Hessian are smooth across the plane.
 //
-// Where the time goes (80 points creeping 0.05 mm a step, AVX-512, phantom to aneurism, ns a point): fields and Newton 44 to 65, of which second steps
-// 14 to 35; the look at X where a foot is not trusted 3 to 6; cell test 18 to 26; lanes in and out 25; partners 37 to 66. None grows with the tree.
-// Tried and lost: blob terms of fewer products (2 %), second steps from value and gradient alone (3 %, and a Hessian that is not that of the foot),
-// a prediction with the gap's change in it (nothing: what remains is the wall's own waviness), memories and hits turned over in registers (AVX2 slower),
-// lanes in the order of their models' size, blobs fetched ahead, cell tests of a whole batch in one call (nothing, 1 %), second steps side by side (1 %).
+// Time per point (80 points creeping 0.05 mm a step, AVX-512, phantom to aneurism, ns): fields and Newton 44 to 65, of which second steps 14 to 35; evaluation
+// at X where a foot is not trusted 3 to 6; cell test 18 to 26; loading and storing lanes 25; partners 37 to 66. None of these grows with the tree. Tried and
+// rejected: blob terms with fewer products (2 % gain), second steps from value and gradient alone (3 %, and the Hessian is not that of the foot), a prediction
+// that includes the change of the gap (no gain: the remaining error is the waviness of the wall itself), memories and hits transposed in registers (slower with
+// AVX2), lanes ordered by model size, prefetched blobs, cell tests of a whole batch in one call (0 to 1 %), second steps side by side (1 %).
 #include "geom/foot_lanes.h"
 #include "base/base.h"
 #include "geom/power_blocks.h"
@@ -35,52 +35,52 @@ typedef struct NodeModel {
     const BlobGroup *group;
     const NearGroup *near;
     int groups;
-    int near_groups, all_near;   // groups of planes that count within the node's ball, see fill_near, and all
-    int source;              // the node whose blobs these are: itself, or the nearest relative where it has none
-    bool carried;            // near the inlet: goes on upstream
-    double radius, bend;     // [mm], and its inverse
+    int near_groups, all_near;   // number of groups of planes: those that matter within the node's ball, see fill_near, and all
+    int source;              // the node whose blobs these are: itself, or the nearest relative if it has none
+    bool carried;            // near the inlet: the wall continues upstream
+    double radius, bend;     // [mm]; bend: its inverse
     Vec3 center;
-    double room;             // [mm] a foot in this cell that is nearer is the closest: see measure_room
-    double ball2;            // [mm^2] (1.2 r)^2: beyond, power_walk looks around
-    double least;            // [mm] blend_least; 0 where nothing is mixed
-    double clear;            // [mm] true distance from the node's centre to the wall of this model, less a margin; < 0: no bound
+    double room;             // [mm] a foot in this cell at a smaller distance is the closest: see measure_room
+    double ball2;            // [mm^2] (1.2 r)^2: beyond it, power_walk also searches other nodes
+    double least;            // [mm] blend_least; 0 if nothing is blended
+    double clear;            // [mm] distance from the node's centre to the wall of this model, minus a margin; < 0: unknown
 } NodeModel;
 
 typedef struct LimVessel {
-    Vessel vessel;           // first: a Vessel * to us is a LimVessel *
+    Vessel vessel;           // first: a Vessel * points to its LimVessel
     const VesselTree *tree;
     LimVesselOptions options;
     const LaneKernels *kernels;
     BlobGroup *group;        // all nodes' groups
     NearGroup *near;
     NodeModel *model;        // (N)
-    PowerBlocks blocks;      // for points without a node
-    bool inlet_open;         // the root is an end of the tree
+    PowerBlocks blocks;      // to locate points without a node
+    bool inlet_open;         // the root is an open end of the tree
 } LimVessel;
 
-// Points of a query are taken in batches, and each batch in stages (all fields at X, all first Newton steps, …), see foot_lanes.h. A point's answer
-// does not depend on its batch. What the lanes do not hold:
+// The points of a query are processed in batches, and each batch in stages (all fields at X, all first Newton steps, …), see foot_lanes.h. A point's result
+// does not depend on its batch. Data per point that the lanes do not hold:
 enum { PARTNERS_MAX = 7 };
 typedef struct Lane {
-    int point;               // of the query
+    int point;               // index in the query
     int node;
     bool sure, again;
-    bool at_home;            // in the node's ball, as before
-    bool trusted;            // no other wall can be closer: not asked at X
-    bool checked;            // no other wall stands within 0.7 gap
-    int partners;            // nodes whose models are mixed in
+    bool at_home;            // still within the node's ball
+    bool trusted;            // no other wall can be closer: the field at X is not evaluated
+    bool checked;            // no other wall lies within 0.7 gap
+    int partners;            // number of nodes whose models are blended in
     int partner[PARTNERS_MAX];
     float weight[PARTNERS_MAX];
 } Lane;
 
-// A batch's lanes, those with most partners first, so that the k-th partners are asked for neighbours.
+// A batch's lanes, those with most partners first, so that the lanes with a k-th partner are consecutive.
 typedef struct LaneBatch {
     int count;
     Lane *of[FOOT_BATCH];
-    int asked_count, asked[FOOT_BATCH + 1];   // those that are not trusted
+    int asked_count, asked[FOOT_BATCH + 1];   // the lanes that are not trusted
     FootBatch foot;
-    FootSample at_x;         // of those, side by side
-    Lane lane[FOOT_BATCH];   // as they come
+    FootSample at_x;         // fields at X of these lanes, consecutively
+    Lane lane[FOOT_BATCH];   // in the order of the points
 } LaneBatch;
 
 static Vec3 lane_point(const FootBatch *b, int i) { return vec3(b->xx[i], b->xy[i], b->xz[i]); }
@@ -112,7 +112,7 @@ static double carried_height(double z, double h, double *slope, double *bend)
     return h * u * u * u * (2 - u);
 }
 
-// Sums of the fields, those near the inlet as they go on upstream.
+// Sums of the fields; near the inlet, of the fields that continue upstream.
 static void sample(const LimVessel *lim, FootSample *s, const int *lane, int count, bool hessian)
 {
     SEL_ASSERT(count >= 0 && count <= FOOT_BATCH, "a batch has no more lanes than samples");
@@ -152,7 +152,7 @@ static void sample(const LimVessel *lim, FootSample *s, const int *lane, int cou
 
 static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec3 x)
 {
-    SEL_ASSERT(node >= 0 && node < lim->tree->node_count, "a lane asks a node of the tree");
+    SEL_ASSERT(node >= 0 && node < lim->tree->node_count, "a lane's node is one of the tree");
     SEL_ASSERT(i >= 0 && i < FOOT_BATCH, "a lane is one of the batch");
     const NodeModel *m = &lim->model[node];
     s->group[i] = m->group;
@@ -164,13 +164,13 @@ static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec
 
 // --- Feet ---
 
-// [mm] what Newton may leave: of a foot that was followed, of one found afresh.
+// [mm] error that Newton may leave: for a foot that was followed, for one found from scratch.
 static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9;
 
-// Lanes are computed in whole blocks: those beyond the last in use hold numbers.
+// Lanes are computed in whole blocks: fills the lanes after the last one in use with numbers.
 static void fill_block(FootBatch *b, int count)
 {
-    SEL_ASSERT(count > 0 && count <= FOOT_BATCH, "a batch has no more lanes than room");
+    SEL_ASSERT(count > 0 && count <= FOOT_BATCH, "a batch has no more lanes than its capacity");
     for (int i = count; i % FOOT_BLOCK != 0; i++) {
         FootSample *s = &b->at;
         s->x[i] = s->y[i] = s->z[i] = s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
@@ -182,8 +182,7 @@ static void fill_block(FootBatch *b, int count)
     }
 }
 
-// At most `rounds` Newton steps of the pending lanes; those that are not done then are lost. False where
-// all are done.
+// At most `rounds` Newton steps of the pending lanes; lanes not done after that are lost. Returns false if all are done.
 static bool newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rounds, bool careful)
 {
     int lane[FOOT_BATCH];
@@ -204,12 +203,12 @@ static bool newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rou
     return true;
 }
 
-// From the sample at the running foot one step of the march towards the wall; true where it is within a twentieth of the radius of it.
+// One step of the march towards the wall, from the sample at the current foot. Returns true if the step is shorter than a twentieth of the radius.
 static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
 {
     const VesselTree *tree = lim->tree;
     Vec3 g = {b->at.gx[i], b->at.gy[i], b->at.gz[i]}, p = lane_foot(b, i);
-    // inside a vessel the side wall is nearer than its ends, though near the axis the field may fall faster towards those
+    // inside a vessel the side wall is closer than the ends, though near the axis the field may fall faster towards the ends
     if (b->inside[i] > 0 && tree->kind[node] == NODE_VESSEL)
         g = vec3_add_scaled(g, -vec3_dot(g, tree->direction[node]), tree->direction[node]);
     double radius = tree->radius[node], level = 1 / sqrt(tree->iso_level), slope = vec3_norm(g), sum = b->at.f[i] + tree->iso_level, step = radius;
@@ -218,7 +217,7 @@ static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
         step = fmax(2 * (w - level) / (w * w * w * slope), -1.2 * radius);   // < 0 inside: outwards
         p = vec3_add_scaled(p, step / slope, g);
     } else {
-        // on a symmetric axis or at a lone blob's centre any way out is as good, the same one always
+        // on a symmetry axis or at the centre of a single blob any direction will do, but always the same one
         p = vec3_add_scaled(p, radius, vec3_normal_to(tree->direction[node]));
     }
     b->at.x[i] = p.x, b->at.y[i] = p.y, b->at.z[i] = p.z;
@@ -236,7 +235,7 @@ static void march_rounds(const LimVessel *lim, LaneBatch *batch, const int *lane
         if (batch->of[i]->trusted)
             trusted[n++] = i;
     }
-    if (n > 0) {   // the trust was misplaced
+    if (n > 0) {   // lanes that were trusted wrongly
         sample(lim, &b->at, trusted, n, false);
         for (int k = 0; k < n; k++)
             b->inside[trusted[k]] = b->at.f[trusted[k]] > 0;
@@ -251,7 +250,8 @@ static void march_rounds(const LimVessel *lim, LaneBatch *batch, const int *lane
     }
 }
 
-// The wall in the plane through X across the inlet's direction d: for feet near the inlet that nothing else finds. False where that section holds no wall.
+// The wall in the plane through X across the inlet's direction d: for feet near the inlet that are not found otherwise. Returns false if the section holds no
+// wall.
 static bool project_in_section(const LimVessel *lim, int node, Vec3 x, SurfacePoint *found)
 {
     enum { STEPS = 30 };
@@ -278,7 +278,7 @@ static bool project_in_section(const LimVessel *lim, int node, Vec3 x, SurfacePo
             p = vec3_add_scaled(p, step / slope, g);
             continue;
         }
-        // Newton in the section: one tangent
+        // Newton in the section, with one tangent
         Vec3 n = vec3_scale(g, 1 / slope), t = vec3_cross(d, n), away = vec3_sub(p, x);
         double gap = -vec3_dot(away, n), k = sym3_quadratic(&h, t) / slope, y = -vec3_dot(away, t) / fmax(fabs(1 + gap * k), 0.2);
         y = fmax(-0.5 * radius, fmin(0.5 * radius, y));
@@ -309,7 +309,7 @@ static void project_slowly(const LimVessel *lim, FootBatch *b, int i, Lane *of)
     of->sure = s.converged;
     normal = s.normal;
     if (!s.converged) {
-        // Taubin's distance along the gradient, or what little is known: a flat wall there
+        // Taubin's distance along the gradient, or the distance found, with a flat wall there
         double gap = slope > 1e-100 && fabs(f / slope) < fabs(s.distance) ? f / slope : s.distance;
         normal = vec3_unit_or(g, s.normal);
         s.foot = vec3_add_scaled(x, -gap, normal);
@@ -324,8 +324,8 @@ static void project_slowly(const LimVessel *lim, FootBatch *b, int i, Lane *of)
 
 static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0) != (b->inside[i] > 0) && fabs(b->gap[i]) > 1e-6; }
 
-// Newton's steps from the remembered feet. A point near the axis has many feet nearly as close as each other, and its foot runs round with it: careful
-// steps from the last one find it, where a march from X falls on any side and takes long.
+// Newton's steps from the remembered feet. A point near the axis has many feet at nearly the same distance, and its foot moves around with it: careful steps
+// from the last foot find it, whereas a march from X ends on an arbitrary side and takes long.
 static void follow_feet(const LimVessel *lim, FootBatch *b, int count)
 {
     bool deep = false;
@@ -341,7 +341,7 @@ static void follow_feet(const LimVessel *lim, FootBatch *b, int count)
         newton_rounds(lim, b, count, 12, true);
 }
 
-// What the field at X says of the lanes that are not trusted.
+// Evaluates the field at X for the lanes that are not trusted.
 static void ask_at_points(const LimVessel *lim, LaneBatch *batch)
 {
     FootBatch *b = &batch->foot;
@@ -365,11 +365,11 @@ static void ask_at_points(const LimVessel *lim, LaneBatch *batch)
     }
 }
 
-// On the axis of a round vessel all feet around are equally near: Newton's steps go round for ever, and any of them is right to second order in what is
-// left of the way along the wall. Keeps the lanes of which that is not true; returns their number.
+// On the axis of a round vessel all feet around are equally near and Newton does not converge; any of them is correct to second order in the remaining
+// tangential distance. Keeps the lanes for which this does not hold; returns their number.
 static int settle_on_axis(const LimVessel *lim, FootBatch *b, int *lane, int count)
 {
-    static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
+    static const double LEFT = 1e-4, OFF = 1e-5;     // relative to the radius: tangential and normal residual
     int kept = 0;
     sample(lim, &b->at, lane, count, false);
     for (int k = 0; k < count; k++) {
@@ -386,8 +386,8 @@ static int settle_on_axis(const LimVessel *lim, FootBatch *b, int *lane, int cou
     return kept;
 }
 
-// Feet of a batch's lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
-// stands further off than another, is not the closest: those start once more from X.
+// Feet of a batch's lanes on the models of their nodes; `again` marks lanes without a start. A foot on the wrong side of the wall, or on a wall that is further
+// away than another, is not the closest: these lanes start again from X.
 static void project_batch(const LimVessel *lim, LaneBatch *batch)
 {
     FootBatch *b = &batch->foot;
@@ -433,9 +433,9 @@ static const Vec3 look[LOOKS] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}
                                  {C, C, -C}, {C, -C, C}, {C, -C, -C}, {-C, C, C}, {-C, C, -C}, {-C, -C, C}, {-C, -C, -C}};
 #undef C
 
-// A foot far off is the locally closest, but is it the closest? Looks on a sphere of 0.9 times its distance about X in 14 directions, at most 36 degrees
-// apart from any other: all inside means that no (flat) wall is nearer than 0.7 gap. What fails is projected anew, slowly and thoroughly. Asked only
-// where the clearance of an earlier check has been used up; near the wall the estimate serves.
+// A distant foot is locally the closest, but another wall may be closer. Tests 14 directions, at most 36 degrees apart, on a sphere about X of 0.9 times the
+// foot's distance: if all are inside, no (flat) wall is closer than 0.7 gap. A point that fails is projected again, slowly and thoroughly. Done only where the
+// clearance of an earlier check has been used up; near the wall the estimate suffices.
 static void check_batch(const LimVessel *lim, LaneBatch *batch, const VesselMemory *memory)
 {
     FootBatch *b = &batch->foot;
@@ -484,15 +484,14 @@ static void check_batch(const LimVessel *lim, LaneBatch *batch, const VesselMemo
 
 // --- The blended field ---
 
-// Models that differ by less than this are mixed, ever less the more they differ: half the radius, and never so much that the mixed wall
-// leaves the own model's by more than 0.15 mm (0.18 of it, for one partner). One that says something else altogether is a ghost and left out.
-// On the angiogram's model neighbours differ by up to 0.3 mm in sharp bends; mixing up to 0.25 mm only left steps in the wall that threw the
-// wire 0.3 mm out, where this leaves 0.09 mm.
+// Models that differ by less than this are blended, with a weight that falls with the difference: half the radius, and so little that the blended wall stays
+// within 0.15 mm of the own model's (0.18 of the limit, for one partner). A model that differs more is spurious and is ignored. On the angiogram's model,
+// neighbours differ by up to 0.3 mm in sharp bends; a limit of 0.25 mm left steps in the wall that threw the wire 0.3 mm out, where this limit leaves 0.09 mm.
 static double blend_agree(double radius) { return fmin(FOOT_AGREE_RADII * radius, FOOT_AGREE); }
-// The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for a few partners, w = (1 - q^2)^2.
+// The blended gap is less than the own model's by at most this: sum w q / (1 + sum w) < 1/2 of the above for a few partners, w = (1 - q^2)^2.
 static double blend_least(double radius) { return 0.5 * blend_agree(radius); }
-// Half width of the mixed zone: a node counts where its power distance exceeds the best by less than this part of the node spacing squared,
-// which is 0 at the cell's border and 1 at its middle.
+// Half width of the blending zone: a node counts where its power distance exceeds the best by less than this fraction of the squared node spacing; the excess
+// is 0 at the cell's border and 1 at its middle.
 static const double BLEND_BAND = 2;
 
 static double spacing2(const VesselTree *tree, int node)
@@ -504,7 +503,7 @@ static double spacing2(const VesselTree *tree, int node)
     return end > first ? sum / (end - first) : 0;
 }
 
-// A partner's answers for the lanes [lane, lane + n) of a batch of `count`; those whose walls differ much get a second look.
+// Evaluates a partner for the lanes [lane, lane + n) of a batch of `count`; lanes whose walls differ much are evaluated a second time.
 static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *partner, int *lane, int n, int count)
 {
     int again = 0;
@@ -523,7 +522,7 @@ static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *
     lim->kernels->partner(b, partner, count, true);
 }
 
-// Mixes the partners' walls into the hits of a batch, partner by partner.
+// Blends the partners' walls into the hits of a batch, partner by partner.
 static void blend_batch(const LimVessel *lim, const LaneBatch *batch, double reach, VesselHit *hit)
 {
     const FootBatch *b = &batch->foot;
@@ -582,7 +581,7 @@ static VesselHit open_end(VesselMemory *memory, int node)
     return (VesselHit){.gap = HUGE_VAL, .node = node, .flags = VESSEL_OPEN_END};
 }
 
-// Collects the partners of `node` at y from its centre, among the first of its near groups. False where X is in another node's cell.
+// Collects the partners of `node` at y from its centre, among the first `groups` near groups. Returns false if X is in another node's cell.
 static bool collect_partners(const LimVessel *lim, const NodeModel *m, int groups, Vec3 y, Lane *of)
 {
     float at[3] = {(float)y.x, (float)y.y, (float)y.z}, weight[NEAR_GROUP];
@@ -593,7 +592,7 @@ static bool collect_partners(const LimVessel *lim, const NodeModel *m, int group
         own &= better == 0;
         for (in = mixed ? in : 0; in != 0 && found < PARTNERS_MAX; in &= in - 1) {
             int k = __builtin_ctz(in);
-            SEL_ASSERT(m->near[g].node[k] >= 0, "an empty plane has no mixed zone");
+            SEL_ASSERT(m->near[g].node[k] >= 0, "an empty plane has no blending zone");
             of->partner[found] = m->near[g].node[k];
             of->weight[found++] = better >> k & 1 ? 1 : weight[k];
         }
@@ -609,7 +608,7 @@ static int walk(const LimVessel *lim, Vec3 x, int from, int hops)
     return known ? power_walk(lim->tree, x, from, hops) : power_blocks_nearest(&lim->blocks, x);
 }
 
-// The point's node and its partners.
+// Returns the point's node and collects its partners.
 static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
 {
     const VesselTree *tree = lim->tree;
@@ -627,7 +626,7 @@ static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
     return next;
 }
 
-// Answers where no field is needed; false where one is.
+// Returns true if the hit can be filled without evaluating the field.
 static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMemory *memory, Lane *of, VesselHit *hit)
 {
     if (!(vec3_norm2(x) < 1e100)) {
@@ -657,10 +656,10 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
     return true;
 }
 
-// What a lane is asked, and what is remembered: kernels->predict makes the start of it.
+// Loads a lane with its point, its model and the remembered foot; kernels->predict computes its start from these.
 static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, const VesselMemory *memory)
 {
-    SEL_ASSERT(i >= 0 && i < FOOT_BATCH && node >= 0 && node < lim->tree->node_count, "a lane of the batch asks a node of the tree");
+    SEL_ASSERT(i >= 0 && i < FOOT_BATCH && node >= 0 && node < lim->tree->node_count, "the lane is one of the batch and its node one of the tree");
     const NodeModel *m = &lim->model[node];
     b->at.group[i] = m->group, b->at.groups[i] = m->groups;
     b->at.carried[i] = m->carried, b->at.any_carried |= m->carried;
@@ -678,11 +677,11 @@ static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x
     }
 }
 
-enum { TRUST = 16 };         // queries in which a trusted foot goes without the look at X
+enum { TRUST = 16 };         // number of queries for which a trusted foot is not checked at X
 
 static void answer_from_foot(const FootBatch *b, int i, const Lane *of, VesselMemory *memory, VesselHit *hit)
 {
-    // by values: reading back what was just written in pieces stalls
+    // copied as values: reading back what was just written in parts causes a stall
     Vec3 x = lane_point(b, i), foot = lane_foot(b, i), normal = lane_normal(b, i);
     Sym3 hessian = lane_hessian(b, i);
     double gap = b->gap[i];
@@ -699,7 +698,7 @@ static void answer_from_foot(const FootBatch *b, int i, const Lane *of, VesselMe
     memory->hessian = hessian;
 }
 
-// Takes the lanes in the order of their partners' number, most first.
+// Orders the lanes by number of partners, most first.
 static void order_lanes(LaneBatch *batch, const int *with)
 {
     int place[PARTNERS_MAX + 1], at = 0;
@@ -707,7 +706,7 @@ static void order_lanes(LaneBatch *batch, const int *with)
         place[k] = at;
         at += with[k];
     }
-    SEL_REQUIRE(at == batch->count, "each lane is counted once by its partners");
+    SEL_REQUIRE(at == batch->count, "the counts by number of partners include each lane once");
     for (int i = 0; i < batch->count; i++)
         batch->of[place[batch->lane[i].partners]++] = &batch->lane[i];
 }
@@ -792,9 +791,9 @@ static void lim_destroy(Vessel *vessel)
     free(lim);
 }
 
-// --- Making one ---
+// --- Creation ---
 
-// A node without blobs answers with those of its nearest ancestor that has some, else of the first node that has.
+// A node without blobs uses those of its nearest ancestor that has some, else those of the first node that has some.
 static void choose_sources(const VesselTree *tree, NodeModel *model)
 {
     SEL_ASSERT(tree->blob_count == tree->blob_offset[tree->node_count] && tree->blob_count > 0, "some node has blobs");
@@ -803,21 +802,21 @@ static void choose_sources(const VesselTree *tree, NodeModel *model)
         first++;
     for (int i = 0; i < tree->node_count; i++) {
         bool own = tree->blob_offset[i + 1] > tree->blob_offset[i];
-        SEL_ASSERT(tree->parent[i] < i, "parents stand before children");
+        SEL_ASSERT(tree->parent[i] < i, "parents come before children");
         model[i].source = own ? i : i > 0 ? model[tree->parent[i]].source : first;
     }
 }
 
 static int near_groups_of(const VesselTree *tree, int node) { return (tree->near_offset[node + 1] - tree->near_offset[node] + NEAR_GROUP - 1) / NEAR_GROUP; }
 
-// A near node's plane, see NearGroup: within the mixed zone, or beyond, where base - e.y <= width.
+// A near node's plane, see NearGroup: y lies within the blending zone or beyond it if base - e.y <= width.
 typedef struct NearPlane {
     int node;
     double base, width;
     Vec3 e;
 } NearPlane;
 
-// The mixed zone is as wide as the narrower of the two nodes' own.
+// The blending zone has the width of the narrower of the two nodes' zones.
 static NearPlane near_plane(const VesselTree *tree, int i, int j)
 {
     Vec3 e = vec3_sub(tree->center[j], tree->center[i]);
@@ -825,8 +824,8 @@ static NearPlane near_plane(const VesselTree *tree, int i, int j)
     return (NearPlane){j, base, fmax(BLEND_BAND * fmin(spacing2(tree, i), spacing2(tree, j)), 1e-12), vec3_scale(e, 2)};
 }
 
-// Within the ball |y| < ball, does a's cell cover all of the space in which b counts? With a's plane the ball is cut to y.e_a <= base_a: how far does that
-// reach along e_b?
+// Returns whether, within the ball |y| < ball, a's cell covers all of the region in which b counts. The plane of a cuts the ball to y.e_a <= base_a; the test
+// is how far that part extends along e_b.
 static bool covers(const NearPlane *a, const NearPlane *b, double ball)
 {
     double size_a = vec3_norm(a->e), size_b = vec3_norm(b->e), most = ball * size_b;
@@ -840,8 +839,8 @@ static bool covers(const NearPlane *a, const NearPlane *b, double ball)
     return b->base - most > b->width + 1e-4 * (ball * size_b + fabs(b->base));   // single precision
 }
 
-// Planes to the near nodes: first those that count for points in the ball of 1.2 r, whose number of groups is returned. Along a vessel that leaves the two
-// next on either side of nine and more.
+// Fills the planes to the near nodes, first those that matter for points in the ball of 1.2 r; returns the number of groups of these. Along a vessel, the two
+// adjacent nodes on either side remain of nine or more.
 static int fill_near(const VesselTree *tree, int i, double ball, NearGroup *group)
 {
     int first = tree->near_offset[i], count = tree->near_offset[i + 1] - first, kept = 0;
@@ -869,13 +868,13 @@ static int fill_near(const VesselTree *tree, int i, double ball, NearGroup *grou
         NearGroup *g = &group[k / NEAR_GROUP];
         int lane = k % NEAR_GROUP;
         g->node[lane] = -1;
-        g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // nowhere in its band
+        g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // never within its band
     }
-    SEL_ASSERT(kept <= count, "the planes that count are some of all");
+    SEL_ASSERT(kept <= count, "the planes that matter are a subset of all");
     return (kept + NEAR_GROUP - 1) / NEAR_GROUP;
 }
 
-// The root's section goes on upstream in the models near it that hold the root's centre.
+// Makes the root's section continue upstream in the models near it that hold the root's centre.
 static void carry_inlet(LimVessel *lim)
 {
     const VesselTree *tree = lim->tree;
@@ -894,9 +893,9 @@ static bool is_lumen_within(const Blobby *blobs, Vec3 middle, double radius)
     return lumen;
 }
 
-// Is the model's wall about the node one sheet with room before it? Takes feet around the node, over the length of its cell, and looks 14 ways from
-// the middle of a ball that touches each: where all is lumen, a foot closer than 0.6 times its radius is the closest. The ball is of 0.8 r, or of less, down
-// to 0.3 r, where that has no room, as beside a branch.
+// Computes `room`: whether the model's wall around the node is a single sheet with free lumen in front of it. For feet around the node, over the length of its
+// cell, the function tests 14 directions from the centre of a ball that touches the wall there: if all are lumen, a foot closer than 0.6 times the ball's
+// radius is the closest. The ball has a radius of 0.8 r, or less, down to 0.3 r, where there is not enough room, as next to a branch.
 static double measure_room(const LimVessel *lim, int node)
 {
     enum { AROUND = 8 };
@@ -912,7 +911,7 @@ static double measure_room(const LimVessel *lim, int node)
         Vec3 foot = vec3_add_scaled(tree->center[node], (k / AROUND - 1) * reach, d), g;
         if (!(blobby_field(&blobs, foot) > 0))
             return 0;
-        for (int i = 0; i<12; i++, step *= i> 4 ? 0.5 : 1) // out, then closer and closer to the wall
+        for (int i = 0; i<12; i++, step *= i> 4 ? 0.5 : 1) // outwards, then in smaller steps to the wall
             if (i < 5 ? blobby_field(&blobs, vec3_add_scaled(foot, step, out)) > 0 : true) {
                 Vec3 next = vec3_add_scaled(foot, step, out);
                 foot = blobby_field(&blobs, next) > 0 ? next : foot;
@@ -943,7 +942,7 @@ static void fill_models(LimVessel *lim, size_t groups, size_t nears)
             blob_groups_fill(group, &blobs);
             group += m->groups;
         } else {
-            m->group = NULL;   // below, when all are filled
+            m->group = NULL;   // set below, when all are filled
         }
         m->center = tree->center[i];
         m->radius = tree->radius[i];
@@ -951,7 +950,7 @@ static void fill_models(LimVessel *lim, size_t groups, size_t nears)
         m->bend = 1 / m->radius;
         m->ball2 = 1.44 * m->radius * m->radius;
         m->least = lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0;
-        // less than what was found, should that be another side's foot
+        // less than the distance found, in case that foot is on another side
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
         m->clear = s.converged && s.distance > 0 ? fmin(0.95 * s.distance, tree->radius[i]) : -HUGE_VAL;
         m->room = measure_room(lim, i);

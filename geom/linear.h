@@ -1,8 +1,7 @@
 // Small vectors, matrices and unit quaternions, all double, all inline.
 //
-// Conventions: Mat3 is row-major, m[row][col]. Sym3 holds the six distinct entries of a symmetric matrix.
-// Quat is (w, x, y, z), |q| = 1, and rotates a body vector into space: v_space = q v_body q*.
-// A rotation vector is angle [rad] times unit axis. Nothing here allocates, branches on a clock or sees a file.
+// Conventions: Mat3 is row-major, m[row][col]. Sym3 holds the six distinct entries of a symmetric matrix. Quat is (w, x, y, z), |q| = 1, and rotates a body
+// vector into space: v_space = q v_body q*. A rotation vector is the angle [rad] times the unit axis. Nothing here allocates.
 #ifndef SELDINGER_GEOM_LINEAR_H
 #define SELDINGER_GEOM_LINEAR_H
 
@@ -43,19 +42,18 @@ static inline Vec3 vec3_cross(Vec3 a, Vec3 b) { return (Vec3){a.y * b.z - a.z * 
 static inline double vec3_norm2(Vec3 a) { return vec3_dot(a, a); }
 static inline double vec3_norm(Vec3 a) { return sqrt(vec3_dot(a, a)); }
 static inline double vec3_distance(Vec3 a, Vec3 b) { return vec3_norm(vec3_sub(a, b)); }
-// [rad] between a and b, of any length, 0 to pi.
+// Angle [rad] between a and b, which may have any length; 0 to pi.
 static inline double vec3_angle(Vec3 a, Vec3 b) { return same_atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
 static inline bool vec3_is_finite(Vec3 a) { return isfinite(a.x) && isfinite(a.y) && isfinite(a.z); }
-// The unit vector along a; `otherwise` where a is too short to have a direction.
+// The unit vector along a; `otherwise` if a is too short to have a direction.
 static inline Vec3 vec3_unit_or(Vec3 a, Vec3 otherwise)
 {
     double n = vec3_norm(a);
     return n > 1e-300 ? vec3_scale(a, 1 / n) : otherwise;
 }
 static inline Vec3 vec3_unit(Vec3 a) { return vec3_unit_or(a, (Vec3){1, 0, 0}); }
-// A unit vector perpendicular to unit d. It is the projection of the coordinate axis that follows d's dominant axis cyclically
-// (x -> y -> z -> x), with the sign of d's component along it, so that it commutes with mirroring in a coordinate plane
-// wherever d is not in that plane: a mirrored scene gets the mirrored frame.
+// A unit vector perpendicular to unit d: the projection of the coordinate axis that follows d's dominant axis cyclically (x -> y -> z -> x), with the sign of
+// d's component along it. So it commutes with mirroring in a coordinate plane wherever d is not in that plane: a mirrored scene gets the mirrored frame.
 static inline Vec3 vec3_normal_to(Vec3 d)
 {
     double ax = fabs(d.x), ay = fabs(d.y), az = fabs(d.z);
@@ -165,7 +163,7 @@ static inline Quat quat_from_rotation_vector(Vec3 w)
     double s = a > 1e-4 ? same_sin(a / 2) / a : 0.5 - a * a / 48;
     return (Quat){same_cos(a / 2), s * w.x, s * w.y, s * w.z};
 }
-// The rotation vector of the shorter way round, |w| <= pi.
+// The rotation vector of the shorter rotation, |w| <= pi.
 static inline Vec3 quat_to_rotation_vector(Quat q)
 {
     if (q.w < 0)

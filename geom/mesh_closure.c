@@ -1,5 +1,5 @@
-// A surface is closed where it has no boundary as a chain: along each edge the triangles that run one way cancel those that run the other, however many
-// there are. Triangles from each open edge to one point make it so.
+// A surface is closed if it has no boundary as a chain: along each edge, the triangles that traverse it in one direction cancel those that traverse it in the
+// other, however many there are. Triangles from each open edge to a common point close it.
 #include "geom/mesh_closure.h"
 
 #include "base/base.h"
@@ -8,7 +8,7 @@
 #include <string.h>
 
 typedef struct OpenEdge {
-    int from, to;            // as its triangles run along it, once more often than back
+    int from, to;            // in the direction in which its triangles traverse it more often, by one
     int times;
     bool is_turned;
 } OpenEdge;
@@ -32,7 +32,7 @@ static bool add_border(Borders *borders, OpenEdge edge)
     return true;
 }
 
-// --- vertices at the same place ---
+// --- vertices at the same position ---
 
 typedef struct Place {
     Vec3 x;
@@ -51,7 +51,7 @@ static int compare_places(const void *a, const void *b)
     return (p->vertex > q->vertex) - (p->vertex < q->vertex);
 }
 
-// same[v]: the lowest vertex at v's place.
+// same[v]: the lowest vertex at v's position.
 static bool find_same_places(const TriangleMesh *mesh, int *same)
 {
     size_t count = (size_t)mesh->vertex_count;
@@ -72,8 +72,8 @@ static bool find_same_places(const TriangleMesh *mesh, int *same)
 // --- edges ---
 
 typedef struct Side {
-    int to;                  // the higher vertex
-    int sign;                // +1 from the lower to the higher
+    int to;                  // the vertex with the higher index
+    int sign;                // +1 from the lower to the higher index
 } Side;
 
 static int compare_sides(const void *a, const void *b)
@@ -105,7 +105,7 @@ static bool find_borders(const TriangleMesh *mesh, const int *same, Borders *bor
     size_t *first = calloc(vertices + 2, sizeof *first);
     Side *side = malloc((sides + 1) * sizeof *side);
     bool good = first && side;
-    // by the lower end: counted, then laid into its places
+    // counting sort by the lower end: counted in the first pass, placed in the second
     for (int pass = 0; good && pass < 2; pass++) {
         for (size_t i = 0; i < sides; i++) {
             int a = same[mesh->triangle[i / 3][i % 3]], b = same[mesh->triangle[i / 3][(i + 1) % 3]], low = a < b ? a : b;
@@ -128,7 +128,7 @@ static bool find_borders(const TriangleMesh *mesh, const int *same, Borders *bor
 
 // --- lids ---
 
-// How far the rim's edges are from their mean plane, in their mean distance from the middle. The plane's normal is the rim's area vector.
+// Largest distance of the rim's edges from their mean plane, relative to their mean distance from the middle. The plane's normal is the rim's area vector.
 static double rim_unevenness(const TriangleMesh *mesh, const Borders *borders, const int *rim_of, int rim, Vec3 middle)
 {
     Vec3 area = {0, 0, 0};
@@ -149,7 +149,7 @@ static double rim_unevenness(const TriangleMesh *mesh, const Borders *borders, c
     return radius > 0 ? furthest * count / radius : 0;
 }
 
-// Numbers the connected sets of open edges: rim_of[v] for their vertices. -1 where memory lacks.
+// Numbers the connected sets of open edges; rim_of[v] is set for their vertices. Returns their number; -1 if out of memory.
 static int number_rims(const TriangleMesh *mesh, const Borders *borders, int *rim_of)
 {
     int *set = malloc(((size_t)mesh->vertex_count + 1) * sizeof *set), rims = 0;
@@ -232,7 +232,7 @@ bool mesh_closure(const TriangleMesh *mesh, MeshClosure *closure, MeshLids *lids
     for (int v = 0; good && v < mesh->vertex_count; v++)
         same[v] = v;
     good = good && find_borders(mesh, same, &borders);
-    // only a surface that seems open need be looked at for places that are there twice
+    // duplicate positions only matter if the surface seems open
     if (good && borders.count > 0) {
         borders.count = 0;
         good = find_same_places(mesh, same) && find_borders(mesh, same, &borders);

@@ -1,19 +1,19 @@
-// Whether a surface is closed, so that each ray through it goes in as often as out; and closing it where it has rims.
+// Tests whether a surface is closed, so that each ray through it enters as often as it leaves, and closes surfaces that have rims.
 #ifndef SELDINGER_GEOM_MESH_CLOSURE_H
 #define SELDINGER_GEOM_MESH_CLOSURE_H
 
 #include "geom/isosurface.h"
 
 typedef struct MeshClosure {
-    int64_t open_edges;      // that their triangles do not run along as often one way as the other
-    int64_t turned_edges;    // of these: two triangles that both run along them the same way, so that one faces inwards
+    int64_t open_edges;      // edges that their triangles do not traverse equally often in both directions
+    int64_t turned_edges;    // of these, edges that two triangles traverse in the same direction, so that one of them faces inwards
     int rims;                // connected sets of open edges
-    double unevenness;       // of the least flat rim: how far it is from its mean plane, in its mean radius
-    double volume;           // [mm3] enclosed, once rims have flat lids; > 0 where triangles face outwards
+    double unevenness;       // of the least flat rim: its largest distance from its mean plane, relative to its mean radius
+    double volume;           // [mm3] enclosed when the rims are closed by flat lids; > 0 if triangles face outwards
 } MeshClosure;
 
-// Vertices at the same place are taken for one. `lids`: triangles from each rim to its middle, which close the surface: their corners are vertices of the
-// mesh, or vertex_count + r for the middle of rim r. Both arrays are the caller's to free; NULL where there are none.
+// Triangles from each rim to its middle, which close the surface. Their corners are vertices of the mesh, or vertex_count + r for the middle of rim r. The
+// arrays are owned by the caller (mesh_lids_free); NULL if there are none.
 typedef struct MeshLids {
     int middle_count, triangle_count;
     Vec3 *middle;            // (middle_count)
@@ -21,7 +21,7 @@ typedef struct MeshLids {
     int (*triangle)[3];      // (triangle_count)
 } MeshLids;
 
-// False where memory lacks. `lids` may be NULL.
+// Vertices at the same position count as one. `lids` may be NULL. Returns false if out of memory.
 bool mesh_closure(const TriangleMesh *mesh, MeshClosure *closure, MeshLids *lids);
 void mesh_lids_free(MeshLids *lids);
 

@@ -1,7 +1,7 @@
-// Rounds of collapses. In each round all edges are priced and sorted, and the cheap ones collapsed in that order, save those of which an end has been collapsed
-// in this round; so no heap is kept, and the lists of triangles around a vertex stay right where they are still looked at. Price: mean squared distance of the
-// new vertex from the planes of the triangles that have gone into both ends, Q(x) = (x' A x + 2 b' x + c) / w, weighted by their areas w; it is in mm2 of
-// displacement, so that a thin branch, curved more, keeps shorter edges than a wide one.
+// Edges are collapsed in rounds. In each round the cost of every edge is computed, and the cheap edges are collapsed in order of cost, except those with an end
+// that has already been part of a collapse in this round: so no heap is needed, and the lists of triangles around a vertex stay valid where they are still
+// read. The cost is the mean squared distance of the new vertex from the planes of the triangles merged into both ends, weighted by their areas w: Q(x) = (x' A
+// x + 2 b' x + c) / w. It is a displacement in mm2, so that a thin branch, which is more curved, keeps shorter edges than a wide one.
 #include "geom/mesh_decimate.h"
 
 #include <stdlib.h>
@@ -14,7 +14,7 @@ typedef struct Quadric {
 } Quadric;
 
 typedef struct Collapse {
-    float price;             // [mm2] >= 0
+    float price;             // cost [mm2] >= 0
     int kept, gone;          // vertices
 } Collapse;
 
@@ -22,13 +22,13 @@ typedef struct Decimation {
     int vertex_count, triangle_count;
     Vec3 *vertex;            // relative to the mesh's first vertex
     Quadric *quadric;
-    int *node, *into;        // into[v]: the vertex that v has become
+    int *node, *into;        // into[v]: the vertex into which v was merged
     int (*triangle)[3];
     int *first, *around;     // triangles around v: around[first[v]] to around[first[v + 1] - 1]
-    bool *is_fixed;          // rims and pinched vertices
-    bool *is_touched;        // in this round
+    bool *is_fixed;          // rims and non-manifold vertices
+    bool *is_touched;        // was part of a collapse in this round
     Collapse *collapse, *sorted;
-    int *mark;               // stamps of vertices, for common neighbours
+    int *mark;               // marks of vertices, to find common neighbours
     int stamp;
 } Decimation;
 
@@ -48,7 +48,7 @@ static double quadric_price(const Quadric *q, Vec3 x)
     return q->weight > 0 ? fmax(value, 0) / q->weight : 0;
 }
 
-// The least of Q(x) + e w |x - middle|^2: the small second term says where to go along a flat or a ridge.
+// Minimises Q(x) + e w |x - middle|^2; the small second term makes the minimum unique on a plane or along a ridge.
 static Vec3 quadric_least(const Quadric *q, Vec3 middle)
 {
     double e = 1e-3 * q->weight;
@@ -96,7 +96,7 @@ static void list_surroundings(Decimation *d)
             d->around[d->first[d->triangle[t][k] + 1]++] = t;
 }
 
-// A vertex is free where each neighbour shares exactly two of its triangles.
+// A vertex is free if each of its neighbours shares exactly two triangles with it.
 static void find_fixed(Decimation *d)
 {
     int *seen = d->mark;
@@ -118,7 +118,7 @@ static void find_fixed(Decimation *d)
     d->stamp = 0;
 }
 
-// The corners of a triangle as they are now, in the middle of a round; false where it has become flat.
+// The present corners of a triangle during a round; false if it has become degenerate.
 static bool corners_now(const Decimation *d, int t, int c[3])
 {
     for (int k = 0; k < 3; k++)
@@ -126,7 +126,7 @@ static bool corners_now(const Decimation *d, int t, int c[3])
     return c[0] != c[1] && c[1] != c[2] && c[2] != c[0];
 }
 
-// Triangles around a vertex that nothing was collapsed into in this round; fewer than there are otherwise.
+// Number of present triangles around a vertex that has not been part of a collapse in this round; degenerate ones no longer count.
 static int count_around(const Decimation *d, int v)
 {
     int count = 0, c[3];
@@ -135,7 +135,7 @@ static int count_around(const Decimation *d, int v)
     return count;
 }
 
-// The link condition: the ends share exactly the two corners opposite to the edge, and no corner is left with fewer than three triangles.
+// The link condition: the two ends share exactly the two corners opposite to the edge, and no corner is left with fewer than three triangles.
 static bool keeps_topology(Decimation *d, int a, int b)
 {
     int stamp = ++d->stamp, common = 0, c[3];
@@ -157,7 +157,7 @@ static bool keeps_topology(Decimation *d, int a, int b)
     return common == 2;
 }
 
-// Squared: area over the square of the longest side, at most 0.43. Its area vector too.
+// Squared ratio of the area to the square of the longest side, at most 0.43^2; also sets the area vector.
 static double triangle_fullness2(const Vec3 p[3], Vec3 *area)
 {
     double longest = 0;
@@ -167,8 +167,8 @@ static double triangle_fullness2(const Vec3 p[3], Vec3 *area)
     return longest > 0 ? vec3_norm2(*area) / (longest * longest) : 0;
 }
 
-// Triangles around v that stay must not turn by more than some 75 degrees, nor become needles. What is a needle already (marching cubes make many) faces
-// no way that were to be kept, and must only not become much thinner.
+// Triangles around v that remain must not rotate by more than about 75 degrees, nor become needles. A triangle that is a needle already (marching cubes produce
+// many) has no meaningful direction and only must not become much thinner.
 static bool keeps_facing(const Decimation *d, int v, int other, Vec3 place)
 {
     const double needle = 0.03;
@@ -199,7 +199,7 @@ static uint32_t price_bits(float price)
     return bits;
 }
 
-// By price, eleven bits at a time; numbers >= 0 stand in the order of their bits. Equal prices stay in the order of the triangles.
+// Radix sort by cost, eleven bits at a time; non-negative floats have the order of their bits. Equal costs stay in the order of the triangles.
 static void sort_collapses(Decimation *d, int count)
 {
     for (int shift = 0; shift < 33; shift += 11) {
@@ -231,7 +231,7 @@ static int price_edges(Decimation *d)
     for (int t = 0; t < d->triangle_count; t++)
         for (int k = 0; k < 3; k++) {
             int a = d->triangle[t][k], b = d->triangle[t][(k + 1) % 3];
-            // each edge of free vertices has two sides, one of them upwards
+            // each edge between free vertices occurs in two triangles, once in ascending order
             if (a > b || d->is_fixed[a] || d->is_fixed[b])
                 continue;
             Quadric q = edge_quadric(d, a, b);
@@ -262,7 +262,7 @@ static void drop_flat_triangles(Decimation *d)
     d->triangle_count = kept;
 }
 
-// Collapses done. An edge much dearer than the one at which the goal would be reached waits for a round in which less is left.
+// Returns the number of collapses. An edge much more expensive than the one at which the target would be reached waits for a later round.
 static int do_round(Decimation *d, int triangles, double furthest)
 {
     list_surroundings(d);
@@ -373,7 +373,7 @@ TriangleMesh *mesh_decimate(const TriangleMesh *mesh, int triangles, double furt
         gather_quadrics(&d);
         list_surroundings(&d);
         find_fixed(&d);
-        // the last rounds find little: where one in a thousand goes, the rest is held by the shape
+        // the last rounds remove little: if fewer than one triangle in a thousand goes, the shape does not allow more
         for (int done = d.triangle_count; d.triangle_count > triangles && done > d.triangle_count / 2000;)
             done = do_round(&d, triangles, furthest_mm);
         result = make_result(&d, mesh->vertex_count > 0 ? mesh->vertex[0] : vec3(0, 0, 0));

@@ -1,21 +1,21 @@
-// Closest point of a triangle mesh (Embree 3's point query, Kerrien 2017 section 6.3 and Table 6).
+// Closest point of a triangle mesh (Embree 3's point query, Kerrien et al. 2017, section 6.3 and Table 6).
 //
-// The closest point p of a triangle to X lies in its face where X is within the prism over it, else it is the nearest of the three edges' points: this
-// form has no determinant that thin triangles could spoil. All of it is computed in double from a copy of the vertices about the mesh's middle; the tree
-// of boxes is in float and only says where to look, with a radius that is wider than the rounding of box and point (see widened()).
-// Of triangles equally close the one with the lowest index is taken.
+// The closest point p of a triangle to X lies in its face if X is within the prism over it; otherwise it is the closest of the three edges' points: this form
+// has no determinant that thin triangles could make inaccurate. All of it is computed in double from a copy of the vertices, relative to the mesh's middle. The
+// tree of boxes is in float and only selects candidates, with a radius enlarged by the rounding of box and point (see widened()). Of triangles at equal
+// distance the one with the lowest index is taken.
 //
-// A search looks at groups of eight triangles, which lie together and are computed together. From nothing, Embree's tree of the groups' boxes leads to them.
-// From the last triangle, its group gives a distance that bounds the tree's search; and with the group's surroundings (triangle_groups.h, where the proof
-// stands) no search is needed mostly: all that can be closer is in the neighbourhood, or in none.
+// A search evaluates groups of eight adjacent triangles at once. Without a previous triangle, Embree's tree of the groups' boxes finds them. With a previous
+// triangle, its group gives a distance that limits the search in the tree; and with the group's surroundings (proof in triangle_groups.h) usually no search is
+// needed, because every triangle that can be closer is in the neighbourhood.
 //
 // Sign: (X - p) . N, N the pseudonormal of the feature that holds p: face; edge: sum of its two faces' normals; vertex: sum of its faces' normals, each
 // weighted by its angle there (Baerentzen and Aanaes 2005, who prove that this is right for every closed mesh).
 //
-// Hessian of the gap. Faces: 0. An edge with direction t is a cylinder and a vertex a sphere of radius |gap| about it: (I - n n' - t t') / gap and
-// (I - n n') / gap. Inside these are the convex edges that a wire bends round (of concave ones no point inside is the closest); they are positive, as at
-// any convex wall, and say how the normal turns when the wire slides on. MESH_SMOOTH and MESH_CURVED: with vertex normals n_i and the barycentric
-// coordinates b_i of p the normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
+// Hessian of the gap. Faces: 0. An edge with direction t acts as a cylinder and a vertex as a sphere of radius |gap| about it: (I - n n' - t t') / gap and (I -
+// n n') / gap. Inside the lumen these are the convex edges around which a wire bends (no point inside has its closest point on a concave edge). The Hessians
+// are positive, as at any convex wall, and give the rotation of the normal as the wire slides on. MESH_SMOOTH and MESH_CURVED: with vertex normals n_i and the
+// barycentric coordinates b_i of p the normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
 #include "geom/mesh_vessel.h"
 
 MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_CACHED}; }
@@ -27,7 +27,7 @@ bool mesh_vessel_available(void) { return false; }
 Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *options, const char *name, Faults *faults)
 {
     (void)mesh, (void)options;
-    faults_add(faults, name, 0, 0, "a mesh cannot be a vessel: this program was built without Embree; with libembree-dev installed and built again it can");
+    faults_add(faults, name, 0, 0, "cannot make a vessel from a mesh: this program was built without Embree; install libembree-dev and build again");
     return NULL;
 }
 
@@ -43,24 +43,24 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
 #include <string.h>
 
 typedef struct MeshVessel {
-    Vessel vessel;           // first: a Vessel * to us is a MeshVessel *
+    Vessel vessel;           // first: a Vessel * points to its MeshVessel
     MeshVesselOptions options;
     RTCDevice device;
     RTCScene scene;
     ssize_t tree_bytes;
-    Vec3 middle;             // what follows is relative to it
+    Vec3 middle;             // origin of the following coordinates
     double size;             // [mm] largest coordinate
     int vertex_count, triangle_count;
     Vec3 *vertex;            // (V)
-    Vec3 *vertex_normal;     // (V) pseudonormal, of no special length; all normals point into the lumen
+    Vec3 *vertex_normal;     // (V) pseudonormal, not normalised; all normals point into the lumen
     Vec3 *smooth_normal;     // (V) unit; NULL with MESH_FACES
     Sym3 *bend;              // (T) [1/mm] derivative of the interpolated normal over the triangle, symmetrised; NULL with MESH_FACES
     bool *on_rim;            // (V)
-    int *keeper;             // (V) the lowest triangle at the vertex
+    int *keeper;             // (V) the triangle with the lowest index at the vertex
     int (*corner)[3];        // (T)
     int (*across)[3];        // (T) the triangle beyond the side from corner k to the next; -1: rim
     Vec3 *face;              // (T) unit normal
-    GroupMesh mesh;          // the same, as the groups take it
+    GroupMesh mesh;          // the same arrays, for the groups
     const GroupKernels *kernels;
     int group_count;
     TriangleGroup *group;    // (G)
@@ -83,7 +83,7 @@ static void closest_of_triangle(const MeshVessel *m, int triangle, Vec3 x, Foot 
 {
     const int *corner = m->corner[triangle];
     Vec3 v[3] = {m->vertex[corner[0]], m->vertex[corner[1]], m->vertex[corner[2]]}, n = m->face[triangle], q[3], e[3];
-    double beyond[3], all = 0;       // each side's area with X, < 0 within the prism (normals point inwards, corners run round the other way)
+    double beyond[3], all = 0;       // area of each side with X, < 0 within the prism (normals point inwards, corners run in the opposite sense)
     for (int k = 0; k < 3; k++) {
         q[k] = vec3_sub(x, v[k]);
         e[k] = vec3_sub(v[(k + 1) % 3], v[k]);
@@ -123,11 +123,11 @@ typedef struct Search {
     const MeshVessel *mesh;
     Vec3 x;
     double distance2;
-    int triangle;            // -1: none yet
-    const GroupSurroundings *without;    // groups that do not count; NULL: all do
+    int triangle;            // -1: none found yet
+    const GroupSurroundings *without;    // groups to skip; NULL: none
 } Search;
 
-// [mm] the radius within which boxes are visited, for a closest triangle at sqrt(distance2): wider by more than the rounding of boxes and point to float.
+// [mm] the radius within which boxes are visited for a closest triangle at sqrt(distance2), enlarged by more than the rounding of boxes and point to float.
 static float widened(const Search *s)
 {
     double room = 1e-6 * (s->mesh->size + vec3_norm(s->x));
@@ -171,7 +171,7 @@ static void search_tree(Search *s)
     rtcPointQuery(s->mesh->scene, &query, &context, visit, s);
 }
 
-// Does a ball prove that nothing outside the neighbourhood is closer?
+// Returns whether a ball proves that nothing outside the neighbourhood is closer.
 static bool is_proven(const GroupSurroundings *around, const Search *s)
 {
     double d = sqrt(s->distance2);
@@ -183,7 +183,7 @@ static bool is_proven(const GroupSurroundings *around, const Search *s)
     return false;
 }
 
-// The search in the neighbourhood of a group that has been looked at, and of that of what is closer there; true where that settles it.
+// Searches the neighbourhood of a group that has been evaluated, then that of any closer group found. Returns true if that proves the result.
 static bool search_around(Search *s, int own)
 {
     enum { ROUNDS = 3 };
@@ -206,7 +206,7 @@ static bool search_around(Search *s, int own)
     return false;
 }
 
-// The triangle that stands for a feature: the lowest of those that share it. Which of them is the closest is a matter of rounding.
+// The triangle that represents a feature: the lowest of those that share it, because rounding decides which of them is the closest.
 static int keeper_of(const MeshVessel *m, int triangle, int feature)
 {
     SEL_ASSERT(feature >= ON_EDGE && feature <= ON_FACE, "a foot lies on an edge, a vertex or the face");
@@ -218,7 +218,7 @@ static int keeper_of(const MeshVessel *m, int triangle, int feature)
     return other >= 0 && other < triangle ? other : triangle;
 }
 
-// The closest triangle, -1 where none is nearer than `limit`; `from`: a triangle to start from, -1: none is known.
+// The closest triangle; -1 if none is closer than `limit`. `from`: a triangle to start from; -1: none is known.
 static int closest_triangle(const MeshVessel *m, Vec3 x, int from, double limit, Foot *foot)
 {
     Search s = {.mesh = m, .x = x, .distance2 = limit * limit, .triangle = -1};
@@ -237,7 +237,7 @@ static int closest_triangle(const MeshVessel *m, Vec3 x, int from, double limit,
     return keeper;
 }
 
-// --- The answer ---
+// --- The result ---
 
 static Vec3 pseudonormal(const MeshVessel *m, int triangle, int feature)
 {
@@ -256,7 +256,7 @@ static bool is_on_rim(const MeshVessel *m, int triangle, int feature)
     return feature >= ON_VERTEX ? m->on_rim[m->corner[triangle][feature - ON_VERTEX]] : m->across[triangle][feature - ON_EDGE] < 0;
 }
 
-// [mm] closer to an edge or a vertex than this its curvature is taken as here; it grows without bound, and no tool's centre gets there.
+// [mm] closer to an edge or a vertex than this, its curvature is that at this distance; it would grow without bound, and no tool's centre gets there.
 static const double LEAST_DISTANCE = 0.02;
 
 static Sym3 facet_hessian(const MeshVessel *m, int triangle, const Foot *foot, double gap, Vec3 normal)
@@ -277,7 +277,7 @@ static Sym3 facet_hessian(const MeshVessel *m, int triangle, const Foot *foot, d
 
 static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 normal)
 {
-    static const double LEAST_STRETCH = 0.1;     // of I + gap S, which ends at the wall's focal points
+    static const double LEAST_STRETCH = 0.1;     // of I + gap S, which vanishes at the wall's focal points
     const Sym3 *bend = &m->bend[triangle];
     Vec3 u = vec3_normal_to(normal), w = vec3_cross(normal, u), bend_u = sym3_mul_vec(bend, u);
     double uu = vec3_dot(u, bend_u), uw = vec3_dot(w, bend_u), ww = sym3_quadratic(bend, w);
@@ -295,7 +295,7 @@ static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 n
     return h;
 }
 
-// [rad] beyond it no smooth wall is meant.
+// [rad] a larger rotation is not meant to represent a smooth wall.
 static const double TURN_MAX = 0.5;
 
 static void set_hit(const MeshVessel *m, Vec3 x, int from, double limit, VesselHit *hit)
@@ -331,7 +331,7 @@ static void set_hit(const MeshVessel *m, Vec3 x, int from, double limit, VesselH
     hit->hessian = smooth_hessian(m, triangle, hit->gap, hit->normal);
     if (m->options.normals == MESH_CURVED)
         return;
-    // X lies over p along the face's normal; where it would along the smooth one the wall has turned by H (X - p)
+    // X lies above p along the face's normal; the smooth wall's normal at X differs from that at p by H (X - p)
     Vec3 turn = sym3_mul_vec(&hit->hessian, away);
     hit->normal = vec3_unit(vec3_add_scaled(hit->normal, TURN_MAX / fmax(vec3_norm(turn), TURN_MAX), turn));
 }
@@ -354,7 +354,7 @@ static void query_one(const MeshVessel *m, Vec3 point, double reach, VesselMemor
             hit->flags = VESSEL_FAR;
             return;
         }
-        if (bound > 0 && reach > 0)      // still inside: beyond reach there is nothing to be known but a bound that will do for a while
+        if (bound > 0 && reach > 0)      // still inside: beyond reach it is enough to know a bound, which then holds for some steps
             limit = 2 * reach;
     }
     set_hit(m, vec3_sub(point, m->middle), knows ? memory->node : -1, limit, hit);
@@ -414,7 +414,7 @@ static void mesh_destroy(Vessel *vessel)
     free(m);
 }
 
-// --- Making one ---
+// --- Creation ---
 
 static const double COORDINATE_MAX = 1e9;        // [mm]
 static const double THIN = 1e-12;                // height over length of a triangle that has an area
@@ -427,31 +427,31 @@ static bool has_area(const TriangleMesh *mesh, int triangle)
     return f.length > 0 && f.top[1] > THIN * f.length;
 }
 
-// What must hold before edges can be looked at.
+// Checks the conditions that must hold before edges can be examined.
 static bool check_triangles(const TriangleMesh *mesh, const char *name, Faults *faults)
 {
     if (!mesh || mesh->triangle_count <= 0 || mesh->vertex_count <= 0) {
-        faults_add(faults, name, 0, 0, "the mesh has no triangle; a vessel's wall in triangles is valid");
+        faults_add(faults, name, 0, 0, "the mesh has no triangle; expected a vessel's wall");
         return false;
     }
     int before = faults->count, flat = 0, first_flat = 0;
     for (int v = 0; v < mesh->vertex_count && faults->count == before; v++) {
         Vec3 p = mesh->vertex[v];
         if (!(fabs(p.x) < COORDINATE_MAX && fabs(p.y) < COORDINATE_MAX && fabs(p.z) < COORDINATE_MAX))
-            faults_add(faults, name, 0, 0, "vertex %d of the mesh is (%g, %g, %g); numbers below %g mm are valid", v, p.x, p.y, p.z, COORDINATE_MAX);
+            faults_add(faults, name, 0, 0, "vertex %d of the mesh is (%g, %g, %g); expected numbers below %g mm", v, p.x, p.y, p.z, COORDINATE_MAX);
     }
     for (int t = 0; t < mesh->triangle_count && faults->count == before; t++)
         for (int k = 0; k < 3; k++)
             if (mesh->triangle[t][k] < 0 || mesh->triangle[t][k] >= mesh->vertex_count) {
-                faults_add(faults, name, 0, 0, "triangle %d of the mesh has vertex %d; 0 to %d are valid", t, mesh->triangle[t][k], mesh->vertex_count - 1);
+                faults_add(faults, name, 0, 0, "triangle %d of the mesh has vertex %d; expected 0 to %d", t, mesh->triangle[t][k], mesh->vertex_count - 1);
                 break;
             }
     for (int t = 0; t < mesh->triangle_count && faults->count == before; t++)
         if (!has_area(mesh, t) && flat++ == 0)
             first_flat = t;
     if (flat > 0)
-        faults_add(faults, name, 0, 0, "%d of the mesh's %d triangles have no area, triangle %d first; three corners apart and not in line are valid", flat,
-                   mesh->triangle_count, first_flat);
+        faults_add(faults, name, 0, 0, "%d of the mesh's %d triangles have no area, triangle %d first; expected three distinct corners that are not collinear",
+                   flat, mesh->triangle_count, first_flat);
     return faults->count == before;
 }
 
@@ -460,14 +460,14 @@ static bool check_edges(const TriangleMesh *mesh, const char *name, Faults *faul
     SurfaceCensus census;
     int before = faults->count;
     if (!surface_census(mesh, &census)) {
-        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        faults_add(faults, name, 0, 0, "not enough memory for a mesh of %d triangles", mesh->triangle_count);
         return false;
     }
     if (census.non_manifold_edges > 0)
-        faults_add(faults, name, 0, 0, "%lld edges of the mesh are shared by three triangles or more; edges of two, or of one at an open end, are valid",
+        faults_add(faults, name, 0, 0, "%lld edges of the mesh are shared by three triangles or more; expected two, or one at an open end",
                    (long long)census.non_manifold_edges);
     if (census.turned_edges > 0)
-        faults_add(faults, name, 0, 0, "at %lld edges of the mesh two neighbours face opposite ways; triangles that all face out of the lumen are valid",
+        faults_add(faults, name, 0, 0, "at %lld edges of the mesh two neighbours face opposite sides; expected triangles that all face out of the lumen",
                    (long long)census.turned_edges);
     return faults->count == before;
 }
@@ -482,7 +482,7 @@ static int compare_sides(const void *a, const void *b)
     return (x->high > y->high) - (x->high < y->high);
 }
 
-// across: sides are gathered by their lower vertex and sorted by the other. No edge has more than two triangles.
+// across: sides are collected by their lower vertex and sorted by the other. No edge has more than two triangles.
 static bool link_triangles(MeshVessel *m)
 {
     size_t sides = 3 * (size_t)m->triangle_count;
@@ -524,7 +524,7 @@ static bool link_triangles(MeshVessel *m)
     return good;
 }
 
-typedef struct Hull {        // of the mesh with each rim closed by a fan about its middle
+typedef struct Hull {        // the mesh with each rim closed by a fan around its middle
     double volume, wall, caps;       // [mm3], [mm2]
 } Hull;
 
@@ -534,7 +534,7 @@ static void add_to_hull(Hull *hull, double *area, Vec3 a, Vec3 b, Vec3 c)
     *area += 0.5 * vec3_norm(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
 }
 
-// False where memory lacks.
+// Returns false if out of memory.
 static bool measure_hull(const MeshVessel *m, Hull *hull)
 {
     size_t room = (size_t)m->vertex_count + 1;
@@ -544,7 +544,7 @@ static bool measure_hull(const MeshVessel *m, Hull *hull)
     *hull = (Hull){0, 0, 0};
     for (int v = 0; good && v < m->vertex_count; v++)
         rim[v] = v;
-    // first the rims are joined, then their middles found, then the fans added
+    // pass 0 joins the rims, pass 1 finds their middles, pass 2 adds the fans
     for (int pass = 0; good && pass < 3; pass++)
         for (int i = 0; i < 3 * m->triangle_count; i++) {
             const int *c = m->corner[i / 3];
@@ -591,7 +591,7 @@ static void set_bends(MeshVessel *m)
         Sym3 sum = {0, 0, 0, 0, 0, 0};
         for (int k = 0; k < 3; k++) {
             Vec3 a = m->vertex[corner[(k + 1) % 3]], side = vec3_sub(m->vertex[corner[(k + 2) % 3]], a), n = m->smooth_normal[corner[k]];
-            // the barycentric coordinate's gradient: across the opposite side, 1 over the height
+            // gradient of the barycentric coordinate: perpendicular to the opposite side, 1 over the height
             Vec3 g = vec3_cross(side, m->face[t]);
             g = vec3_scale(g, 1 / vec3_dot(g, vec3_sub(m->vertex[corner[k]], a)));
             // sym(n g') = ((n + g)(n + g)' - n n' - g g') / 2
@@ -644,7 +644,7 @@ static bool build_tree(MeshVessel *m, const char *name, Faults *faults)
     enum RTCError error = rtcGetDeviceError(m->device);
     if (error != RTC_ERROR_NONE)
         faults_add(faults, name, 0, 0, "Embree cannot hold the mesh of %d triangles (%s)", m->triangle_count,
-                   error == RTC_ERROR_OUT_OF_MEMORY ? "no memory" : "error of its own");
+                   error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory" : "internal error");
     return error == RTC_ERROR_NONE;
 }
 
@@ -694,7 +694,7 @@ static GroupMiddle middle_of(const MeshVessel *m, const TriangleGroup *g)
     return middle;
 }
 
-typedef struct Ring {        // groups about one, itself first, the nearest by their middles
+typedef struct Ring {        // groups around a group, itself first, ordered by the distance of their middles
     int count;
     int group[GROUP_NEAR];
     double far2[GROUP_NEAR];
@@ -718,7 +718,7 @@ static void add_to_ring(Ring *ring, int group, const GroupMiddle *middle)
     ring->group[k] = group;
 }
 
-// Those that share a vertex with it. first, of: the groups at each vertex.
+// Adds the groups that share a vertex with it. first, of: the groups at each vertex.
 static void gather_ring(const MeshVessel *m, int group, const GroupMiddle *middle, const size_t *first, const int *of, Ring *ring)
 {
     *ring = (Ring){.count = 1, .group = {group}};
@@ -729,7 +729,7 @@ static void gather_ring(const MeshVessel *m, int group, const GroupMiddle *middl
     }
 }
 
-// And of those around these as many as there is room for: the wider the neighbourhood, the more the balls may hold.
+// Adds the groups around these as far as there is room: the larger the neighbourhood, the larger the balls can be.
 static void set_neighbourhood(const MeshVessel *m, int group, const GroupMiddle *middle, const Ring *ring, GroupSurroundings *around)
 {
     Ring wide = ring[group];
@@ -751,7 +751,7 @@ static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurr
     int before = -1;
     around->balls = 0;
     for (int i = 0; i < GROUP_BALLS; i++, touching *= 2) {
-        double most = touching + 2 * middle->radius;         // room for points that have gone further is of no use
+        double most = touching + 2 * middle->radius;         // a larger ball would be of no use, because points do not move further
         Search s = {.mesh = m, .x = vec3_add_scaled(middle->place, touching, around->axis[2]), .distance2 = most * most, .triangle = -1, .without = around};
         if (before >= 0)
             look_at(&s, m->group_of[before]);
@@ -760,7 +760,7 @@ static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurr
         SEL_ASSERT(around->balls < GROUP_BALLS, "there is room for a ball");
         double radius = sqrt(s.distance2) * (1 - 1e-9) - 1e-9 * m->size;
         if (!(radius > touching))
-            return;          // larger ones would have to hold this one
+            return;          // larger balls would contain this one, so they fail too
         around->ball[around->balls].center = s.x;
         around->ball[around->balls++].radius = radius;
     }
@@ -840,19 +840,19 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
         m->options = *options;
     bool good = m && copy_mesh(m, mesh) && link_triangles(m) && measure_hull(m, &hull), faces_out = true;
     if (good) {
-        faces_out = hull.volume >= 0 || hull.caps > 0.5 * hull.wall;     // of a mere patch nobody knows
+        faces_out = hull.volume >= 0 || hull.caps > 0.5 * hull.wall;     // for a mere patch the orientation cannot be determined
         set_normals(m, mesh);
         if (m->bend)
             set_bends(m);
         good = set_groups(m);
     }
     if (!good)
-        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        faults_add(faults, name, 0, 0, "not enough memory for a mesh of %d triangles", mesh->triangle_count);
     else if (!faces_out)
-        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); triangles that face out of it are valid", hull.volume);
+        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); expected triangles that face out of it", hull.volume);
     good = good && faces_out && build_tree(m, name, faults);
     if (good && options->search == MESH_SEARCH_CACHED && !set_surroundings(m)) {
-        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        faults_add(faults, name, 0, 0, "not enough memory for a mesh of %d triangles", mesh->triangle_count);
         good = false;
     }
     if (!good) {

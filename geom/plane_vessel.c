@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 typedef struct PlaneVessel {
-    Vessel vessel;           // first: a Vessel * to us is a PlaneVessel *
+    Vessel vessel;           // first: a Vessel * points to its PlaneVessel
     Vec3 point, normal;
 } PlaneVessel;
 

@@ -42,7 +42,7 @@ bool power_blocks_create(PowerBlocks *blocks, const VesselTree *tree)
             *box++ = b;
         }
     }
-    SEL_REQUIRE(blocks->levels == 0 || (size_t)(box - blocks->box[0]) == all, "the boxes of all levels are one piece");
+    SEL_REQUIRE(blocks->levels == 0 || (size_t)(box - blocks->box[0]) == all, "the boxes of all levels fill one allocation");
     return true;
 }
 
@@ -52,7 +52,7 @@ void power_blocks_free(PowerBlocks *blocks)
     *blocks = (PowerBlocks){0};
 }
 
-// No node of the box has less, rounding included.
+// Lower bound of the power distance to any node of the box, rounding included.
 static double bound(const PowerBox *b, Vec3 x)
 {
     Vec3 out = most(most(vec3_sub(b->low, x), vec3_sub(x, b->high)), vec3(0, 0, 0));
@@ -65,7 +65,7 @@ typedef struct Best {
     int node;
 } Best;
 
-// Looks through a box, its sub-boxes in the order of the tree; of equal nodes the first counts.
+// Searches a box, its children in the order of the tree; of equal nodes the first is taken.
 static void look(const PowerBlocks *blocks, int level, int i, Vec3 x, Best *best)
 {
     const VesselTree *tree = blocks->tree;
@@ -87,7 +87,7 @@ int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x)
     const VesselTree *tree = blocks->tree;
     Best best = {power_distance(x, tree->center[0], tree->radius[0]), 0};
     int at = 0;
-    for (int level = blocks->levels - 2; level >= 0; level--) {   // a good one first: down the most promising boxes
+    for (int level = blocks->levels - 2; level >= 0; level--) {   // first find a good candidate: descend through the most promising boxes
         double least_bound = HUGE_VAL;
         int first = POWER_BLOCK * at;
         for (int k = first; k < first + POWER_BLOCK && k < blocks->count[level]; k++) {

@@ -1,46 +1,46 @@
-// d(X, C) = |X - C|^2 - r^2, Kerrien 2017, eq. (12). The paper's rule takes the best of the node and its neighbours once a step; we
-// take the near nodes (vessel_tree_link) and repeat it a few times, because a tip that springs back may cross several short nodes in one step.
+// d(X, C) = |X - C|^2 - r^2, Kerrien et al. 2017, eq. (12). The paper's rule takes the best of the node and its neighbours once per step. This code uses the
+// near nodes (vessel_tree_link) and repeats the rule a few times, because a tip that springs back may cross several short nodes in one step.
 //
-// Strict descent has a trap: the cell of a node on a vessel reaches as far beside the vessel as the tree leaves it, also across a wide sac that hangs on
-// another node, with worse nodes between. (Seen on the phantom: a wire crossed the whole sac, 9 mm, on the ghost lobe of a node beside the neck.) A point
-// that stands clearly outside its node's ball therefore looks along all ways through the tree that are not much longer than its distance, for a
-// ball that it is inside of.
+// Strict descent has a trap: the cell of a vessel's node extends sideways until another node's cell begins, also across a wide sac that belongs to another
+// node, with worse nodes between. (Seen on the phantom: a wire crossed the whole sac, 9 mm, on the spurious lobe of a node beside the neck.) A point that is
+// clearly outside its node's ball therefore searches, along all paths through the tree that are not much longer than its distance, for a ball that holds it.
 #include "geom/power_walk.h"
 
 #include "base/base.h"
 
-enum { WAYS_MAX = 64 };
+enum { PATHS_MAX = 64 };
 
-typedef struct Way {
+typedef struct TreePath {
     int node, from;
     double length;
-} Way;
+} TreePath;
 
 static int look_around(const VesselTree *tree, Vec3 x, int node)
 {
-    SEL_ASSERT(node >= 0 && node < tree->node_count, "ways start at a node of the tree");
-    Way way[WAYS_MAX] = {{node, -1, 0}};
+    SEL_ASSERT(node >= 0 && node < tree->node_count, "paths start at a node of the tree");
+    TreePath path[PATHS_MAX] = {{node, -1, 0}};
     int known = 1, best_node = node;
-    double longest = 2.5 * vec3_distance(x, tree->center[node]), best = 0;   // only inside a ball
+    double longest = 2.5 * vec3_distance(x, tree->center[node]), best = 0;   // only nodes whose ball holds x improve on 0
     for (int w = 0; w < known; w++) {
-        Way at = way[w];
+        TreePath at = path[w];
         double d = power_distance(x, tree->center[at.node], tree->radius[at.node]);
         if (d < best) {
             best = d;
             best_node = at.node;
         }
-        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < PATHS_MAX; k++) {
             int next = tree->neighbour[k];
             SEL_ASSERT(next >= 0 && next < tree->node_count, "neighbours are nodes of the tree");
             double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
             if (next != at.from && length < longest)
-                way[known++] = (Way){next, at.node, length};
+                path[known++] = (TreePath){next, at.node, length};
         }
     }
     return best_node;
 }
 
-// A vessel that runs beside a sac whose wall bulges out of its ball takes points of the sac that are many of its own radii away, and has no wall there.
+// A vessel that runs beside a sac whose wall bulges out of its ball would capture points of the sac that are many of the vessel's radii away, where it has no
+// wall.
 static bool is_nearer_in_radii(const VesselTree *tree, Vec3 x, int node, int next)
 {
     double r2 = tree->radius[node] * tree->radius[node], next_r2 = tree->radius[next] * tree->radius[next];

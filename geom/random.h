@@ -1,4 +1,4 @@
-// Random numbers: SplitMix64 (Steele, Lea and Flood 2014), the same on every machine. Neighbouring seeds give series that have nothing in common.
+// Random numbers: SplitMix64 (Steele, Lea and Flood 2014), the same on every machine. Series of neighbouring seeds are uncorrelated.
 #ifndef SELDINGER_GEOM_RANDOM_H
 #define SELDINGER_GEOM_RANDOM_H
 
@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 typedef struct Random {
-    uint64_t state;          // any: the seed
+    uint64_t state;          // any value; at the start, the seed
 } Random;
 
 #define RANDOM_STEP UINT64_C(0x9e3779b97f4a7c15)
@@ -21,7 +21,7 @@ static inline uint64_t random_next(Random *random)
     return z ^ (z >> 31);
 }
 
-// As after so many calls of random_next().
+// Sets the state that `numbers` calls of random_next() would leave.
 static inline void random_skip(Random *random, int numbers) { random->state += (uint64_t)numbers * RANDOM_STEP; }
 
 static inline int random_index(Random *random, int count) { return (int)(((random_next(random) >> 32) * (uint64_t)count) >> 32); }   // 0 … count-1, count >= 1

@@ -1,9 +1,9 @@
-// A ball is free where the field is above 0 at 32 points of its surface (vertices and faces of an icosahedron) and of the ball of half its size. A point
-// below 0 at the tool's radius shuts the place for certain. Between two of the 32 directions a wall may come nearer by up to 7.5 % (a flat wall: 1 - cos 21.6
-// degrees); only where the larger ball says no and the ball itself yes the clearance is measured.
+// A ball is free if the field is above 0 at 32 points of its surface (vertices and faces of an icosahedron) and of a ball of half its size. A point below 0 at
+// the tool's radius proves that the place is blocked. Between the 32 directions a wall may come up to 7.5 % closer (a flat wall: 1 - cos 21.6 degrees); so the
+// clearance is measured only where the ball enlarged by that is blocked and the ball itself is free.
 //
-// Aside: stations along the link a quarter of its lesser radius apart, 17 places at each (the line, and two rings of eight), a depth-first search among
-// neighbouring places of one station and of the next. It is run only where the line itself is shut.
+// Aside: stations along the link, at a spacing of a quarter of its lesser radius, with 17 places at each (the line, and two rings of eight), and a depth-first
+// search over neighbouring places of the same station and of the adjacent ones. It is run only if the line itself is blocked.
 #include "geom/reach.h"
 
 #include "base/base.h"
@@ -14,19 +14,19 @@
 #include <stdlib.h>
 
 enum { DIRECTIONS = 32, RING = 8, PLACES = 1 + 2 * RING, FINE = 10, COARSE = 4, STATIONS_MAX = 200 };
-static const double BETWEEN = 1.075;         // 1 / cos of the angle from the 32 directions to what lies farthest between them
+static const double BETWEEN = 1.075;         // 1 / cosine of the largest angle between any direction and the closest of the 32
 
 typedef struct Flood {
     const VesselTree *tree;
     const ReachOptions *options;
     bool open_root;
     Vec3 direction[DIRECTIONS];
-    uint32_t *mask;          // (N) places around node i reached aside, on the disc that ends its link; bit 0: the line
+    uint32_t *mask;          // (N) places around node i that the flood REACH_ASIDE reached, on the disc that ends its link; bit 0: the line
 } Flood;
 
 ReachOptions reach_default_options(void) { return (ReachOptions){.tool_radius = 0.18, .aside = 0.5}; }
 
-// Golden ratio coordinates; faces are sums of three vertices next to each other.
+// Golden ratio coordinates of the vertices; a face is the sum of three adjacent vertices.
 static void fill_directions(Vec3 direction[DIRECTIONS])
 {
     const double g = 0.5 * (1 + sqrt(5));
@@ -56,7 +56,7 @@ double reach_field(const VesselTree *tree, Vec3 x, int *node)
     return blobby_field(&model, x);
 }
 
-// The same; upstream of an open root's plane the section there goes on.
+// The same, with the root's section extended upstream of an open root's plane.
 static double field_at(const Flood *f, Vec3 x, int *node)
 {
     if (f->open_root) {
@@ -68,7 +68,7 @@ static double field_at(const Flood *f, Vec3 x, int *node)
     return reach_field(f->tree, x, node);
 }
 
-// Where the ray from x along d first changes sides, nearer than `most`; else `most`.
+// Distance along the ray from x in direction d at which the field's sign first changes; `most` if that is further.
 static double first_change(const Flood *f, Vec3 x, int node, Vec3 d, bool inside, double step, double most)
 {
     double before = 0;
@@ -89,7 +89,7 @@ static double first_change(const Flood *f, Vec3 x, int node, Vec3 d, bool inside
     return most;
 }
 
-// The nearest change of side among the 32 directions, then from there along the wall's own normal until that brings nothing.
+// The closest change of sign among the 32 directions, then repeatedly along the wall's normal there, as long as the distance falls.
 static double clearance_at(const Flood *f, Vec3 x, int node, double most)
 {
     bool inside = field_at(f, x, &node) > 0;
@@ -161,10 +161,10 @@ static bool ball_is_free(const Flood *f, Vec3 x, int node, double radius)
 // --- One link ---
 
 typedef struct Link {
-    Vec3 from, to, e1, e2;   // e1, e2: across it
-    double length, radius;   // radius: the lesser
+    Vec3 from, to, e1, e2;   // e1, e2: perpendicular to it
+    double length, radius;   // radius: the lesser of the two nodes
     int parent, node;
-    int coarse;              // stations - 1
+    int coarse;              // number of stations - 1
 } Link;
 
 static Link link_of(const VesselTree *tree, int node)
@@ -190,7 +190,7 @@ static Vec3 link_place(const Flood *f, const Link *l, int station, int place)
     return vec3_add_scaled(vec3_add_scaled(x, far * same_cos(angle), l->e1), far * same_sin(angle), l->e2);
 }
 
-// The share of the line on which the field is above 0, from the parent's centre on.
+// Fraction of the line, from the parent's centre, on which the field is above 0.
 static double point_share(const Flood *f, const Link *l)
 {
     double pieces = ceil(FINE * l->length / l->radius);
@@ -216,8 +216,8 @@ static double tool_share(const Flood *f, const Link *l)
     return 1;
 }
 
-// The ball's way from a to b, its ends not looked at.
-static bool way_is_free(const Flood *f, Vec3 a, Vec3 b, int node)
+// Returns whether the ball is free between a and b; the two ends are not tested.
+static bool path_is_free(const Flood *f, Vec3 a, Vec3 b, int node)
 {
     double pieces = ceil(vec3_distance(a, b) / (0.5 * f->options->tool_radius));
     int count = pieces > 100 ? 100 : (int)pieces;
@@ -230,7 +230,7 @@ static bool way_is_free(const Flood *f, Vec3 a, Vec3 b, int node)
 typedef struct Search {
     const Flood *f;
     const Link *l;
-    uint8_t state[STATIONS_MAX][PLACES];     // 0 not asked, 1 shut, 2 free, 3 reached
+    uint8_t state[STATIONS_MAX][PLACES];     // 0 untested, 1 blocked, 2 free, 3 reached
     uint16_t stack[STATIONS_MAX * PLACES];
     int depth, furthest;
 } Search;
@@ -256,11 +256,11 @@ static void try_place(Search *s, Vec3 from, int station, int place)
 {
     if (station < 0 || station > s->l->coarse || s->state[station][place] == 3 || !place_is_free(s, station, place))
         return;
-    if (way_is_free(s->f, from, link_place(s->f, s->l, station, place), 2 * station < s->l->coarse ? s->l->parent : s->l->node))
+    if (path_is_free(s->f, from, link_place(s->f, s->l, station, place), 2 * station < s->l->coarse ? s->l->parent : s->l->node))
         reach_place(s, station, place);
 }
 
-// What lies beside a place on its disc, itself first. Returns the count.
+// Lists a place and its neighbours on the same disc, itself first. Returns the count.
 static int places_beside(int place, int beside[1 + RING])
 {
     int count = 0, ring = (place - 1) / RING, at = (place - 1) % RING;
@@ -278,7 +278,7 @@ static int places_beside(int place, int beside[1 + RING])
     return count;
 }
 
-// Back first and the line last, so that the line onwards is on top of the stack. Ends when the last station is reached.
+// Pushes the previous station first and the line of the next station last, so that the latter is on top of the stack. Ends when the last station is reached.
 static void search_link(Search *s)
 {
     while (s->depth > 0 && s->furthest < s->l->coarse) {
@@ -291,7 +291,7 @@ static void search_link(Search *s)
     }
 }
 
-// The first disc's places that the ball gets to from those around the parent: each from the nearest of these.
+// Finds the places of the first disc that the ball reaches from the places around the parent, each from the closest of these.
 static void enter_link(Search *s)
 {
     const Flood *f = s->f;
@@ -331,7 +331,7 @@ static double aside_share(Flood *f, const Link *l, double on_line)
 
 // --- Clearances ---
 
-// The least along the line between two nodes; only places that are nearer than what is known already are measured.
+// The least clearance along the line between two nodes; measures only places that can be closer than the value found so far.
 static void least_on_line(const Flood *f, const Link *l, double *least, Vec3 *place)
 {
     double pieces = ceil(FINE * l->length / l->radius);
@@ -343,7 +343,7 @@ static void least_on_line(const Flood *f, const Link *l, double *least, Vec3 *pl
             continue;
         if (field > 0 && sphere_is_free(f, x, node, BETWEEN * *least, DIRECTIONS) && sphere_is_free(f, x, node, 0.5 * *least, 12))
             continue;
-        // outside, depth counts: further than what is known
+        // outside, the depth counts, so the search extends further than the value found so far
         double most = field > 0 ? *least : 3 * l->radius + l->length, c = clearance_at(f, x, node, most);
         if (c < *least)
             *least = c, *place = x;
@@ -362,7 +362,7 @@ static int by_clearance(const void *a, const void *b)
     return x->clearance != y->clearance ? (x->clearance > y->clearance) - (x->clearance < y->clearance) : (x->node > y->node) - (x->node < y->node);
 }
 
-// From the parent's centre along the branch until its nodes are clear of the parent's wall.
+// Follows the branch from the parent's centre until its nodes are clear of the parent's wall.
 static void measure_junction(const Flood *f, const VesselBranches *branches, const VesselBranch *branch, ReachJunction *out)
 {
     const VesselTree *tree = f->tree;
@@ -414,7 +414,7 @@ static void flood_root(Flood *f, Reach *reach)
     reach->share[0][REACH_POINT] = open;
     reach->share[0][REACH_TOOL] = free;
     f->mask[0] = free;
-    // the first disc of the root's first link stands for the inlet where its middle is shut
+    // if the middle of the inlet is blocked, the first disc of the root's first link represents the inlet
     if (!free && tree->neighbour_offset[1] > tree->neighbour_offset[0]) {
         Link l = link_of(tree, tree->neighbour[tree->neighbour_offset[0]]);
         for (int place = 1; place < PLACES; place++)
@@ -451,7 +451,8 @@ static void flood_links(Flood *f, Reach *reach)
     }
 }
 
-// What shuts a ball may lie ahead of where it stops: the least on the line from there on, by a diameter, along the children with most behind them.
+// The constriction that blocks a ball may lie ahead of where it stops: finds the least clearance on the line from there over one diameter, along the children
+// with most centreline beyond them.
 static void judge_stop(const Flood *f, const double *all, ReachStop *stop)
 {
     const VesselTree *tree = f->tree;

@@ -1,19 +1,19 @@
 // The surface of a fitted tree as sheets: marching cubes in which a lattice point may lie in several lumens at once.
 //
-// A state is a lattice point x and a node at which a tool point that stands there may be, whose field at x is above 0: of local models one that power_walk
-// does not leave; of shared blobs one that no near node beats by power distance, because only within those cells a node sees all blobs.
-// Where vessels kiss, x has a state for each of them; where they overlap both lumens hold it. Two states at the ends of an edge of the lattice are linked
-// where a tool point that moves from one to the other goes from one node to the other, in either direction. In each cube the states that hang together over
-// edges make a sheet, and each sheet gives the triangles of its own case. Neighbouring cubes give the same segments on their common face, because a
-// case cuts off each run of corners on a face by itself (cube_triangles.h), and runs follow from the edges of that face. So the surface is closed,
-// and lumens that only kiss neither merge nor cut each other open.
+// A state is a lattice point x and a node at which a tool point at x may be, whose field at x is above 0. For local models it must be a node that power_walk
+// does not leave; for shared blobs, a node that no near node beats by power distance, because only within such cells does a node see all blobs. Where vessels
+// touch, x has a state for each of them; where they overlap, both lumens contain it. Two states at the ends of a lattice edge are linked if a tool point that
+// moves from one end to the other, in either direction, goes from one node to the other. In each cube, the states connected by linked edges make a sheet, and
+// each sheet gives the triangles of its own case. Neighbouring cubes give the same segments on their common face, because a case cuts off each run of corners
+// on a face separately (cube_triangles.h), and runs follow from the edges of that face. So the surface is closed, and lumens that only touch neither merge nor
+// cut each other open.
 //
-// Two rules make that hold where walks are not symmetric: states of one point in one sheet of some cube are one state everywhere, and two states at the
-// ends of an edge in one sheet are linked. Both are repeated until nothing changes, over the cubes in which some point has two states or some edge's states
-// are not linked; all other cubes are plain marching cubes.
+// Two rules ensure this although walks are not symmetric: states of one point that are in one sheet of some cube are one state everywhere, and two states at
+// the ends of an edge that are in one sheet are linked. Both rules are repeated until nothing changes, over the cubes in which some point has two states or the
+// states of some edge are not linked; all other cubes are plain marching cubes.
 //
-// A block of the lattice (sparse_march.h) is touched only where some model reaches it, and left again where bounds of the kernels say that it is all outside
-// or all inside: work and memory grow with the surface. The lattice point (i, j, k) lies at cell * (i, j, k), for every tree the same.
+// A block of the lattice (sparse_march.h) is visited only if some model reaches it, and skipped if bounds of the kernels show that it is all outside or all
+// inside: work and memory grow with the surface. The lattice point (i, j, k) lies at cell * (i, j, k), for every tree.
 #include "base/base.h"
 #include "geom/blobby.h"
 #include "geom/isosurface.h"
@@ -24,17 +24,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, WAYS_MAX = 256, PASSES_MAX = 100 };
+enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, PATHS_MAX = 256, PASSES_MAX = 100 };
 
-// A node answers for no lumen further from its centre [its radii]: other nodes lie nearer to that. Blobs of a sac reach far into all cells around it. The
-// root, upstream of which nothing follows, answers for twice as much.
+// A node has no lumen further from its centre than this [its radii], because other nodes are closer there; the blobs of a sac reach far into all cells around
+// it. For the root, upstream of which there is no node, the limit is twice as large.
 static const double REACH_MOST = 3;
 
-typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
+typedef struct Candidate {   // a node that reaches the current block, whose field may be above 0 there and that no other node beats in all of it
     int node, ball, first_row;
-    double low;              // its field is at least that
+    double low;              // lower bound of its field
     Blobby model;
-    double reach;            // [mm] no point of the model's surface lies further from the node's centre
+    double reach;            // [mm] upper bound of the distance of the model's surface from the node's centre
     int rivals, rival[RIVALS_MAX];           // near nodes that beat it somewhere in the block
 } Candidate;
 
@@ -43,10 +43,10 @@ typedef struct States {      // of a lattice point
     double field[STATES_MAX];
 } States;
 
-typedef struct Way {         // to a node whose ball may hold points that a node's model reaches
+typedef struct TreePath {    // path to a node whose ball may hold points that another node's model reaches
     int node, from;
     double length;           // [mm] through the tree
-} Way;
+} TreePath;
 
 typedef struct SheetPoint {  // a corner of a cube that is not plain
     int at[3], first, count;
@@ -58,19 +58,19 @@ typedef struct SheetCube {
 typedef struct SheetMarch {
     March march;
     const VesselTree *tree;
-    int alone;               // the one node whose model is meshed; -1: the tree
-    bool by_power;           // a point goes to any near node that is better by power distance: no further rules
+    int alone;               // the only node whose model is meshed; -1: the whole tree
+    bool by_power;           // a point goes to any near node with a lesser power distance, without further conditions
     int ball_count, *node;   // the march's balls: their nodes …
     double *reach;           // … and reaches
-    int *way_offset, way_capacity;           // (balls + 1) of each …
-    Way *way;                // … the ways that look_around of power_walk.c would find, at most WAYS_MAX
+    int *path_offset, path_capacity;         // (balls + 1) offset of the paths of each ball …
+    TreePath *path;          // … the paths that look_around of power_walk.c would find, at most PATHS_MAX
     int candidate_count, candidate_capacity, out_count, out_capacity;
     Candidate *candidate;
-    int *out;                // nodes that would be candidates, were their field not below 0 all over the block
+    int *out;                // nodes excluded as candidates only because their field is below 0 all over the block
     int32_t *row;            // blobs of candidates that reach the block
     int row_count, row_capacity;
-    States states[MARCH_POINTS];             // of the block at hand
-    // of cubes that are not plain
+    States states[MARCH_POINTS];             // of the current block
+    // for cubes that are not plain
     KeyMap point_of, link_of, vertex_of_state;
     int point_count, point_capacity, cube_count, cube_capacity, state_count, state_capacity;
     SheetPoint *point;
@@ -79,12 +79,12 @@ typedef struct SheetMarch {
         int node, point;
         double field;
     } * state;
-    int *same, same_capacity;                // disjoint sets of states that are one
+    int *same, same_capacity;                // disjoint sets of identical states
 } SheetMarch;
 
-// --- Where models reach ---
+// --- Extent of the models ---
 
-// f > 0 needs a blob that alone gives T / n: rho (1 + x^2 / (5 rho^2))^-2 > T / n, or of compact blobs the support of one that adds.
+// f > 0 requires one blob that alone contributes T / n, rho (1 + x^2 / (5 rho^2))^-2 > T / n; or, for compact blobs, the support of one with a > 0.
 static double reach_of_model(const Blobby *m, Vec3 center)
 {
     double reach = 0;
@@ -101,7 +101,7 @@ static double reach_of_model(const Blobby *m, Vec3 center)
     return reach;
 }
 
-// Bounds of a model's field over the ball of radius h about x.
+// Bounds of a model's field in the ball of radius h about x.
 static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double *high)
 {
     *low = *high = -m->iso_level;
@@ -122,33 +122,33 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
     }
 }
 
-// Breadth first through the tree, as far as a point at the end of the ball's reach would look.
-static bool list_ways(SheetMarch *job, int ball)
+// Breadth-first search through the tree, as far as a point at the end of the ball's reach would search.
+static bool list_paths(SheetMarch *job, int ball)
 {
     const VesselTree *tree = job->tree;
     int node = job->node[ball], known = 1;
-    Way way[WAYS_MAX] = {{node, -1, 0}};
-    job->way_offset[ball + 1] = job->way_offset[ball];
+    TreePath path[PATHS_MAX] = {{node, -1, 0}};
+    job->path_offset[ball + 1] = job->path_offset[ball];
     for (int w = 0; w < known; w++) {
-        Way at = way[w];
-        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
+        TreePath at = path[w];
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < PATHS_MAX; k++) {
             int next = tree->neighbour[k];
             double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
             if (next != at.from && length < 2.5 * job->reach[ball])
-                way[known++] = (Way){next, at.node, length};
+                path[known++] = (TreePath){next, at.node, length};
         }
-        int *count = &job->way_offset[ball + 1];
+        int *count = &job->path_offset[ball + 1];
         if (w == 0 || vec3_distance(tree->center[at.node], tree->center[node]) - tree->radius[at.node] > job->reach[ball])
             continue;
-        if (*count == job->way_capacity) {
-            int capacity = 2 * job->way_capacity + 4096;
-            Way *more = realloc(job->way, (size_t)capacity * sizeof *more);
+        if (*count == job->path_capacity) {
+            int capacity = 2 * job->path_capacity + 4096;
+            TreePath *more = realloc(job->path, (size_t)capacity * sizeof *more);
             if (!more)
                 return false;
-            job->way = more;
-            job->way_capacity = capacity;
+            job->path = more;
+            job->path_capacity = capacity;
         }
-        job->way[(*count)++] = at;
+        job->path[(*count)++] = at;
     }
     return true;
 }
@@ -158,8 +158,8 @@ static bool find_blocks(SheetMarch *job, int first, int end)
     const VesselTree *tree = job->tree;
     job->node = malloc((size_t)(end - first) * sizeof *job->node);
     job->reach = malloc((size_t)(end - first) * sizeof *job->reach);
-    job->way_offset = calloc((size_t)(end - first) + 1, sizeof *job->way_offset);
-    if (!job->node || !job->reach || !job->way_offset)
+    job->path_offset = calloc((size_t)(end - first) + 1, sizeof *job->path_offset);
+    if (!job->node || !job->reach || !job->path_offset)
         return false;
     for (int i = first; i < end; i++) {
         Blobby model = blobby_of(tree, i);
@@ -172,23 +172,23 @@ static bool find_blocks(SheetMarch *job, int first, int end)
         job->reach[job->ball_count++] = reach + 2 * job->march.cell;
     }
     for (int n = 0; n < job->ball_count; n++)
-        if ((job->alone < 0 && !list_ways(job, n)) || !march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
+        if ((job->alone < 0 && !list_paths(job, n)) || !march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
             return false;
     return true;
 }
 
-// Whether all points of the ball (x, h) that stand clearly outside their node's ball look around and go to a node whose ball they are in
-// (power_walk.h). The list of ways does not depend on the point, so that what holds for a block holds for its points.
+// Returns whether all points of the ball (x, h) lie clearly outside their node's ball and move to a node whose ball holds them (power_walk.h). The list of
+// paths does not depend on the point, so what holds for a block holds for its points.
 static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
 {
     const VesselTree *tree = job->tree;
     double near = vec3_distance(x, tree->center[job->node[ball]]) - h;
     if (job->alone >= 0 || !(near > 1.2 * tree->radius[job->node[ball]]))
         return false;
-    for (int k = job->way_offset[ball]; k < job->way_offset[ball + 1]; k++) {
-        const Way *way = &job->way[k];
-        double r = tree->radius[way->node] - h;
-        if (way->length < 2.5 * near && r > 0 && vec3_norm2(vec3_sub(x, tree->center[way->node])) < r * r)
+    for (int k = job->path_offset[ball]; k < job->path_offset[ball + 1]; k++) {
+        const TreePath *path = &job->path[k];
+        double r = tree->radius[path->node] - h;
+        if (path->length < 2.5 * near && r > 0 && vec3_norm2(vec3_sub(x, tree->center[path->node])) < r * r)
             return true;
     }
     return false;
@@ -196,8 +196,8 @@ static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
 
 // --- Candidates of a block ---
 
-// A walk moves to a better node only within two radii of it, or where that is nearer in radii (power_walk.h). The difference of two power distances is
-// linear, so its ends over the cube around `middle` (h: its circumscribed radius) follow from its slope.
+// A walk moves to a better node only within two radii of it, or if the point is closer to it relative to the radii (power_walk.h). The difference of two power
+// distances is linear, so its range over the cube around `middle` (h: circumscribed radius) follows from its slope.
 static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double h)
 {
     const VesselTree *tree = job->tree;
@@ -232,7 +232,7 @@ static bool grow_by(void **array, int count, int *capacity, int more, size_t siz
     return true;
 }
 
-// Of compact blobs only those that reach the ball (middle, h): the others' terms are 0 there. Their rows start at c->first_row.
+// For compact blobs, keeps only those that reach the ball (middle, h), because the others' terms are 0 there. Their rows start at c->first_row.
 static bool narrow_model(SheetMarch *job, Candidate *c, Vec3 middle, double h)
 {
     const Blobby *all = &c->model;
@@ -291,7 +291,7 @@ static bool is_near(const VesselTree *tree, int node, int other)
     return false;
 }
 
-// Whether a walk from a candidate may lead to a node that says outside.
+// Returns whether a walk from a candidate may lead to a node whose field is below 0.
 static bool may_lead_out(const SheetMarch *job)
 {
     for (int k = 0; k < job->candidate_count; k++)
@@ -301,7 +301,8 @@ static bool may_lead_out(const SheetMarch *job)
     return false;
 }
 
-// Whether the block is certainly without surface: no model may be above 0 in it, or all are and in one of them a walk stays all over it.
+// Returns whether the block certainly contains no surface: either no model can be above 0 in it, or all are above 0 and a walk from one of them does not leave
+// it anywhere in the block.
 static bool block_is_plain(const SheetMarch *job, const MarchBlock *b)
 {
     double h;
@@ -350,8 +351,8 @@ static bool is_beaten(const SheetMarch *job, const Candidate *c, Vec3 x)
     return false;
 }
 
-// A node that is further from x than 1.2 of its radii does not answer for it where another one's ball holds x in its lumen: the cell of a vessel beside a
-// sac reaches all across it, and sees some of its blobs.
+// Removes nodes that are further from x than 1.2 of their radii if another node's ball holds x in its lumen: the cell of a vessel beside a sac extends all
+// across the sac and sees some of its blobs.
 static void drop_distant(const SheetMarch *job, Vec3 x, States *states)
 {
     const VesselTree *tree = job->tree;
@@ -388,7 +389,7 @@ static void find_states(SheetMarch *job, Vec3 x, States *states)
         drop_distant(job, x, states);
 }
 
-// Whether a tool point that moves between x, where it is at node a, and y comes to node b, or back.
+// Returns whether a tool point that moves from x, where its node is a, to y arrives at node b, or the reverse.
 static bool is_linked(const SheetMarch *job, Vec3 x, int a, Vec3 y, int b)
 {
     return a == b || is_near(job->tree, a, b) || is_near(job->tree, b, a) || walk_on(job, y, a) == b || walk_on(job, x, b) == a;
@@ -396,7 +397,7 @@ static bool is_linked(const SheetMarch *job, Vec3 x, int a, Vec3 y, int b)
 
 // --- Vertices ---
 
-// Onto the model's surface, by at most three quarters of a cell: where neighbouring models disagree there may be none near, and p stays.
+// Moves p onto the model's surface, by at most three quarters of a cell: where neighbouring models disagree there may be no surface near, and p stays.
 static Vec3 settle(const SheetMarch *job, const Blobby *m, Vec3 p, Vec3 *normal)
 {
     Vec3 g, x = p;
@@ -422,7 +423,7 @@ static Vec3 lattice_point(const SheetMarch *job, const int at[3]) { return vec3(
 
 static uint64_t lattice_key(const int at[3]) { return march_key(at[0], at[1], at[2]); }
 
-// The vertex on the edge from the inside point `at` along axis, up or down. `key` in `map`: what it is known by.
+// The vertex on the edge from the inside point `at` along axis, up or down, stored in `map` under `key`.
 static bool add_vertex(SheetMarch *job, KeyMap *map, uint64_t key, const int at[3], int axis, bool up, int node, double field, int *index)
 {
     TriangleMesh *mesh = job->march.mesh;
@@ -493,7 +494,7 @@ static bool march_plain_cube(SheetMarch *job, const MarchBlock *b, int i, int j,
     return true;
 }
 
-// The point's number; new points bring their states. -1: no memory.
+// The point's index; a new point is added with its states. Returns -1 if out of memory.
 static int keep_point(SheetMarch *job, const int at[3], const States *states)
 {
     bool is_new;
@@ -547,7 +548,7 @@ static bool march_cubes(SheetMarch *job, const MarchBlock *b)
 
 // --- Cubes that are not plain ---
 
-typedef struct CubeSheets {  // the states at a cube's corners; sheet[s]: the lowest of those it hangs together with
+typedef struct CubeSheets {  // the states at a cube's corners; sheet[s]: the lowest of the states that are connected with s
     int count, state[CUBE_STATES_MAX], corner[CUBE_STATES_MAX], sheet[CUBE_STATES_MAX];
 } CubeSheets;
 
@@ -586,7 +587,8 @@ static void find_sheets(SheetMarch *job, const SheetCube *cube, CubeSheets *shee
         sheets->sheet[a] = disjoint_root(sheets->sheet, a);
 }
 
-// What hangs together in a cube must do so wherever its points and edges are met again. True where that was new.
+// Applies the two rules to a cube: states connected in it must be identical or linked wherever their points and edges occur again. Returns true if that changed
+// anything.
 static bool unify(SheetMarch *job, const CubeSheets *sheets, bool *failed)
 {
     bool changed = false;
@@ -686,8 +688,8 @@ static void free_march(SheetMarch *job)
     key_map_free(&job->vertex_of_state);
     free(job->node);
     free(job->reach);
-    free(job->way_offset);
-    free(job->way);
+    free(job->path_offset);
+    free(job->path);
     free(job->candidate);
     free(job->out);
     free(job->row);

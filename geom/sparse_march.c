@@ -11,7 +11,7 @@ enum {
     BLOCKS_MAX = 20000000,
 };
 
-// Room for one more entry; false where memory ends or an index would not fit an int.
+// Makes room for one more entry; returns false if out of memory or if an index would not fit an int.
 static bool grow(void **array, int count, int *capacity, size_t size)
 {
     if (count < *capacity)
@@ -81,7 +81,7 @@ bool march_add_ball(March *march, int index, Vec3 c, double ball_reach)
     for (int i = low[0]; i <= high[0]; i++)
         for (int j = low[1]; j <= high[1]; j++)
             for (int k = low[2]; k <= high[2]; k++) {
-                // the nearest point of the block to the centre
+                // the point of the block closest to the centre
                 Vec3 d = vec3(fmax(0, fmax(i * block - c.x, c.x - (i + 1) * block)), fmax(0, fmax(j * block - c.y, c.y - (j + 1) * block)),
                               fmax(0, fmax(k * block - c.z, c.z - (k + 1) * block)));
                 int base[3] = {i * MARCH_BLOCK, j * MARCH_BLOCK, k * MARCH_BLOCK};

@@ -1,5 +1,5 @@
-// A node's centre is held by a part where the field is above 0 on the straight way from it to some vertex of that part that the node answers for. A few
-// vertices of each node and part are tried.
+// A part holds a node's centre if the field is above 0 on the straight line from the centre to some vertex of that part whose node it is. A few vertices per
+// node and part are tried.
 #include "geom/surface_parts.h"
 
 #include "base/base.h"
@@ -58,10 +58,10 @@ static bool sees(const VesselTree *tree, int node, Vec3 x)
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
         if (tree->near[k] == at)
             return true;
-    return at == node;       // elsewhere the way has led into another lumen
+    return at == node;       // otherwise the line has led into another lumen
 }
 
-// Which nodes the parts hold; reached[part]: one of them is reached by a point.
+// Determines which nodes the parts hold; reached[part]: a point reaches one of them.
 static bool find_nodes(const TriangleMesh *mesh, const VesselTree *tree, const Reach *reach, SurfaceParts *parts, bool *reached)
 {
     KeyMap tries = {0};

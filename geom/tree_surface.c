@@ -1,5 +1,5 @@
-// Edges are sorted by counting on their lower vertex; parts are found by joining the ends of edges (union-find). The inlet is cut by clipping each
-// triangle at the root's plane; vertices closer to it than a twentieth of an edge are moved onto it first, so that no slivers remain.
+// Edges are sorted by counting on their lower vertex; parts are found by union-find over the ends of edges. The inlet is cut by clipping each triangle at the
+// root's plane; vertices closer to it than a twentieth of an edge are moved onto it first, so that no slivers remain.
 #include "geom/tree_surface.h"
 
 #include "base/base.h"
@@ -10,7 +10,7 @@
 
 // --- Parts ---
 
-// part[v]: the lowest vertex of v's connected part. NULL where memory lacks.
+// part[v]: the lowest vertex of v's connected part. Returns NULL if out of memory.
 static int *find_parts(const TriangleMesh *mesh)
 {
     int *part = malloc(((size_t)mesh->vertex_count + 1) * sizeof *part);
@@ -42,8 +42,8 @@ static double triangle_area(const TriangleMesh *mesh, int t)
 // --- Census ---
 
 typedef struct HalfEdge {
-    int to;                  // the higher vertex
-    bool upwards;            // runs from the lower to the higher
+    int to;                  // the vertex with the higher index
+    bool upwards;            // runs from the lower to the higher index
 } HalfEdge;
 
 static int compare_half_edges(const void *x, const void *y)
@@ -67,7 +67,7 @@ static void sort_half_edges(HalfEdge *edge, int count)
     }
 }
 
-// The half edges of each vertex v, at [first[v], first[v + 1]), sorted; to be freed with `first`. NULL where memory lacks.
+// The half edges of each vertex v, at [first[v], first[v + 1]), sorted; the caller frees them and `first`. Returns NULL if out of memory.
 static HalfEdge *half_edges(const TriangleMesh *mesh, size_t **first)
 {
     size_t vertices = (size_t)mesh->vertex_count, sides = 3 * (size_t)mesh->triangle_count, *at = calloc(vertices + 2, sizeof *at);
@@ -119,7 +119,7 @@ bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census)
     for (size_t v = 0; good && v < vertices; v++)
         count_edges(edge + first[v], (int)(first[v + 1] - first[v]), census, (int)v, mesh, &rim);
     if (good) {
-        // used vertices: marked in `first`, whose work is done
+        // mark the vertices in use in `first`, which is no longer needed
         memset(first, 0, (vertices + 2) * sizeof *first);
         for (size_t i = 0; i < sides; i++)
             first[mesh->triangle[i / 3][i % 3]] = 1;
@@ -142,7 +142,7 @@ bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census)
 
 // --- Dropping ---
 
-// has_rim[p]: part p has an edge with one triangle. False where memory lacks.
+// has_rim[p]: part p has an edge with a single triangle. Returns false if out of memory.
 static bool find_rims(const TriangleMesh *mesh, const int *part, bool *has_rim)
 {
     size_t *first = NULL;
@@ -156,7 +156,7 @@ static bool find_rims(const TriangleMesh *mesh, const int *part, bool *has_rim)
     return good;
 }
 
-// A part with a rim encloses nothing, and the cones over it add up to anything: its volume is that of the ball with its area.
+// A part with a rim encloses nothing, and the cones over it add up to an arbitrary value: its volume is that of the ball with the same area.
 int surface_drop_specks(TriangleMesh *mesh, double least_volume)
 {
     int *part = find_parts(mesh), dropped = 0, largest = 0;
@@ -176,7 +176,7 @@ int surface_drop_specks(TriangleMesh *mesh, double least_volume)
         keep[t] = of == largest || volume[of] >= least_volume;
         if (!keep[t] && !isnan(volume[of])) {
             dropped++;
-            volume[of] = NAN;   // counted
+            volume[of] = NAN;   // marks the part as counted
         }
     }
     good = good && (dropped == 0 || triangle_mesh_keep(mesh, keep));
@@ -192,8 +192,8 @@ int surface_drop_specks(TriangleMesh *mesh, double least_volume)
 typedef struct Inlet {
     const VesselTree *tree;
     Vec3 center, direction;
-    double *height;          // (V) over the plane; 0: on it
-    bool *is_cut;            // (V) goes away
+    double *height;          // (V) height above the plane; 0: on it
+    bool *is_cut;            // (V) will be removed
     int split_count, split_capacity;
     struct Split {
         int a, b, vertex;    // a < b: ends of the edge, and the new vertex on it
@@ -202,7 +202,7 @@ typedef struct Inlet {
     int (*triangle)[3];
 } Inlet;
 
-// Onto the node's model within the plane; p stays where that is further than `most`.
+// Moves p onto the node's model within the plane; returns p unchanged if that is further than `most`.
 static Vec3 settle_in_plane(const Inlet *inlet, int node, Vec3 p, double most)
 {
     Blobby model = blobby_of(inlet->tree, node);
@@ -239,7 +239,7 @@ static double mean_edge(const TriangleMesh *mesh)
     return sum / mesh->triangle_count;
 }
 
-// Marks what hangs together upstream of the plane and touches the wall around the root. False where it goes too far.
+// Marks the vertices that are connected upstream of the plane with the wall around the root. Returns false if they extend too far.
 static bool mark_cut(const TriangleMesh *mesh, Inlet *inlet, double eps)
 {
     const VesselTree *tree = inlet->tree;
@@ -267,7 +267,7 @@ static bool mark_cut(const TriangleMesh *mesh, Inlet *inlet, double eps)
     return true;
 }
 
-// The new vertex where the edge crosses the plane. -1: no memory.
+// Returns the new vertex where the edge crosses the plane; -1 if out of memory.
 static int split_edge(TriangleMesh *mesh, Inlet *inlet, int a, int b)
 {
     int low = a < b ? a : b, high = a < b ? b : a;
@@ -304,7 +304,7 @@ static int split_edge(TriangleMesh *mesh, Inlet *inlet, int a, int b)
     return made;
 }
 
-// What of a triangle lies downstream of the plane: up to two triangles. False where memory lacks.
+// Keeps the part of a triangle downstream of the plane, as up to two triangles. Returns false if out of memory.
 static bool clip_triangle(TriangleMesh *mesh, Inlet *inlet, const int corner[3])
 {
     int polygon[4], n = 0;
@@ -350,7 +350,7 @@ static bool cut_inlet(TriangleMesh *mesh, Inlet *inlet)
     for (int t = 0; good && t < before; t++)
         good = clip_triangle(mesh, inlet, mesh->triangle[t]);
     if (good) {
-        // a triangle left with no corner above the plane lies in it: it belongs to the lid
+        // a remaining triangle with no corner above the plane lies in the plane: it belongs to the lid
         for (int t = 0; t < inlet->triangle_count; t++) {
             const int *c = inlet->triangle[t];
             keep[t] = false;
@@ -415,7 +415,7 @@ bool surface_open_inlet(TriangleMesh *mesh, const VesselTree *tree)
 
 enum { NODES_MAX = 64 };
 
-// The nodes whose points are asked for a vertex of `node`: two links around it, further while they have no points.
+// The nodes whose points are compared with a vertex of `node`: those up to two links away, and further as long as they have no points.
 static int nodes_around(const VesselTree *tree, int node, int around[NODES_MAX])
 {
     int count = 1, ring = 0;

@@ -1,5 +1,5 @@
-// The squared distance of a point to a triangle: height over its plane, and in the plane, unless within, to the nearest side. One text, compiled for each
-// instruction set, with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
+// The squared distance of a point from a triangle: height over its plane and, if the projection is outside, the distance in the plane to the closest side. One
+// source, compiled for each instruction set with -fno-math-errno and -fno-trapping-math, which change no result but allow the selects to be vectorised.
 #include "geom/triangle_groups.h"
 
 #include "base/base.h"
@@ -14,7 +14,7 @@ static const GroupKernels kernel_table[SIMD_COUNT] = SIMD_EACH(KERNEL_TABLE);
 
 const GroupKernels *group_kernels(int isa) { return &kernel_table[simd_choose(isa)]; }
 
-// --- Order: halves by the longest side of the centroids' box, cut where whole groups end ---
+// --- Order: recursive halving along the longest side of the centroids' box, at multiples of a group ---
 
 static double along(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -24,7 +24,7 @@ static bool stands_before(const Vec3 *centroid, int axis, int a, int b)
     return x < y || (x == y && a < b);
 }
 
-// Puts the `left` lowest of `count` first (Hoare's selection).
+// Moves the `left` lowest of `count` to the front (Hoare's selection algorithm).
 static void select_lowest(int *order, int count, int left, const Vec3 *centroid, int axis)
 {
     int low = 0, high = count - 1;
@@ -109,7 +109,7 @@ TriangleFrame triangle_frame(const Vec3 *vertex, const int *corner)
     f.across = vec3_add_scaled(c, -f.top[0], f.along);
     f.top[1] = vec3_norm(f.across);
     f.across = vec3_unit(f.across);
-    f.across = vec3_unit(vec3_add_scaled(f.across, -vec3_dot(f.across, f.along), f.along));      // again, for what rounding left of a thin one
+    f.across = vec3_unit(vec3_add_scaled(f.across, -vec3_dot(f.across, f.along), f.along));      // repeated to remove rounding errors of thin triangles
     f.normal = vec3_cross(f.across, f.along);
     return f;
 }

@@ -1,4 +1,4 @@
-// Surfaces of vessels that are no trees: rings along a tube's centreline, and a square of a plane.
+// Display surfaces of vessels that are not trees: rings along a tube's centreline, and a square of a plane.
 #include "geom/tube_mesh.h"
 
 #include "base/base.h"
@@ -32,7 +32,7 @@ static void add_station(Path *path, Vec3 point, Vec3 tangent)
     path->tangent[path->count++] = tangent;
 }
 
-// Straight stretches in parts of a lumen's radius, so that the painter's sort has small triangles. Stations `first` to (parts - `spared`).
+// Divides straight pieces into parts of the lumen's radius, so that the painter's sort has small triangles. Stations `first` to (parts - `spared`).
 static void add_line(Path *path, Vec3 from, Vec3 direction, double length, double part, int first, int spared)
 {
     int parts = (int)fmin(fmax(ceil(length / part), 1), 2000);
@@ -40,7 +40,7 @@ static void add_line(Path *path, Vec3 from, Vec3 direction, double length, doubl
         add_station(path, vec3_add_scaled(from, length * k / parts, direction), direction);
 }
 
-// The same convention as geom/tube_vessel.c: an arc's plane first turns the normal about the tangent, then the arc turns towards the normal.
+// The same convention as in geom/tube_vessel.c: an arc's plane first rotates the normal about the tangent, then the arc turns towards the normal.
 static void lay_pieces(Path *path, const TubeOptions *tube)
 {
     Vec3 p = tube->start, t = vec3_unit(tube->direction), n = vec3_add_scaled(tube->normal, -vec3_dot(tube->normal, t), t);
@@ -65,8 +65,8 @@ static void lay_pieces(Path *path, const TubeOptions *tube)
     }
 }
 
-// One ring at a gentle corner, along the mean of its tangents (two would cross each other on the inner side, and shine through as a dark line); a
-// sharp corner is turned about, which leaves the sphere on its outer side.
+// At a slight corner, one ring along the mean of its tangents (two would cross each other on the inner side and appear as a dark line); around a sharp corner,
+// a series of rings, which gives the sphere on its outer side.
 static void add_corner(Path *path, Vec3 point, Vec3 before, Vec3 after)
 {
     double angle = vec3_angle(before, after);
@@ -163,7 +163,7 @@ TriangleMesh *triangle_mesh_of_plane(Vec3 point, Vec3 normal, double half_width)
     TriangleMesh *mesh = create_mesh((PARTS + 1) * (PARTS + 1), 2 * PARTS * PARTS);
     if (!mesh)
         return NULL;
-    // out of the lumen is against the plane's normal, which points into it
+    // outwards is opposite to the plane's normal, which points into the lumen
     Vec3 out = vec3_negate(vec3_unit(normal)), u = vec3_normal_to(out), v = vec3_cross(out, u);
     int triangle = 0;
     for (int j = 0; j <= PARTS; j++)

@@ -1,19 +1,19 @@
-// The exact tube: the union of spheres of one radius along a centreline of lines and arcs, or along a polyline. The reference geometry
-// of the mechanics tests (docs/references.md "Wire and walls").
+// The exact tube: the union of spheres of one radius along a centreline of lines and arcs, or along a polyline. It is the reference geometry of the mechanics
+// tests (docs/references.md "Wire and walls").
 //
 // With d the distance from X to the centreline and F its foot there: gap = radius - d, normal = (F - X) / d, and the gap's Hessian is -Hess d:
-//   straight: 1/d about the axis, 0 along it;  arc of radius R, rho the distance to its axis of turning: also (rho - R) / (rho d) along the turn;
+// straight: 1/d about the axis, 0 along it;  arc of radius R, rho the distance to its axis: also (rho - R) / (rho d) along the arc;
 //   end or corner (the nearest centreline point is a fixed point): 1/d in both directions.
 //
-// The centreline is cut into segments, arcs into parts of at most 90 degrees, so that a segment's closest point is unique near the tube. Between two
-// segments stands a plane through their joint, half way between their directions: near the tube a point is closer to the segment on its own side. A
-// point walks from its last segment across such planes, to a neighbour only and only where that is closer: it never jumps to another coil that crosses
-// or nearly touches its own, and its cost does not depend on the number of segments.
+// The centreline is divided into segments, arcs into parts of at most 90 degrees, so that a segment's closest point is unique near the tube. Between two
+// segments lies a plane through their joint, perpendicular to the mean of their directions: near the tube a point is closer to the segment on its own side. A
+// point walks from its last segment across such planes, only to a neighbour and only if that is closer: it never jumps to another coil that crosses or nearly
+// touches its own, and its cost does not depend on the number of segments.
 //
-// Open ends. Upstream of the first plane the first cross-section goes on as a cylinder for ever: a coil that bulges back past the sheath is held. The
-// last end's wall flares like a trumpet's bell, a quarter of a circle of radius L = radius: the rim is rounded, as a sharp edge can hold a tool only
-// at points that happen to lie in its plane. So a wire that leaves at an angle leans on the bell, tangent at first. There gap = D - L with D the distance
-// to the circle of radius (radius + L) in the end plane. Two radii beyond the end, where the bell is further than any tool's radius, there is no wall.
+// Open ends. Upstream of the first plane the first cross-section continues as a cylinder without end: a coil that bulges back past the sheath is held. The last
+// end's wall flares like the bell of a trumpet, a quarter of a circle of radius L = radius: the rim is rounded because a sharp edge can hold a tool only at
+// points that happen to lie in its plane. So a wire that leaves at an angle leans on the bell, tangentially at first. There gap = D - L, with D the distance to
+// the circle of radius (radius + L) in the end plane. Two radii beyond the end, where the bell is further away than any tool's radius, there is no wall.
 #include "geom/vessel.h"
 #include "base/base.h"
 
@@ -25,18 +25,18 @@ typedef struct Segment {
     Vec3 start, end;
     Vec3 tangent;            // at the start
     Vec3 end_tangent;
-    Vec3 normal;             // carried frame at the start; an arc turns towards it
-    Vec3 binormal;           // tangent x normal, the arc's axis of turning
-    Vec3 center;             // of the arc
-    Vec3 joint;              // normal of the plane at the end, onwards (no unit vector)
+    Vec3 normal;             // transported frame at the start; an arc turns towards it
+    Vec3 binormal;           // tangent x normal, the arc's axis
+    Vec3 center;             // centre of the arc
+    Vec3 joint;              // normal of the plane at the end, in the direction of the tube (not a unit vector)
     double length;           // line
     double arc_radius;       // 0: line
     double angle;            // arc, (0, pi/2] …
-    double cosine, sine, half_cosine, half_sine;     // … and of the half of it
+    double cosine, sine, half_cosine, half_sine;     // … and of half of it
 } Segment;
 
 typedef struct TubeVessel {
-    Vessel vessel;           // first: a Vessel * to us is a TubeVessel *
+    Vessel vessel;           // first: a Vessel * points to its TubeVessel
     double radius;
     bool closed_ends;
     int count;
@@ -44,9 +44,9 @@ typedef struct TubeVessel {
 } TubeVessel;
 
 typedef struct CentrePoint {
-    Vec3 foot, tangent, side;    // side: a unit vector across, for a point on the centreline itself
+    Vec3 foot, tangent, side;    // side: a unit vector perpendicular to the tangent, for a point on the centreline itself
     double distance2;
-    double rho;                  // arc: distance of X to the axis of turning
+    double rho;                  // arc: distance of X to its axis
     int end;                     // -1 before the segment's start, +1 beyond its end, 0 between
 } CentrePoint;
 
@@ -64,7 +64,7 @@ static CentrePoint closest_on_segment(const Segment *s, Vec3 x)
         Vec3 y = vec3_sub(x, s->center);
         double u = -vec3_dot(y, s->normal), v = vec3_dot(y, s->tangent), rho = sqrt(u * u + v * v);
         double cp = rho > 0 ? u / rho : s->half_cosine, sp = rho > 0 ? v / rho : s->half_sine;
-        if (sp < 0 || cp * s->sine < sp * s->cosine)     // outside of the arc's wedge: the end on X's side of its middle
+        if (sp < 0 || cp * s->sine < sp * s->cosine)     // outside the arc's sector: the end on X's side of the middle
             c.end = sp * s->half_cosine < cp * s->half_sine ? -1 : 1;
         Vec3 out = vec3_add_scaled(vec3_scale(s->normal, -cp), sp, s->tangent);
         c.rho = rho;
@@ -82,15 +82,15 @@ static CentrePoint closest_on_segment(const Segment *s, Vec3 x)
 
 static bool is_past(const Segment *s, Vec3 x) { return vec3_dot(vec3_sub(x, s->end), s->joint) > 0; }
 
-// Walks to ever closer neighbours; ends, since the distance falls strictly.
+// Walks to ever closer neighbours; ends, because the distance decreases strictly.
 static int walk(const TubeVessel *tube, Vec3 x, int segment, CentrePoint *closest)
 {
     SEL_ASSERT(segment >= 0 && segment < tube->count, "a walk starts on a segment of the tube");
     const Segment *s = tube->segment;
     *closest = closest_on_segment(&s[segment], x);
-    for (int way = -1; way <= 1; way += 2)
-        for (int next = segment + way; next >= 0 && next < tube->count; next += way) {
-            bool on = way > 0 ? closest->end > 0 || is_past(&s[segment], x) : closest->end < 0 || !is_past(&s[next], x);
+    for (int step = -1; step <= 1; step += 2)
+        for (int next = segment + step; next >= 0 && next < tube->count; next += step) {
+            bool on = step > 0 ? closest->end > 0 || is_past(&s[segment], x) : closest->end < 0 || !is_past(&s[next], x);
             if (!on)
                 break;
             CentrePoint c = closest_on_segment(&s[next], x);
@@ -117,15 +117,15 @@ static int nearest_overall(const TubeVessel *tube, Vec3 x)
     return best;
 }
 
-// The gap's curvature grows without bound towards the centreline and, outside, towards the axis of an arc's turning; neither place is one
-// where a contact may sit, and both are held to what they are at a tenth of the radius.
+// The gap's curvature grows without bound towards the centreline and, outside, towards the axis of an arc. Contacts occur at neither place, and both curvatures
+// are limited to their values at a tenth of the radius.
 static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePoint *c, Vec3 normal, double distance)
 {
     SEL_ASSERT(distance >= 0, "a distance is a length");
     Sym3 h = {0, 0, 0, 0, 0, 0};
     double least = 0.1 * tube->radius, d = distance > least ? distance : least;
     if (c->end != 0) {
-        // a fixed nearest point: a sphere about it, -(I - n n') / d
+        // a fixed closest point: a sphere about it, -(I - n n') / d
         h.xx = h.yy = h.zz = -1 / d;
         sym3_add_outer(&h, 1 / d, normal);
         return h;
@@ -144,7 +144,7 @@ static VesselHit open_end(VesselMemory *memory, int node)
     return (VesselHit){.gap = HUGE_VAL, .node = node, .flags = VESSEL_OPEN_END};
 }
 
-// Beyond the last end's plane by z > 0: the bell.
+// Hit at height z > 0 beyond the last end's plane: the bell.
 static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent, double z, VesselMemory *memory)
 {
     SEL_ASSERT(z > 0, "the bell begins beyond the last plane");
@@ -154,7 +154,7 @@ static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent
     if (z > 2 * bell || rho > r + 2 * bell)
         return open_end(memory, memory->node);
     VesselHit hit = {.node = memory->node, .flags = VESSEL_BEYOND};
-    if (aside <= 0) {   // before the flange that the bell ends in
+    if (aside <= 0) {   // before the flange at the end of the bell
         hit.gap = z - bell;
         hit.normal = tangent;
     } else {
@@ -185,7 +185,7 @@ static VesselHit hit_at(const TubeVessel *tube, Vec3 x, VesselMemory *memory)
     const Segment *s = &tube->segment[k];
     if (c.end != 0) {
         double forward = vec3_dot(vec3_sub(x, c.foot), c.tangent);
-        // on the plane of a smooth joint rounding may put a point before one segment and beyond the other: that is no corner
+        // on the plane of a smooth joint, rounding may put a point before one segment and beyond the other: that is no corner
         if (fabs(forward) <= 1e-9 * tube->radius)
             c.end = 0;
         else if (!tube->closed_ends && k == 0 && c.end < 0 && forward < 0) {
@@ -206,7 +206,7 @@ static VesselHit hit_at(const TubeVessel *tube, Vec3 x, VesselMemory *memory)
 
 static void tube_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    (void)reach;   // the exact answer costs no more than a bound
+    (void)reach;   // the exact result costs no more than a bound
     for (int i = 0; i < count; i++)
         hit[i] = hit_at((const TubeVessel *)vessel, point[i], &memory[i]);
 }
@@ -235,7 +235,7 @@ static void tube_destroy(Vessel *vessel)
     free(vessel);
 }
 
-// --- Making one ---
+// --- Creation ---
 
 static void check_pieces(const TubeOptions *o, const char *file, Faults *faults)
 {
@@ -243,34 +243,33 @@ static void check_pieces(const TubeOptions *o, const char *file, Faults *faults)
     for (int i = 0; i < o->piece_count; i++) {
         const TubePiece *p = &o->piece[i];
         if (!isfinite(p->angle) || p->angle < 0)
-            faults_add(faults, file, 0, 0, "tube: path[%d] turns by %g deg; an arc's angle is above 0", i, p->angle * 180 / PI);
+            faults_add(faults, file, 0, 0, "tube: path[%d] turns by %g deg; expected an arc's angle above 0", i, p->angle * 180 / PI);
         else if (p->angle == 0 && (!isfinite(p->length) || !(p->length > 0)))
-            faults_add(faults, file, 0, 0, "tube: path[%d] is %g mm long; a line's length is above 0 (and an arc's angle)", i, p->length);
+            faults_add(faults, file, 0, 0, "tube: path[%d] is %g mm long; expected a line's length above 0 (or an arc's angle)", i, p->length);
         else if (p->angle > 0 && (!isfinite(p->arc_radius) || !(p->arc_radius > o->radius)))
             faults_add(faults, file, 0, 0, "tube: path[%d] has an arc of radius %g mm; it must be larger than the lumen's radius, %g mm", i, p->arc_radius,
                        o->radius);
         if (!isfinite(p->plane))
-            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc's plane that is no number; degrees are valid", i);
+            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc's plane that is not a number; expected degrees", i);
         parts += p->angle > 0 ? 1 + p->angle / (PI / 2) : 1;
     }
     if (!(parts < SEGMENTS_MAX))
-        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; fewer than %d lines and quarter turns are valid", parts, (int)SEGMENTS_MAX);
+        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; expected fewer than %d lines and quarter turns", parts, (int)SEGMENTS_MAX);
 }
 
 static void check_polyline(const TubeOptions *o, const char *file, Faults *faults)
 {
     if (o->point_count < 2 || o->point_count > SEGMENTS_MAX) {
-        faults_add(faults, file, 0, 0, "tube: the centreline has %d points; 2 to %d are valid", o->point_count, (int)SEGMENTS_MAX);
+        faults_add(faults, file, 0, 0, "tube: the centreline has %d points; expected 2 to %d", o->point_count, (int)SEGMENTS_MAX);
         return;
     }
     for (int i = 0; i < o->point_count; i++) {
         if (!vec3_is_finite(o->point[i])) {
-            faults_add(faults, file, 0, 0, "tube: point %d is (%g, %g, %g); finite coordinates in mm are valid", i, o->point[i].x, o->point[i].y,
-                       o->point[i].z);
+            faults_add(faults, file, 0, 0, "tube: point %d is (%g, %g, %g); expected finite coordinates in mm", i, o->point[i].x, o->point[i].y, o->point[i].z);
             return;
         }
         if (i > 0 && !(vec3_distance(o->point[i - 1], o->point[i]) > 1e-9)) {
-            faults_add(faults, file, 0, 0, "tube: points %d and %d coincide; neighbouring points differ", i - 1, i);
+            faults_add(faults, file, 0, 0, "tube: points %d and %d coincide; expected distinct neighbours", i - 1, i);
             return;
         }
     }
@@ -281,9 +280,9 @@ static bool check_options(const TubeOptions *o, const char *file, Faults *faults
     int before = faults->count;
     bool pieces = o->piece_count > 0 && o->piece, points = o->point_count > 0 && o->point;
     if (!isfinite(o->radius) || !(o->radius > 0))
-        faults_add(faults, file, 0, 0, "tube: radius_mm is %g; a number above 0 is valid", o->radius);
+        faults_add(faults, file, 0, 0, "tube: radius_mm is %g; expected a number above 0", o->radius);
     if (pieces == points)
-        faults_add(faults, file, 0, 0, "tube: %s; exactly one of `path` and `points` is valid",
+        faults_add(faults, file, 0, 0, "tube: %s; expected exactly one of `path` and `points`",
                    pieces ? "both a path and points are given" : "neither a path nor points are given");
     else if (points)
         check_polyline(o, file, faults);
@@ -294,11 +293,11 @@ static bool check_options(const TubeOptions *o, const char *file, Faults *faults
         for (int i = 0; i < o->piece_count; i++)
             turns = turns || o->piece[i].angle > 0;
         if (!vec3_is_finite(o->start))
-            faults_add(faults, file, 0, 0, "tube: start_mm is not finite; coordinates in mm are valid");
+            faults_add(faults, file, 0, 0, "tube: start_mm is not finite; expected coordinates in mm");
         if (!isfinite(length) || !(length > 1e-12))
-            faults_add(faults, file, 0, 0, "tube: direction has no length; a vector into the tube is valid");
+            faults_add(faults, file, 0, 0, "tube: direction has no length; expected a vector into the tube");
         else if (turns && !(across > 1e-9 * length * vec3_norm(o->normal)))
-            faults_add(faults, file, 0, 0, "tube: normal is zero or along direction; arcs turn towards it, a vector across direction is valid");
+            faults_add(faults, file, 0, 0, "tube: normal is zero or along direction; arcs turn towards it, so expected a vector across direction");
     }
     return faults->count == before;
 }
@@ -368,7 +367,7 @@ static int lay_polyline(const TubeOptions *o, Segment *out)
         Vec3 p = o->point[i], step = vec3_sub(o->point[i + 1], p), t = vec3_unit(step);
         n = unit_across(n, t);
         add_line(out + i, &p, t, n, vec3_norm(step));
-        out[i].end = o->point[i + 1];   // so that neighbours share their corner to the bit
+        out[i].end = o->point[i + 1];   // the exact value, so that neighbours share their corner bit for bit
     }
     return o->point_count - 1;
 }
@@ -386,7 +385,7 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
     TubeVessel *tube = calloc(1, sizeof *tube);
     Segment *segment = calloc(capacity, sizeof *segment);
     if (!tube || !segment) {
-        faults_add(faults, file, 0, 0, "tube: no memory for %zu segments", capacity);
+        faults_add(faults, file, 0, 0, "tube: not enough memory for %zu segments", capacity);
         free(tube);
         free(segment);
         return NULL;
@@ -396,7 +395,7 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
     tube->closed_ends = options->closed_ends;
     tube->segment = segment;
     tube->count = pieces ? lay_pieces(options, segment) : lay_polyline(options, segment);
-    SEL_REQUIRE(tube->count > 0 && (size_t)tube->count <= capacity, "lines and parts of arcs fit into what was counted");
+    SEL_REQUIRE(tube->count > 0 && (size_t)tube->count <= capacity, "the lines and parts of arcs fit into the counted capacity");
     tube->vessel.primitives = tube->count;
     tube->vessel.bytes = sizeof *tube + (size_t)tube->count * sizeof *segment;
     for (int i = 0; i + 1 < tube->count; i++)

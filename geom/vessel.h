@@ -1,7 +1,7 @@
-// What the solver asks of a vessel: for tool points with their last node, the gap to the wall, the wall's normal and the
-// Hessian of the gap. One small interface; LIM, exact tube, plane (and later mesh) answer it.
+// The interface through which the solver queries a vessel: for tool points with their last node, the gap to the wall, the wall's normal and the Hessian of the
+// gap. Implemented by the fitted tree (LIM or shared blobs), mesh, grid, exact tube and plane.
 //
-// gap: signed distance from the point to the wall [mm], > 0 inside the lumen (the tool's radius is the caller's business).
+// gap: signed distance from the point to the wall [mm], > 0 inside the lumen (the caller subtracts the tool's radius).
 // normal: unit, gradient of the gap, pointing into the lumen. hessian: second derivative of the gap AT THE POINT [1/mm]: with S the
 // surface's Hessian of distance at the foot, S (I + gap S)^-1; 0 along the normal.
 // A vessel is immutable after creation; queries allocate nothing and may run in several threads, each with its own memory array.
@@ -13,39 +13,39 @@
 #include "geom/vessel_tree.h"
 
 enum { VESSEL_BLOBS = 24 };
-// What a tool point remembers between steps.
+// What is stored for a tool point between steps. The closest point on the wall is called the foot.
 typedef struct VesselMemory {
-    Vec3 foot;               // last projection, where Newton starts
-    Vec3 place, normal;      // where the foot was found from, the answer there …
-    Sym3 hessian;            // … and its curvature: they say where the foot has moved to
-    // Of the field of shared blobs; field_lanes.h loads the numbers from `foot` to `bound_for` as one row of 32.
-    double down;             // within `bound_for` mm of `bound_at` f bends down by no more than this, and up …
-    Vec3 miss, step;         // by how much the last prediction missed the foot, and the motion that it was made for
-    double trust;            // [mm] from `bound_at` within which no walls but the rival's need be looked for
-    double up;               // … by no more than this [1/mm^2]
+    Vec3 foot;               // last foot, where Newton starts
+    Vec3 place, normal;      // the point that the foot belongs to, the normal there …
+    Sym3 hessian;            // … and the Hessian of the gap: from them the foot's motion is predicted
+    // For the field of shared blobs; field_lanes.h loads the numbers from `foot` to `bound_for` as one row of 32.
+    double down;             // bound of the field's downward second derivative within `bound_for` mm of `bound_at` [1/mm^2] …
+    Vec3 miss, step;         // by how much the last prediction missed the foot, and the motion for which it was made
+    double trust;            // [mm] from `bound_at`, within which no wall except the rival's can be closer
+    double up;               // … and of its upward one
     Vec3 held_at;            // the blobs below are all that reach to within …
-    double held_for2;        // … the root of this [mm^2] of here, as `node` sees the field
+    double held_for2;        // … the square root of this [mm^2] of this point, in the field as `node` sees it
     Vec3 bound_at;
     double bound_for;
     Vec3 rival;              // another foot, nearly as close
     bool has_rival;
-    bool contradicted;       // by another node, which puts the wall nearer than it can be: for now
-    double credible;         // … the gap is this [mm]
-    double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
+    bool contradicted;       // another node currently puts the wall nearer than it can be …
+    double credible;         // … and the gap is this [mm]
+    double clearance;        // [mm] lower bound of the distance from `clear_place` to the wall of `node`; 0: unknown. Far points are skipped by it
     Vec3 clear_place;
-    int node;                // node of the tree, or segment of the tube; -1: not yet located
-    int trusted;             // queries for which the foot need not be compared with other walls
+    int node;                // node of the tree or segment of the tube; -1: not yet located
+    int trusted;             // number of queries for which the foot need not be compared with other walls
     bool has_foot;
-    int blobs;               // held; -1: more than there is room for
-    int32_t blob[VESSEL_BLOBS];      // rows of the field, those beyond `blobs` that of the blob without weight
-} VesselMemory;              // a fresh one: {.node = -1}
+    int blobs;               // number held; -1: more than VESSEL_BLOBS
+    int32_t blob[VESSEL_BLOBS];      // rows of the field; beyond `blobs`, the row of the blob of amplitude 0
+} VesselMemory;              // initial value: {.node = -1}
 
 enum {
     VESSEL_FAR = 1,          // certainly further from the wall than `reach`: gap is a lower bound, normal and hessian are unset (0)
     VESSEL_OPEN_END = 2,     // beyond an open end and clear of it: there is no wall, gap = +HUGE_VAL, normal 0
-    VESSEL_BEYOND = 8,       // beyond an open end's plane, where the wall is what carries on from the end (a cylinder upstream, a bell downstream)
+    VESSEL_BEYOND = 8,       // beyond an open end's plane, where the wall is an extension of the end (a cylinder upstream, a bell downstream)
     VESSEL_UNSURE = 4,       // the projection did not converge: gap is Taubin's distance, normal the gradient's direction
-    VESSEL_DISAGREE = 16,    // two nodes put the point's wall at different places, see field_vessel_create: a fault of the model
+    VESSEL_DISAGREE = 16,    // two nodes put the point's wall at different places, see field_vessel_create: a defect of the model
 };
 
 typedef struct VesselHit {
@@ -58,58 +58,59 @@ typedef struct VesselHit {
 
 typedef struct Vessel Vessel;
 struct Vessel {
-    const char *kind;        // "field", "lim", "tube", "plane"
-    // Answers for `count` points. memory[i] is updated. reach [mm]: gaps beyond it may be answered by VESSEL_FAR.
+    const char *kind;        // "field", "lim", "mesh", "grid", "tube", "plane"
+    // Fills hit[i] for `count` points and updates memory[i]. reach [mm]: a gap beyond it may be returned as VESSEL_FAR.
     void (*query)(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit);
-    // First location of a point: the best node overall where `from` is -1, else the best reached by walking from node `from`
-    // (Kerrien 2017, 6.2.1: the proximal point globally, each further one from its predecessor).
+    // First location of a point: the best node overall if `from` is -1, else the best node reached by walking from node `from` (Kerrien et al. 2017, 6.2.1: the
+    // proximal point globally, each further one from its predecessor).
     int (*locate)(const Vessel *vessel, Vec3 point, int from);
-    // Inlet: a point on the root's open end and the unit direction into the vessel. False where it has none (plane).
+    // Sets a point on the root's open end and the unit direction into the vessel. Returns false if there is none (plane).
     bool (*inlet)(const Vessel *vessel, Vec3 *point, Vec3 *direction);
     void (*destroy)(Vessel *vessel);
     int64_t primitives;      // blobs, triangles, lattice points, segments
-    size_t bytes;            // that queries read, of whatever owner; both for tables
+    size_t bytes;            // memory that queries read, whoever owns it; both figures are for tables
 };
 
-// Does a hit keep what is promised above: a gap that is a number, a unit normal where there is a wall?
+// Returns whether a hit fulfils the definitions above: the gap is a number, the normal is a unit vector where there is a wall.
 bool vessel_hit_is_sound(const VesselHit *hit);
 
 static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    SEL_ASSERT(count >= 0 && !isnan(reach), "a vessel is asked about a number of points, as far as a reach");
+    SEL_ASSERT(count >= 0 && !isnan(reach), "the number of points is not negative and the reach is a number");
     v->query(v, count, point, reach, memory, hit);
     for (int i = 0; SELDINGER_ASSERTS && i < count; i++)
         SEL_ASSERT(vessel_hit_is_sound(&hit[i]), "a gap is a number and a wall's normal a unit vector");
 }
 
-// --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. NULL where the tree has no model. ---
-// The root's end is open: its section goes on upstream of its plane (center, direction) as a cylinder, smoothly, from half a radius downstream on. Where
-// the root's model does not hold the root's centre there is no wall upstream. A root from which the tree goes on upstream, or that its points close over,
-// is no such end. Leaves are closed by their blobs.
+// --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. Returns NULL if the tree has no model. ---
+// The root's end is open: its section continues upstream of its plane (center, direction) as a cylinder, with a smooth transition from half a radius downstream
+// on. There is no wall upstream if the root's model does not hold the root's centre. A root is no open end if the tree continues upstream of it or if its
+// points close over it. Leaves are closed by their blobs.
 Vessel *lim_vessel_create(const VesselTree *tree);
 
 typedef enum {
-    LIM_SWITCH,              // the paper's: the local model of the point's node alone; the wall jumps where the node changes
-    LIM_BLEND,               // the default: gaps, normals and Hessians of the node's and its neighbours' models mixed towards the borders of the power
-                             // cells, where they differ by less than min(r / 2, 0.8 mm); stays within 0.15 mm of the own model. The normal is the mean of
-                             // normals: it leaves out the weights' slope, so that a wire sliding along does not catch on what the models differ by
+    LIM_SWITCH,              // as in the paper: the local model of the point's node alone; the wall jumps where the node changes
+    LIM_BLEND,               // the default: gaps, normals and Hessians of the node's and its neighbours' models are blended towards the borders of the power
+                             // cells, where they differ by less than min(r / 2, 0.8 mm); stays within 0.15 mm of the own model. The normal is the mean of the
+                             // normals: without the gradient of the weights, so that a sliding wire does not catch on the differences between the models
 } LimField;
 typedef struct LimVesselOptions {
     LimField field;
-    int hops;                // moves to a better neighbour a point may make in one query, >= 1 (the paper's: 1)
-    int isa;                 // 0: what simd_level() says; 1 SSE2, 2 AVX2, 3 AVX-512 (the widest there is, where absent). All give the same bits
+    int hops;                // moves to a better neighbour that a point may make in one query, >= 1 (in the paper: 1)
+    int isa;                 // 0: the widest that simd_level() allows, 1 SSE2, 2 AVX2, 3 AVX-512; if absent, the widest available. All give the same bits
 } LimVesselOptions;
 LimVesselOptions lim_vessel_default_options(void);
 Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *options);
 
-// --- The wall of shared blobs (vessel_tree_is_shared): one field, so that it is the same from both sides of every border between near cells. Borrows the
-// tree. NULL where the tree has no such model, or there is no memory. ---
-// A gap changes by no more than the point moves. Where it does by 0.1 mm more (no tool is thinner), because another node answers, the two contradict each
-// other: VESSEL_DISAGREE. A wall that is suddenly nearer than it can be throws no tool: the gap goes over to it as the point moves on, by 0.2 mm a mm.
+// --- The wall of shared blobs (vessel_tree_is_shared): one field, so that the wall is the same from both sides of every border between near cells. Borrows the
+// tree. Returns NULL if the tree has no such model or if out of memory. ---
+// A gap changes by no more than the point's motion. Where it changes by 0.1 mm more (no tool is thinner) because another node's field is used, the two nodes
+// contradict each other: VESSEL_DISAGREE. So that a wall which is suddenly nearer than it can be does not throw the tool, the gap approaches the new value as
+// the point moves, by 0.2 mm per mm.
 Vessel *field_vessel_create(const VesselTree *tree);
-// isa: 0: what simd_level() says; 1 SSE2, 2 AVX2, 3 AVX-512 (the widest there is, where absent). All give the same bits.
+// isa: as LimVesselOptions.isa.
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa);
-// Whichever of the two answers for the tree's model; NULL where it has none.
+// Creates whichever of the two fits the tree's model. Returns NULL if the tree has none.
 Vessel *model_vessel_create(const VesselTree *tree);
 
 // --- Exact tube: the union of spheres of one radius along lines and arcs, or along a polyline. ---
@@ -120,16 +121,16 @@ typedef struct TubePiece {   // a line (angle 0) or an arc
     double plane;            // arc: the turning plane is first rotated by this about the tangent [rad]
 } TubePiece;
 typedef struct TubeOptions {
-    Vec3 start, direction, normal;   // arcs turn towards normal (made perpendicular to direction; the frame is carried along without twist)
+    Vec3 start, direction, normal;   // arcs turn towards normal (made perpendicular to direction; the frame is transported without twist)
     double radius;           // lumen [mm] > 0
     int piece_count;
     const TubePiece *piece;  // either pieces …
     int point_count;
     const Vec3 *point;       // … or a polyline of >= 2 points
-    bool closed_ends;        // hemispheres instead of open ends (open at BOTH ends when false: the first cross-section goes on upstream as a cylinder,
-                             // the last end flares like a bell of the lumen's radius, see tube_vessel.c)
+    bool closed_ends;        // hemispheres instead of open ends (if false, BOTH ends are open: the first cross-section continues upstream as a cylinder, the
+                             // last end flares like a bell of the lumen's radius, see tube_vessel.c)
 } TubeOptions;
-// NULL with a fault where a radius or a length is not positive, or an arc's radius is not larger than the lumen's.
+// Returns NULL with a fault if a radius or a length is not positive, or if an arc's radius is not larger than the lumen's.
 Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults *faults);
 
 // --- Half space: gap = (x - point) . normal. ---

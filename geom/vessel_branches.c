@@ -1,15 +1,15 @@
-// The width of a child is the mean radius of its next few nodes: one node alone, just off the fork, says little.
+// The width of a child is the mean radius of its next few nodes, because a single node just beyond the fork is not representative.
 #include "geom/vessel_branches.h"
 
 #include <stdlib.h>
 
 enum { LOOK = 5 };
 
-// next[i]: the child through which node i's branch goes on, -1 at its end.
+// next[i]: the child through which node i's branch continues; -1 at its end.
 static bool choose_next(const VesselTree *tree, int *next)
 {
     int n = tree->node_count;
-    int *first = malloc((size_t)n * sizeof *first);   // lowest vessel child
+    int *first = malloc((size_t)n * sizeof *first);   // (N) child of kind vessel with the lowest index
     double *width = malloc((size_t)n * sizeof *width);
     if (!first || !width) {
         free(first);
@@ -41,21 +41,21 @@ static bool choose_next(const VesselTree *tree, int *next)
 static void measure(const VesselTree *tree, const VesselBranches *b, VesselBranch *branch)
 {
     const int *node = b->node + branch->first;
-    double *along = b->along + branch->first, way = 0;
+    double *along = b->along + branch->first, covered = 0;
     Vec3 start = tree->center[branch->from_node >= 0 ? branch->from_node : node[0]], at = start;
     branch->radius_least = HUGE_VAL;
     for (int k = 0; k < branch->count; k++) {
         double r = tree->radius[node[k]];
-        way += vec3_distance(at, tree->center[node[k]]);
+        covered += vec3_distance(at, tree->center[node[k]]);
         at = tree->center[node[k]];
-        along[k] = way;
+        along[k] = covered;
         branch->radius_mean += r / branch->count;
         branch->radius_least = fmin(branch->radius_least, r);
         branch->radius_largest = fmax(branch->radius_largest, r);
     }
     double chord = vec3_distance(start, at);
-    branch->length = way;
-    branch->tortuosity = chord > 1e-9 * way && way > 0 ? way / chord : 1;
+    branch->length = covered;
+    branch->tortuosity = chord > 1e-9 * covered && covered > 0 ? covered / chord : 1;
 }
 
 VesselBranches *vessel_branches_create(const VesselTree *tree)

@@ -1,5 +1,5 @@
-// The tree cut into branches, as people count them: a branch goes on at a fork through the widest child, every other child starts a branch of its
-// own, one order higher than what it springs from. Nodes of aneurysms belong to no branch.
+// The tree divided into branches: at a fork, a branch continues through the widest child; every other child starts a new branch, one order higher than its
+// parent branch. Nodes of aneurysms belong to no branch.
 #ifndef SELDINGER_GEOM_VESSEL_BRANCHES_H
 #define SELDINGER_GEOM_VESSEL_BRANCHES_H
 
@@ -17,14 +17,14 @@ typedef struct VesselBranch {
 } VesselBranch;
 
 typedef struct VesselBranches {
-    int count;               // >= 1 where the tree has a vessel node; by index of their first nodes, parents before children
+    int count;               // >= 1 if the tree has a vessel node; ordered by the index of the first node, parents before children
     VesselBranch *branch;
-    int *node;               // (N) nodes by branches
-    double *along;           // (N) [mm] way of node[i] along its branch
+    int *node;               // (N) nodes, branch by branch
+    double *along;           // (N) [mm] arc length of node[i] along its branch
     int *of_node;            // (N) branch of each node, -1 for nodes of aneurysms
 } VesselBranches;
 
-// NULL where memory lacks.
+// Returns NULL if out of memory.
 VesselBranches *vessel_branches_create(const VesselTree *tree);
 void vessel_branches_free(VesselBranches *branches);
 

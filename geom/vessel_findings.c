@@ -18,8 +18,8 @@ typedef struct Profile {     // of one branch
     int count;
     const double *along;
     double *radius;          // (count) smoothed
-    double *reference;       // (count) 0: none
-    double *least, *most;    // (count) of the two sides' medians
+    double *reference;       // (count) 0: unknown
+    double *least, *most;    // (count) of the medians of the two sides
     double *scratch;         // (count)
 } Profile;
 
@@ -52,7 +52,7 @@ static void fill_profile(Profile *p, const VesselTree *tree, const VesselBranche
     }
 }
 
-// Runs of nodes beyond the bound, each with its extreme.
+// Runs of nodes beyond the threshold, each with its extreme.
 static int find_runs(const Profile *p, const VesselBranches *branches, int index, FindingKind kind, double bound, Finding *found)
 {
     int count = 0, node_of = branches->branch[index].first;
@@ -61,7 +61,7 @@ static int find_runs(const Profile *p, const VesselBranches *branches, int index
         double furthest = 0;
         for (; k < p->count && p->reference[k] > 0; k++) {
             double ratio = p->radius[k] / p->reference[k], beyond = kind == FINDING_STENOSIS ? bound - ratio : ratio - bound;
-            // beside a bulge the mean is wide: beyond half the bound on either side too
+            // next to a widening the mean is large: require half the deviation relative to each side's median too
             double half = 0.5 * (1 + bound);
             if (!(beyond > 0) || (kind == FINDING_STENOSIS ? p->radius[k] > half * p->least[k] : p->radius[k] < half * p->most[k]))
                 break;
@@ -84,7 +84,7 @@ static int find_runs(const Profile *p, const VesselBranches *branches, int index
     return count;
 }
 
-// The radius of the circle of the same area as the model's section across `axis` at `at`; 0 where `at` is outside, HUGE_VAL where the section does not end.
+// The radius of the circle with the area of the model's section perpendicular to `axis` at `at`; 0 if `at` is outside, HUGE_VAL if the section is not closed.
 static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double longest)
 {
     enum { RAYS = 36 };
@@ -94,32 +94,32 @@ static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double lon
         return 0;
     for (int i = 0; i < RAYS; i++) {
         double angle = 2 * PI * i / RAYS, step = longest / 64, low = 0, high = step;
-        Vec3 way = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
-        while (high < longest && blobby_field(model, vec3_add_scaled(at, high, way)) > 0)
+        Vec3 ray = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
+        while (high < longest && blobby_field(model, vec3_add_scaled(at, high, ray)) > 0)
             low = high, high += step;
         if (!(high < longest))
             return HUGE_VAL;
         for (int k = 0; k < 30; k++) {
             double middle = 0.5 * (low + high);
-            *(blobby_field(model, vec3_add_scaled(at, middle, way)) > 0 ? &low : &high) = middle;
+            *(blobby_field(model, vec3_add_scaled(at, middle, ray)) > 0 ? &low : &high) = middle;
         }
         sum += low * low / RAYS;
     }
     return sqrt(sum);
 }
 
-// Sections across the line from the vessel's axis to the sac's middle, from the vessel's wall on.
+// Sections perpendicular to the line from the vessel's axis to the sac's middle, starting at the vessel's wall.
 static double neck_width(const VesselTree *tree, int sac, int vessel)
 {
     enum { SECTIONS = 40 };
     Blobby model = blobby_of(tree, sac);
     Vec3 to = vec3_sub(tree->center[sac], tree->center[vessel]);
-    double way = vec3_norm(to), start = 0.7 * tree->radius[vessel], least = HUGE_VAL;
-    if (model.count < 1 || !(way > start))
+    double distance = vec3_norm(to), start = 0.7 * tree->radius[vessel], least = HUGE_VAL;
+    if (model.count < 1 || !(distance > start))
         return NAN;
-    Vec3 axis = vec3_scale(to, 1 / way);
+    Vec3 axis = vec3_scale(to, 1 / distance);
     for (int i = 0; i <= SECTIONS; i++) {
-        double s = start + (way - start) * i / SECTIONS,
+        double s = start + (distance - start) * i / SECTIONS,
                r = section_radius(&model, vec3_add_scaled(tree->center[vessel], s, axis), axis, 3 * tree->radius[sac]);
         least = r > 0 ? fmin(least, r) : least;
     }
@@ -128,7 +128,7 @@ static double neck_width(const VesselTree *tree, int sac, int vessel)
 
 static double extent_of(const VesselTree *tree, const int *top, int sac)
 {
-    // farthest pair by a few hops from point to farthest point: exact enough for a size
+    // farthest pair by a few iterations from a point to its farthest point: accurate enough for a size
     Vec3 at = tree->center[sac];
     double extent = 0;
     for (int hop = 0; hop < 6; hop++) {
@@ -146,11 +146,11 @@ static double extent_of(const VesselTree *tree, const int *top, int sac)
     return extent > 0 ? extent : 2 * tree->radius[sac];
 }
 
-// One finding for each connected group of aneurysm nodes, at its largest.
+// One finding for each connected group of aneurysm nodes, at its largest node.
 static int find_sacs(const VesselTree *tree, const VesselBranches *branches, int *top, Finding *found)
 {
     int count = 0;
-    for (int i = 0; i < tree->node_count; i++) {   // top[i]: the group's first node
+    for (int i = 0; i < tree->node_count; i++) {   // top[i]: the first node of i's group
         int p = tree->parent[i];
         top[i] = tree->kind[i] != NODE_ANEURYSM ? -1 : p >= 0 && tree->kind[p] == NODE_ANEURYSM ? top[p] : i;
         if (top[i] == i) {
@@ -187,7 +187,7 @@ Finding *vessel_findings(const VesselTree *tree, const VesselBranches *branches,
     double *numbers = malloc(5 * n * sizeof *numbers);
     Profile p = {.radius = numbers};
     int *top = malloc(n * sizeof *top);
-    Finding *found = malloc((2 * n + 1) * sizeof *found);   // runs of each kind are apart
+    Finding *found = malloc((2 * n + 1) * sizeof *found);   // runs of the same kind are separated by at least one node
     bool good = numbers && top && found;
     *count = 0;
     if (good)

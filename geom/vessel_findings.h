@@ -1,10 +1,10 @@
-// What a reader of an angiogram looks for, as candidates: narrow places, wide places, sacs. Measured on the tree's radii and points; a candidate is a
-// place to look at, not a diagnosis.
+// Candidate findings as in the reading of an angiogram: narrowings, widenings, sacs. Measured on the tree's radii and points; a candidate marks a place to
+// examine and is not a diagnosis.
 //
-// The reference radius at a place is the mean of two medians: of the radii 2 to 8 branch radii (the branch's median) upstream, and downstream, along
-// the branch, at least three nodes each. No reference near a branch's ends, nor where it still runs inside the vessel it springs from. Radii
-// are first smoothed by the median of three neighbours. A narrow place is also narrower than either median by half as much, a wide one wider: so what
-// stands beside a wide place is not called narrow.
+// The reference radius at a place is the mean of two medians, of the radii from 2 to 8 branch radii (the branch's median) upstream and downstream along the
+// branch, with at least three nodes each. There is no reference near a branch's ends, nor where the branch still runs inside its parent vessel. Radii are first
+// smoothed by the median of three neighbours. A narrowing must also lie below each of the two medians by half as much, a widening above each: so the vessel
+// beside a widening is not called narrow.
 #ifndef SELDINGER_GEOM_VESSEL_FINDINGS_H
 #define SELDINGER_GEOM_VESSEL_FINDINGS_H
 
@@ -14,24 +14,25 @@ typedef enum { FINDING_STENOSIS, FINDING_DILATATION, FINDING_ANEURYSM } FindingK
 
 typedef struct Finding {
     FindingKind kind;
-    int branch;              // index, -1: none (a sac that hangs on no branch)
+    int branch;              // index; -1: none (a sac that is connected to no branch)
     int node;                // the narrowest, the widest, or the sac's first node
-    double along;            // [mm] way along the branch; of a sac: of the node it hangs on
-    double length;           // [mm] of the run of nodes beyond the bound; of a sac 0
-    double radius;           // [mm] there (smoothed); of a sac its largest node's
-    double reference;        // [mm] of a sac: the radius of the vessel it hangs on
+    double along;            // [mm] arc length along the branch; for a sac, of the node it is connected to
+    double length;           // [mm] of the run of nodes beyond the threshold; 0 for a sac
+    double radius;           // [mm] at `node` (smoothed); for a sac, of its largest node
+    double reference;        // [mm]; for a sac, the radius of the vessel it is connected to
     double degree;           // [%] of a stenosis: 100 (1 - radius / reference); of a dilatation 100 (radius / reference - 1)
-    double extent;           // [mm] sac: largest distance between its points; else 0
-    double neck;             // [mm] sac: width of its narrowest section towards the vessel, by area, on its model; NaN: not known
+    double extent;           // [mm] for a sac, the largest distance between its points; else 0
+    double neck;             // [mm] for a sac, the width of its narrowest section (by area) towards the vessel, on its model; NaN: unknown
 } Finding;
 
 typedef struct FindingOptions {
-    double narrow;           // a stenosis is below this part of the reference, default 0.7
-    double wide;             // a dilatation is above it, default 1.5
+    double narrow;           // a stenosis is below this fraction of the reference, default 0.7
+    double wide;             // a dilatation is above this fraction, default 1.5
 } FindingOptions;
 FindingOptions finding_default_options(void);
 
-// The findings by branch and way along it, sacs last; *count of them. NULL where memory lacks (and *count 0); free() it.
+// Returns the findings ordered by branch and arc length, sacs last, and their number in *count; the caller frees the array. Returns NULL, with *count 0, if out
+// of memory.
 Finding *vessel_findings(const VesselTree *tree, const VesselBranches *branches, const FindingOptions *options, int *count);
 
 #endif

@@ -1,13 +1,13 @@
 // The wall of any vessel as triangles (isosurface.h): marching cubes over its gap, and refinement with new vertices on the wall.
 //
-// A lattice point is asked from the ball in which it lies deepest for the ball's size; where that says outside, from the other balls around it too, and
-// any that says inside is believed: beside a wide vessel may run a thin one. Where two lumens lie so near each other that no lattice point might
-// fall between, those nearest to the wall between are taken for outside, so that the lumens stay apart whatever the cell. The gap is 1-Lipschitz, so that
-// a block whose middle is further from the wall than its corners has none of it. Where a vessel answers from local models the gap jumps a little; so a
-// block that a marched one passes the wall on to is marched too, whatever its middle says.
+// A lattice point is queried from the ball in which it lies deepest relative to the ball's size; if the result is outside, it is queried from the other balls
+// around it too, and one result of inside is enough, because a thin vessel may run beside a wide one. Where two lumens are so close that there might be no
+// lattice point between them, the points closest to the wall between are set to outside, so that the lumens stay separate for every cell size. The gap is
+// 1-Lipschitz, so a block whose middle is further from the wall than its corners contains no wall. If a vessel is made of local models, the gap has small
+// jumps; so a block into which the wall of a marched block continues is marched too, whatever the result at its middle.
 //
-// Vertices start near the middles of crossed edges, wherever the crossing is, and are then moved onto the wall along its normal: that keeps those
-// round one lattice point apart, and triangles have no angle below some 10 degrees. (Starting at the crossings: angles below 0.1.)
+// Vertices start near the middles of crossed edges, wherever the crossing is, and are then moved onto the wall along its normal: this keeps the vertices around
+// one lattice point apart, and no triangle has an angle below about 10 degrees. (Starting at the crossings gave angles below 0.1 degrees.)
 #include "base/base.h"
 #include "geom/sparse_march.h"
 
@@ -19,16 +19,16 @@ enum { BATCH = 256, STEPS_MAX = 30 };
 
 static uint64_t edge_key(int a, int b) { return a < b ? (uint64_t)(uint32_t)a << 32 | (uint32_t)b : (uint64_t)(uint32_t)b << 32 | (uint32_t)a; }
 
-static const double CLOSE = 2e-10;           // [mm] to the wall: a step ends where the gap is that small
-static const double LEAST_SHARE = 0.4;       // of an edge, from its ends
-// [cells] A vertex moves by at most that …
+static const double CLOSE = 2e-10;           // [mm] a vertex has converged if its gap is below this
+static const double LEAST_SHARE = 0.4;       // of an edge, measured from its ends
+// [cells] A vertex moves by at most this …
 static const double MOVE = 1.2;
-// … two lumens are kept that far apart on the lattice: any line of it has a point between …
+// … two lumens are kept at least this far apart on the lattice: every lattice line has a point between them …
 static const double APART = 1.05;
-// … and lattice points that far beyond the balls are known too, so that all cells about a vertex within the balls have all their corners.
+// … and lattice points this far beyond the balls are evaluated too, so that all cells around a vertex within the balls have all their corners.
 static const double MARGIN = 2.8;
 
-// Points to ask, with what they are of: lattice points of a block, a block's middle.
+// Points to query: lattice points of a block, or a block's middle.
 typedef struct Questions {
     int count;
     int of[MARCH_POINTS], ball[MARCH_POINTS];
@@ -40,19 +40,19 @@ typedef struct Questions {
 enum { NO_WALL = -1000 };    // [cells]
 
 typedef struct VesselMarch {
-    March march;             // first: a March * to us is a VesselMarch *
+    March march;             // first: a March * points to its VesselMarch
     const Vessel *vessel;
     const Vec3 *center;
     const double *reach;
     const int *from;
     Questions ask;
-    double other[MARCH_POINTS];              // the nearest gap below 0 of those that do not answer for a lattice point
+    double other[MARCH_POINTS];              // the largest gap below 0 among the other balls' results for a lattice point
     int capacity;
-    int *made_in;            // block of each vertex
+    int *made_in;            // block in which each vertex was made
     bool failed;
 } VesselMarch;
 
-// Signed gap: open ends are inside.
+// Signed gap; a point beyond an open end counts as inside.
 static double gap_of(const VesselHit *hit) { return hit->flags & VESSEL_OPEN_END ? HUGE_VAL : hit->gap; }
 
 static bool is_covered(const VesselMarch *job, const MarchBlock *b, Vec3 x)
@@ -65,7 +65,7 @@ static bool is_covered(const VesselMarch *job, const MarchBlock *b, Vec3 x)
     return false;
 }
 
-// The ball in which x lies deepest for its size; -1 where none reaches as far as `margin` beyond itself.
+// The ball in which x lies deepest relative to the ball's size; -1 if x is further than `margin` outside all balls.
 static int deepest_ball(const VesselMarch *job, const MarchBlock *b, Vec3 x, double margin)
 {
     int best = -1;
@@ -92,8 +92,8 @@ static void add_question(VesselMarch *job, int of, int ball, Vec3 x, int node)
 
 static void put_questions(VesselMarch *job, double reach) { vessel_query(job->vessel, job->ask.count, job->ask.point, reach, job->ask.memory, job->ask.hit); }
 
-// Asks x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to other nodes than those that were asked before. False
-// where there is no room for all.
+// Queues queries of x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to nodes not yet queried. Returns false if
+// there is not enough room for all.
 static bool ask_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, double margin, int first_node)
 {
     enum { NODES_MAX = 16 };
@@ -134,7 +134,7 @@ static bool block_is_plain(VesselMarch *job, const MarchBlock *b)
     return all_out;
 }
 
-// Takes what the second round's questions said: inside is believed.
+// Applies the results of the second round: one result of inside is enough.
 static void hear_others(VesselMarch *job)
 {
     March *march = &job->march;
@@ -155,7 +155,7 @@ static void hear_others(VesselMarch *job)
     job->ask.count = 0;
 }
 
-// A point inside by g of one lumen and outside by s of another has a wall of s - g beside it.
+// For a point inside one lumen by g and outside another by s, the wall between the lumens has a thickness of s - g.
 static void keep_apart(VesselMarch *job)
 {
     double apart = APART * job->march.cell;
@@ -202,7 +202,7 @@ static void sample_block(VesselMarch *job, const MarchBlock *b)
     hear_others(job);
     keep_apart(job);
     for (int at = 0; at < MARCH_POINTS; at++)
-        if (!isnan(march->value[at]))        // finite, for shares of an edge
+        if (!isnan(march->value[at]))        // finite, so that the crossing of an edge can be interpolated
             march->value[at] = fmin(fmax(march->value[at], -march->cell), march->cell);
 }
 
@@ -223,8 +223,8 @@ static void place_vertex(March *march, const MarchBlock *b, Vec3 p, int inside, 
     *node = job->from ? job->from[inside] : -1;
 }
 
-// Moves points onto the wall, none further than most[i]; where there is no wall that near the point comes as near as it can. `node` is where they are
-// asked from, and then the node that answers; `normal` looks out. Every step asks afresh: what a point remembers could change its answer.
+// Moves points onto the wall, none further than most[i]; if the wall is further away, the point comes as close as it can. `node` is the node from which a point
+// is queried, and then that of the result; `normal` points outwards. Every step uses a fresh memory, because a point's memory could change the result.
 static void settle(const Vessel *vessel, int count, Vec3 *point, const double *most, Vec3 *normal, int *node)
 {
     VesselMemory memory[BATCH];
@@ -264,7 +264,7 @@ static void settle(const Vessel *vessel, int count, Vec3 *point, const double *m
     }
 }
 
-// All vertices from `first` on. most == NULL: all may move by `same`.
+// Moves all vertices from `first` on. most == NULL: each may move by `same`.
 static void settle_all(const Vessel *vessel, TriangleMesh *mesh, int first, const double *most, double same)
 {
     double bound[BATCH];
@@ -276,7 +276,7 @@ static void settle_all(const Vessel *vessel, TriangleMesh *mesh, int first, cons
     }
 }
 
-// Where there was no wall to tell a vertex its normal, the triangles around do. False where memory lacks.
+// Sets the normal of vertices that found no wall from the surrounding triangles. Returns false if out of memory.
 static bool mend_normals(TriangleMesh *mesh)
 {
     bool missing = false;
@@ -300,7 +300,7 @@ static bool mend_normals(TriangleMesh *mesh)
     return true;
 }
 
-// Puts the blocks beside b across whose faces the wall goes on in the queue, if they were left out.
+// Queues the neighbours of block `index` across whose common face the wall continues, if they were skipped.
 static void pass_on(VesselMarch *job, int index, const bool *is_plain, bool *is_queued, int *queue, int *count)
 {
     const March *march = &job->march;
@@ -349,7 +349,7 @@ static bool march_blocks(VesselMarch *job)
 
 // --- The rim ---
 
-// ends[v]: rim edges at v, of the triangles kept. False where memory lacks.
+// ends[v]: number of rim edges at v among the kept triangles. Returns false if out of memory.
 static bool count_rim(const TriangleMesh *mesh, const bool *keep, KeyMap *edge_of, int (*edge)[3], int *ends)
 {
     int count = 0;
@@ -371,7 +371,7 @@ static bool count_rim(const TriangleMesh *mesh, const bool *keep, KeyMap *edge_o
     return true;
 }
 
-// Parts all of whose triangles touch the rim are scraps.
+// Removes fragments: parts whose triangles all touch the rim.
 static void drop_scraps(const TriangleMesh *mesh, bool *keep, const int *ends, int *part, bool *is_whole)
 {
     for (int v = 0; v < mesh->vertex_count; v++)
@@ -388,7 +388,7 @@ static void drop_scraps(const TriangleMesh *mesh, bool *keep, const int *ends, i
         keep[t] = keep[t] && is_whole[disjoint_root(part, mesh->triangle[t][0])];
 }
 
-// What lies outside the balls goes, then what hangs on by a single vertex of the rim, then scraps. False where memory lacks.
+// Removes what lies outside the balls, then what is connected only by a single vertex of the rim, then fragments. Returns false if out of memory.
 static bool trim(VesselMarch *job)
 {
     TriangleMesh *mesh = job->march.mesh;
@@ -465,7 +465,7 @@ TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vesse
     if (mesh->triangle_count > TRIANGLES_MAX / 4)
         return NULL;
     size_t old = (size_t)mesh->vertex_count, triangles = (size_t)mesh->triangle_count, edges = 0;
-    // at most 3 T / 2 edges with two triangles and as many again on rims; found as they come
+    // at most 3 T / 2 edges of two triangles, and as many again on rims; numbered as they are found
     KeyMap edge_of = {0};
     TriangleMesh *fine = calloc(1, sizeof *fine);
     int(*middle)[3] = malloc((triangles + 1) * sizeof *middle);

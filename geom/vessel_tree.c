@@ -1,13 +1,13 @@
-// The tree's arrays, its rules and its neighbour lists. See vessel_tree.h; names in messages are those of the model file.
+// The tree's arrays, their validation and the tree's length. See vessel_tree.h; names in messages are those of the model file.
 #include "geom/vessel_tree.h"
 
 #include <limits.h>
 #include <stdlib.h>
 
-// More than a machine of ours has: a count that wants it comes from a broken file. (The sanitizers' allocator aborts above twice this.)
+// More memory than the intended machines have: a count that needs it comes from a corrupt file. (The sanitizers' allocator aborts above twice this.)
 static const uint64_t BYTES_MAX = (uint64_t)1 << 39;
 
-// An array of no entries still gets an address, so that NULL means "no memory".
+// An empty array also gets an address, so that NULL means "out of memory".
 static void *array(int64_t count, size_t size)
 {
     if (count < 0 || (uint64_t)count > BYTES_MAX / size)
@@ -93,27 +93,26 @@ void vessel_tree_free(VesselTree *tree)
 static void check_offsets(const int64_t *offset, int node_count, int64_t total, const char *name, const char *file, Faults *faults)
 {
     if (offset[0] != 0) {
-        faults_add(faults, file, 0, 0, "%s/offset[0] is %lld; the first offset is 0", name, (long long)offset[0]);
+        faults_add(faults, file, 0, 0, "%s/offset[0] is %lld; expected 0", name, (long long)offset[0]);
         return;
     }
     for (int i = 0; i < node_count; i++)
         if (offset[i + 1] < offset[i]) {
-            faults_add(faults, file, 0, 0, "%s/offset[%d] is %lld, below the one before it (%lld); offsets never fall", name, i + 1, (long long)offset[i + 1],
-                       (long long)offset[i]);
+            faults_add(faults, file, 0, 0, "%s/offset[%d] is %lld, below the one before it (%lld); expected offsets that do not decrease", name, i + 1,
+                       (long long)offset[i + 1], (long long)offset[i]);
             return;
         }
     if (offset[node_count] != total)
-        faults_add(faults, file, 0, 0, "%s/offset ends at %lld; the last offset is the number of rows, %lld", name, (long long)offset[node_count],
-                   (long long)total);
+        faults_add(faults, file, 0, 0, "%s/offset ends at %lld; expected the number of rows, %lld", name, (long long)offset[node_count], (long long)total);
 }
 
-#define MOST_MM 1e9   // squares and products of lengths stay far from overflow
+#define MOST_MM 1e9   // squares and products of lengths do not overflow
 
 static void check_vectors(const Vec3 *v, int64_t count, const char *name, const char *file, Faults *faults)
 {
     for (int64_t i = 0; i < count; i++)
         if (!(fabs(v[i].x) < MOST_MM && fabs(v[i].y) < MOST_MM && fabs(v[i].z) < MOST_MM)) {
-            faults_add(faults, file, 0, 0, "%s[%lld] is (%g, %g, %g); coordinates are finite numbers below 1e9 mm", name, (long long)i, v[i].x, v[i].y, v[i].z);
+            faults_add(faults, file, 0, 0, "%s[%lld] is (%g, %g, %g); expected finite numbers below 1e9 mm", name, (long long)i, v[i].x, v[i].y, v[i].z);
             return;
         }
 }
@@ -123,7 +122,7 @@ static void check_lengths(const double *v, int64_t count, bool positive, const c
 {
     for (int64_t i = 0; i < count; i++)
         if (!(v[i] < MOST_MM) || v[i] < 0 || (positive && !(v[i] > 0))) {
-            faults_add(faults, file, 0, 0, "%s[%lld] is %g; a number of mm %s 0 and below 1e9 is valid", name, (long long)i, v[i],
+            faults_add(faults, file, 0, 0, "%s[%lld] is %g; expected a number of mm %s 0 and below 1e9", name, (long long)i, v[i],
                        positive ? "above" : "of at least");
             return;
         }
@@ -133,7 +132,7 @@ static void check_amplitudes(const VesselTree *tree, const char *file, Faults *f
 {
     for (int64_t i = 0; i < tree->blob_count; i++)
         if (!(fabs(tree->blob_amplitude[i]) < MOST_MM)) {
-            faults_add(faults, file, 0, 0, "blobs/amplitude[%lld] is %g; finite numbers below 1e9 are valid", (long long)i, tree->blob_amplitude[i]);
+            faults_add(faults, file, 0, 0, "blobs/amplitude[%lld] is %g; expected a finite number below 1e9", (long long)i, tree->blob_amplitude[i]);
             return;
         }
 }
@@ -141,11 +140,11 @@ static void check_amplitudes(const VesselTree *tree, const char *file, Faults *f
 static void check_parents(const VesselTree *tree, const char *file, Faults *faults)
 {
     if (tree->parent[0] != -1)
-        faults_add(faults, file, 0, 0, "nodes/parent[0] is %d; node 0 is the root and has parent -1", (int)tree->parent[0]);
+        faults_add(faults, file, 0, 0, "nodes/parent[0] is %d; expected -1, because node 0 is the root", (int)tree->parent[0]);
     for (int i = 1; i < tree->node_count; i++)
         if (tree->parent[i] < 0 || tree->parent[i] >= i) {
-            faults_add(faults, file, 0, 0, "nodes/parent[%d] is %d; %s 0 to %d are valid", i, (int)tree->parent[i],
-                       tree->parent[i] == -1 ? "a tree has one root, node 0, and" : "parents stand before children:", i - 1);
+            faults_add(faults, file, 0, 0, "nodes/parent[%d] is %d; %s 0 to %d", i, (int)tree->parent[i],
+                       tree->parent[i] == -1 ? "a tree has one root, node 0; expected" : "parents come before children; expected", i - 1);
             return;
         }
 }
@@ -154,7 +153,7 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
 {
     int before = faults->count, n = tree->node_count;
     if (n < 1) {
-        faults_add(faults, file, 0, 0, "the tree has no nodes; at least one is needed");
+        faults_add(faults, file, 0, 0, "the tree has no nodes; expected at least one");
         return false;
     }
     check_vectors(tree->center, n, "nodes/center", file, faults);
@@ -162,7 +161,7 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
     for (int i = 0; i < n; i++) {
         double length = vec3_norm(tree->direction[i]);
         if (!(fabs(length - 1) <= 1e-6)) {
-            faults_add(faults, file, 0, 0, "nodes/direction[%d] has length %g; directions have length 1", i, length);
+            faults_add(faults, file, 0, 0, "nodes/direction[%d] has length %g; expected length 1", i, length);
             break;
         }
     }
@@ -170,7 +169,7 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
     check_parents(tree, file, faults);
     for (int i = 0; i < n; i++)
         if (tree->kind[i] != NODE_VESSEL && tree->kind[i] != NODE_ANEURYSM) {
-            faults_add(faults, file, 0, 0, "nodes/kind[%d] is %d; 0 (vessel) and 1 (aneurysm) are valid", i, tree->kind[i]);
+            faults_add(faults, file, 0, 0, "nodes/kind[%d] is %d; expected 0 (vessel) or 1 (aneurysm)", i, tree->kind[i]);
             break;
         }
     check_vectors(tree->point, tree->point_count, "points/xyz", file, faults);
@@ -183,7 +182,7 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
     if (tree->blob_count > 0)
         check_lengths(tree->error, n, false, "blobs/error_mm", file, faults);
     if (!isfinite(tree->iso_level) || !(tree->iso_level > 0))
-        faults_add(faults, file, 0, 0, "iso_level is %g; a finite number above 0 is valid", tree->iso_level);
+        faults_add(faults, file, 0, 0, "iso_level is %g; expected a finite number above 0", tree->iso_level);
     return faults->count == before;
 }
 

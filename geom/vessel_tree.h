@@ -1,12 +1,12 @@
 // The vascular tree: centreline nodes with local point sets (RBT) and, once fitted, an implicit wall: one field of shared blobs, or a local blobby
 // model for each node (LIM). Kerrien et al. 2017, sections 3.1 and 4.5. Lengths mm, in the frame of the volume the tree came from.
 //
-// A shared blob belongs to one node (its owner) and has compact support. Which nodes see it follows from the tree alone (vessel_tree_link): the flood from
-// its owner over near nodes whose power cells meet its support. Where two near cells meet, a blob that only one of their nodes sees is therefore zero, so
-// that the wall is the same from both sides; and vessels that touch without being near in the tree never see each other's blobs.
+// A shared blob belongs to one node (its owner) and has compact support. Which nodes see it (add it to their field) follows from the tree alone
+// (vessel_tree_link): a flood from its owner over near nodes whose power cells meet its support. So at the border between two near cells, a blob that only one
+// of the two nodes sees is zero, and the wall is the same from both sides; and vessels that touch without being near in the tree never see each other's blobs.
 //
-// One tree owns all its arrays. Parents stand before children; the root is node 0 with parent -1. A tree that was made or
-// loaded is read-only afterwards and may be shared by threads.
+// A tree owns all its arrays. Parents come before children; the root is node 0 with parent -1. After creation or loading a tree is read-only and may be shared
+// by threads.
 #ifndef SELDINGER_GEOM_VESSEL_TREE_H
 #define SELDINGER_GEOM_VESSEL_TREE_H
 
@@ -34,42 +34,43 @@ typedef struct VesselTree {
     int64_t blob_count;      // B, 0 until fitted
     Vec3 *blob_center;       // (B)
     double *blob_width;      // (B) [mm] > 0: rho of a local blob, radius of support R of a shared one
-    double *blob_amplitude;  // (B) of shared blobs, of either sign; NULL: local models
+    double *blob_amplitude;  // (B) of shared blobs, of either sign; NULL for local models
     int64_t *blob_offset;    // (N+1) node i owns blobs [offset[i], offset[i+1])
     double *error;           // (N) [mm] 90th percentile of Taubin's distance of the node's points
-    double iso_level;        // T: 0.1 of local models, 1 of shared blobs
+    double iso_level;        // T: 0.1 for local models, 1 for shared blobs
 
     int *neighbour_offset;   // (N+1) derived: parent and children of each node …
     int *neighbour;          // … in one list of 2 (N-1) entries, parent first, children by index
-    int *near_offset;        // (N+1) derived: the nodes to which a tool point of node i may move, …
-    int *near;               // … nearest by links first: see vessel_tree_link
-    int64_t *seen_offset;    // (N+1) derived, of shared blobs: node i sees …
-    int32_t *seen;           // … the blobs seen[seen_offset[i] … seen_offset[i+1]-1], in ascending order. NULL with local models
+    int *near_offset;        // (N+1) derived: the nodes to which a tool point of node i may move …
+    int *near;               // … ordered by distance along the links: see vessel_tree_link
+    int64_t *seen_offset;    // (N+1) derived, for shared blobs: node i sees …
+    int32_t *seen;           // … the blobs seen[seen_offset[i] … seen_offset[i+1]-1], in ascending order. NULL for local models
 } VesselTree;
 
-// Allocates all arrays for the counts (all zeroed, offsets included, iso_level 0.1). NULL where memory or a count is unfit.
-// `blob_count` 0 gives a tree without model: blob arrays and error exist with size 0 (blob_offset all zero).
+// Allocates all arrays for the counts (all zeroed, offsets included; iso_level 0.1). `blob_count` 0 gives a tree without model: the blob arrays and error have
+// size 0 (blob_offset all zero). Returns NULL if a count is out of range or if out of memory.
 VesselTree *vessel_tree_create(int node_count, int64_t point_count, int64_t blob_count);
 // The same for a field of shared blobs: with amplitudes, iso_level 1.
 VesselTree *vessel_tree_create_shared(int node_count, int64_t point_count, int64_t blob_count);
 void vessel_tree_free(VesselTree *tree);
-// Checks everything the comments above promise (finite numbers, offsets monotone and closed, parents before children, one
-// root, unit directions to 1e-6, radii and widths positive). Adds one fault per broken rule with the first offending index.
+// Checks the properties stated above (finite numbers, offsets monotone and complete, parents before children, one root, unit directions to 1e-6, radii and
+// widths positive). Adds one fault per broken rule, with the first offending index.
 bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faults);
-// Fills the neighbour lists; call once after parents, centres and radii are set. False where there is no memory.
-// Near is wider than the paper's neighbours (6.2.1), which stall where a sac or a side branch opens over several nodes: a point at the far lip of
-// a mouth would have to pass nodes that are worse. Node j is near node i where their centres are closer than 1.5 (r_i + r_j) and the way
-// through the tree is shorter than 3 (r_i + r_j): the nodes of a wide mouth are near those of the vessel that it opens into although the way leads
-// about its rim, and what lies between two limbs of a hairpin is for the one field of both to say. Local models know nothing of each other's walls: theirs
-// are 1.2 and 1.5 (a vessel that turns back on itself needs pi times its radius, so kissing walls stay apart), with a sac's node 1.5 and 2 (on the
-// phantom a tip slid out of the sac on the model of a node beside its neck).
-// Near is mutual, and complete: only where a tree has so many nodes in one place that the lists would not fit are these distances cut, for all alike.
-// Of shared blobs it makes the lists of who sees which, too.
+// Fills the neighbour and near lists, and for shared blobs the `seen` lists; call once after parents, centres and radii are set. Returns false if out of
+// memory.
+// "Near" is wider than the paper's neighbours (6.2.1), with which tracking stalls where a sac or a side branch opens over several nodes: a point at the far lip
+// of the mouth would have to pass through worse nodes. Node j is near node i if their centres are closer than 1.5 (r_i + r_j) and the path through the tree is
+// shorter than 3 (r_i + r_j): so the nodes of a wide mouth are near those of the vessel that it opens into, although the path leads around its rim. Between two
+// limbs of a hairpin both see one field, which decides.
+// Local models know nothing of each other's walls: for them the factors are 1.2 and 1.5 (a vessel that turns back on itself needs pi times its radius, so
+// touching walls stay separate), and 1.5 and 2 with a sac's node (on the phantom a tip slid out of the sac on the model of a node beside its neck).
+// Near is mutual. It is complete, except that these distances are reduced for all nodes alike if the tree has so many nodes in one place that the lists would
+// not fit.
 bool vessel_tree_link(VesselTree *tree);
-// Whether the root is an end through which a tool comes in: neither does the tree go on upstream of it, nor do the root's own points close it
-// over, as those of a blind end do.
+// Returns whether the root is an open end through which a tool enters: the tree does not continue upstream of it, and its own points do not close over it, as
+// those of a blind end do.
 bool vessel_tree_root_is_open(const VesselTree *tree);
-// [mm] of its vessels' centrelines; the links within and into sacs are none.
+// [mm] total length of the vessels' centrelines; links within and into sacs do not count.
 double vessel_tree_length(const VesselTree *tree);
 static inline bool vessel_tree_is_model(const VesselTree *tree) { return tree->blob_count > 0; }
 static inline bool vessel_tree_is_shared(const VesselTree *tree) { return tree->blob_amplitude != NULL; }

@@ -1,4 +1,4 @@
-// The tree's derived lists: neighbours, near nodes, who sees which blob. See vessel_tree.h.
+// The tree's derived lists: neighbours, near nodes, the blobs that each node sees. See vessel_tree.h.
 #include "geom/vessel_tree.h"
 #include "base/base.h"
 
@@ -12,7 +12,7 @@ static void link_neighbours(VesselTree *tree)
     int n = tree->node_count, *offset = tree->neighbour_offset;
     for (int i = 0; i <= n; i++)
         offset[i] = 0;
-    // count, sum, fill, as in counting sort; offset[i + 1] serves as node i's fill position and ends as its end
+    // counting sort: count, sum, fill; offset[i + 1] is node i's fill position and finally its end
     for (int i = 1; i < n; i++) {
         int p = tree->parent[i];
         if (p >= 0 && p < i) {
@@ -27,7 +27,7 @@ static void link_neighbours(VesselTree *tree)
         sum += own;
     }
     SEL_REQUIRE(sum <= 2 * (n - 1), "each node but the root has one link up, so the list of 2 (N - 1) neighbours holds all");
-    // a node's own parent comes before any of its children do, because parents stand before children
+    // a node's parent is listed before its children, because parents come before children
     for (int i = 1; i < n; i++) {
         int p = tree->parent[i];
         if (p >= 0 && p < i) {
@@ -37,23 +37,23 @@ static void link_neighbours(VesselTree *tree)
     }
 }
 
-// A way through the tree from a node, as far as it has been followed.
-typedef struct Way {
+// The end of a path through the tree from a node.
+typedef struct TreePath {
     int node, from, top;     // top: the common ancestor of both ends
-} Way;
+} TreePath;
 
 typedef struct NearSearch {
     const VesselTree *tree;
     double *along;           // (N) [mm] from the root
-    double largest;          // radius
-    double part;             // of the distances that count as near: 1, or less where a tree is too crowded
-    Way *way;                // (N) a tree has one way to each node
+    double largest;          // largest radius
+    double part;             // factor for the distances that count as near: 1, or less if the tree is too crowded
+    TreePath *path;          // (N) a tree has one path to each node
     int64_t visits;
-    int *near;               // all nodes' lists
+    int *near;               // the lists of all nodes
     size_t count, capacity;
 } NearSearch;
 
-// More than any vessel has; a broken file's nodes, all in one place, would be near each other in pairs.
+// More than any vessel needs; in a corrupt file with all nodes in one place, every pair would be near.
 static const int64_t VISITS_MAX = (int64_t)1 << 27;
 static const size_t NEAR_MAX = (size_t)1 << 24;
 
@@ -72,12 +72,15 @@ static bool add_near(NearSearch *s, int node)
     return true;
 }
 
-// The length of a way is the same from both of its ends, to the bit: so is who is near whom.
-static double way_length(const NearSearch *s, int from, Way way) { return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]); }
+// The length of a path is the same from both of its ends, bit for bit; so "near" is symmetric.
+static double path_length(const NearSearch *s, int from, TreePath path)
+{
+    return (s->along[from] - s->along[path.top]) + (s->along[path.node] - s->along[path.top]);
+}
 
-// How long a way and how far apart near nodes are at most, in sums of their radii: see vessel_tree_link.
+// Largest length of a path and largest distance between near nodes, relative to the sum of their radii: see vessel_tree_link.
 typedef struct NearLimits {
-    double way, apart;
+    double path, apart;
 } NearLimits;
 
 static const NearLimits near_most = {3, 1.5}, near_local_sac = {2, 1.5}, near_local = {1.5, 1.2};
@@ -91,27 +94,27 @@ static NearLimits near_limits(const VesselTree *tree, int a, int b)
     return at_sac ? near_local_sac : near_local;
 }
 
-// The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices. False where there is
-// no memory.
+// Collects the nodes near `node`, including its neighbours. Breadth first, so that the order is by number of links, then by index. Returns false if out of
+// memory.
 static bool collect_near(NearSearch *s, int node)
 {
     const VesselTree *tree = s->tree;
     int known = 1;
-    double farthest = s->part * near_most.way * (tree->radius[node] + s->largest);
-    s->way[0] = (Way){node, -1, node};
+    double farthest = s->part * near_most.path * (tree->radius[node] + s->largest);
+    s->path[0] = (TreePath){node, -1, node};
     for (int w = 0; w < known; w++, s->visits++) {
-        Way at = s->way[w];
+        TreePath at = s->path[w];
         double reach = s->part * (tree->radius[node] + tree->radius[at.node]);
         NearLimits most = near_limits(tree, node, at.node);
-        bool is_near = way_length(s, node, at) < most.way * reach && vec3_distance(tree->center[node], tree->center[at.node]) < most.apart * reach;
+        bool is_near = path_length(s, node, at) < most.path * reach && vec3_distance(tree->center[node], tree->center[at.node]) < most.apart * reach;
         if (w > 0 && (at.from == node || is_near) && !add_near(s, at.node))
             return false;
         for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1]; k++) {
             int next = tree->neighbour[k];
-            Way way = {next, at.node, next < at.node ? next : at.top};
-            if (next != at.from && (w == 0 || way_length(s, node, way) < farthest)) {
-                SEL_REQUIRE(known < tree->node_count, "a tree has one way to each node");
-                s->way[known++] = way;
+            TreePath path = {next, at.node, next < at.node ? next : at.top};
+            if (next != at.from && (w == 0 || path_length(s, node, path) < farthest)) {
+                SEL_REQUIRE(known < tree->node_count, "a tree has one path to each node");
+                s->path[known++] = path;
             }
         }
     }
@@ -134,7 +137,7 @@ static bool link_near(VesselTree *tree, NearSearch *s)
         for (; i < n && (s->part == 0 || (s->visits < VISITS_MAX && s->count < NEAR_MAX)); i++) {
             if (!collect_near(s, i))
                 return false;
-            SEL_REQUIRE(s->count <= INT_MAX, "entries of the near list are counted by int");
+            SEL_REQUIRE(s->count <= INT_MAX, "the number of entries of the near list fits an int");
             tree->near_offset[i + 1] = (int)s->count;
         }
         if (i == n)
@@ -151,10 +154,10 @@ bool vessel_tree_link(VesselTree *tree)
     free(tree->near);
     tree->near = NULL;
     tree->near_offset = calloc(n + 1, sizeof *tree->near_offset);
-    NearSearch search = {.tree = tree, .along = calloc(n, sizeof *search.along), .way = calloc(n, sizeof *search.way)};
-    bool good = tree->near_offset && search.along && search.way && link_near(tree, &search);
+    NearSearch search = {.tree = tree, .along = calloc(n, sizeof *search.along), .path = calloc(n, sizeof *search.path)};
+    bool good = tree->near_offset && search.along && search.path && link_near(tree, &search);
     free(search.along);
-    free(search.way);
+    free(search.path);
     if (search.near)
         tree->near = realloc(search.near, search.count * sizeof *search.near);
     else

@@ -211,7 +211,8 @@ static bool end_session(Trainer *trainer, Faults *faults)
     snprintf(figures->recording, sizeof figures->recording, "%s", session->record_path);
     name_devices(trainer, device);
     if (whole && session->record_path[0])
-        whole = session_files_save(trainer->scene, trainer->trainee, device, trainer->date, lesson_score(session->lesson), session->record_path, faults);
+        whole =
+            session_files_save(trainer->scene, trainer->trainee, device, trainer->date, session_tracker_score(session->tracker), session->record_path, faults);
     live_session_free(session);
     return whole;
 }
@@ -566,13 +567,13 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
 static void tell_news(Trainer *trainer, const Moment *moment)
 {
     char text[HAND_MESSAGE_LENGTH];
-    const LessonView *lesson = moment->extra;
+    const TrackerView *tracked = moment->extra;
     while (trainer->hands && hands_message(trainer->hands, text, sizeof text))
         say(trainer, MARK_WARNING, "%s", text);
-    if (!trainer->has_told_end && (lesson->score.state == SCORE_REACHED || lesson->score.state == SCORE_TIME_OUT)) {
+    if (!trainer->has_told_end && (tracked->score.state == SCORE_REACHED || tracked->score.state == SCORE_TIME_OUT)) {
         trainer->has_told_end = true;
-        say(trainer, lesson->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
-            lesson->score.state == SCORE_REACHED ? "target reached and held" : "the time is over", lesson->score.points);
+        say(trainer, tracked->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
+            tracked->score.state == SCORE_REACHED ? "target reached and held" : "the time is over", tracked->score.points);
     }
 }
 
@@ -614,18 +615,18 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     const Moment *moment = realtime_moment(trainer->session.realtime);
     if (!moment)
         return;
-    const LessonView *lesson = moment->extra;
+    const TrackerView *tracked = moment->extra;
     const Pose *pose = moment->pose;
     pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
     ViewsFrame frame = {
         .pose = pose, .xray = xray, .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
-    trainer_cine_frame(&trainer->cine, passed_s, lesson->concentration, &frame);
+    trainer_cine_frame(&trainer->cine, passed_s, tracked->concentration, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
-    trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
+    trainer_panel_show(&trainer->shown, trainer->scene, pose, &tracked->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
     trainer_panel_views(&trainer->shown, &trainer->controls, trainer->views, xray);
     trainer_panel_grip(&trainer->shown, &trainer->controls.grip);
-    trainer_panel_injection(&trainer->shown, trainer->scene, lesson->contrast_tool, lesson->flow_ml_s, xray);
+    trainer_panel_injection(&trainer->shown, trainer->scene, tracked->contrast_tool, tracked->flow_ml_s, xray);
     state->now_s = since_begin(trainer);
     state->is_recording_cine = cine_is_recording(trainer->cine.cine);
     state->cine_frames = cine_count(trainer->cine.cine);

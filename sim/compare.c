@@ -35,7 +35,7 @@ static double comment_figure(const char *text, size_t length, const char *name, 
     return missing;
 }
 
-// The name of the comment that counts a tool's nodes.
+// The name of the comment with a tool's node count.
 static const char *nodes_key(const ToolPath *path, int tool, char text[40])
 {
     if (path->tool_count == 1)
@@ -44,7 +44,7 @@ static const char *nodes_key(const ToolPath *path, int tool, char text[40])
     return text;
 }
 
-// How many tools and nodes there are.
+// Reads the number of tools and the node count of each.
 static void parse_counts(const char *text, size_t length, const char *file, ToolPath *path, Faults *faults)
 {
     double tools = comment_figure(text, length, "tools", 1);
@@ -218,7 +218,7 @@ bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last)
     double dt_s = simulator_scene(simulator)->dt / 1000;
     int64_t steps = simulator_totals(simulator)->steps, every = (int64_t)fmax(1, floor(sample_s / dt_s + 0.5));
     bool due = steps % every == 0;
-    // also sample the end if it falls between two samples
+    // also sample the end if it lies between two samples
     if (last ? due || steps == 0 : !due)
         return true;
     if (!make_room(path, SAMPLED_NODES * path->tool_count))

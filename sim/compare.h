@@ -34,9 +34,9 @@ typedef struct ToolPath {
     ToolNode *node;          // scratch for sampling
 } ToolPath;
 
-// Default. Measured on wires pushed, turned and pulled back through bent tubes for 0.4 and 3.5 s: a change in the last bits (1e-13 to 1e-10 of a
-// parameter, what another mathematics library does) moves the path by at most 1e-7 mm; one per cent of friction by 0.00004 and 0.0008 mm, of
-// stiffness by 0.003 and 0.009, of the lumen's radius by 0.027 and 0.016.
+// Default. Measured on wires pushed, turned and pulled back through bent tubes for 0.4 and 3.5 s: a change of parameters in the last bits (1e-13 to 1e-10, as
+// from another mathematics library) moves the path by at most 1e-7 mm; one per cent of friction moves it by 0.00004 and 0.0008 mm, of stiffness by 0.003 and
+// 0.009 mm, of the lumen's radius by 0.027 and 0.016 mm.
 #define COMPARE_TOLERANCE_MM 1e-5
 
 ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Faults *faults);

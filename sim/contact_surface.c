@@ -51,7 +51,7 @@ static bool fill_balls(Balls *balls, const Vessel *exact, const VesselTree *node
         int before = nodes->parent[i] >= 0 ? balls->from[nodes->parent[i]] : -1;
         double reach = 1.2 * farthest_point(nodes, i) + 2 * cell;
         if (open_end && i == nodes->node_count - 1)
-            reach = fmax(reach, 2.2 * nodes->radius[i]);     // the flared end of an exact tube
+            reach = fmax(reach, 2.2 * nodes->radius[i]);     // for the flared end of an exact tube
         add_ball(balls, nodes->center[i], reach, exact->locate(exact, nodes->center[i], before));
     }
     Vec3 inlet, direction;
@@ -82,13 +82,12 @@ static void tell(NoteFunction note, const char *name, const char *format, ...)
         note(name, text);
 }
 
-// Where neighbouring local models disagree, small bubbles of wall float in the lumen: those smaller than a ball of the thinnest radius are not
-// vessels.
+// Where neighbouring local models disagree, there are small bubbles of wall in the lumen: parts smaller than a ball of the thinnest radius are not vessels.
 static void drop_specks(TriangleMesh *mesh, double thinnest, const char *name, NoteFunction note)
 {
     int dropped = surface_drop_specks(mesh, 4 * PI / 3 * thinnest * thinnest * thinnest);
     if (dropped > 0)
-        tell(note, name, "%d specks of its mesh were left out: neighbouring local models disagree there", dropped);
+        tell(note, name, "removed %d specks of its mesh, where neighbouring local models disagree", dropped);
 }
 
 TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes, bool open_end, double cell_mm, const char *name, NoteFunction note,
@@ -125,7 +124,7 @@ double contact_surface_cell(const VesselTree *nodes, double triangles)
         double length = parent < 0 ? 0 : vec3_distance(nodes->center[i], nodes->center[parent]);
         area += 2 * PI * nodes->radius[i] * fmax(length, parent < 0 ? nodes->radius[i] : 0);
     }
-    return sqrt(2.3 * area / triangles);     // marching cubes cut a cell's face in 2.3 triangles on the average
+    return sqrt(2.3 * area / triangles);     // marching cubes give 2.3 triangles per cell face on average
 }
 
 double contact_surface_edge(const TriangleMesh *mesh)
@@ -153,7 +152,7 @@ Vessel *contact_surface_vessel(ContactKind kind, const Vessel *exact, const Tria
     return mesh_vessel_create(mesh, &options, name, faults);
 }
 
-// Vertex normals out of the lumen, by the faces' angles there.
+// Vertex normals out of the lumen, weighted by the faces' angles at the vertex.
 static void add_normals(TriangleMesh *mesh)
 {
     for (int t = 0; t < mesh->triangle_count; t++)

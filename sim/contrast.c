@@ -1,10 +1,10 @@
-// Finite volumes in the order of flow, one sweep a step. A cell of volume V and concentration c receives the volume U with the mean concentration m
-// and releases the same volume:
+// Finite volumes in the order of flow, one sweep per step. A cell of volume V and concentration c receives the volume U with the mean concentration m and
+// releases the same volume:
 //   U <= V   the cell's own contents leave (upwind): out = c, c' = c + (m - c) U / V;
-//   U >  V   all of them leave, then what comes in passes through: c' = m, out = (V c + (U - V) m) / U.
-// What leaves is what was there plus what came, less what stays, so mass is conserved; c' and out are means of c and m, so both stay within 0 to 1;
-// at U = V contents move by exactly one cell. The scheme is stable for any step length and any cell size, V = 0 included. Where more is injected than
-// flows, J > W, the branches between the tip and the first fork that carries more run backwards: they come first.
+//   U >  V   all of them leave, then part of the inflow passes through: c' = m, out = (V c + (U - V) m) / U.
+// The outflow is the content plus the inflow minus what remains, so mass is conserved; c' and out are means of c and m, so both stay within 0 to 1; at U = V
+// contents move by exactly one cell. The scheme is stable for any step length and any cell size, V = 0 included. If more is injected than flows, J > W, the
+// branches between the tip and the first fork that carries more run backwards: they are processed first.
 #include "sim/contrast.h"
 
 #include "base/base.h"
@@ -14,24 +14,24 @@
 #include <string.h>
 
 enum { SWEEPS_BETWEEN_TIDYINGS = 32 };
-static const double NOTHING = 1e-12;       // concentration below which a cell is clear: decay never ends, and slows down where numbers are denormal
+static const double NOTHING = 1e-12;       // concentration below which a cell counts as clear: otherwise decay would not end, and denormal numbers are slow
 static const double MOST_RATE_ML_S = 100;
 
 struct Contrast {
     FlowNetwork network;
     double step_s, pulsation, heart_rad_s;
     double phase_s;          // real time, modulo heart periods
-    double flowed_s;         // since the last sweep: time weighed with the pulse
+    double flowed_s;         // since the last sweep: time weighted with the pulse
     double pending;          // [mm3] injected since the last sweep
     double injected, gone;   // [mm3]
     bool clear;
     int sweeps;              // since cells were last cleared
     double *cell;            // (cells) concentration
     double *sac;             // (sacs)
-    double *outlet;          // (branches) concentration that continues at its downstream end, in the sweep
+    double *outlet;          // (branches) concentration that leaves its downstream end in this sweep
     double *back;            // (branches) volume entering its downstream end backwards, 0 outside the sweep
-    bool *on_way;            // (branches) between inlet and tip, false outside the sweep
-    float *node;             // (nodes)
+    bool *runs_to_tip;       // (branches) between inlet and tip, false outside the sweep
+    float *node;             // (nodes) concentration
 };
 
 ContrastOptions contrast_default_options(void)
@@ -63,10 +63,10 @@ Contrast *contrast_create(const VesselTree *tree, const ContrastOptions *options
         contrast->sac = calloc((size_t)network->sac_count + 1, sizeof *contrast->sac);
         contrast->outlet = calloc(branches, sizeof *contrast->outlet);
         contrast->back = calloc(branches, sizeof *contrast->back);
-        contrast->on_way = calloc(branches, sizeof *contrast->on_way);
+        contrast->runs_to_tip = calloc(branches, sizeof *contrast->runs_to_tip);
         contrast->node = calloc((size_t)network->node_count, sizeof *contrast->node);
     }
-    if (contrast->cell && contrast->sac && contrast->outlet && contrast->back && contrast->on_way && contrast->node)
+    if (contrast->cell && contrast->sac && contrast->outlet && contrast->back && contrast->runs_to_tip && contrast->node)
         return contrast;
     contrast_free(contrast);
     return NULL;
@@ -81,7 +81,7 @@ void contrast_free(Contrast *contrast)
     free(contrast->sac);
     free(contrast->outlet);
     free(contrast->back);
-    free(contrast->on_way);
+    free(contrast->runs_to_tip);
     free(contrast->node);
     free(contrast);
 }
@@ -106,7 +106,7 @@ void contrast_copy(Contrast *to, const Contrast *from)
     const FlowNetwork *network = &to->network;
     *to = *from;
     to->network = own.network;
-    to->cell = own.cell, to->sac = own.sac, to->outlet = own.outlet, to->back = own.back, to->on_way = own.on_way, to->node = own.node;
+    to->cell = own.cell, to->sac = own.sac, to->outlet = own.outlet, to->back = own.back, to->runs_to_tip = own.runs_to_tip, to->node = own.node;
     if (network->node_count == 0)
         return;
     memcpy(to->cell, from->cell, (size_t)network->cell_count * sizeof *to->cell);
@@ -116,7 +116,7 @@ void contrast_copy(Contrast *to, const Contrast *from)
 
 // --- one sweep ---
 
-// As at the head of the file; returns the concentration of the outflow.
+// As described at the top of the file; returns the concentration of the outflow.
 static double pass(double *cell, double volume, double through, double mean)
 {
     double out = *cell;
@@ -129,7 +129,7 @@ static double pass(double *cell, double volume, double through, double mean)
     return mean + (out - mean) * (volume / through);
 }
 
-// Cells [from, to) of a branch, upwards where to < from, `through` flowing from the first to the last.
+// Cells [from, to) of a branch, upstream if to < from, with `through` flowing from the first to the last.
 static double pass_cells(Contrast *contrast, double volume, int from, int to, double through, double mean)
 {
     int step = from < to ? 1 : -1;
@@ -138,15 +138,15 @@ static double pass_cells(Contrast *contrast, double volume, int from, int to, do
     return mean;
 }
 
-// What is injected in this sweep, and where.
+// Volume and place of the injection in this sweep.
 typedef struct Injection {
-    int branch, cell;        // -1: nothing is
+    int branch, cell;        // -1: no injection
     int sac;                 // sac into which it flows, -1: none
     double volume;
-    double into_sac;         // of it
+    double into_sac;         // part of the volume that flows into the sac
 } Injection;
 
-// A cell with sacs, or with the tip. `through` comes from its neighbour with the concentration `mean`.
+// A cell with sacs or with the tip. `through` comes from the neighbouring cell with the concentration `mean`.
 static double pass_neck(Contrast *contrast, const FlowBranch *branch, int cell, int first_sac, int end_sac, double through, double mean,
                         const Injection *injection)
 {
@@ -165,7 +165,7 @@ static double pass_neck(Contrast *contrast, const FlowBranch *branch, int cell, 
     return out;
 }
 
-// A part of a branch, its cells [from, to) as in pass_cells.
+// A part of a branch, with cells [from, to) as in pass_cells.
 static double pass_part(Contrast *contrast, const FlowBranch *branch, int from, int to, double through, double mean, const Injection *injection)
 {
     const FlowSac *sac = contrast->network.sac;
@@ -173,7 +173,7 @@ static double pass_part(Contrast *contrast, const FlowBranch *branch, int from, 
     while (from != to) {
         int s = step > 0 ? first : end - 1;
         bool any = first < end;
-        if (any && (step > 0 ? sac[s].cell < from : sac[s].cell > from)) {   // behind
+        if (any && (step > 0 ? sac[s].cell < from : sac[s].cell > from)) {   // already passed
             first += step > 0;
             end -= step < 0;
             continue;
@@ -206,7 +206,7 @@ static double pass_tip(Contrast *contrast, const FlowBranch *branch, double thro
 
 static double swept_volume(const Contrast *contrast, const FlowBranch *branch) { return branch->flow * contrast->step_s; }
 
-// The branches that run backwards, from the tip up: their cells above the tip. Returns the concentration that leaves the tip's cell, to both sides.
+// The branches that run backwards, upstream from the tip: their cells above the tip. Returns the concentration that leaves the tip's cell to both sides.
 static double sweep_back(Contrast *contrast, const Injection *injection)
 {
     const FlowNetwork *network = &contrast->network;
@@ -223,24 +223,24 @@ static double sweep_back(Contrast *contrast, const Injection *injection)
             contrast->gone += up * mean;
         } else {
             contrast->back[branch->parent] = up;
-            contrast->outlet[branch->parent] = mean;   // into the fork's other branches, and further up
+            contrast->outlet[branch->parent] = mean;   // flows into the fork's other branches, and further upstream
         }
     }
     return tip;
 }
 
-// A branch in the sense of the flow, or of one that runs backwards the part below the tip.
+// A branch in the direction of flow; for a branch that runs backwards, the part below the tip.
 static void sweep_branch(Contrast *contrast, int index, const Injection *injection, double tip_mean)
 {
     const FlowNetwork *network = &contrast->network;
     const FlowBranch *branch = &network->branch[index];
     int end = branch->first_cell + branch->cell_count;
     bool has_tip = index == injection->branch;
-    double full = swept_volume(contrast, branch), through = contrast->on_way[index] ? full - injection->volume : full;
+    double full = swept_volume(contrast, branch), through = contrast->runs_to_tip[index] ? full - injection->volume : full;
     double mean = branch->parent >= 0 ? contrast->outlet[branch->parent] : 0;
     if (through < 0) {
         if (!has_tip)
-            return;   // its outlet is what came up
+            return;   // its outlet is set by the backward flow
         mean = pass_part(contrast, branch, injection->cell + 1, end, full, tip_mean, injection);
     } else if (has_tip) {
         mean = pass_part(contrast, branch, branch->first_cell, injection->cell, through, mean, injection);
@@ -279,13 +279,13 @@ static void sweep(Contrast *contrast, int tip_node, double volume)
     Injection injection = inject(contrast, tip_node, volume);
     double tip_mean = 0;
     for (int i = injection.branch; i >= 0; i = network->branch[i].parent)
-        contrast->on_way[i] = true;
+        contrast->runs_to_tip[i] = true;
     if (injection.branch >= 0 && injection.volume > swept_volume(contrast, &network->branch[injection.branch]))
         tip_mean = sweep_back(contrast, &injection);
     for (int i = 0; i < network->branch_count; i++)
         sweep_branch(contrast, i, &injection, tip_mean);
     for (int i = injection.branch; i >= 0; i = network->branch[i].parent) {
-        contrast->on_way[i] = false;
+        contrast->runs_to_tip[i] = false;
         contrast->back[i] = 0;
     }
 }
@@ -327,7 +327,7 @@ static void read_nodes(Contrast *contrast)
     }
 }
 
-// Integral of the pulse 1 + 0.4 p (cos + cos of twice / 2): 1.6 at its height, 0.7 at its least for p = 1.
+// Integral of the pulse 1 + 0.4 p (cos + half the cosine of twice the phase): 1.6 at the maximum, 0.7 at the minimum for p = 1.
 static double pulse_integral(const Contrast *contrast, double time_s)
 {
     double angle = contrast->heart_rad_s * time_s;

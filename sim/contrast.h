@@ -2,11 +2,11 @@
 //
 // Blood flows from the inlet to the ends, steady but for the heart's pulse. At a fork it splits by Murray's law, as r^3 of the branches (Murray, PNAS
 // 12:207, 1926); with speed Q / (pi r^2) each piece of a branch has a transit time. The inlet's mean flow is 250 mm/s over its section, which matches
-// flows measured in internal carotid and middle cerebral arteries (275 ml/min: Ford et al., Physiol Meas 26:477, 2005; 1.8 ml a beat: Enzmann et al.,
-// AJNR 15:123, 1994), and no more than the heart's 5 l/min. The pulse is 1.6 of the mean at systole, 0.7 at its least (Ford). The injected agent
-// displaces blood from upstream, because the resistance lies beyond the tree, in the small vessels: the concentration below the tip is injected /
-// (injected + what still comes from upstream), and where more is injected than flows, the rest goes upstream, into the branches of the forks above
-// and out of the inlet. Sacs are well mixed and exchange with the vessel at their neck.
+// flows measured in internal carotid and middle cerebral arteries (275 ml/min: Ford et al., Physiol Meas 26:477, 2005; 1.8 ml a beat: Enzmann et al., AJNR
+// 15:123, 1994), and at most the heart's 5 l/min. The pulse is 1.6 times the mean at systole and 0.7 times at its minimum (Ford). The injected agent displaces
+// blood from upstream, because the resistance lies beyond the tree, in the small vessels: the concentration below the tip is injected / (injected + what still
+// comes from upstream). If more is injected than flows, the rest goes upstream, into the branches of the forks above and out of the inlet. Sacs are well mixed
+// and exchange with the vessel at their neck.
 //
 // Deterministic: the same calls give the same bits. No call after create allocates. One thread at a time.
 #ifndef SELDINGER_SIM_CONTRAST_H
@@ -18,7 +18,7 @@ ContrastOptions contrast_default_options(void);
 
 typedef struct Contrast Contrast;
 
-// Copies what it needs of the tree. `tree` may be NULL (injected agent leaves at once), `options` NULL (default); values out of range are clamped.
+// Copies what it needs of the tree. `tree` may be NULL (injected agent then leaves at once), `options` NULL (default); values out of range are clamped. Returns
 // NULL if out of memory.
 Contrast *contrast_create(const VesselTree *tree, const ContrastOptions *options);
 void contrast_free(Contrast *contrast);

@@ -8,8 +8,8 @@ struct ContrastInjection {
     ContrastLumens *lumens;
     int tool_count;
     double injected;                 // [mm3] at hubs
-    double waiting[TOOLS_MOST];      // [mm3] of agent that has left a tip and that the vessel has not taken yet
-    double taken_out;                // [mm3] of agent, with tools that were exchanged
+    double waiting[TOOLS_MOST];      // [mm3] of agent that has left a tip and that the vessel has not yet accepted
+    double taken_out;                // [mm3] of agent removed with exchanged tools
     double inserted[TOOLS_MOST];     // at the last advance
 };
 

@@ -1,10 +1,10 @@
-// An injection: contrast agent enters at the hub of a tool, down its lumen (sim/contrast_lumen.h), out at its tip and on with the blood
+// An injection: contrast agent enters at the hub of a tool, flows down its lumen (sim/contrast_lumen.h), leaves at its tip and travels with the blood
 // (sim/contrast.h). A session and its replay use the same code.
 //
-// The agent flows through the requested tool, or the next one around it that has a lumen (for a wire, the catheter around it). Where none has, as in
-// scenes with a wire alone, and in recordings from before a tool could be chosen, agent comes from the foremost tip at the asked rate, as if through
-// an imaginary catheter. The vessel accepts agent from one tip at a time, the one with most waiting; during an injection the small amount that saline
-// drives out of another tool therefore arrives in bursts.
+// The agent flows through the requested tool, or through the next one around it that has a lumen (for a wire, the catheter around it). If none has one, as in
+// scenes with a wire alone and in recordings from before a tool could be chosen, agent leaves the foremost tip at the requested rate, as if through an
+// imaginary catheter. The vessel accepts agent from one tip at a time, the one with the largest waiting amount; during an injection the small amount that
+// saline drives out of another tool therefore arrives in bursts.
 //
 // Deterministic; no call after create allocates. One thread at a time.
 #ifndef SELDINGER_SIM_CONTRAST_INJECTION_H
@@ -23,7 +23,7 @@ typedef struct TipPlaces {
     int foremost_node;
 } TipPlaces;
 
-// `tree` may be NULL. `node_count` and `s`: see contrast_lumens_create. NULL when out of memory.
+// `tree` may be NULL. `node_count` and `s`: see contrast_lumens_create. Returns NULL if out of memory.
 ContrastInjection *contrast_injection_create(const VesselTree *tree, const Scene *scene, const int *node_count, const double *const *s);
 void contrast_injection_free(ContrastInjection *injection);
 void contrast_injection_copy(ContrastInjection *to, const ContrastInjection *from);   // both made of the same scene

@@ -8,28 +8,28 @@
 enum { SLUGS = 16 };
 static const double NOTHING = 1e-9;          // [mm3] of agent below which a lumen counts as clear
 
-// From the hub to the tip.
+// A piece of the column, ordered from the hub to the tip.
 typedef struct Slug {
     double volume, concentration;
 } Slug;
 
 typedef struct Column {
     int count;
-    Slug slug[SLUGS + 2];                    // two more while something comes in and before neighbours are mixed
+    Slug slug[SLUGS + 2];                    // two more for inflow, until neighbours are merged
 } Column;
 
 typedef struct Bore {                        // of one tool, by its sections
     int section_count;
     double *end, *outer, *lumen;             // [mm] arc length at its end; radii
     double length;
-    bool is_open;                            // a lumen all along
+    bool is_open;                            // has a lumen over its whole length
     int node_count;
     double *s;
 } Bore;
 
 typedef struct Piece {                       // a stretch of lumen of constant section
     double end;
-    double area, resistance;                 // open for flow [mm2]; [1/mm3], pressure over flow and viscosity
+    double area, resistance;                 // area open for flow [mm2]; [1/mm3], pressure over flow and viscosity
 } Piece;
 
 struct ContrastLumens {
@@ -37,17 +37,17 @@ struct ContrastLumens {
     int tool_count, piece_count;
     Bore device[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device that may be this tool …
     Bore bore[TOOLS_MOST];                   // … of the device inserted now, whose arrays these are
-    int room[TOOLS_MOST];                    // nodes of whichever has most
+    int room[TOOLS_MOST];                    // node count of the device with most nodes
     int fitted[TOOLS_MOST];
     Column column[TOOLS_MOST];
-    Piece *piece;                            // of the lumen that is looked at
+    Piece *piece;                            // pieces of the current lumen
 };
 
 LumenOptions lumen_default_options(void) { return (LumenOptions){.pressure_mpa = 2.07, .viscosity_mpa_s = 6.3e-9, .flush_ml_s = 0.05}; }
 
 double lumen_annulus_share(double ratio)
 {
-    const double narrow = 1e-3;              // below it the formula cancels, and two flat walls are right to a millionth
+    const double narrow = 1e-3;              // below it the formula suffers from cancellation, and the flow between flat walls is accurate to 1e-6
     if (!(ratio > 0))
         return 1;
     if (ratio >= 1)
@@ -168,16 +168,16 @@ static int section_at(const Bore *bore, double s)
     return i;
 }
 
-// The tool within `tool` at its arc length s, -1: none; `*border` comes nearer where what lies within changes before it.
+// The tool within `tool` at its arc length s, -1: none; `*border` is reduced if the tool within changes before it.
 static int occupant(const ContrastLumens *lumens, int tool, const double *inserted, double s, double *border, double *radius)
 {
     const double same = 1e-9;
-    double x = s + inserted[tool] - lumens->bore[tool].length;   // from the mouth
+    double x = s + inserted[tool] - lumens->bore[tool].length;   // distance from the mouth
     int found = -1;
     *radius = 0;
     for (int j = tool + 1; j < lumens->tool_count; j++) {
         const Bore *inner = &lumens->bore[j];
-        double tip = inserted[j] - x, hub = tip - inner->length;     // how far ahead
+        double tip = inserted[j] - x, hub = tip - inner->length;     // how far ahead of s
         if (hub > same)
             *border = fmin(*border, s + hub);
         if (hub > same || tip <= same)
@@ -194,7 +194,7 @@ static int occupant(const ContrastLumens *lumens, int tool, const double *insert
     return found;
 }
 
-// The lumen of `tool`, from the hub, into lumens->piece.
+// Divides the lumen of `tool`, from the hub, into lumens->piece.
 static void cut_lumen(ContrastLumens *lumens, int tool, const double *inserted)
 {
     const Bore *bore = &lumens->bore[tool];
@@ -247,7 +247,7 @@ static void remove_slug(Column *column, int at)
     memmove(&column->slug[at], &column->slug[at + 1], (size_t)(column->count - at) * sizeof column->slug[0]);
 }
 
-// Merges two neighbours, keeping their agent.
+// Merges two neighbouring pieces, conserving their agent.
 static void mix(Column *column, int at)
 {
     Slug *a = &column->slug[at], *b = a + 1;
@@ -343,7 +343,7 @@ void contrast_lumens_advance(ContrastLumens *lumens, double dt_s, const double *
     }
 }
 
-// --- what is seen ---
+// --- concentrations ---
 
 // Agent in the first `volume` from the hub.
 static double agent_within(const Column *column, double volume)
@@ -356,7 +356,7 @@ static double agent_within(const Column *column, double volume)
     return agent;
 }
 
-// The lumen is cut: its volume from the hub to the arc length s.
+// Volume of the lumen, after cut_lumen(), from the hub to the arc length s.
 static double volume_to(const ContrastLumens *lumens, double s)
 {
     double volume = 0, from = 0;
@@ -397,7 +397,7 @@ int contrast_lumens_node_count(const ContrastLumens *lumens)
     return count;
 }
 
-// Of the whole lumen, including the inner tool.
+// Volume of the whole lumen, including the inner tool.
 static double bore_volume_to(const Bore *bore, double s)
 {
     double volume = 0, from = 0;

@@ -1,6 +1,6 @@
-// Steady flow in a tree: at each fork Q_child = Q r_child^3 / sum r^3 (Murray), along a branch the transit time of a piece is its volume / Q. A
-// branch's cells have equal transit times, as near to the step as a whole number of them allows and never shorter unless the branch is: then a step
-// moves the contents of each cell by nearly one cell, which upwind transport does without numerical diffusion at any speed.
+// Steady flow in a tree: at each fork Q_child = Q r_child^3 / sum r^3 (Murray), along a branch the transit time of a piece is its volume / Q. A branch's cells
+// have equal transit times, as close to the step as an integer number of cells allows, and never shorter than it unless the branch is. So a step moves the
+// contents of each cell by nearly one cell, which upwind transport does without numerical diffusion at any speed.
 #include "sim/contrast_network.h"
 
 #include "base/base.h"
@@ -10,7 +10,7 @@
 enum { LEAST_CELLS_MAX = 20000 };
 
 static const double INLET_SPEED = 250, HEART_FLOW = 5e6 / 60;   // [mm/s], [mm3/s]; contrast.h has the sources
-static const double LEAST_SHARE = 1e-9;                         // of a fork's flow: no branch stands still
+static const double LEAST_SHARE = 1e-9;                         // of a fork's flow, so that no branch has zero flow
 static const double LEAST_SAC = 1e-9;                           // [mm3]
 
 typedef struct Builder {
@@ -18,13 +18,13 @@ typedef struct Builder {
     int node_count;
     int *up;           // (N) upstream node, -1 at the inlet
     int *order;        // (N) upstream first
-    bool *flows;       // (N) blood goes through: a vessel, or a sac's node with a vessel downstream
-    double *lumen;     // (N) [mm] radius of what flows
-    int *first;        // (N + 1) downstream neighbours that flow …
+    bool *flows;       // (N) blood flows through it: a vessel, or a sac's node with a vessel downstream
+    double *lumen;     // (N) [mm] radius of the flow cross-section
+    int *first;        // (N + 1) downstream neighbours with flow …
     int *next;         // (N) … by node
     int *branch_of;    // (N)
     int *sac_of;       // (N) -1 if none
-    double *along;     // (N) [s] within its branch
+    double *along;     // (N) [s] transit time within its branch
 } Builder;
 
 static void builder_free(Builder *b)
@@ -70,7 +70,7 @@ static void orient(Builder *b, int inlet)
         b->up[parent[node]] = node;
     // upstream first: the reversed path, then all others, whose parents come before them
     int count = 0;
-    bool *placed = b->flows;   // temporary, set again below
+    bool *placed = b->flows;   // temporary use, set again below
     for (int node = inlet; node >= 0; node = parent[node]) {
         b->order[count++] = node;
         placed[node] = true;
@@ -95,7 +95,7 @@ static void find_flow(Builder *b, int inlet)
         double radius = b->tree->radius[node];
         b->lumen[node] = is_sac(b, node) && up >= 0 ? fmin(radius, b->lumen[up]) : radius;
     }
-    int *first = b->first;   // counted, summed, filled: first[node + 1] is node's fill position and ends as its end
+    int *first = b->first;   // counting sort: first[node + 1] is node's fill position and finally its end
     for (int node = 0; node < b->node_count; node++)
         if (b->flows[node] && b->up[node] >= 0)
             first[b->up[node] + 2]++;
@@ -109,7 +109,7 @@ static void find_flow(Builder *b, int inlet)
 static int child_count(const Builder *b, int node) { return b->first[node + 1] - b->first[node]; }
 static double link_length(const Builder *b, int node) { return vec3_distance(b->tree->center[node], b->tree->center[b->up[node]]); }
 
-// Mean radius of the branch that begins with the link to `node`, from where it leaves the lumen of the vessel upstream to ten radii of that.
+// Mean radius of the branch that begins with the link to `node`, from the point where it leaves the lumen of the upstream vessel over ten radii of that vessel.
 static double branch_radius(const Builder *b, int node)
 {
     int start = b->up[node];
@@ -142,14 +142,14 @@ static double inlet_flow(const Builder *b, int inlet, double asked_ml_s)
     return fmin(INLET_SPEED * PI * radius * radius, HEART_FLOW);
 }
 
-// A truncated cone between the sections of two nodes.
+// Volume of a truncated cone between the sections of two nodes.
 static double link_volume(const Builder *b, int node)
 {
     double r0 = b->lumen[b->up[node]], r1 = b->lumen[node];
     return link_length(b, node) * PI / 3 * (r0 * r0 + r0 * r1 + r1 * r1);
 }
 
-// Follows a branch whose first node is `node`: its transit time, and its last node.
+// Follows a branch whose first node is `node`: sets its transit time and returns its last node.
 static int follow(Builder *b, int node, int index, FlowBranch *branch)
 {
     double volume = 0;
@@ -160,11 +160,11 @@ static int follow(Builder *b, int node, int index, FlowBranch *branch)
         if (child_count(b, node) != 1)
             break;
     }
-    if (branch->parent < 0 && volume == 0) {   // a single node: as far as it reaches
+    if (branch->parent < 0 && volume == 0) {   // a single node: its own extent
         double radius = b->lumen[node];
         volume = PI * radius * radius * fmax(b->tree->height[node], radius);
     }
-    branch->cell_volume = volume;   // of all, until it is cut
+    branch->cell_volume = volume;   // of the whole branch, until it is divided into cells
     branch->transit = volume > 0 ? volume / branch->flow : 0;
     return node;
 }
@@ -207,7 +207,7 @@ static bool make_branches(Builder *b, FlowNetwork *network, int inlet, double fl
     return true;
 }
 
-// A long slow branch may need too many cells; then all branches get fewer.
+// A long slow branch may need too many cells; then all branches get fewer cells.
 static void cut_cells(FlowNetwork *network, double step_s)
 {
     double wanted = 0, most = fmax(LEAST_CELLS_MAX, 4.0 * network->node_count);
@@ -216,7 +216,7 @@ static void cut_cells(FlowNetwork *network, double step_s)
     double share = fmin(1, most / fmax(wanted, 1));
     for (int i = 0; i < network->branch_count; i++) {
         FlowBranch *branch = &network->branch[i];
-        // a whole number of cells, rounded down by one
+        // an integer number of cells that rounding reduced by one
         double cells = fmin(branch->transit / step_s, most) * share * (1 + 1e-12);
         branch->first_cell = network->cell_count;
         branch->cell_count = cells > 1 ? (int)cells : 1;
@@ -233,7 +233,7 @@ static void place_nodes(const Builder *b, FlowNetwork *network, double *start)
     }
     for (int k = 0; k < b->node_count; k++) {
         int node = b->order[k];
-        if (!b->flows[node]) {   // where its sac hangs
+        if (!b->flows[node]) {   // find the neck of its sac
             network->place[node] = network->place[b->up[node]];
             continue;
         }
@@ -252,7 +252,7 @@ static void place_nodes(const Builder *b, FlowNetwork *network, double *start)
 
 static double sphere_volume(double r) { return 4 * PI / 3 * r * r * r; }
 
-// Of two spheres a distance d apart.
+// Common volume of two spheres a distance d apart.
 static double lens_volume(double r0, double r1, double d)
 {
     if (d >= r0 + r1)
@@ -270,7 +270,7 @@ static int compare_necks(const void *left, const void *right)
     return a->cell != b->cell ? (a->cell > b->cell) - (a->cell < b->cell) : (a->exchange_flow > b->exchange_flow) - (a->exchange_flow < b->exchange_flow);
 }
 
-// Each connected set of a sac's nodes is one compartment: spheres round the nodes, what neighbours share counted once.
+// Each connected set of a sac's nodes is one compartment: spheres around the nodes, with the overlap of neighbours counted once.
 static bool hang_sacs(Builder *b, FlowNetwork *network, const ContrastOptions *options)
 {
     int count = 0;
@@ -295,7 +295,7 @@ static bool hang_sacs(Builder *b, FlowNetwork *network, const ContrastOptions *o
             const FlowPlace *neck = &network->place[up >= 0 ? up : node];
             sac->branch = neck->branch;
             sac->cell = neck->weight < 0.5f ? neck->first : neck->second;
-            // its number until they are sorted
+            // stores its index until the sacs are sorted
             sac->exchange_flow = own;
         } else {
             sac->volume -= lens_volume(radius, b->tree->radius[up], link_length(b, node));
@@ -314,7 +314,7 @@ static bool hang_sacs(Builder *b, FlowNetwork *network, const ContrastOptions *o
         for (; s < count && network->sac[s].branch == i; s++) {
             FlowSac *sac = &network->sac[s];
             sac->volume = fmax(sac->volume, LEAST_SAC);
-            // as much in a step as an exponential loses; no more than half of the vessel's
+            // loses per step as much as an exponential would; at most half of the vessel's flow
             sac->exchange_flow = fmin(-same_expm1(-options->step_s / options->sac_residence_s) * sac->volume / options->step_s, branch->flow / 2);
         }
         branch->sac_count = s - branch->first_sac;
@@ -358,7 +358,7 @@ void flow_network_free(FlowNetwork *network)
 
 // --- the inlet ---
 
-// Mean radius of the end branch at `end`, over at most ten of its radii; 0 if it is shorter than one and a half.
+// Mean radius of the end branch at `end`, over at most ten of its radii; 0 if the branch is shorter than 1.5 radii.
 static double end_radius(const VesselTree *tree, const int *vessel_children, int end)
 {
     double reach = 10 * tree->radius[end], length = 0, sum = 0;

@@ -7,7 +7,7 @@
 
 static void add_vector(cJSON *object, const char *name, Vec3 v) { cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3)); }
 
-// When which device took a tool's place.
+// Adds when which device replaced a tool.
 static void add_recorded_exchanges(cJSON *tool, const RecordedRun *run, int index)
 {
     cJSON *list = cJSON_AddArrayToObject(tool, "exchanges");
@@ -121,7 +121,7 @@ bool describe_scene(cJSON *object, const char *path, Faults *faults)
     return true;
 }
 
-// What a script does with one tool, in sum.
+// Adds the sums of a script's motions of one tool.
 static void add_hand(cJSON *object, const Script *script, int tool)
 {
     double push = 0, twist = 0, released = 0;

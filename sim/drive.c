@@ -7,8 +7,7 @@
 #include <time.h>
 
 static const double rest_speed_mm_s = 0.01;
-// A swinging wire is still at each turning point, so only a pause this long counts as rest. A swing of 1 Hz that passes this test has an amplitude of
-// 1.3 um.
+// A swinging wire is at rest at each turning point, so only a pause this long counts as rest. A swing of 1 Hz that passes this test has an amplitude of 1.3 um.
 static const double rest_hold_s = 0.1;
 
 static int64_t wall_ns(void)
@@ -25,7 +24,7 @@ static void sleep_until(int64_t deadline_ns)
         ;
 }
 
-// The calling thread's scheduling while it is paced. Threads that exist already keep theirs.
+// The calling thread's scheduling while it is paced. Existing threads keep theirs.
 typedef struct Priority {
     int policy;
     struct sched_param parameter;
@@ -74,7 +73,7 @@ static double last_ramp_s(const Scene *scene)
     return end;
 }
 
-// Without input nothing moves, but exchanged devices stay inserted.
+// Commands without motion, with the exchanged devices kept inserted.
 static ToolCommands settled(const ToolCommands *last)
 {
     ToolCommands commands = {0};

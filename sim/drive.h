@@ -1,5 +1,4 @@
-// Many steps: a script drives a simulator, as fast as possible or paced in real time. Input is sampled on simulated time, so pacing changes no
-// result.
+// Many steps: a script drives a simulator, as fast as possible or paced in real time. Input is sampled on simulated time, so pacing does not change any result.
 #ifndef SELDINGER_SIM_DRIVE_H
 #define SELDINGER_SIM_DRIVE_H
 
@@ -9,15 +8,15 @@
 
 typedef enum { DRIVE_DONE, DRIVE_STOPPED, DRIVE_DIVERGED } DriveEnd;
 
-// Paced: step i begins at base + i dt of real time and is due at base + (i + 1) dt, both absolute. One that ends later is a missed deadline; the base
-// then moves by as much as it is late. So simulated time falls behind real time permanently, by slowed_s in total: no step is skipped or hurried,
-// which the operator would feel as a jump.
+// Paced: step i begins at base + i dt of real time and is due at base + (i + 1) dt, both absolute. A step that ends later is a missed deadline; the base then
+// moves by its lateness. So simulated time falls behind real time permanently, by slowed_s in total: no step is skipped or shortened, which the operator would
+// feel as a jump.
 typedef struct DriveReport {
     DriveEnd end;
     double wall_s;
     int64_t deadline_misses;
-    double slowed_s;                 // by which simulated time fell behind
-    double latest_s;                 // the worst single deadline was missed by this
+    double slowed_s;                 // how far simulated time fell behind real time
+    double latest_s;                 // largest lateness of a single step
     bool real_time_priority;         // paced with SCHED_FIFO; false if not permitted, so that other programs may delay steps
     bool settled;                    // nothing was faster than 0.01 mm/s during the last 0.1 s
 } DriveReport;

@@ -19,7 +19,7 @@ Exercise exercise_default(void)
     return exercise;
 }
 
-// Which of `names` the value is; -1 with a fault. `what`: "target", "tool".
+// Index of the value in `names`; -1 with a fault. `what`: "target", "tool".
 static int read_name(YamlValue value, const char *what, int count, const char *const *names)
 {
     const char *name;
@@ -41,7 +41,7 @@ static int read_target(YamlValue value, const ExerciseScene *scene)
     return target;
 }
 
-// Which device each tool has to be.
+// Reads the device required for each tool.
 static void read_devices(YamlValue value, const ExerciseScene *scene, int device[TOOLS_MOST])
 {
     const char *keys[TOOLS_MOST + 1] = {0};
@@ -82,7 +82,7 @@ static void read_texts(const YamlMap *map, Exercise *exercise)
     }
     exercise->instructions = strdup(text);
     if (!exercise->instructions)
-        yaml_fault(map->value, "no memory");
+        yaml_fault(map->value, "out of memory");
 }
 
 static void read_rules(YamlValue value, ExerciseRules *rules)

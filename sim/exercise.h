@@ -1,5 +1,5 @@
-// The `exercise:` key of a scene: the trainee's task and how it is scored (sim/score.h). Numbers keep the file's units, which are part of their
-// names, and are shown and compared as typed.
+// The `exercise:` key of a scene: the trainee's task and how it is scored (sim/score.h). Numbers are kept in the file's units, which are part of their names,
+// and are shown and compared as typed.
 //
 //   exercise:
 //     title: Reach the aneurysm             # required, at most 95 bytes
@@ -68,7 +68,7 @@ typedef struct Exercise {
     double error_points;
 } Exercise;
 
-// The defaults: 2 s, 600 s, buckling only, no par, all weights 1, 5 points an error.
+// The defaults: 2 s, 600 s, buckling only, no par, all weights 1, 5 points per error.
 Exercise exercise_default(void);
 typedef struct ExerciseScene {   // names that an exercise may refer to; counts are 0 if they could not be read
     int target_count, tool_count;

@@ -38,8 +38,8 @@ static bool cache_folder(char folder[CACHE_PATH])
     return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
 }
 
-// The key holds all that fit_shape() sees: the shape with its options, the kind of contact, and the program or library itself, whose defaults are the fit's options.
-// False where the program cannot be read.
+// The key covers all inputs of fit_shape(): the shape with its options, the kind of contact, and the program or library itself, whose defaults are the fit's
+// options. Returns false if the program cannot be read.
 static bool cache_key(const Scene *scene, char hex[65])
 {
     bool local = contact_is_local(scene->contact);

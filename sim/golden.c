@@ -32,7 +32,7 @@ ToolPath *golden_run(const Scene *scene, const OpenVessel *open, double duration
         sampling.no_memory |= !tool_path_sample(sampling.path, simulator, true);
     }
     if (simulator && (!sampling.path || sampling.no_memory)) {
-        faults_add(faults, scene->path, 0, 0, "no memory for its tool path");
+        faults_add(faults, scene->path, 0, 0, "not enough memory for its tool path");
         tool_path_free(sampling.path);
         sampling.path = NULL;
     }

@@ -2,7 +2,7 @@
 
 #include "input/input.h"
 
-// The partner: the next tool inside the chosen one; for the innermost tool the next around it; for a single tool itself. Both together are the pair.
+// The partner of the chosen tool is the next tool inside it; for the innermost tool, the next one around it; for a single tool, itself. The two are the pair.
 static int hand_grip_partner(const HandGrip *grip, int tool_count)
 {
     return grip->chosen + 1 < tool_count ? grip->chosen + 1 : grip->chosen > 0 ? grip->chosen - 1 : 0;
@@ -48,7 +48,7 @@ void hand_grip_release(HandGrip *grip)
 {
     grip->released ^= 1u << grip->chosen;
     if (grip->released >> grip->chosen & 1)
-        grip->locked &= ~(3u << grip->chosen);   // to the tool around it, and to the one inside
+        grip->locked &= ~(3u << grip->chosen);   // the lock with the tool around it and the one with the tool inside
 }
 
 void hand_grip_fit(HandGrip *grip, int tool_count, int tool, int which)

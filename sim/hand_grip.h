@@ -12,10 +12,10 @@ typedef struct HandGrip {
     int chosen;              // moved by inputs that select no tool
     unsigned locked;         // bit k: tool k moves as tool k - 1 does
     unsigned released;       // bit k: no hand holds tool k (input/command.h)
-    int fitted[TOOLS_MOST];  // which of its devices each tool should be (input/command.h); a tool not at its hub stays as it is, see hand_grip_fit()
+    int fitted[TOOLS_MOST];  // device requested for each tool (input/command.h); a tool not at its hub keeps its device, see hand_grip_fit()
 } HandGrip;
 
-// The tool that a hand moves which drives this (HandDrives of input/hand_port.h).
+// The tool that a hand with this HandDrives setting moves (input/hand_port.h).
 int hand_grip_tool(const HandGrip *grip, int tool_count, int drives);
 void hand_grip_choose(HandGrip *grip, int tool_count, int tool);       // no effect if there is no such tool
 // Locks the pair, or opens its lock. No effect with one tool.
@@ -23,9 +23,9 @@ void hand_grip_lock(HandGrip *grip, int tool_count);
 bool hand_grip_pair_is_locked(const HandGrip *grip, int tool_count);
 // Releases the chosen tool, or takes hold of it again.
 void hand_grip_release(HandGrip *grip);
-// Requests device `which` of tool `tool` (0: the scene's, 1, 2, … those under its `exchange:`). The tool is held for that on its own, so its locks
-// open. No effect if there is no such tool. An exchange that is refused (Pose.refused_exchanges grows, Pose.refusal says why) is retried only after
-// another request: request the inserted device (PoseTool.fitted), then the new one again.
+// Requests device `which` of tool `tool` (0: the scene's, 1, 2, … those under its `exchange:`). A tool is exchanged on its own, so its locks open. No effect if
+// there is no such tool. An exchange that is refused (Pose.refused_exchanges grows, Pose.refusal gives the reason) is retried only after another request:
+// request the inserted device (PoseTool.fitted), then the new one again.
 void hand_grip_fit(HandGrip *grip, int tool_count, int tool, int which);
 // Obeys newly pressed buttons (HAND_ bits): those not in `before`, which is updated to the buttons held now.
 void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *before);

@@ -29,20 +29,20 @@ bool hand_set_add(HandSet *set, HandPort *port)
 static double limited(double value, double most) { return isfinite(value) ? fmax(-most, fmin(most, value)) : 0; }
 
 // The part of `total` - `taken` that may be fed in this step in addition to `moved`; advances `taken`.
-static double take_way(double total, double *taken, double moved, double most)
+static double take_displacement(double total, double *taken, double moved, double most)
 {
-    double way = total - *taken;
-    if (!isfinite(way)) {
+    double pending = total - *taken;
+    if (!isfinite(pending)) {
         *taken = isfinite(total) ? total : *taken;
         return moved;
     }
-    double sum = limited(moved + way, most);
+    double sum = limited(moved + pending, most);
     *taken += sum - moved;
     return sum;
 }
 
 // Discards the outstanding displacement of a port.
-static void forget_way(HandSet *set, int i)
+static void forget_displacement(HandSet *set, int i)
 {
     set->taken_mm[i] = atomic_load_explicit(&set->port[i]->advanced_mm, memory_order_relaxed);
     set->taken_deg[i] = atomic_load_explicit(&set->port[i]->turned_deg, memory_order_relaxed);
@@ -56,13 +56,13 @@ void hand_set_grip(HandSet *set, const HandGrip *grip)
     set->grip = *grip;
     for (int i = 0; i < set->count; i++)
         if (tool_of(set, set->port[i]) != held[i])
-            forget_way(set, i);
+            forget_displacement(set, i);
 }
 
 ToolCommands hand_set_command(HandSet *set, double dt)
 {
     double seconds = dt / 1000, most_mm = set->fastest_mm_s * seconds, most_deg = set->fastest_deg_s * seconds;
-    double moved_mm[TOOLS_MOST] = {0}, turned_deg[TOOLS_MOST] = {0};     // of the outermost of the tools that move together
+    double moved_mm[TOOLS_MOST] = {0}, turned_deg[TOOLS_MOST] = {0};     // of the outermost of the tools locked together
     const HandGrip *grip = &set->grip;
     bool is_stopped = hand_set_buttons(set) & HAND_STOP;
     for (int i = 0; i < set->count; i++) {
@@ -84,8 +84,8 @@ ToolCommands hand_set_command(HandSet *set, double dt)
             set->taken_mm[i] = mm;
             set->taken_deg[i] = deg;
         }
-        moved_mm[lead] = take_way(mm, &set->taken_mm[i], moved_mm[lead], most_mm);
-        turned_deg[lead] = take_way(deg, &set->taken_deg[i], turned_deg[lead], most_deg);
+        moved_mm[lead] = take_displacement(mm, &set->taken_mm[i], moved_mm[lead], most_mm);
+        turned_deg[lead] = take_displacement(deg, &set->taken_deg[i], turned_deg[lead], most_deg);
     }
     ToolCommands commands = {.released = grip->released & ((1u << set->tool_count) - 1)};
     memcpy(commands.fitted, grip->fitted, (size_t)set->tool_count * sizeof *commands.fitted);

@@ -1,6 +1,6 @@
-// The input devices ("hands") that hold the tools: their rates and displacements become one command per tool and step, and the tool's reaction is
-// returned to them. Rates of several hands on one tool add up. Displacements (an encoder's counts) are totals: the outstanding part is fed at no more
-// than the fastest rate, the rest in later steps, so a burst of counts does not jump ahead of the tool and no count is lost.
+// The input devices ("hands") that hold the tools: their rates and displacements become one command per tool and step, and the tool's reaction is returned to
+// them. Rates of several hands on one tool add up. Displacements (an encoder's counts) are totals: the outstanding part is fed at no more than the fastest
+// rate, the rest in later steps, so a burst of counts causes no jump of the tool and no count is lost.
 //
 // Tools locked together move by the sum of their hands' commands, and each hand feels the sum of their reactions. Motion made while a tool is
 // released or stopped is discarded, as is the outstanding displacement when a hand switches tools.
@@ -28,7 +28,7 @@ void hand_set_grip(HandSet *set, const HandGrip *grip);
 // The commands of the next step of dt [ms]; HAND_STOP on any hand stops all tools.
 ToolCommands hand_set_command(HandSet *set, double dt);
 unsigned hand_set_buttons(const HandSet *set);
-// After a step: force, torque and the step's number.
+// To be called after a step: returns force, torque and the step's number to the hands.
 void hand_set_answer(HandSet *set, const StepReport *report, int64_t step);
 
 #endif

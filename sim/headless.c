@@ -20,7 +20,7 @@ bool headless_open(HeadlessRun *run, const HeadlessOptions *options, const Scene
     if (options->has_moments)
         good = moments_open(&run->moments, run->simulator, options->moment_count, options->moment_s) && good;
     if (options->scores)
-        good = (run->lesson = lesson_create(run->simulator, open->tree)) && good;
+        good = (run->tracker = session_tracker_create(run->simulator, open->tree)) && good;
     if (!good)
         faults_add(faults, scene->path, 0, 0, "out of memory");
     simulator_watch_energy(run->simulator);
@@ -31,8 +31,8 @@ static bool after_step(void *context, Simulator *simulator, const ToolCommands *
 {
     HeadlessRun *run = context;
     moments_step(&run->moments, simulator, commands);
-    if (run->lesson)
-        lesson_step(run->lesson, simulator, commands, NULL);
+    if (run->tracker)
+        session_tracker_step(run->tracker, simulator, commands, NULL);
     if (run->watch)
         run->watch(run->context, run);
     if (run->recording && !recording_step(run->recording, simulator, commands, NULL))
@@ -70,7 +70,7 @@ bool headless_drive(HeadlessRun *run, ToolCommands (*hand)(void *context), void 
 void headless_close(HeadlessRun *run)
 {
     recording_abandon(run->recording);
-    lesson_free(run->lesson);
+    session_tracker_free(run->tracker);
     moments_close(&run->moments);
     free(run->node);
     simulator_destroy(run->simulator);

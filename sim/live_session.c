@@ -18,7 +18,7 @@ static bool take_over_step(void *context, Simulator *simulator, const ToolComman
     LiveSession *session = take_over->session;
     if (take_over->options->progress && ++take_over->done % TELL_EVERY == 0)
         take_over->options->progress(take_over->options->progress_context, (double)take_over->done / (double)take_over->steps);
-    lesson_step(session->lesson, simulator, commands, xray);
+    session_tracker_step(session->tracker, simulator, commands, xray);
     session->resumed_released = commands->released;
     memcpy(session->resumed_fitted, commands->fitted, sizeof session->resumed_fitted);
     return !session->recording || recording_step(session->recording, simulator, commands, xray);
@@ -47,17 +47,17 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
 {
     *session = (LiveSession){.scene = scene};
     session->simulator = simulator_create(scene, open->vessel, faults);
-    session->lesson = session->simulator ? lesson_create(session->simulator, open->tree) : NULL;
-    if (session->simulator && !session->lesson)
+    session->tracker = session->simulator ? session_tracker_create(session->simulator, open->tree) : NULL;
+    if (session->simulator && !session->tracker)
         faults_add(faults, scene->path, 0, 0, "not enough memory for a session");
-    if (session->lesson && options->record_path) {
+    if (session->tracker && options->record_path) {
         RecordingOptions record = recording_session_options();
         record.trainee = options->trainee;
         record.date = options->date;
         snprintf(session->record_path, sizeof session->record_path, "%s", options->record_path);
         session->recording = recording_create(options->record_path, session->simulator, &record, faults);
     }
-    bool good = session->lesson && (session->recording || !options->record_path) && (!options->resume || take_over(session, options, faults));
+    bool good = session->tracker && (session->recording || !options->record_path) && (!options->resume || take_over(session, options, faults));
     if (good) {
         RealtimeOptions realtime = realtime_default_options();
         realtime.simulator = session->simulator;
@@ -70,10 +70,10 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
             memcpy(realtime.grip.fitted, session->resumed_fitted, sizeof session->resumed_fitted);
         realtime.xray = options->xray;
         realtime.paused = options->paused;
-        realtime.after_step = lesson_step;
-        realtime.publish = lesson_publish;
-        realtime.context = session->lesson;
-        realtime.extra_bytes = lesson_view_bytes(session->lesson);
+        realtime.after_step = session_tracker_step;
+        realtime.publish = session_tracker_publish;
+        realtime.context = session->tracker;
+        realtime.extra_bytes = session_tracker_view_bytes(session->tracker);
         session->realtime = realtime_start(&realtime, faults);
         good = session->realtime != NULL;
     }
@@ -95,7 +95,7 @@ bool live_session_stop(LiveSession *session, RealtimeFigures *figures, Faults *f
 
 void live_session_free(LiveSession *session)
 {
-    lesson_free(session->lesson);
+    session_tracker_free(session->tracker);
     simulator_destroy(session->simulator);
     *session = (LiveSession){0};
 }

@@ -3,17 +3,17 @@
 #ifndef SELDINGER_SIM_LIVE_SESSION_H
 #define SELDINGER_SIM_LIVE_SESSION_H
 
-#include "sim/lesson.h"
 #include "sim/open_vessel.h"
 #include "sim/realtime.h"
+#include "sim/session_tracker.h"
 
 typedef struct LiveSession {
     const Scene *scene;
     Simulator *simulator;
-    Lesson *lesson;
+    SessionTracker *tracker;
     Recording *recording;        // NULL: not recorded
     Realtime *realtime;
-    char record_path[4096];      // "" where not recorded
+    char record_path[4096];      // "" if not recorded
     double resumed_s;            // simulated time taken over from an earlier recording …
     unsigned resumed_released;   // … the tools released at that time (ToolCommands) …
     int resumed_fitted[TOOLS_MOST];  // … and the devices requested last
@@ -25,17 +25,17 @@ typedef struct LiveSessionOptions {
     int hand_count;
     HandPort *const *hand;       // (hand_count)
     HandGrip grip;               // grip at the start; in a resumed session the tools in `resumed_released` are released too, and `fitted` is `resumed_fitted`
-    XrayControl xray;            // the same
+    XrayControl xray;            // X-ray controls at the start; also used in a resumed session
     const RecordedRun *resume;   // NULL, or a recording to be simulated first, as fast as possible …
     double resume_s;             // … up to this time
-    void (*progress)(void *context, double part);    // progress of that; may be NULL
+    void (*progress)(void *context, double part);    // progress of that simulation; may be NULL
     void *progress_context;
     bool paused;
 } LiveSessionOptions;
 
-// False with faults; then nothing is left open. A resumed recording that does not reproduce its own states is refused.
+// Returns false with faults and leaves nothing open. A resumed recording that does not reproduce its own states is refused.
 bool live_session_open(LiveSession *session, const Scene *scene, const OpenVessel *open, const LiveSessionOptions *options, Faults *faults);
-// Stops the thread and closes the recording; simulator and lesson stay available. False with a fault if the recording is incomplete.
+// Stops the thread and closes the recording; simulator and tracker stay available. Returns false with a fault if the recording is incomplete.
 bool live_session_stop(LiveSession *session, RealtimeFigures *figures, Faults *faults);
 void live_session_free(LiveSession *session);   // after stop, or if it never opened
 

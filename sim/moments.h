@@ -1,4 +1,4 @@
-// A run's poses at moments that were chosen before it, for its pictures.
+// A run's poses at moments chosen before the run, for its pictures.
 #ifndef SELDINGER_SIM_MOMENTS_H
 #define SELDINGER_SIM_MOMENTS_H
 
@@ -13,9 +13,9 @@ typedef struct Moments {
     Pose *pose[MOMENTS_MOST];
 } Moments;
 
-// `at_s` (count): none is the end of the run. False where memory lacks; moments_close() is due all the same.
+// `at_s` (count); if it is empty, the end of the run. Returns false if out of memory; moments_close() must be called in either case.
 bool moments_open(Moments *moments, Simulator *simulator, int count, const double *at_s);
-// After each step; allocates nothing.
+// To be called after each step; allocates nothing.
 void moments_step(Moments *moments, Simulator *simulator, const ToolCommands *commands);
 void moments_end(Moments *moments, Simulator *simulator);
 void moments_close(Moments *moments);

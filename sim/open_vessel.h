@@ -15,14 +15,14 @@ typedef struct OpenVessel {
 typedef struct OpenVesselOptions {
     int threads;             // of a fit; 0: all cores
     const Progress *progress;        // of a fit; may be NULL
-    NoteFunction note;       // receives the defects found and repaired in a mesh, and losses where one is made; may be NULL
+    NoteFunction note;       // receives the defects found and repaired in a mesh, and what is lost in making one; may be NULL
 } OpenVesselOptions;
 
-// False with faults; call open_vessel_close in any case.
+// Returns false with faults; call open_vessel_close in either case.
 bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults);
 // The vessel's surface for pictures; NULL if it has none or memory runs out.
 const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open);
-// If the scene has `inlet: root`: start and direction of the tool from the vessel's inlet. False with a fault where it has none.
+// If the scene has `inlet: root`, sets start and direction of the tool from the vessel's inlet. Returns false with a fault if the vessel has none.
 bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults);
 void open_vessel_close(OpenVessel *open);
 

@@ -75,8 +75,8 @@ void pose_copy(Pose *to, const Pose *from)
     }
 }
 
-// Behind the mouth lies what of the first tool, `length` [mm] long in all, is not inserted; s grows along the centreline, also from a tool to the one
-// within. Without a sheath everything is free.
+// Nodes of the centreline at arc lengths below (`length` of the first tool [mm] - its inserted length) lie behind the mouth; s increases along the centreline,
+// also from a tool to the one within. Without a sheath all nodes are free.
 static void find_first_free(Pose *pose, bool has_sheath, double length)
 {
     double hidden = has_sheath ? length - pose->inserted_mm : 0;
@@ -132,7 +132,7 @@ void pose_fill_single_tool(Pose *pose)
                                    .carrier = j < pose->first_free_node ? -1 : 0};
 }
 
-// The nearest place to `x` between two points, from the first: 0 to 1; where it lies no nearer than `least2`: -1.
+// Fraction (0 to 1) between a and b of the point closest to `x`; -1 if that is no closer than sqrt(*least2).
 static double nearest_between(Vec3 a, Vec3 b, Vec3 x, double *least2)
 {
     Vec3 d = vec3_sub(b, a);

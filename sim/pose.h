@@ -5,7 +5,7 @@
 
 #include "sim/recording.h"
 
-// One of the coaxial tools, all of it: behind the hub, in the sheath and inside other tools too. With one tool these are the pose's own nodes.
+// One of the coaxial tools over its whole length, also behind the hub, in the sheath and inside other tools. With one tool these are the pose's own nodes.
 typedef struct PoseTool {
     Command command;         // of the last step
     double inserted_mm;      // beyond the mouth
@@ -27,8 +27,8 @@ typedef struct Pose {
     StepReport report;       // of the last step
     int tool_count;          // outermost first
     PoseTool tool[STEP_TOOLS_MAX];
-    int64_t refused_exchanges;       // so far …
-    StepExchange refusal;            // … and why the last one was; EXCHANGE_DONE: none
+    int64_t refused_exchanges;       // exchanges refused so far …
+    StepExchange refusal;            // … and the reason of the last refusal; EXCHANGE_DONE: none
     // the shared centreline, which the wall touches
     int node_capacity;       // at most M
     int node_count;          // M, proximal to distal; with several tools nodes come and go

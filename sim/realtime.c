@@ -14,23 +14,23 @@ enum { FIGURES_EVERY = 20 };
 struct Realtime {
     RealtimeOptions options;
     HandSet hands;
-    // operator to thread
+    // from the operator to the thread
     TripleBuffer xray_buffer, grip_buffer;
     XrayControl xray[3];
     HandGrip grip[3];
     _Atomic int paused, ending;
-    // thread to window
+    // from the thread to the window
     TripleBuffer moment_buffer;
     Moment moment[3];
-    bool has_moment;         // the window's
-    // the thread's
+    bool has_moment;         // read by the window only
+    // used by the thread only
     pthread_t thread;
-    XrayControl now;         // of this step
+    XrayControl now;         // controls of this step
     int64_t pose_every, since_pose, moments;
     DriveReport live;
     TimeHistogram late_ns;
     RealtimeFigures figures;
-    double factor_from_s;    // real and simulated time at the last figures
+    double factor_from_s;    // real and simulated time of the last figures
     double factor_from_simulated_s;
 };
 
@@ -169,7 +169,7 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
     }
     if (good)
         return realtime;
-    faults_add(faults, scene->path, 0, 0, "not enough memory or thread for a session");
+    faults_add(faults, scene->path, 0, 0, "cannot start a session: out of memory, or no thread available");
     if (realtime)
         realtime_free(realtime);
     return NULL;

@@ -1,4 +1,4 @@
-// Reading a recording back (recon/hdf5_reader.h checks what it holds). Rows that one dataset has more than another (a file still being written) are left out.
+// Reads a recording (recon/hdf5_reader.h checks its contents). Rows that only some of the datasets have yet (in a file still being written) are ignored.
 #include "sim/recording.h"
 #include "base/base.h"
 
@@ -15,7 +15,7 @@ typedef struct Reader {
     const char *path;
     Faults *faults;
     bool is_finite;          // refuse NaN and infinity in datasets read from here on
-    bool has_motion;         // frames come from there
+    bool has_motion;         // frames are read from /motion
 } Reader;
 
 // Reads a dataset of `rank` dimensions whose trailing ones are shape[1 …] (0: any, filled in); shape[0] is filled in. NULL with a fault.
@@ -65,12 +65,12 @@ static void put_units(Hdf5Type type, void *values, size_t i, int32_t units, doub
         ((int8_t *)values)[i] = (int8_t)units;
 }
 
-// Sums up the changes. Of a frame they are (parts, nodes), its values (nodes, parts).
+// Sums up the changes. A frame's changes are stored as (parts, nodes), its values as (nodes, parts).
 static void add_up(const uint32_t *change, uint64_t frames, uint64_t nodes, uint64_t parts, Hdf5Type type, double unit, uint32_t *now, void *values)
 {
     for (uint64_t k = 0; k < frames; k++)
         for (uint64_t part = 0; part < parts; part++) {
-            uint32_t moved = 0;      // by the node before
+            uint32_t moved = 0;      // change of the previous node
             for (uint64_t node = 0; node < nodes; node++) {
                 uint32_t relative = *change++, *at = &now[part * nodes + node];
                 moved += relative >> 1 ^ (relative & 1 ? UINT32_MAX : 0);
@@ -80,7 +80,7 @@ static void add_up(const uint32_t *change, uint64_t frames, uint64_t nodes, uint
         }
 }
 
-// The frames' dataset `name` reconstructed from motion: `shape` as of read_dataset. NULL with a fault.
+// The frames' dataset `name`, reconstructed from /motion; `shape` as for read_dataset. NULL with a fault.
 static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
     char path[64];
@@ -111,7 +111,7 @@ static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, 
     return values;
 }
 
-// Reads what exists once per frame.
+// Reads a dataset with one entry per frame.
 static void *read_frames_of(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
     return reader->has_motion ? read_motion(reader, name, type, rank, shape) : read_dataset(reader, name, type, rank, shape);
@@ -157,7 +157,7 @@ static bool count_tools(const Reader *reader, RecordedRun *run)
     return true;
 }
 
-// A tool's values of every step; the first one's are also at the root, as for a single tool.
+// The per-step values of a tool; the first tool's are also at the root, as for a single tool.
 static int64_t read_tool_series(const Reader *reader, const char *group, RecordedTool *tool)
 {
     uint64_t command[2] = {0, 2}, proximal[2] = {0, 2}, inserted[1] = {0}, released[1] = {0};
@@ -174,7 +174,7 @@ static int64_t read_tool_series(const Reader *reader, const char *group, Recorde
     return knows_release ? least(count, released[0]) : count;
 }
 
-// Which device was requested and which was inserted in every step, if tools could be exchanged.
+// The device requested and the device inserted in every step, if tools could be exchanged.
 static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
 {
     uint64_t size[3] = {0, (uint64_t)run->tool_count, 2};
@@ -188,7 +188,7 @@ static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
     return (int64_t)size[0];
 }
 
-// How many nodes each device has: the profile is NaN beyond them.
+// Node count of each device: the profile is NaN beyond it.
 static void count_device_nodes(const Reader *reader, const char *group, RecordedTool *tool)
 {
     for (int i = 0; i < tool->device_count; i++) {
@@ -201,7 +201,7 @@ static void count_device_nodes(const Reader *reader, const char *group, Recorded
     }
 }
 
-// What a tool has in every frame, and its devices' profiles: for a tool that cannot be exchanged a single one, as a plain list.
+// The per-frame values of a tool and its devices' profiles; for a tool that cannot be exchanged a single profile, as a plain list.
 static int64_t read_tool_frames(const Reader *reader, const char *group, bool is_exchanged, RecordedTool *tool)
 {
     int rank = is_exchanged ? 2 : 1;
@@ -250,7 +250,7 @@ static XrayControl *read_xray(const Reader *reader, uint64_t *count)
     return xray;
 }
 
-// Reads what every step has.
+// Reads the per-step datasets.
 static int64_t read_series(const Reader *reader, RecordedRun *run)
 {
     uint64_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, watched = 0;
@@ -421,7 +421,7 @@ static void check_times(const Reader *reader, const RecordedRun *run)
     }
 }
 
-// Valid settings of X-ray system and injector: wider than our controls allow, but safe to count and draw.
+// Checks the settings of X-ray system and injector against ranges wider than those of the controls, but safe to count and draw.
 static void check_xray(const Reader *reader, const RecordedRun *run)
 {
     static const struct {
@@ -466,7 +466,7 @@ static void read_run(Reader *reader, RecordedRun *run, bool with_frames)
         read_frames(reader, run);
 }
 
-// Takes ownership of `name`. CONTACT_COUNT if unknown: then the scene's own.
+// Takes ownership of `name`. CONTACT_COUNT if unknown: the scene's own is used.
 static ContactKind contact_of(char *name)
 {
     int kind = 0;

@@ -19,7 +19,7 @@
 
 enum { STEP_RING = 4096, FRAME_RING = 128, LEVEL_OF_SESSIONS = 6, LEVEL_OF_RUNS = 1 /* many times faster, and exact data hardly compress better */ };
 
-// What the values of a session's recording are rounded to: powers of two, so that rounding is exact and the rest of a double is zeros.
+// Rounding units of the values of a session's recording: powers of two, so that rounding is exact and the remaining bits of a double are zero.
 static const double length_grid_mm = 1.0 / 128, turn_grid = 1.0 / 512, node_force_grid_n = 1.0 / 2048, radius_grid_mm = 1.0 / 1024,
                     figure_grid = 1.0 / 16384 /* of step figures in mm, N and N mm */, eight_bits = -8 /* of each value */;
 
@@ -32,19 +32,19 @@ typedef struct Column {
     double grid;             // rounding unit of the values; 0: exact; < 0: number of bits kept
     unsigned char *ring;     // (ring length, row_bytes); NULL if rows come from another column
     unsigned char *chunk;    // (chunk_rows, row_bytes)
-    hsize_t chunk_rows, rows;        // rows: taken so far
-    int32_t *before;         // of motion: the last row, in units
+    hsize_t chunk_rows, rows;        // rows: number taken so far
+    int32_t *before;         // for motion: the previous row, in units
     hid_t type, dataset;
     haddr_t header;
-    int set;                 // of the ordered file
+    int set;                 // data set of the ordered file
 } Column;
 
-// Per-step values of each tool come first: the first tool's are at the root, those of the others after everything else.
+// Per-step values of each tool come first: the first tool's are at the root, the others' after all other columns.
 enum { COMMAND, PROXIMAL, INSERTED, RELEASED, TOOL_STEP_COLUMNS };
 enum { TIME = TOOL_STEP_COLUMNS, HASH, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, XRAY, STEP_COLUMNS };
-// After those of all tools if any may be exchanged: the last that fits on the page with those of four tools.
+// Follows those of all tools if a tool may be exchanged: the last column that fits on the page with those of four tools.
 static const char *const tool_step_name[TOOL_STEP_COLUMNS] = {"command", "proximal", "inserted_mm", "released"};
-// Per frame; from COUNT on only with several tools, then for each of them …
+// Per frame; from COUNT on with several tools only, then for each tool …
 enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, ONE_TOOL_COLUMNS, COUNT = ONE_TOOL_COLUMNS, ARC, RADIUS, FRAME_COLUMNS };
 enum { OWN_POSITION, OWN_QUATERNION, OWN_CARRIER, TOOL_FRAME_COLUMNS };      // … these
 enum {
@@ -74,24 +74,24 @@ typedef struct Ring {
 
 struct Recording {
     char *path;
-    PartFile part;           // until it is named
+    PartFile part;           // until it has its final name
     RecordingOptions options;
-    int tool_count, tool_nodes[STEP_TOOLS_MAX];      // at most, for any device
+    int tool_count, tool_nodes[STEP_TOOLS_MAX];      // the most for any device
     bool has_exchanges;
-    int node_count;          // at most
+    int node_count;          // the most
     NodeReport *node;        // (M) scratch of the simulation thread
-    ToolNode *own;           // of a tool's nodes, the same
+    ToolNode *own;           // the same for a tool's nodes
     int64_t frame_every, last_frame_step;
-    int64_t key_every;       // number of a session's poses per frame; 0: not a session, each pose is a frame
+    int64_t key_every;       // number of a session's poses per frame; 0: not a session, so each pose is a frame
     Column step_column[MOST_STEP_COLUMNS], frame_column[MOST_FRAME_COLUMNS], motion_column[MOST_FRAME_COLUMNS];
     Ring steps, frames;
-    hid_t file;              // while it is built
+    hid_t file;              // while HDF5 builds it
     OrderedFile *ordered;    // afterwards
     int half_fan;            // of the chunk indices
     unsigned char *shuffled, *packed;        // scratch of the writer, for the largest chunk
     size_t packed_bytes;
     hsize_t stated_steps;    // of the last flush
-    bool named;              // renamed to its path
+    bool named;              // renamed to its final path
     pthread_t writer;
     bool started;
     atomic_bool finish, failed, abandoned;
@@ -176,7 +176,7 @@ static void describe_columns(Recording *recording)
         step[exchange_column(recording)] = column_of("", "exchange", H5T_NATIVE_UINT8, 2, (hsize_t)recording->tool_count, 2);
 }
 
-// What the columns of a session are rounded to; of frames also the units of motion.
+// Sets the rounding of a session's columns; for frames, also the units of motion.
 static void round_columns(Recording *recording)
 {
     Column *step = recording->step_column, *frame = recording->frame_column;
@@ -193,7 +193,7 @@ static void round_columns(Recording *recording)
     }
 }
 
-// Each of a frame's columns has one of the same name below /motion: its changes, each coordinate's values side by side.
+// For each frame column, adds a column of the same name below /motion: its changes, with the values of each coordinate stored consecutively.
 static void describe_motion(Recording *recording)
 {
     for (int i = 0; i < frame_columns(recording); i++) {
@@ -278,7 +278,7 @@ static bool write_number(hid_t place, const char *attribute, double value)
     return good;
 }
 
-// Arc lengths and radii of a tool's nodes, (count) or of its devices (devices, count).
+// Arc lengths and radii of a tool's nodes (count), or of its devices' nodes (devices, count).
 static bool write_profile(hid_t file, const char *group, int devices, int count, const double *profile[2])
 {
     const hsize_t size[2] = {(hsize_t)devices, (hsize_t)count};
@@ -296,7 +296,7 @@ static bool write_profile(hid_t file, const char *group, int devices, int count,
     return good;
 }
 
-// Of the inserted device and of its alternatives: one row each, padded with NaN.
+// Profiles of the scene's device and of its alternatives: one row each, padded with NaN.
 static bool write_profiles(const Recording *recording, const Scene *scene, int tool, const char *group)
 {
     int devices = recording->has_exchanges ? scene_device_count(scene, tool) : 0, rows = devices > 0 ? devices : 1, count = recording->tool_nodes[tool];
@@ -369,7 +369,7 @@ static bool write_session(hid_t place, const RecordingOptions *options)
     return !options->trainee || (write_text(place, "trainee", NULL, options->trainee) && write_text(place, "date", NULL, options->date));
 }
 
-// /scene: the text, and path and sha256 of every file that the run was made from, one per line.
+// /scene: the text, and path and sha256 of every input file of the run, one per line.
 static bool write_scene(Recording *recording, const Scene *scene)
 {
     const char *file[MOST_FILES];
@@ -388,7 +388,7 @@ static bool write_scene(Recording *recording, const Scene *scene)
     for (int i = 0; i < scene->exchange_count; i++)
         if (scene->exchange[i].device.device_path)
             file[count++] = scene->exchange[i].device.device_path;
-    SEL_REQUIRE(count <= MOST_FILES, "there is room for the files that a scene names");
+    SEL_REQUIRE(count <= MOST_FILES, "there is room for the files that a scene refers to");
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
         file[count++] = recording->options.file[i];
     char *paths = NULL, *sums = NULL, *path = whole_path(scene->path);
@@ -448,7 +448,7 @@ static bool link_all(hid_t file, const Column *column, int count)
 
 static int motion_columns(const Recording *recording) { return recording->key_every > 0 ? frame_columns(recording) : 0; }
 
-// Creates them anonymously one after the other, so that their headers are adjacent; then links them.
+// Creates the datasets anonymously one after the other, so that their headers are adjacent; then links them.
 static bool create_datasets(Recording *recording)
 {
     hid_t file = recording->file;
@@ -515,7 +515,7 @@ static bool build_file(Recording *recording, const Scene *scene)
 
 // --- the writer's thread ---
 
-// Like the filter `shuffle`: the first bytes of all values, then the second ones …
+// Like the HDF5 filter `shuffle`: the first bytes of all values, then the second bytes, …
 static void shuffle(const unsigned char *from, size_t count, size_t value_bytes, unsigned char *to)
 {
     for (size_t byte = 0; byte < value_bytes; byte++)
@@ -552,7 +552,7 @@ static void round_row(const Column *column, unsigned char *row)
         ((float *)(void *)row)[i] = (float)rounded((double)((float *)(void *)row)[i], column->grid);
 }
 
-// The place of the next row.
+// Position of the next row in the chunk.
 static unsigned char *next_row(const Column *column) { return column->chunk + column->rows % column->chunk_rows * column->row_bytes; }
 
 static bool end_row(Recording *recording, Column *column) { return ++column->rows % column->chunk_rows != 0 || pack_chunk(recording, column); }
@@ -567,7 +567,7 @@ static bool take_row(Recording *recording, Column *column, const unsigned char *
     return end_row(recording, column);
 }
 
-// A value in units. NaN (the node does not exist) repeats the node before it, which compresses to nothing.
+// A value in units. NaN (the node does not exist) is replaced by the previous node's value, which compresses to nothing.
 static int32_t in_units(const Column *column, const unsigned char *row, size_t i, int32_t otherwise)
 {
     double value = column->value_bytes == 1                ? (double)((const int8_t *)row)[i]
@@ -577,12 +577,12 @@ static int32_t in_units(const Column *column, const unsigned char *row, size_t i
     return isnan(value) ? otherwise : (int32_t)fmax(-MOTION_MOST, fmin(MOTION_MOST, rint(value)));
 }
 
-// Changes since the row before, less the change of the node before: nodes that follow each other move nearly alike. Encoded as unsigned integers: 0,
-// -1, 1, -2, 2 … become 0, 1, 2, 3, 4 …
+// Changes since the previous row, minus the change of the previous node, because adjacent nodes move nearly alike. Encoded as unsigned integers: 0, -1, 1, -2,
+// 2 … become 0, 1, 2, 3, 4 …
 static bool take_motion(Recording *recording, const Column *from, Column *to, const unsigned char *row)
 {
     uint32_t *change = (uint32_t *)(void *)next_row(to);
-    SEL_ASSERT(to->row_bytes / to->value_bytes == from->row_bytes / from->value_bytes, "motion has a value for each of the frame's");
+    SEL_ASSERT(to->row_bytes / to->value_bytes == from->row_bytes / from->value_bytes, "motion has one value for each value of the frame");
     size_t parts = from->rank == 2 ? from->shape[1] : 1, nodes = from->rank == 0 ? 1 : from->shape[0];
     for (size_t part = 0; part < parts; part++) {
         uint32_t neighbours = 0;
@@ -613,7 +613,7 @@ static bool take_steps(Recording *recording, long long row)
     return good;
 }
 
-// In a session each pose adds to /motion, and every few poses one is also a frame.
+// In a session each pose is added to /motion, and every key_every-th pose is also a frame.
 static bool take_frame(Recording *recording, long long row)
 {
     const Ring *ring = &recording->frames;
@@ -646,10 +646,10 @@ static bool drain(Recording *recording, long long steps, long long frames)
     return good;
 }
 
-// The step, from 0, that a row of a column shows, where `every` steps lie between two rows.
+// The step, from 0, that a row of a column shows; `every`: steps per row.
 static hsize_t step_of(hsize_t row, int64_t every) { return row == 0 ? 0 : row * (hsize_t)every - 1; }
 
-// How many rows of whole chunks show steps before `steps`.
+// Number of rows in whole chunks that show steps before `steps`.
 static hsize_t whole_rows(const Column *column, int64_t every, hsize_t steps)
 {
     hsize_t rows = column->rows / column->chunk_rows * column->chunk_rows;
@@ -684,7 +684,7 @@ static bool name_file(Recording *recording)
     return recording->named;
 }
 
-// Commits the rows of all whole chunks and, at the end, of partial ones. Does nothing without a new chunk.
+// Commits the rows of all whole chunks; at the end also those of partial chunks. Does nothing if there is no new chunk.
 static bool flush(Recording *recording, bool is_last)
 {
     Column *step = recording->step_column, *frame = recording->frame_column, *motion = recording->motion_column;
@@ -811,7 +811,7 @@ static bool push_frame(Recording *recording, Simulator *simulator)
     int nodes = state->node_count;
     SEL_REQUIRE(nodes <= recording->node_count, "a frame has room for all nodes");
     int64_t row = simulator_totals(simulator)->steps - 1;
-    SEL_ASSERT(row >= 0 && row > recording->last_frame_step, "frames follow steps, in their order");
+    SEL_ASSERT(row >= 0 && row > recording->last_frame_step, "frames are added after steps, in the order of steps");
     stepper_node_report(stepper, recording->node);
     put(ring, FRAME_STEP, &row);
     Vec3 *position = slot_of(ring, POSITION);
@@ -843,7 +843,7 @@ static void put_exchange(Recording *recording, const Stepper *stepper, const Too
 {
     uint8_t *row = slot_of(&recording->steps, exchange_column(recording));
     for (int k = 0; k < recording->tool_count; k++) {
-        SEL_ASSERT(commands->fitted[k] >= 0 && commands->fitted[k] <= UINT8_MAX, "a device has a number of one byte");
+        SEL_ASSERT(commands->fitted[k] >= 0 && commands->fitted[k] <= UINT8_MAX, "the index of a device fits one byte");
         row[2 * k] = (uint8_t)commands->fitted[k];
         row[2 * k + 1] = (uint8_t)stepper_fitted(stepper, k);
     }
@@ -1041,7 +1041,7 @@ static Recording *create(const char *path, Simulator *simulator, const Recording
     return recording;
 }
 
-// HDF5 only builds the file; the writer's thread does without.
+// HDF5 only builds the file; the writer thread does not use it.
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults)
 {
     Hdf5Silence silence = hdf5_silence_begin();
@@ -1065,7 +1065,7 @@ bool recording_close(Recording *recording, Simulator *simulator, Faults *faults)
     if (failed) {
         faults_add(faults, recording->path, 0, 0, "recording stopped after %.3f s: %s; %s, free some space or record elsewhere",
                    (double)recording->stated_steps * simulator_scene(simulator)->dt / 1000, recording->reason,
-                   recording->named ? "the file is whole up to its last flush" : "no file was made");
+                   recording->named ? "the file is complete up to its last flush" : "no file was made");
     }
     recording_free(recording);
     return !failed;

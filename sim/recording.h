@@ -2,24 +2,25 @@
 //
 // The simulation thread copies into rings; a writer thread drains them, compresses whole chunks of 0.2 s (shuffle, then deflate; any HDF5 reader can
 // read them) and commits them about as often, so no step touches a file. The file opens in any HDF5 reader while it is written and after a kill,
-// complete up to the last flush. How:
+// complete up to the last flush. This is achieved as follows:
 //   - it is built under a temporary name and renamed once its first chunks are flushed, so its structure is on disk before it gets its name;
-//   - after that datasets grow only, by whole chunks, in an order of writes of which every prefix is a valid file (sim/ordered_file.h);
+// - after that, datasets only grow, by whole chunks, in an order of writes of which every prefix is a valid file (sim/ordered_file.h);
 //   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no field depends on the bytes of another;
-//   - the extents of datasets that lie in one page change in one write: of a single tool all with S rows, and all with K or P. S is written first and may be one
-//     flush ahead of the others; of several tools those of a kind may lie in two pages, and differ by a flush.
-// A reader of a file that was killed, or is being written, takes the least S, K and P, and of the frames those whose step is below S.
-// After a failed write (full disk, full index) nothing more is written, the file stays as the last flush left it.
+// - the extents of datasets that lie in one page change in one write: for a single tool all datasets of length S together, and all of length K or P. S is
+// written first and may be one flush ahead of the others; with several tools the datasets of one length may lie in two pages and differ by a flush.
+// A reader of a file whose writer was killed or is still writing takes the least S, K and P, and only the frames whose step is below S. After a failed write
+// (full disk, full index) nothing more is written; the file stays as the last flush left it.
 //
-// Two kinds. A run's (`run --record`; recording_default_options) is exact, every value as the simulator has it. A session's (`nav`; recording_session_options) is small:
-// commands, times, state hashes and whole numbers are exact, so that each step can be simulated again to the bit; the rest is rounded, to multiples of 2^-14 in step
-// figures (mm, N, N mm; the residual to 8 bits) and 2^-7 mm, 2^-9 (quaternions), 2^-11 N in frames. Frames stand each second; between them /motion has poses (P)
-// each 10 ms: to each of the frames' datasets X a dataset /motion/X, as whole numbers: its change since the pose before, from zero, less that of the node before, in the
-// unit that the file's attribute motion_length_mm (position, gap_mm, s_mm), motion_turn (quaternion), motion_force_n or motion_radius_mm says, else 1; 0, -1, 1, -2,
-// 2 … stand as 0, 1, 2, 3, 4 …, and the last two dimensions are exchanged: (P,M,3) is (P,3,M). With h5py:
+// Two kinds. A run's (`run --record`; recording_default_options) is exact: every value as the simulator has it. A session's (`nav`; recording_session_options)
+// is small: commands, times, state hashes and integers are exact, so that each step can be simulated again bit for bit; the other values are rounded, to
+// multiples of 2^-14 in step figures (mm, N, N mm; the residual to 8 bits) and of 2^-7 mm, 2^-9 (quaternions) and 2^-11 N in frames. Frames are stored every
+// second; between them /motion holds poses (P) every 10 ms. For each dataset X of the frames, /motion/X holds integers: the change since the previous pose (the
+// first: since zero) minus the change of the previous node, in the unit given by the file's attribute motion_length_mm (position, gap_mm, s_mm), motion_turn
+// (quaternion), motion_force_n or motion_radius_mm, else 1. 0, -1, 1, -2, 2 … are stored as 0, 1, 2, 3, 4 …, and the last two dimensions are exchanged: (P,M,3)
+// becomes (P,3,M). With h5py:
 //   c = file["/motion/wire/position"][:].astype("i8")
 //   position = numpy.cumsum((c >> 1) ^ -(c & 1), axis=-1).cumsum(axis=0).swapaxes(1, 2) * file.attrs["motion_length_mm"]
-// Values beyond 2^30 units are infinite; nodes that do not exist (beyond /wire/count) repeat another's; /motion/wire/step is the row itself.
+// Values beyond 2^30 units are infinite; nodes that do not exist (beyond /wire/count) repeat another node; /motion/wire/step is the row itself.
 //
 // Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 while the tool
 // is released, /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force),
@@ -32,10 +33,9 @@
 //   rows: command (S,2), proximal (S,2), inserted_mm (S), released (S); of tool 0 they are links to those at the root;
 //   frames of its own nodes, inside other tools and behind the hub too: position (K,MN,3), quaternion (K,MN,4), carrier (K,MN) the outermost tool there, -1 in the
 //   sheath or behind the hub; once: s_mm (MN), radius_mm (MN).
-// Where the scene has tools to exchange, /exchange (S,T,2) says of each of the T tools in every step which of its devices was requested and which is
-// inserted (0 the
-//   scene's, 1, 2, … those under its `exchange:`). MN is the largest number of nodes of its D devices, and s_mm and radius_mm are (D,MN); values
-//   beyond a device's nodes are NaN, in the frames too (carrier -1).
+// If the scene has tools to exchange, /exchange (S,T,2) holds, for each of the T tools in every step, the device requested and the device inserted (0 the
+// scene's, 1, 2, … those under its `exchange:`). MN is the largest number of nodes of its D devices, and s_mm and radius_mm are (D,MN); values beyond a
+// device's nodes are NaN, in the frames too (carrier -1).
 #ifndef SELDINGER_SIM_RECORDING_H
 #define SELDINGER_SIM_RECORDING_H
 
@@ -46,14 +46,14 @@ typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
     double
         pose_ms; // > 0 for a session: simulated time between its poses (/motion), some of which are frames; values are rounded. Default 0: everything is exact
-    double flush_s;          // simulated time in a chunk; flushes wait for whole chunks, and at least half as long in wall time. Default 0.2
+    double flush_s;          // simulated time per chunk; flushes wait for whole chunks, and for at least half that time in wall time. Default 0.2
     const char *trainee, *date;      // of a session (session_date()), else NULL
-    int64_t expected_steps;  // sizes the chunks and their index; 0 or 1: unknown, 14 hours at the most
-    int file_count;          // further files that the run depends on, besides those of the scene
+    int64_t expected_steps;  // determines the size of the chunks and of their index; 0 or 1: unknown, at most 14 hours
+    int file_count;          // number of further files that the run depends on, in addition to those of the scene
     const char *const *file;
 } RecordingOptions;
-RecordingOptions recording_default_options(void);    // a run's: every value exact
-RecordingOptions recording_session_options(void);    // the trainer's: poses at 100 Hz, frames at 1 Hz, at most 200 MB an hour of 120 nodes
+RecordingOptions recording_default_options(void);    // for a run: every value exact
+RecordingOptions recording_session_options(void);    // for a trainer session: poses at 100 Hz, frames at 1 Hz, at most 200 MB per hour with 120 nodes
 
 // Values of /motion are within this many units of zero.
 #define MOTION_MOST 1073741824.0
@@ -62,12 +62,12 @@ typedef struct Recording Recording;
 
 // To be called before the first use of HDF5 in a program that records: after a full disk the library must not write at exit.
 void recording_prepare_process(void);
-// NULL with a fault if the file cannot be created.
+// Returns NULL with a fault if the file cannot be created.
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults);
-// To be called after each step. No allocation, no file access; waits if the disk is slower than the simulation. False once writing failed. `xray` may
-// be NULL (a run without a viewer); injections by its script are recorded anyway.
+// To be called after each step. Makes no allocation and no file access; waits if the disk is slower than the simulation. `xray` may be NULL (a run without a
+// viewer); injections by its script are recorded in any case. Returns false once writing has failed.
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
-// Adds the last state as a frame (in a session as a pose), writes the rest and closes. False with a fault if writing failed; always frees.
+// Adds the last state as a frame (in a session, as a pose), writes the rest and closes. Always frees. Returns false with a fault if writing failed.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
 // Closes and removes the file. NULL is allowed.
 void recording_abandon(Recording *recording);
@@ -76,15 +76,15 @@ void recording_abandon(Recording *recording);
 typedef struct RecordedTool {
     char name[TOOL_NAME_SIZE];       // "" if the file has none: a single tool
     char kind[TOOL_NAME_SIZE];
-    double *command;         // (S, 2); those of the first tool are the run's
+    double *command;         // the first tool's are those of the run
     double *proximal;        // (S, 2)
     double *inserted;        // (S) [mm]
     uint8_t *released;       // (S)
     double *turned;          // (S) [deg] since the start, the sum of the commands
     // with several tools only
-    int node_count;          // N, the largest number of its devices
+    int node_count;          // N, the largest number of nodes of its devices
     int device_count;        // D, 1 if it could not be exchanged
-    int device_nodes[1 + EXCHANGES_MOST];    // (D) of each
+    int device_nodes[1 + EXCHANGES_MOST];    // (D) node count of each device
     Vec3 *position;          // (K, N)
     Quat *quaternion;        // (K, N)
     int8_t *carrier;         // (K, N)
@@ -114,13 +114,13 @@ typedef struct RecordedRun {
     uint32_t *flags;         // (S) STEP_ flags
     double *wall_force;      // (S, 2) [N] largest and sum
     double *s, *radius;      // (M) [mm], of several tools (K, M)
-    char *scene_text, *scene_path;   // NULL if the file lacks them
-    char *trainee, *date;    // of a session, else NULL
+    char *scene_text, *scene_path;   // NULL if the file does not hold them
+    char *trainee, *date;    // of a session; else NULL
     char *files, *sha256;    // paths and checksums of the run's input files, one per line
     ContactKind contact;     // CONTACT_COUNT: not given, the scene's
     double step_ms;
 } RecordedRun;
-// NULL with faults if it is not a recording or its sizes are inconsistent.
+// Returns NULL with faults if the file is not a recording or its sizes are inconsistent.
 RecordedRun *recorded_run_load(const char *path, Faults *faults);
 // The same without frames and nodes, whose counts are 0 (an hour takes 0.6 GB instead of 2).
 RecordedRun *recorded_run_load_series(const char *path, Faults *faults);
@@ -135,7 +135,7 @@ typedef struct RecordedFrame {
     const int32_t *vessel_node;
 } RecordedFrame;
 RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame);
-// A tool's own nodes in a frame, of several tools.
+// A tool's own nodes in a frame; with several tools only.
 typedef struct RecordedToolFrame {
     int node_count;
     const double *s, *radius;
@@ -144,7 +144,7 @@ typedef struct RecordedToolFrame {
     const int8_t *carrier;
 } RecordedToolFrame;
 RecordedToolFrame recorded_run_tool_frame(const RecordedRun *run, int tool, int64_t frame);
-int recorded_run_fitted(const RecordedRun *run, int tool, int64_t step);     // which of its devices is in
+int recorded_run_fitted(const RecordedRun *run, int tool, int64_t step);     // device inserted at that step
 ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step);
 // Whether the run had a viewer: its steps have X-ray controls (`nav`). Otherwise (`run --record`) moving without X-ray is not an error.
 bool recorded_run_was_watched(const RecordedRun *run);

@@ -52,7 +52,7 @@ bool recording_export_rows(const RecordedRun *run, const char *path, Faults *fau
     return output_text_write(&text, path, faults);
 }
 
-// A line of a frame: the single tool, or one of several with all its own nodes.
+// A polyline of a frame: that of the single tool, or of one of several tools with all its own nodes.
 typedef struct FrameLine {
     int count;
     const Vec3 *position;
@@ -130,7 +130,7 @@ static bool export_frame(const char *path, const RecordedRun *run, int64_t frame
     return output_text_write(&text, path, faults);
 }
 
-// OUT.pvd names OUT_00000.vtp and on, each with its time; the .pvd is written last, so the files it lists exist.
+// OUT.pvd lists OUT_00000.vtp and the following with their times; it is written last, so the files that it lists exist.
 bool recording_export_series(const RecordedRun *run, const char *path, Faults *faults)
 {
     int stem = (int)(strlen(path) - 4);

@@ -5,8 +5,8 @@
 
 #include "sim/open_vessel.h"
 
-// Writes the session file beside a recording. `options`: how its vessel is opened. `progress` (may be NULL) is called with the fraction done from
-// time to time. False with faults, also if this program does not reproduce the recorded states.
+// Writes the session file next to a recording. `options`: how its vessel is opened. `progress` (may be NULL) is called from time to time with the fraction
+// done. Returns false with faults, also if this program does not reproduce the recorded states.
 bool recover_session(const char *recording, const OpenVesselOptions *options, void (*progress)(void *context, double part), void *context, Faults *faults);
 
 #endif

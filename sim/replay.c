@@ -61,7 +61,7 @@ bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults)
     return fits;
 }
 
-// Which columns besides its motion each tool needs in the script.
+// Columns that a tool needs in the script in addition to its motion.
 typedef struct ScriptUse {
     bool releases[TOOLS_MOST], injects[TOOLS_MOST], exchanges[TOOLS_MOST];
 } ScriptUse;

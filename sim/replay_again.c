@@ -7,7 +7,7 @@
 #include <string.h>
 
 typedef struct Sampling {
-    ToolPath *path;          // NULL: none wanted
+    ToolPath *path;          // NULL: not requested
     bool no_memory;
 } Sampling;
 
@@ -20,13 +20,13 @@ static bool sample(void *context, Simulator *simulator, const ToolCommands *comm
     return !sampling->no_memory;
 }
 
-// Into the folder; false with faults.
+// Writes scene and golden path to the folder; returns false with faults.
 static bool write_scene(const Sampling *sampling, Simulator *simulator, const RecordedRun *run, const Scene *scene, const char *folder, const char *name,
                         Faults *faults)
 {
     if (tool_path_sample(sampling->path, simulator, true) && !sampling->no_memory)
         return replay_write_scene(run, scene, folder, faults) && replay_write_golden(sampling->path, folder, faults);
-    faults_add(faults, name, 0, 0, "no memory for its tool path");
+    faults_add(faults, name, 0, 0, "not enough memory for its tool path");
     return false;
 }
 
@@ -38,7 +38,7 @@ bool replay_again(const RecordedRun *run, const Scene *scene, const OpenVessel *
     if (!simulator)
         return false;
     if (replay_fits(run, simulator, faults) && folder && !(sampling.path = tool_path_create(simulator, (double)run->step_count * run->step_ms / 1000)))
-        faults_add(faults, name, 0, 0, "no memory for its tool path");
+        faults_add(faults, name, 0, 0, "not enough memory for its tool path");
     bool good = faults->count == 0;
     if (good) {
         again->verdict = replay_verify(simulator, run, -1, folder != NULL, sample, &sampling);
@@ -70,9 +70,9 @@ bool replay_is_of(const RecordedRun *run, const Scene *scene, const char *record
 {
     if (run->scene_text && !strcmp(run->scene_text, scene->text) && run->step_ms == scene->dt)
         return true;
-    faults_add(
-        faults, recording, 0, 0,
-        "is a recording of another scene than %s, of an older state of it, or with devices added from the tray; `seldinger replay` goes on from any (F5)",
-        scene->path);
+    faults_add(faults, recording, 0, 0,
+               "is a recording of another scene than %s, of an older state of it, or with devices added from the tray; `seldinger replay` can continue any "
+               "recording (F5)",
+               scene->path);
     return false;
 }

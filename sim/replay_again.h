@@ -1,4 +1,4 @@
-// A recording simulated again, and made into a regression scene on the way.
+// Simulates a recording again and, if requested, writes it as a regression scene.
 #ifndef SELDINGER_SIM_REPLAY_AGAIN_H
 #define SELDINGER_SIM_REPLAY_AGAIN_H
 
@@ -10,15 +10,15 @@
 typedef struct ReplayAgain {
     ReplayVerdict verdict;
     bool diverged;
-    bool is_written;         // the scene
+    bool is_written;         // the scene was written
 } ReplayAgain;
 
-// `folder` (NULL: no scene is made; else all is simulated, also past a difference) gets the scene of sim/replay_scene.h. `name` of the recording stands in faults.
-// False with faults where it was not simulated.
+// With `folder`, simulates all steps even after a difference and writes the scene of sim/replay_scene.h there; NULL: no scene is written. `name` of the
+// recording appears in faults. Returns false with faults if it was not simulated.
 bool replay_again(const RecordedRun *run, const Scene *scene, const OpenVessel *open, const char *folder, const char *name, ReplayAgain *again, Faults *faults);
-// A line for each file that the run was made from and that is no longer what it was.
+// Prints a line for each input file of the run that has changed since.
 void replay_print_changed_files(FILE *out, const RecordedRun *run);
-// A recording goes on in its own scene only: the same text. False with a fault, in which `recording` names it.
+// A recording can only be continued in its own scene, that is, with the same text. Returns false with a fault that includes the name `recording`.
 bool replay_is_of(const RecordedRun *run, const Scene *scene, const char *recording, Faults *faults);
 
 #endif

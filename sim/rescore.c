@@ -1,8 +1,8 @@
 #include "sim/rescore.h"
 
 #include "sim/clock.h"
-#include "sim/lesson.h"
 #include "sim/replay.h"
+#include "sim/session_tracker.h"
 
 #include <stdlib.h>
 
@@ -11,7 +11,7 @@ static const double kept_s = 0.1;
 struct Rescore {
     const RecordedRun *run;
     Simulator *simulator;
-    Lesson *lesson;
+    SessionTracker *tracker;
     int64_t steps, different;
     bool was_watched;
     int kept_count;
@@ -23,7 +23,7 @@ static void keep(Rescore *rescore)
 {
     if (rescore->kept_count == rescore->capacity || simulator_time_s(rescore->simulator) < rescore->kept_count * kept_s - 1e-9)
         return;
-    rescore->kept[rescore->kept_count++] = score_figures(lesson_score(rescore->lesson));
+    rescore->kept[rescore->kept_count++] = score_figures(session_tracker_score(rescore->tracker));
 }
 
 Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVessel *open, Faults *faults)
@@ -36,14 +36,14 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
         rescore->capacity = (int)fmin(1e7, (double)run->step_count * run->step_ms / 1000 / kept_s + 2);
         rescore->kept = calloc((size_t)rescore->capacity, sizeof *rescore->kept);
         rescore->simulator = simulator_create(scene, open->vessel, faults);
-        rescore->lesson = rescore->simulator ? lesson_create(rescore->simulator, open->tree) : NULL;
+        rescore->tracker = rescore->simulator ? session_tracker_create(rescore->simulator, open->tree) : NULL;
     }
     bool fits = rescore && rescore->simulator && replay_fits(run, rescore->simulator, faults);
-    if (fits && rescore->kept && rescore->lesson) {
+    if (fits && rescore->kept && rescore->tracker) {
         keep(rescore);
         return rescore;
     }
-    if (!rescore || (fits && !(rescore->kept && rescore->lesson)))
+    if (!rescore || (fits && !(rescore->kept && rescore->tracker)))
         faults_add(faults, scene->path, 0, 0, "not enough memory to simulate it again");
     rescore_free(rescore);
     return NULL;
@@ -53,7 +53,7 @@ void rescore_free(Rescore *rescore)
 {
     if (!rescore)
         return;
-    lesson_free(rescore->lesson);
+    session_tracker_free(rescore->tracker);
     simulator_destroy(rescore->simulator);
     free(rescore->kept);
     free(rescore);
@@ -68,7 +68,7 @@ void rescore_advance(Rescore *rescore, int64_t to, double budget_s)
         int64_t i = rescore->steps++;
         ToolCommands commands = recorded_run_commands(run, i);
         simulator_step(rescore->simulator, &commands);
-        lesson_step(rescore->lesson, rescore->simulator, &commands, rescore->was_watched ? &run->xray[i] : NULL);
+        session_tracker_step(rescore->tracker, rescore->simulator, &commands, rescore->was_watched ? &run->xray[i] : NULL);
         if (simulator_hash(rescore->simulator) != run->state_hash[i])
             rescore->different = i;
         else
@@ -84,4 +84,4 @@ const ScoreFigures *rescore_at(Rescore *rescore, double time_s)
 
 int64_t rescore_first_different(const Rescore *rescore) { return rescore->different; }
 int64_t rescore_steps(const Rescore *rescore) { return rescore->steps; }
-const Score *rescore_score(const Rescore *rescore) { return lesson_score(rescore->lesson); }
+const Score *rescore_score(const Rescore *rescore) { return session_tracker_score(rescore->tracker); }

@@ -1,5 +1,5 @@
-// In a wire that nothing twists, the material frame is carried along the rest curve without torsion, and so is the frame of a path of lines and
-// arcs. An arc of radius R whose plane is turned by the sum of all plane angles up to it is therefore a rest curvature 1 / R in that direction.
+// In a wire without applied twist, the material frame is transported along the rest curve without torsion, as is the frame of a path of lines and arcs. An arc
+// of radius R, with its plane rotated by the sum of all plane angles up to it, is therefore a rest curvature 1 / R in that direction.
 #include "sim/rest_shape.h"
 
 #include "base/base.h"
@@ -18,7 +18,7 @@ double rest_shape_length(const TubePiece *piece, int piece_count)
     return sum;
 }
 
-// Where sections end, each moved to a piece's border that it nearly meets, and where pieces end, in rising order.
+// Lists the ends of sections, each moved to a piece's border if that is very close, and the ends of pieces, in rising order.
 static int lay_borders(const double *section_end, int section_count, const double *piece_end, int piece_count, double *moved_end, double *border)
 {
     int count = 0;
@@ -48,7 +48,7 @@ WireSection *rest_shape_sections(const WireSection *section, int section_count, 
         double total = 0;
         for (int i = 0; i < section_count; i++)
             section_end[i] = total += section[i].length;
-        // piece_end[0]: where the straight proximal part ends; the last piece ends with the wire, to the bit
+        // piece_end[0]: end of the straight proximal part; the last piece ends with the wire, bit for bit
         piece_end[piece_count] = total;
         for (int k = piece_count; k > 0; k--)
             piece_end[k - 1] = piece_end[k] - piece_length(&piece[k - 1]);

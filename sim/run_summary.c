@@ -10,7 +10,7 @@
 // A tool deeper in the wall than this has left the vessel. (Leaving through an open end is reported but is not a failure.)
 static const double lost_mm = 1;
 
-// How far the last state's deepest node is outside the wall [mm], from a node report.
+// Distance of the last state's deepest node outside the wall [mm], from a node report.
 static double run_final_penetration_mm(const NodeReport *node, int node_count)
 {
     double deepest = 0;
@@ -174,7 +174,8 @@ static char *run_summary_json(Simulator *simulator, const DriveReport *drive, co
     return text;
 }
 
-// Of several tools every tool's own nodes, each where it lies on the shared centreline; what the wall does is said of the chain's nodes, the carriers'.
+// With several tools, the own nodes of every tool, at their positions on the shared centreline; the wall's effects are given at the chain's nodes, for the
+// carriers.
 static bool write_tools(FILE *stream, Simulator *simulator, const NodeReport *node)
 {
     const Scene *scene = simulator_scene(simulator);
@@ -256,7 +257,7 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     if (totals->self_contacts_max)
         fprintf(out, "the tool touches itself at %d places (at most %d), %.4f mm deep at most\n", last->self_contacts, totals->self_contacts_max,
                 totals->self_overlap_max);
-    fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64 " did not converge\n",
+    fprintf(out, "%" PRId64 " steps took a further linearisation, %" PRId64 " were cut short and completed by later steps, %" PRId64 " did not converge\n",
             totals->further_linearisations, totals->limited_steps, totals->not_converged_steps);
     if (totals->hand_slip_steps)
         fprintf(out, "the hand slipped in %" PRId64 " steps, %.2f mm along the tool: it holds no more than %g N\n", totals->hand_slip_steps,
@@ -280,7 +281,7 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
                 reach[i].distance, scene->target[i].radius, reach[i].time_s);
 }
 
-// No node of a run that can be shown is further outside the wall than this.
+// A run with a node further outside the wall than this gets a warning.
 static const double deep_mm = 0.2;
 
 void run_print_warnings(FILE *out, const Simulator *simulator, const DriveReport *drive)
@@ -303,10 +304,10 @@ void run_print_warnings(FILE *out, const Simulator *simulator, const DriveReport
                 path, (long long)totals->disagreeing_steps, (long long)totals->steps);
     const EnergyBalance *energy = simulator_energy(simulator);
     if (simulator_gains_energy(simulator))
-        fprintf(out, "%s: warning: single steps gained %.3g mJ that nobody gave, of %.4g mJ of work (most: %.3g mJ at %.3f s)\n", path, energy->gained,
-                energy->work, energy->gained_most, energy->gained_at_s);
+        fprintf(out, "%s: warning: single steps gained %.3g mJ of energy without a source, of %.4g mJ of work (most: %.3g mJ at %.3f s)\n", path,
+                energy->gained, energy->work, energy->gained_most, energy->gained_at_s);
     if (totals->not_converged_steps > 0)
-        fprintf(out, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
+        fprintf(out, "%s: warning: the contact solve of %lld of %lld steps stopped at its limit of iterations (residual at most %.2g)\n", path,
                 (long long)totals->not_converged_steps, (long long)totals->steps, totals->residual_max);
 }
 

@@ -6,14 +6,14 @@
 
 #include <stdio.h>
 
-// A node left the vessel: beyond an open end, or so far outside the wall that the wall no longer holds it.
+// Returns whether a node left the vessel: beyond an open end, or so far outside the wall that the wall no longer holds it.
 bool run_left_vessel(const RunTotals *totals);
 
-// The same into files ("-": standard output); false with a fault.
+// run_write_summary writes the JSON summary and run_write_final the CSV of the final state to a file ("-": standard output). Both return false with a fault.
 bool run_write_summary(const char *path, Simulator *simulator, const DriveReport *drive, const NodeReport *node, Faults *faults);
 bool run_write_final(const char *path, Simulator *simulator, const NodeReport *node, Faults *faults);
 void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const NodeReport *node);
-// What makes the run doubtful, a line each; nothing where nothing does.
+// Prints what makes the run doubtful, one line each; prints nothing if there is nothing.
 void run_print_warnings(FILE *out, const Simulator *simulator, const DriveReport *drive);
 
 #endif

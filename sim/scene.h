@@ -12,8 +12,8 @@
 
 typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_MESH, SOURCE_NONE } VesselSourceKind;
 // `contact:` of the vessel, `--contact` on the command line.
-// lim: the wall of a fitted model, whichever it is; shapes and tubes are fitted by shared blobs. lim_blend, lim_switch: of local models only, neighbours mixed, or
-// the paper's one model a point.
+// lim: the wall of a fitted model of either type; shapes and tubes are fitted with shared blobs. lim_blend, lim_switch: local models only, with neighbours
+// blended, or with one model per point as in the paper.
 typedef enum {
     CONTACT_LIM,
     CONTACT_MESH,
@@ -27,7 +27,7 @@ typedef enum {
 } ContactKind;
 static inline bool contact_is_local(ContactKind contact) { return contact == CONTACT_LIM_BLEND || contact == CONTACT_LIM_SWITCH; }
 static inline bool contact_is_fitted(ContactKind contact) { return contact == CONTACT_LIM || contact_is_local(contact); }
-extern const char *const contact_name[CONTACT_COUNT + 1];  // as they are written; NULL at the end
+extern const char *const contact_name[CONTACT_COUNT + 1];  // as written in files; NULL at the end
 
 typedef struct SceneTarget {
     char name[64];
@@ -36,10 +36,10 @@ typedef struct SceneTarget {
 } SceneTarget;
 
 typedef enum { TOOL_GUIDE_CATHETER, TOOL_CATHETER, TOOL_MICROCATHETER, TOOL_WIRE, TOOL_KIND_COUNT } ToolKind;
-extern const char *const tool_kind_name[TOOL_KIND_COUNT + 1];      // as they are written; NULL at the end
+extern const char *const tool_kind_name[TOOL_KIND_COUNT + 1];      // as written in files; NULL at the end
 
 typedef enum { CORE_STEEL, CORE_NITINOL, CORE_COUNT } ToolCore;
-extern const char *const tool_core_name[CORE_COUNT + 1];           // as they are written; NULL at the end
+extern const char *const tool_core_name[CORE_COUNT + 1];           // as written in files; NULL at the end
 
 typedef struct SceneTool {
     char name[TOOL_NAME_SIZE];   // prefix of its script columns; no dot, comma or space
@@ -75,7 +75,7 @@ typedef struct Scene {
     double mesh_cell;        // [mm] cell edge of a mesh or grid made from another source; 0: chosen from the vessel
     ContactKind contact;
     double friction;
-    WireOptions wire;        // of the first tool; sections, fixes, loads owned by the scene. To be changed here by options of the command line
+    WireOptions wire;        // of the first tool; sections, fixes and loads are owned by the scene. Options of the command line change it here
     int tool_count;          // 1 to 4, outermost first; with `wire:` one named "wire"
     SceneTool tool[TOOLS_MOST];
     bool inlet_is_root;      // sheath `inlet: root`: start and direction come from vessel->inlet
@@ -108,17 +108,17 @@ WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own);
 // Device `which` of tool `tool`, counted as in scripts: 0 as the scene has it, 1, 2, … under its `exchange:`. NULL if there is none.
 const SceneTool *scene_device(const Scene *scene, int tool, int which);
 WireOptions scene_device_wire(const Scene *scene, int tool, int which);
-int scene_device_count(const Scene *scene, int tool);      // 1 where it cannot be exchanged
-int scene_most_nodes(const Scene *scene, int tool);        // of whichever device is in
+int scene_device_count(const Scene *scene, int tool);      // 1 if it cannot be exchanged
+int scene_most_nodes(const Scene *scene, int tool);        // of the device with most nodes
 ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene
 // Replaces its script by a file's. NULL: the file is only checked. False with faults.
 bool scene_use_script(Scene *scene, const char *path, Faults *faults);
-// [1/mm] by which the first tool, or any, takes X-rays away at arc length s from its proximal end.
+// [1/mm] X-ray attenuation of the first tool, or of any tool or device, at arc length s from its proximal end.
 double scene_attenuation(const Scene *scene, double s);
 double scene_tool_attenuation(const Scene *scene, int tool, double s);
 double scene_device_attenuation(const Scene *scene, int tool, int which, double s);
-double scene_device_marker(const Scene *scene, int tool, int which);       // [mm] its length, 0: none
-// The file that the vessel comes from, a model or a mesh; NULL if it needs none.
+double scene_device_marker(const Scene *scene, int tool, int which);       // [mm] length of its marker, 0: none
+// The file that the vessel is read from, a model or a mesh; NULL if it needs none.
 static inline const char *scene_needed_file(const Scene *scene) { return scene->source == SOURCE_MODEL ? scene->model_path : scene->mesh_path; }
 
 #endif

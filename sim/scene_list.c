@@ -50,7 +50,7 @@ bool scene_has_verify(const char *path)
     size_t length;
     faults_clear(&ignored);
     char *text = text_file_read(path, &length, &ignored);
-    // one that cannot be read is not left out: whoever opens it says why
+    // a file that cannot be read is listed, because opening it later reports the reason
     bool found = !text || !strncmp(text, "verify:", 7) || strstr(text, "\nverify:");
     free(text);
     return found;

@@ -1,4 +1,4 @@
-// Scenes that can be checked, by what lies beside them and in them: a golden tool path, the key `verify:`.
+// Lists scenes that can be checked: those with a golden tool path next to them or with the key `verify:`.
 #ifndef SELDINGER_SIM_SCENE_LIST_H
 #define SELDINGER_SIM_SCENE_LIST_H
 
@@ -10,13 +10,13 @@ typedef struct SceneList {
 } SceneList;
 
 void scene_list_add(SceneList *list, const char *path);
-// All below a folder that have one of both, by name; links to folders are not followed.
+// Adds all such scenes below a folder, by name; links to folders are not followed.
 void scene_list_add_folder(SceneList *list, const char *folder);
 void scene_list_free(SceneList *list);
 
-// X.golden.csv beside X.yaml.
+// Returns whether X.golden.csv exists next to X.yaml.
 bool scene_has_golden(const char *scene);
-// Does the file's text hold the key, at the start of a line? True too where it cannot be read: whoever opens it says why.
+// Returns whether the file's text holds the key at the start of a line; also true if it cannot be read, because opening it later reports the reason.
 bool scene_has_verify(const char *path);
 
 #endif

@@ -38,7 +38,7 @@ static void read_shape(Reading *reading, YamlValue value)
         if (!key || !strcmp(key, "name") || !yaml_text(option, &text))
             continue;
         if (strlen(key) >= 64 || strlen(text) >= 64) {
-            yaml_fault(option, "option and value have at most 63 letters");
+            yaml_fault(option, "option and value must have at most 63 letters");
             continue;
         }
         strcpy(scene->shape_option[scene->shape_option_count][0], key);
@@ -167,7 +167,7 @@ static void read_vessel(Reading *reading, YamlValue value)
     if (yaml_has(&map, "mesh") && yaml_text(yaml_get(&map, "mesh", false), &text))
         scene->mesh_path = scene_resolved(reading, text);
     if (yaml_has(&map, "mesh_scale") && scene->source != SOURCE_MESH)
-        yaml_fault(yaml_get(&map, "mesh_scale", false), "'mesh_scale' goes with the source 'mesh'");
+        yaml_fault(yaml_get(&map, "mesh_scale", false), "'mesh_scale' applies only to the source 'mesh'");
     yaml_map_number(&map, "mesh_scale", false, (NumberRange){0, 1e9, true}, &scene->mesh_scale);
     yaml_map_number(&map, "mesh_cell_mm", false, (NumberRange){0, 100, true}, &scene->mesh_cell);
     read_contact(&map, scene);
@@ -176,7 +176,7 @@ static void read_vessel(Reading *reading, YamlValue value)
 
 // --- sheath, rig ---
 
-// `normal` of a sheath or rig: the direction to which a rest curvature with plane 0 bends; default vec3_normal_to(direction).
+// `normal` of a sheath or rig: direction towards which a rest curvature with plane 0 bends; default vec3_normal_to(direction).
 static void read_normal(const YamlMap *map, WireOptions *wire)
 {
     if (yaml_map_unit_vector(map, "normal", false, &wire->normal) && vec3_norm(vec3_cross(wire->normal, wire->direction)) < 1e-6)
@@ -304,7 +304,7 @@ static void read_simulation(Reading *reading, YamlValue value)
     scene->self_contact = choice == 1 ? SELF_CONTACT_ON : choice == 2 ? SELF_CONTACT_OFF : SELF_CONTACT_AUTO;
 }
 
-// The valid keys of a script's row: t_s, the first tool's by their bare names, and each tool's by its name.
+// The valid keys of a script's row: t_s, the first tool's keys without a name, and each tool's keys with its name.
 enum { KEYS_OF_TOOL = 5, NAMED_KEYS = 1 + KEYS_OF_TOOL };
 typedef struct RowKeys {
     const char *key[NAMED_KEYS + KEYS_OF_TOOL * TOOLS_MOST + 1];

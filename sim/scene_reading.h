@@ -10,7 +10,7 @@ typedef struct ToolReading { // how a tool was read, for the rules that relate t
     double inserted_mm;      // `inserted_known`: it was given and in range
     bool inserted_known;
     double length;           // [mm] of all sections …
-    bool length_known;       // … unless one of them, or `length_mm`, had a fault
+    bool length_known;       // … unknown if one of them, or `length_mm`, had a fault
     bool sound;              // its sections and rest shape had no fault
 } ToolReading;
 
@@ -36,11 +36,11 @@ void *scene_zeroed(Reading *reading, int count, size_t size);    // NULL with a 
 char *scene_resolved(Reading *reading, const char *name);        // relative to the scene's file; NULL with a fault
 bool scene_read_piece(YamlValue value, TubePiece *piece);        // a line or an arc, of a tube's path or a rest shape
 
-// `wire:` becomes the scene's one tool, `tools:` up to four; scene->wire is the first one's. Before `sheath:` and `rig:` are read …
+// `wire:` becomes the scene's only tool, `tools:` up to four; scene->wire is that of the first. To be called before `sheath:` and `rig:` are read …
 void scene_read_wire(Reading *reading, YamlValue value);
 void scene_read_tools(Reading *reading, YamlValue value);
-// … and after them: what a tool inherits from the scene's start, how far each is inserted, and whether each fits into the one around it. `placed`: a
-// sheath or a rig was there.
+// … and this after them: sets what a tool inherits from the scene's start and how far each is inserted, and checks whether each fits into the one around it.
+// `placed`: a sheath or a rig was given.
 void scene_settle_tools(Reading *reading, bool placed);
 
 #endif

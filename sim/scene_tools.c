@@ -1,8 +1,8 @@
-// The tools of a scene: `wire:`, or `tools:` from the outermost to the innermost, each with keys of its own or from a device file.
+// The tools of a scene: `wire:`, or `tools:` from the outermost to the innermost, each with its own keys or those of a device file.
 //
-// Two tools, one in the other, both measured from the sheath's mouth (or the rig's start): the inner one of length L_i has a_i beyond the mouth and
-// L_i - a_i behind it, where the hand holds it. That hand stands behind the outer tool's hub: L_i - a_i >= L_o - a_o. In a rig the first tool lies
-// beyond the start with its whole length, a_o = L_o.
+// Two tools, one in the other, both measured from the sheath's mouth (or the rig's start): the inner one, of length L_i, has a_i beyond the mouth and L_i - a_i
+// behind it, where the hand holds it. That hand is behind the outer tool's hub: L_i - a_i >= L_o - a_o. In a rig the first tool lies beyond the start with its
+// whole length, a_o = L_o.
 #include "sim/scene_reading.h"
 
 #include "base/base.h"
@@ -13,18 +13,18 @@
 #include <stdio.h>
 #include <string.h>
 
-// Of a catheter: polymer with 20 % by weight of barium sulphate, 1.24 g/cm3, at 60 keV 5.10 cm2/g of the salt and 0.20 of the polymer (NIST XCOM): 0.15 /mm.
-// With 30 % it is 0.23; tungsten and bismuth go higher.
+// Attenuation of a catheter: polymer with 20 % by weight of barium sulphate, 1.24 g/cm3, at 60 keV 5.10 cm2/g for the salt and 0.20 for the polymer (NIST
+// XCOM): 0.15 /mm. With 30 % it is 0.23; with tungsten or bismuth it is higher.
 static const double catheter_attenuation = 0.15;
 static const double wire_attenuation = 0.55, marker_attenuation = 1.2,
                     marker_length = 3; // [1/mm], [1/mm], [mm]: chosen by appearance (docs/design.md, "X-ray attenuation")
 static const double hand_limit_n = 20;       // about the grip of two fingers
-static const double valve_n = 0.2;           // of a haemostatic valve that is open for a tool to slide: an assumption
+static const double valve_n = 0.2;           // friction of a haemostatic valve opened so that a tool can slide: an assumption
 // A lumen lined with PTFE. Handbooks give PTFE on steel 0.04 to 0.1; of the wires that Schroeder measured (Cardiovasc Intervent Radiol 1993;16:93-97) a
 // PTFE coat halved the friction of bare steel and a hydrophilic one brought it to a sixth.
 static const double friction_inside = 0.05;
 
-// Where a tool's keys come from: those beside it override its device file's.
+// Where a tool's keys come from: the keys given in the scene override those of its device file.
 typedef struct ToolSource {
     YamlMap own, device;     // device.value.node 0: none
 } ToolSource;
@@ -113,7 +113,7 @@ static void read_rest(Reading *reading, YamlValue list, SceneTool *tool, double 
     free(piece);
 }
 
-// `length_mm`: the first section is cut or drawn out, so that the whole is this long.
+// `length_mm`: the first section is shortened or lengthened so that the whole tool has this length.
 static bool read_length(YamlValue value, WireSection *first, double *total)
 {
     double wanted, beyond = *total - first->length;
@@ -129,7 +129,7 @@ static bool read_length(YamlValue value, WireSection *first, double *total)
     return true;
 }
 
-// `shaped_tip`: bent by hand while the wire is out; the last part of its sections is made again.
+// `shaped_tip`: bent by hand while the wire is outside; the last part of its sections is replaced.
 static void read_shaped_tip(YamlValue value, SceneTool *tool)
 {
     static const char *const keys[] = {"length_mm", "angle_deg", "mandrel_mm", NULL};
@@ -198,7 +198,7 @@ static void read_title(const ToolSource *source, SceneTool *tool)
         snprintf(tool->title, sizeof tool->title, "%s", title);
 }
 
-// What `wire:` and an entry of `tools:` have in common.
+// Keys common to `wire:` and an entry of `tools:`.
 static void read_tool(Reading *reading, const ToolSource *source, SceneTool *tool, ToolReading *read)
 {
     static const char *const marker_keys[] = {"length_mm", "attenuation_1_mm", NULL};
@@ -265,8 +265,8 @@ static YamlMap device_map_of(YamlReader *reader)
     return yaml_map(root, keys);
 }
 
-// A device file's description of itself. `bending_n_mm2` is the bending stiffness that its source gives for the first section: the section's modulus
-// and diameters must come to that.
+// Keys of a device file that describe the device. `bending_n_mm2` is the bending stiffness that its source gives for the first section: the section's modulus
+// and diameters must reproduce it.
 static void check_device(const ToolSource *source, const SceneTool *tool, bool sound)
 {
     static const char *const texts[] = {"source", "uncertainty", "goes_through", NULL};
@@ -315,7 +315,7 @@ static void read_name(Reading *reading, YamlValue value, int index)
     strcpy(scene->tool[index].name, name);
 }
 
-// What an entry of `tools:` and one of `exchange:` have in common, from the scene or a device file.
+// Keys common to an entry of `tools:` and one of `exchange:`, from the scene or a device file.
 static void read_device(Reading *reading, ToolSource *source, SceneTool *tool, ToolReading *read, bool needs_kind)
 {
     YamlReader *device = NULL;
@@ -398,7 +398,7 @@ void scene_read_tools(Reading *reading, YamlValue value)
 
 static const char *called(const SceneTool *tool, const ToolReading *read) { return tool->name[0] ? tool->name : read->whole.name; }
 
-// By what is known of both: a section with a fault counts neither as thick nor as narrow.
+// Uses only what is known of both tools: a section with a fault counts neither as thick nor as narrow.
 static void check_lumen(const ToolReading *read, const SceneTool *inner, const ToolReading *around, const SceneTool *outer)
 {
     const char *inner_name = called(inner, read), *outer_name = called(outer, around);
@@ -415,7 +415,7 @@ static void check_lumen(const ToolReading *read, const SceneTool *inner, const T
                    inner_name, thickest, outer_name, narrowest);
 }
 
-// The inner tool's proximal end lies behind the outer one's hub.
+// Checks that the inner tool's proximal end lies behind the outer tool's hub.
 static void check_hub(const ToolReading *read, const SceneTool *inner, const ToolReading *around, const SceneTool *outer, double outer_inserted)
 {
     const char *inner_name = called(inner, read), *outer_name = called(outer, around);
@@ -433,7 +433,7 @@ static void check_hub(const ToolReading *read, const SceneTool *inner, const Too
                    least);
 }
 
-// Each of them fits into all that may be around it, and around all that may be within.
+// Checks that each device fits into all that may be around it, and around all that may be within it.
 static void check_exchanges(const Reading *reading)
 {
     const Scene *scene = reading->scene;

@@ -1,8 +1,8 @@
 #include "sim/score.h"
 
 #include "geom/geom.h"
+#include "sim/score_path.h"
 #include "sim/score_tool.h"
-#include "sim/score_way.h"
 
 #include <stdlib.h>
 
@@ -16,32 +16,32 @@ const char *const score_error_words[ERROR_COUNT] = {"wrong branch",
                                                     "too much contrast agent",
                                                     "wire lost in the catheter",
                                                     "tip jumped while its hand rested",
-                                                    "tip left the place that it should keep"};
+                                                    "tip left its required place"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
-static const double LOOK_MS = 10;            // between looks at where in the tree the tip is
+static const double LOOK_MS = 10;            // interval between locations of the tips in the tree
 static const double CHORD_MM = 0.2;          // of the tip's path
-static const double QUIET_MS = 500;          // until an episode is over
-static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // fraction of a limit below which a measure counts as back
+static const double QUIET_MS = 500;          // duration after which an episode is over
+static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // fraction of a limit below which an episode may end
 enum { HOPS = 8 };
 
 struct Score {
     const Scene *scene;
     Exercise exercise;           // the scene's, or the default; its text is the scene's
     ScoreFigures figures;
-    ScoreWay way;
+    ScorePath path;
     int tool_count;
     ScoreTool tool[TOOLS_MOST];
     double dt;                   // [ms]
     double since_look;           // [ms]
-    Vec3 path_from;              // where the last chord of the tip's path ended
+    Vec3 path_from;              // end of the last chord of the tip's path
     double wall_force;           // [N] mean
-    ScoreEpisode episode[ERROR_COUNT];       // of what concerns no single tool
-    double pulse_phase;          // of the next X-ray pulse, 1: now
+    ScoreEpisode episode[ERROR_COUNT];       // of errors that belong to no single tool
+    double pulse_phase;          // phase of the next X-ray pulse; 1: due now
     bool had_pedal;
-    int64_t held_steps, stood_steps;         // within the target; the tool that stays within its own
-    bool stands;                 // it has come to stay …
-    Vec3 stood_at;               // … there
+    int64_t held_steps, stood_steps;         // within the target; of the tool that must stay, within its own target
+    bool stands;                 // the tool has reached the target in which it must stay …
+    Vec3 stood_at;               // … at this place
     int event_count;
     ScoreEvent event[SCORE_EVENTS_MOST];
 };
@@ -58,7 +58,7 @@ static int leader(const Score *score, const Stepper *stepper)
     return foremost;
 }
 
-// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has; HUGE_VAL if unknown.
+// The lumen's radius at the mouth: that of the tree or the tube, else the free space around the first free node; HUGE_VAL if unknown.
 static double lumen_radius(const Scene *scene, Simulator *simulator, const VesselTree *tree)
 {
     if (scene->source == SOURCE_TUBE)
@@ -77,11 +77,11 @@ static double lumen_radius(const Scene *scene, Simulator *simulator, const Vesse
     return radius;
 }
 
-// The next node towards the target, past it or without one into the widest branch; -1 at an end.
+// The next node towards the target; past the target or without one, the next node into the widest branch; -1 at an end.
 static int follow(const Score *score, const VesselTree *tree, int node)
 {
-    if (score->exercise.target >= 0 && node != score->way.goal)
-        return score->way.toward[node];
+    if (score->exercise.target >= 0 && node != score->path.goal)
+        return score->path.toward[node];
     int next = -1;
     for (int i = node + 1; i < tree->node_count; i++)
         if (tree->parent[i] == node && (next < 0 || tree->radius[i] > tree->radius[next]))
@@ -89,7 +89,7 @@ static int follow(const Score *score, const VesselTree *tree, int node)
     return next;
 }
 
-// By how much the vessel turns behind the mouth, which is where a tube begins. False if out of memory.
+// Determines the vessel's turn behind the mouth, which is where a tube begins. Returns false if out of memory.
 static bool find_turn(Score *score, ScoreSheath *sheath, const VesselTree *tree)
 {
     const TubeOptions *tube = &score->scene->tube;
@@ -139,14 +139,14 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     Vec3 tip = stepper_tool_place(simulator_stepper(simulator), led, stepper_tool_length(simulator_stepper(simulator), led)).position;
     Vec3 target = at >= 0 ? scene->target[at].point : tip;
     // the path first: the vessel's turn behind the mouth is measured along it
-    if (!score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0) || !create_tools(score, simulator, tree)) {
+    if (!score_path_create(&score->path, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0) || !create_tools(score, simulator, tree)) {
         score_free(score);
         return NULL;
     }
     ScoreFigures *f = &score->figures;
     f->has_exercise = scene->exercise != NULL;
     f->tip_node = f->tool[led].tip_node;
-    f->way_mm = f->remaining_mm = f->least_remaining_mm = score_way_left(&score->way, tip, f->tip_node);
+    f->way_mm = f->remaining_mm = f->least_remaining_mm = score_path_left(&score->path, tip, f->tip_node);
     f->target_distance_mm = vec3_distance(tip, target);
     for (int i = 0; i < PART_COUNT; i++)
         f->part[i] = 1;
@@ -158,11 +158,11 @@ void score_free(Score *score)
 {
     if (!score)
         return;
-    score_way_destroy(&score->way);
+    score_path_destroy(&score->path);
     free(score);
 }
 
-// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`. By `tool`, or by no single tool (-1).
+// An episode of `kind` begins when the measure is `over` its limit and ends once it was `back` for `quiet_ms`. Caused by `tool`, or by no single tool (-1).
 static void judge(Score *score, ScoreError kind, int tool, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
 {
     ScoreEpisode *episode = tool < 0 ? &score->episode[kind] : &score->tool[tool].episode[kind];
@@ -241,7 +241,7 @@ static bool has_its_devices(const Score *score)
     return true;
 }
 
-// The tool that must stay: once its tip has reached its target, whether it remains there.
+// For the tool that must stay: once its tip has reached its target, checks whether it remains there.
 static void watch_stay(Score *score, double now_s)
 {
     int k = score->exercise.stays;
@@ -301,7 +301,7 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
         judge_limit(score, ERROR_KICK, k, own->kick_mm_s, rules->kick_mm_s, AGAIN, score->dt, now_s);
         if (k == 0)
             continue;
-        // an exchangeable tool comes out on purpose; the error is advancing the tool around it without it
+        // an exchangeable tool is withdrawn on purpose; the error is to advance the tool around it without it
         bool judged = rules->wire_behind_mm > 0 &&
                       (scene_device_count(score->scene, k) == 1 || tool->episode[ERROR_WIRE_LOST].is_on || commands->tool[k - 1].push_mm_s > 0);
         judge(score, ERROR_WIRE_LOST, k, own->spare_mm < tool->hub_limit || (judged && own->behind_mm > rules->wire_behind_mm),
@@ -310,8 +310,8 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
     f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
 }
 
-// The tip's node, from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two looks: it is
-// outside that node's ball then by half the radius, and inside another's.
+// The tip's node, starting from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two locations: it is
+// then outside that node's ball by half the radius, and inside another's.
 static int find_node(const VesselTree *tree, Vec3 tip, int node)
 {
     if (!tree->near)
@@ -323,14 +323,14 @@ static int find_node(const VesselTree *tree, Vec3 tip, int node)
     return vec3_distance(tip, tree->center[nearest]) < tree->radius[nearest] ? nearest : node;
 }
 
-// Where a tool's tip is in the vessel: a withdrawn tool is at the sheath's mouth.
+// Position of a tool's tip in the vessel; a withdrawn tool is at the sheath's mouth.
 static Vec3 place_in_vessel(const Score *score, const Stepper *stepper, int k)
 {
     const WireOptions *wire = &score->scene->wire;
     return wire->has_sheath && stepper_tool_inserted(stepper, k) < 0 ? wire->start : score->tool[k].at;
 }
 
-// Where in the tree the tips are, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
+// Locates the tips in the tree, every 10 ms: a tool at 100 mm/s moves 1 mm in that time.
 static void look(Score *score, const Stepper *stepper, int led, double now_s)
 {
     ScoreFigures *f = &score->figures;
@@ -339,15 +339,15 @@ static void look(Score *score, const Stepper *stepper, int led, double now_s)
     for (int k = 0; k < score->tool_count; k++) {
         ScoreToolFigures *own = &f->tool[k];
         score_sheath_look(&score->tool[k].sheath, stepper, k);
-        if (!score->way.tree)
+        if (!score->path.tree)
             continue;
-        own->tip_node = find_node(score->way.tree, place_in_vessel(score, stepper, k), own->tip_node);
-        own->off_way_mm = score->exercise.target >= 0 ? score->way.off[own->tip_node] : 0;
+        own->tip_node = find_node(score->path.tree, place_in_vessel(score, stepper, k), own->tip_node);
+        own->off_way_mm = score->exercise.target >= 0 ? score->path.off[own->tip_node] : 0;
     }
     f->tip_node = f->tool[led].tip_node;
     if (score->exercise.target < 0)
         return;
-    f->remaining_mm = score_way_left(&score->way, place_in_vessel(score, stepper, led), f->tip_node);
+    f->remaining_mm = score_path_left(&score->path, place_in_vessel(score, stepper, led), f->tip_node);
     f->least_remaining_mm = fmin(f->least_remaining_mm, f->remaining_mm);
     for (int k = 0; k < score->tool_count; k++)
         judge_limit(score, ERROR_WRONG_BRANCH, k, f->tool[k].off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);
@@ -406,7 +406,7 @@ static bool is_moved(const Score *score, const ToolCommands *commands)
     return moves;
 }
 
-// A tool exchanged in this step is another device, and the other hubs have moved.
+// A tool exchanged in this step is a different device, and the other tools' hubs have moved.
 static void refit_tools(Score *score, Simulator *simulator)
 {
     bool was_exchanged = false;
@@ -430,7 +430,7 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
     }
     refit_tools(score, simulator);
     double moved = watch_sheath(score, stepper, commands, now_s);
-    if (f->state == SCORE_WAITING)       // initial settling of the tools is not an error of the trainee
+    if (f->state == SCORE_WAITING)       // while waiting, initial settling of the tools is not an error of the trainee
         return;
     int led = leader(score, stepper);
     f->time_s = now_s - f->start_s;
@@ -461,7 +461,7 @@ const ScoreEvent *score_events(const Score *score, int *count)
 
 void score_copy(Score *to, const Score *from)
 {
-    ScoreWay way = to->way;
+    ScorePath path = to->path;
     *to = *from;
-    to->way = way;
+    to->path = path;
 }

@@ -36,11 +36,11 @@ typedef struct ScoreToolFigures {
     char name[TOOL_NAME_SIZE];
     double inserted_mm, withdrawn_mm;    // total length fed in and pulled out, both >= 0
     double tip_force_n, tip_force_peak_n;    // means over 20 ms
-    double kick_mm_s, kick_peak_mm_s;    // of its tip while it is not moved, else 0
-    double lost_mm, lost_limit_mm;       // length lost next to the mouth, and its limit (buckling); limit 0: not known yet
-    double behind_mm;            // its tip lies so far behind the tip of the tool around it, >= 0
-    double spare_mm;             // its proximal end lies so far behind that one's hub, >= 0
-    double strayed_mm;           // of the tool that must stay: largest distance of its tip from its target
+    double kick_mm_s, kick_peak_mm_s;    // of its tip while its hand does not move it, else 0
+    double lost_mm, lost_limit_mm;       // length lost next to the mouth, and its limit (buckling); limit 0: not yet known
+    double behind_mm;            // distance of its tip behind the tip of the tool around it, >= 0
+    double spare_mm;             // distance of its proximal end behind that tool's hub, >= 0
+    double strayed_mm;           // for the tool that must stay: largest distance of its tip from where it had reached its target
     int tip_node;                // node of the tree at which its tip is; -1 without tree
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the path
 } ScoreToolFigures;
@@ -57,10 +57,10 @@ typedef struct ScoreFigures {
     double dose_area_cm2;        // pulses times the field's open area at the isocentre: proportional to the dose-area product
     double contrast_ml;
     double path_mm;              // of the tip that has to reach the target, in chords of 0.2 mm, so that tremor does not count
-    double way_mm;               // from where the tip was at the start to the target, along the tree's centrelines; straight without a tree
-    double remaining_mm;         // of it, now
+    double way_mm;               // length of the path from the tip's place at the start to the target, along the tree's centrelines; straight without a tree
+    double remaining_mm;         // remaining length of that path
     double least_remaining_mm;
-    double efficiency;           // distance gained over path length, 0 to 1
+    double efficiency;           // part of that path gained / path length of the tip, 0 to 1
     double inserted_mm, withdrawn_mm;    // of all tools in sum
     double wall_force_peak_n;    // largest contact force of any step
     double wall_impulse_n_s;     // sum of all contact forces over time

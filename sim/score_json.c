@@ -9,8 +9,8 @@
 static const struct Figure {
     const char *name;
     size_t offset;
-    double most;                 // from 0
-    bool is_later;               // missing in older versions
+    double most;                 // the range is 0 to this
+    bool is_later;               // not in files of older versions
 } figure_table[] = {
 #define FIGURE(name, most)                                                                                                                                     \
     {                                                                                                                                                          \
@@ -38,9 +38,9 @@ static const struct Figure {
 #undef FIGURE
 };
 enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
-// after the numbers of the table; "tools" where there are several
+// the keys after those of the table; "tools" with several tools only
 static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors", "tools"};
-// Of a tool. An episode still in progress is not written.
+// Figures of a tool. An episode still in progress is not written.
 static const struct Figure tool_table[] = {
 #define FIGURE(name, most)                                                                                                                                     \
     {                                                                                                                                                          \
@@ -56,7 +56,7 @@ static const struct Figure tool_table[] = {
 #undef FIGURE
 };
 enum { TOOL_FIGURES = sizeof tool_table / sizeof tool_table[0] };
-// Errors missing in older versions.
+// Whether files of older versions do not have this error.
 static bool is_later(ScoreError kind) { return kind > ERROR_CONTRAST; }
 enum { OTHERS = sizeof other_key / sizeof other_key[0] };
 
@@ -192,7 +192,7 @@ static void read_figures(const JsonReading *reading, const cJSON *object, const 
     }
 }
 
-// A single tool has no list.
+// With a single tool there is no list.
 static void read_tools(const JsonReading *reading, const cJSON *list, ScoreFigures *f)
 {
     const char *keys[TOOL_FIGURES + 2] = {"name"};

@@ -1,4 +1,4 @@
-// A score's figures to and from JSON: one table for both.
+// Converts a score's figures to and from JSON, with one table for both.
 #ifndef SELDINGER_SIM_SCORE_JSON_H
 #define SELDINGER_SIM_SCORE_JSON_H
 
@@ -9,14 +9,14 @@
 // Adds all figures to an object; false if out of memory.
 bool score_add_json(cJSON *object, const ScoreFigures *figures);
 
-// Reads an object by its keys; everything wrong becomes a fault of `file`.
+// Reads an object by its keys; every error is reported as a fault of `file`.
 typedef struct JsonReading {
     const char *file;
     Faults *faults;
 } JsonReading;
 void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *figures);
 
-// Checks that the members of `object`, called `where` in messages, are `keys` (NULL-terminated), each once. NULL or another type is a fault; then
+// Checks that `object`, called `where` in messages, is an object whose members are `keys` (NULL-terminated), each once. Otherwise adds a fault and returns
 // false.
 bool json_keys(const JsonReading *reading, const cJSON *object, const char *where, const char *const *keys);
 double json_number(const JsonReading *reading, const cJSON *object, const char *where, const char *key, double least, double most);

@@ -1,8 +1,8 @@
 #include "sim/score_sheath.h"
 
-static const double MARGIN = 1;              // [mm] over what the clearance takes
-enum { DIAMETERS = 5 };                      // of the lumen, in l
-static const double UNBENT = 0.1;            // [mm] lost by a tool that slides
+static const double MARGIN = 1;              // [mm] in addition to what the clearance takes
+enum { DIAMETERS = 5 };                      // l, in lumen diameters
+static const double UNBENT = 0.1;            // [mm] lost at most by a tool that slides
 
 void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted)
 {
@@ -35,7 +35,7 @@ double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, 
     sheath->last_inserted = inserted;
     if (!sheath->is_judged || inserted <= 0)
         return fed;
-    // a tip that is curved at rest moves across itself as it is dragged along a wall: it says nothing
+    // a tip that is curved at rest moves sideways as it is dragged along a wall, so it cannot be used
     double hidden = stepper_tool_length(stepper, tool) - inserted, at = fmin(hidden + sheath->reach, sheath->straight);
     if (at <= hidden)
         return fed;
@@ -45,7 +45,7 @@ double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, 
     return fed;
 }
 
-// By how much the line through `point` turns, beginning in the sheath's direction.
+// Total turn of the line through `point`, starting from the sheath's direction.
 static double turn_of(const ScoreSheath *sheath, const Vec3 *point, int count)
 {
     double turn = 0;

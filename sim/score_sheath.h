@@ -1,5 +1,5 @@
-// Buckling of one tool at the sheath: the length that went in at the mouth and did not continue, over the first part of the tool beyond it. score.h
-// explains what is measured and why.
+// Buckling of one tool at the sheath: the length that was fed in at the mouth and did not advance, over the first part of the tool beyond it. score.h explains
+// what is measured and why.
 #ifndef SELDINGER_SIM_SCORE_SHEATH_H
 #define SELDINGER_SIM_SCORE_SHEATH_H
 
@@ -23,7 +23,7 @@ void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lum
 void score_sheath_refit(ScoreSheath *sheath, const WireOptions *wire, double inserted);
 // The vessel's centreline from the mouth on, `count` points: sets the turn, by chords of one lumen diameter.
 void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *point, int count);
-// Tool `tool` after a step of `dt` [ms]. Returns what was fed in [mm].
+// Updates the state of tool `tool` after a step of `dt` [ms]. Returns the length fed in [mm].
 double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, double dt);
 void score_sheath_set_pieces(ScoreSheath *sheath, const TubePiece *piece, int count);   // the same of lines and arcs
 // If the turn is unknown: measures it from the tool while hardly any length is lost.

@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-// The element behind the tip of a tool that is the only one.
+// Finds the element behind the tip of a single tool.
 static bool find_element(ScoreTip *tip, const WireOptions *options, double tip_length)
 {
     char why[256];
@@ -50,7 +50,7 @@ double score_tip_force(ScoreTip *tip, const Stepper *stepper, int tool)
 {
     if (!tip->is_single)
         return vec3_norm(stepper_tool_wall_force(stepper, tool, tip->from));
-    // an element that is not out of the sheath carries its reaction
+    // an element partly in the sheath carries the sheath's reaction
     const WireState *state = stepper_state(stepper);
     int i = tip->element;
     if (i < 0 || tip->s < stepper_tool_length(stepper, tool) - state->inserted - 1e-9)

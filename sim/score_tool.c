@@ -5,12 +5,12 @@
 #include <string.h>
 
 static const double MEAN_MS = 20;
-static const double REST_MS = 100;           // from when on a hand rests: what its own motion has set going has died down
+static const double REST_MS = 100;           // a hand counts as resting after this time, when the effects of its own motion have died down
 static const double HUB_MM = 1;
 
 double score_mean(double mean, double value, double elapsed_ms) { return mean + (value - mean) * -same_expm1(-elapsed_ms / MEAN_MS); }
 
-// How far its proximal end is behind the hub of the tool around it, and its tip behind the tip.
+// Distances of its proximal end behind the hub of the tool around it, and of its tip behind that tool's tip.
 static void measure_ends(const ScoreTool *tool, const Stepper *stepper, ScoreToolFigures *f)
 {
     if (tool->index == 0)
@@ -20,7 +20,7 @@ static void measure_ends(const ScoreTool *tool, const Stepper *stepper, ScoreToo
     f->spare_mm = fmax(tool->length - own - (stepper_tool_length(stepper, tool->index - 1) - around), 0);
 }
 
-// Where its tip is, and how near its end may come to the hub.
+// Finds its tip, and how close its proximal end may come to the hub.
 static void find_ends(ScoreTool *tool, const Stepper *stepper, ScoreToolFigures *figures)
 {
     tool->at = stepper_tool_place(stepper, tool->index, tool->length).position;
@@ -53,7 +53,7 @@ void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *f
         tool->drift = vec3(0, 0, 0);
         tool->rested = 0;
         score_sheath_refit(&tool->sheath, &wire, inserted);
-        score_tip_create(&tool->tip, stepper, tool->index, &wire, tool->tip_length);     // of several tools nothing is made
+        score_tip_create(&tool->tip, stepper, tool->index, &wire, tool->tip_length);     // allocates nothing with several tools
     }
     tool->sheath.last_inserted = inserted;
     find_ends(tool, stepper, figures);

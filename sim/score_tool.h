@@ -9,28 +9,28 @@
 
 typedef struct ScoreEpisode {
     bool is_on;
-    double quiet;                // [ms] that its measure has been back
+    double quiet;                // [ms] since its measure went back below the threshold
 } ScoreEpisode;
 
 typedef struct ScoreTool {
     int index;                   // of the scene's tools
-    int fitted;                  // which of its devices it is
+    int fitted;                  // the inserted device
     double length;               // [mm]
     double tip_length;           // [mm]
     ScoreTip tip;
     ScoreSheath sheath;
     Vec3 at;                     // its tip
-    Vec3 drift;                  // [mm/ms] the tip's velocity, mean
-    double rested;               // [ms] that its hand has held it still
+    Vec3 drift;                  // [mm/ms] mean velocity of the tip
+    double rested;               // [ms] since its hand last moved it
     double hub_limit;            // [mm] spare_mm below which it counts as drawn in
     ScoreEpisode episode[ERROR_COUNT];
 } ScoreTool;
 
-// `lumen_radius` [mm] of the vessel at the mouth, HUGE_VAL if nothing says it. False if out of memory.
+// `lumen_radius` [mm] of the vessel at the mouth, HUGE_VAL if unknown. Returns false if out of memory.
 bool score_tool_create(ScoreTool *tool, Simulator *simulator, int index, double lumen_radius, double tip_length, ScoreToolFigures *figures);
-// Between a step in which any tool was exchanged and score_tool_feed(): continues from where the tools are then. Allocates nothing.
+// To be called between a step in which a tool was exchanged and score_tool_feed(): continues from the tools' present positions. Allocates nothing.
 void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *figures);
-// After a step of `dt` [ms]: what was fed [mm]. Sheath and ends only: forces while a tool settles before the first action do not count.
+// After a step of `dt` [ms]: returns the length fed [mm]. Sheath and ends only: forces while a tool settles before the first action do not count.
 double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, ScoreToolFigures *figures);
 void score_tool_watch(ScoreTool *tool, const Stepper *stepper, const ToolCommands *commands, double dt, ScoreToolFigures *figures);
 // Updates a 20 ms mean with `value`, which held for `elapsed_ms`.

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// At most `capacity` - 1 bytes, ending with a whole character.
+// Copies at most `capacity` - 1 bytes, ending with a whole character.
 static void copy_text(char *to, size_t capacity, const char *from)
 {
     size_t length = strlen(from);
@@ -160,7 +160,7 @@ static void read_hex(const JsonReading *reading, const cJSON *object, const char
 {
     json_text(reading, object, where, key, digits + 1, text);
     if (!is_hex(text, digits) && !(may_lack && !*text))
-        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' has %zu hexadecimal digits, small letters", where, key, digits);
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is not a string of %zu lower-case hexadecimal digits", where, key, digits);
 }
 
 static void read_recording(const JsonReading *reading, const cJSON *object, Session *s)
@@ -177,7 +177,7 @@ static void read_recording(const JsonReading *reading, const cJSON *object, Sess
     s->state_hash = strtoull(hash, NULL, 16);
 }
 
-// With several tools, the tool of an error is written if it is a single one.
+// With several tools, the tool of an error is written if the error belongs to a single one.
 static int read_event_tool(const JsonReading *reading, const cJSON *event, const ScoreFigures *f)
 {
     const char *names[TOOLS_MOST + 1] = {0};
@@ -265,7 +265,7 @@ bool session_load(const char *path, Session *session, Faults *faults)
     return good;
 }
 
-// --- a folder of them ---
+// --- sessions of a folder ---
 
 static int by_date(const void *a, const void *b)
 {

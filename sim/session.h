@@ -5,7 +5,7 @@
 //    "scene": {"path": "", "sha256": "", "title": "", "target": ""},
 //    "recording": {"path": "", "steps": 0, "step_ms": 1, "series_sha256": "", "state_hash": ""},
 //    "score": {figures of score.h, "parts": {}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}, "tools": [{"name": "", …}] of several},
-//    "events": [{"kind": "wrong_branch", "time_s": 0}]}       and, of several tools, "tool": whose error it is
+//   "events": [{"kind": "wrong_branch", "time_s": 0}]}       and, with several tools, "tool": the tool that caused it
 #ifndef SELDINGER_SIM_SESSION_H
 #define SELDINGER_SIM_SESSION_H
 
@@ -41,15 +41,15 @@ void session_set_score(Session *session, const Score *score);
 void session_set_run(Session *session, const RecordedRun *run, const char *path);
 // Whether `run` belongs to the session, by its digest.
 bool session_is_of(const Session *session, const RecordedRun *run);
-// The file's text, to be written beside and renamed (base/output.h); the caller frees. NULL if out of memory.
+// The text of the session file; the caller frees. NULL if out of memory.
 char *session_json(const Session *session);
 
-// `text` need not be NUL-terminated. False with all faults at once: invalid JSON, trailing bytes, unknown, duplicate or missing keys, wrong types and
-// ranges; the session is then untouched.
+// `text` need not be NUL-terminated. Returns false with all faults at once: invalid JSON, trailing bytes, unknown, duplicate or missing keys, wrong types and
+// ranges; the session is then unchanged.
 bool session_parse(const char *text, size_t length, const char *path, Session *session, Faults *faults);
 bool session_load(const char *path, Session *session, Faults *faults);
-// The sessions in a folder, oldest first, that have this trainee and title (the same exercise). Other files are ignored; unreadable sessions are
-// counted in *broken. The caller frees. NULL with a fault where the folder cannot be read or memory runs out.
+// The sessions in a folder with this trainee and title (the same exercise), oldest first. Other files are ignored; unreadable sessions are counted in *broken.
+// The caller frees. Returns NULL with a fault if the folder cannot be read or if out of memory.
 Session *session_list(const char *folder, const char *trainee, const char *title, int *count, int *broken, Faults *faults);
 
 #endif

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// Each folder of the path in turn.
+// Creates each folder of the path in turn.
 static bool make_folders(char *path)
 {
     for (char *at = path + 1; *at; at++) {

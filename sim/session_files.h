@@ -9,9 +9,9 @@
 bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faults);
 // FOLDER/SCENE-20261121-221100.EXT: local time; with a number appended if that name is taken.
 void session_file_name(const char *folder, const char *scene_path, const char *extension, char *out, size_t capacity);
-// Beside a recording: its name with another extension.
+// The recording's name with another extension.
 void session_file_beside(const char *recording, const char *extension, char *out, size_t capacity);
-// Writes the session file beside a recording that is closed. False with faults.
+// Writes the session file next to a closed recording. Returns false with faults.
 bool session_files_save(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
                         Faults *faults);
 

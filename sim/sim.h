@@ -1,6 +1,6 @@
 // sim: builds a simulator from a scene, drives it by input, records and compares runs. Uses base, geom, solver, recon and input.
-// Reading order: scene.h (what is simulated), open_vessel.h (the wall), simulator.h (one step), drive.h (many steps), recording.h, compare.h; for a hand:
-// hand_set.h, realtime.h.
+// Reading order: scene.h (what is simulated), open_vessel.h (the wall), simulator.h (one step), drive.h (many steps), recording.h, compare.h; for input by
+// hand: hand_set.h, realtime.h.
 #ifndef SELDINGER_SIM_SIM_H
 #define SELDINGER_SIM_SIM_H
 

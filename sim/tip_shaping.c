@@ -1,17 +1,18 @@
-// A round core of radius r is bent to the curvature k. Its fibres strain by k y; those farther than c = e / k from the neutral axis have yielded, e the yield
-// strain. With x = c / r <= 1 and My = E e pi r^3 / 4, at which the outermost fibre yields (k = e / r), the moment is
+// A round core of radius r is bent to the curvature k. Its fibres have the strain k y; those further than c = e / k from the neutral axis have yielded, e the
+// yield strain. With x = c / r <= 1 and My = E e pi r^3 / 4, at which the outermost fibre yields (k = e / r), the moment is
 //
 //   M / My = 16 / pi ( (asin x - x sqrt(1 - x^2) (1 - 2 x^2)) / (8 x) + (1 - x^2)^(3/2) / 3 )
 //
-// (elastic within c: 4 integrals of E k y^2 sqrt(r^2 - y^2); beyond it: of E e y sqrt(r^2 - y^2)). Let go, the section springs back linearly by M / (E I), so
+// (elastic within c: 4 integrals of E k y^2 sqrt(r^2 - y^2); beyond it: of E e y sqrt(r^2 - y^2)). When released, the section springs back linearly by M / (E
+// I), so
 //
 //   kept curvature = k - M / (E I) = k - (M / My) e / r.
 //
-// No fibre yields again on the return path: the outermost goes from E e to E e (1 - M / My) >= -0.70 E e.
+// No fibre yields again during springback: the outermost goes from E e to E e (1 - M / My) >= -0.70 E e.
 //
-// Yield strain of the core: ASTM A313 has hard-drawn stainless steel wire (302, 304) of up to 0.009 inch at 325 ksi = 2240 MPa at least; its elastic limit in
-// tension lies at 65 to 75 % of that (handbooks of spring design), its modulus at 193 GPa: 0.0075 to 0.0087. Cores that were heat-treated or ground to a
-// ribbon lie lower, 0.006. The coil around the core keeps nothing and carries nothing here; bends before this one are taken as pressed straight.
+// Yield strain of the core: ASTM A313 gives hard-drawn stainless steel wire (302, 304) of up to 0.009 inch at least 325 ksi = 2240 MPa; its elastic limit in
+// tension is 65 to 75 % of that (handbooks of spring design), its modulus 193 GPa: 0.0075 to 0.0087. Cores that were heat-treated or ground to a ribbon have
+// less, 0.006. The coil around the core carries no load here and keeps no bend; earlier bends are assumed to have been straightened.
 #include "sim/tip_shaping.h"
 
 #include "base/base.h"
@@ -22,14 +23,14 @@
 
 const double tip_yield_strain = 0.008;
 static const double core_modulus = 193000;       // [MPa]
-static const double sliver = 1e-6;               // [mm] no section is as short
+static const double sliver = 1e-6;               // [mm] shorter sections are skipped
 
 double tip_core_moment(double curvature)
 {
     if (curvature <= 1)
         return curvature;
     double x = 1 / curvature, root = sqrt(1 - x * x);
-    // its terms cancel to x^3 / 3; below this a series is as exact
+    // its terms cancel to x^3 / 3; below this value a series is as accurate
     double elastic = x > 0.01 ? (same_asin(x) - x * root * (1 - 2 * x * x)) / (8 * x) : x * x / 3 - x * x * x * x / 10;
     return 16 / PI * (elastic + root * root * root / 3);
 }
@@ -53,7 +54,7 @@ static void append(WireSection *out, int *count, const WireSection *section, dou
     out[(*count)++].rest_plane = 0;
 }
 
-// The section from `begin` on, which lies within the part that is shaped: bent until the angle is reached, then straight.
+// Shapes the section from `begin` on, which lies within the shaped part: bent until the angle is reached, then straight.
 static void shape_section(WireSection *out, int *count, const WireSection *section, double length, const TipShaping *shaping, double *angle_left,
                           TipShaped *shaped)
 {
@@ -82,7 +83,7 @@ WireSection *tip_shaped_sections(const WireSection *section, int count, const Ti
     }
     WireSection *out = calloc(2 * (size_t)count + 1, sizeof *out);
     if (!out) {
-        snprintf(why, capacity, "no memory");
+        snprintf(why, capacity, "out of memory");
         return NULL;
     }
     for (int i = 0; i < count; begin += section[i++].length) {

@@ -75,7 +75,7 @@ static Scene *scene_with_entry(const Scene *scene, int tool, const char *entry, 
     return extended;
 }
 
-// Reading it as part of the scene applies all rules that tie one tool to another.
+// Reading it as part of the scene applies all rules that relate one tool to another.
 static bool add_file(TrayDevices *tray, const Scene *scene, const char *path)
 {
     static Faults faults;
@@ -138,13 +138,13 @@ void tray_devices_free(TrayDevices *tray)
 
 // --- a shaped tip ---
 
-// "0.014 inch wire, tip 45° over 10 mm": one that was shaped before is called by its new shape alone.
+// "0.014 inch wire, tip 45° over 10 mm": a device shaped before is named by its new shape only.
 static void name_shaped(char *title, size_t capacity, const TrayDevice *from, const TipShaping *tip)
 {
     static const char word[] = ", tip shaped to ";
     const char *shaped = strstr(from->title, word);
     int length = shaped ? (int)(shaped - from->title) : (int)strlen(from->title);
-    length = length < 56 ? length : 56;      // SceneTool.title holds it all
+    length = length < 56 ? length : 56;      // SceneTool.title can hold all of it
     while (length > 0 && ((unsigned char)from->title[length] & 0xC0) == 0x80)
         length--;
     snprintf(title, capacity, "%.*s%s%.0f\u00b0", length, from->title, word, tip->angle / per_degree);
@@ -195,7 +195,7 @@ static void print_section(FILE *stream, const WireSection *s)
     fputc('}', stream);
 }
 
-// All keys of an entry of `exchange:`, on one line and with no file behind it.
+// All keys of an entry of `exchange:`, on one line and without a device file.
 static char *print_device(const TrayDevice *device, const TipShaping *tip)
 {
     const SceneTool *tool = &device->tool;

@@ -1,5 +1,5 @@
-// The devices available for a tool: those in the scene, and those of a folder that would fit. A device that is not in the scene yet, or whose tip is
-// shaped by hand, is written into the scene's text under `exchange:`, so that a session's recording holds all its inputs.
+// The devices available for a tool: those in the scene, and those of a folder that fit. A device that is not yet in the scene, or whose tip is shaped by hand,
+// is written into the scene's text under `exchange:`, so that a session's recording holds all its inputs.
 #ifndef SELDINGER_SIM_TRAY_DEVICES_H
 #define SELDINGER_SIM_TRAY_DEVICES_H
 
@@ -9,7 +9,7 @@ enum { TRAY_DEVICES = 48, TRAY_TITLE = 120 };
 
 typedef struct TrayDevice {
     SceneTool tool;          // its sections are the tray's
-    int which;               // 0 as the scene has it, 1, 2, … under its `exchange:`; -1: the scene does not have it yet
+    int which;               // 0: the scene's own, 1, 2, …: those under its `exchange:`; -1: not yet in the scene
     char title[TRAY_TITLE];
 } TrayDevice;
 
@@ -19,8 +19,9 @@ typedef struct TrayDevices {
     TrayDevice device[TRAY_DEVICES];
 } TrayDevices;
 
-// Finds them. `library`: a folder of device files (*.yaml), or NULL for the scene's own devices alone; each is cut to the length and divided into the elements of
-// the scene's tool, and left out where it is of another kind, does not fit the tools around it and within it, or cannot be read. False when out of memory.
+// Finds the devices. `library`: a folder of device files (*.yaml), or NULL for the scene's own devices only. Each is cut to the length and divided into the
+// elements of the scene's tool; it is left out if it is of another kind, does not fit the tools around it and within it, or cannot be read. Returns false if
+// out of memory.
 bool tray_devices_find(TrayDevices *tray, const Scene *scene, int tool, const char *library);
 void tray_devices_free(TrayDevices *tray);
 // `from` with its tip shaped. False with the reason in `why` if it cannot keep that shape.

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 
 typedef struct TripleBuffer {
-    ATOMIC(unsigned) between;        // index of the waiting slot, with TRIPLE_FRESH where the reader has not seen it
+    ATOMIC(unsigned) between;        // index of the waiting slot, with TRIPLE_FRESH if the reader has not yet fetched it
     unsigned writing, reading;       // each side's own
 } TripleBuffer;
 

@@ -1,5 +1,5 @@
-// The axis is traced by queries to the tube: a probe beside the axis gets gap and normal, and the axis lies at x + (r - gap) normal. So lines, arcs
-// and polylines need no special code here.
+// The axis is traced by queries to the tube: at a probe beside the axis, gap and normal give the point x + (r - gap) normal of the axis. So lines, arcs and
+// polylines need no special code here.
 #include "sim/tube_tree.h"
 
 #include "base/base.h"
@@ -34,7 +34,7 @@ static VesselHit ask(const Vessel *tube, Vec3 x, double reach, VesselMemory *mem
     return hit;
 }
 
-// From x a step along d: the axis' point there; false beyond the end.
+// A step from x along d: sets the axis' point there; returns false beyond the end.
 static bool follow(const Vessel *tube, double r, double step, Vec3 x, Vec3 d, VesselMemory *memory, Vec3 *next)
 {
     Vec3 probe = vec3_add_scaled(vec3_add_scaled(x, step, d), 0.4 * r, vec3_normal_to(d));
@@ -61,7 +61,7 @@ static bool trace_axis(const Vessel *tube, const TubeOptions *options, Axis *axi
     return axis->count >= 3;
 }
 
-// The surface's point beyond x in direction out; false if that is not wall.
+// The point of the surface from x in direction `out`; returns false if there is no wall there.
 static bool sample(const Vessel *tube, Vec3 x, Vec3 out, double r, VesselMemory *memory, Vec3 *surface)
 {
     Vec3 probe = vec3_add_scaled(x, 0.9 * r, out);

@@ -11,7 +11,7 @@ typedef struct Trace {       // one case over its time
     int count;               // samples
     double first, last, before, sum, least, most, jump;
     Vec3 first_point;
-    // crossings of the level, and turning points about it
+    // crossings of the level, and turning points around it
     int crossings, peaks;
     double first_cross_s, last_cross_s, first_peak, last_peak;
 } Trace;
@@ -59,7 +59,7 @@ void verify_measure_free(VerifyMeasure *m)
     free(m);
 }
 
-// Arc lengths, forces and gaps of the nodes at the present state: asked once a step at most, and only where a case needs them.
+// Arc lengths, forces and gaps of the nodes at the present state: queried at most once per step, and only if a case needs them.
 static const NodeReport *nodes_now(VerifyMeasure *m)
 {
     int64_t step = simulator_totals(m->simulator)->steps;
@@ -69,7 +69,7 @@ static const NodeReport *nodes_now(VerifyMeasure *m)
     return m->node;
 }
 
-// Where a tool's own nodes are, the same.
+// The own nodes of a tool, queried in the same way.
 static const ToolNode *own_now(VerifyMeasure *m, int tool)
 {
     int64_t step = simulator_totals(m->simulator)->steps;
@@ -79,7 +79,7 @@ static const ToolNode *own_now(VerifyMeasure *m, int tool)
     return m->own[tool];
 }
 
-// The element that holds s and how far into it, 0 to 1.
+// The element that contains s and the fraction of it up to s, 0 to 1.
 static int element_at(const ToolNode *node, int count, double s, double *part)
 {
     int i = 0;
@@ -89,7 +89,7 @@ static int element_at(const ToolNode *node, int count, double s, double *part)
     return i;
 }
 
-// Between nodes: the cubic through both positions and tangents.
+// Position and tangent between nodes: the cubic through both positions and tangents.
 static void point_at(VerifyMeasure *m, const VerifyCase *c, Vec3 *point, Vec3 *tangent)
 {
     double x;
@@ -106,7 +106,7 @@ static void point_at(VerifyMeasure *m, const VerifyCase *c, Vec3 *point, Vec3 *t
     *tangent = vec3_unit(vec3_add_scaled(*tangent, x * (3 * x - 2), t2));
 }
 
-// Turn about the tool itself from one place to another, element by element: it counts whole turns.
+// Rotation about the tool's axis from one arc length to another, summed over elements, so that it counts whole turns.
 static double twist_between(VerifyMeasure *m, const VerifyCase *c)
 {
     const ToolNode *node = own_now(m, c->tool);
@@ -147,7 +147,7 @@ static double of_range(VerifyMeasure *m, const VerifyCase *c)
     }
 }
 
-// `point`: the place, for a change of position without an axis.
+// `point`: set to the place, for a change of position without an axis.
 static double value_now(VerifyMeasure *m, const VerifyCase *c, Vec3 *point)
 {
     Stepper *stepper = simulator_stepper(m->simulator);
@@ -169,7 +169,7 @@ static double value_now(VerifyMeasure *m, const VerifyCase *c, Vec3 *point)
     }
 }
 
-// A crossing by the line through two samples, a turning point by the parabola through three.
+// A crossing is found by linear interpolation between two samples, a turning point by a parabola through three.
 static void oscillate(Trace *trace, double level, double value, double time_s, double step_s)
 {
     double now = value - level, last = trace->last - level, before = trace->before - level;

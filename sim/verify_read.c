@@ -14,7 +14,7 @@ const char *const verify_take_name[] = {"last", "change", "mean", "least", "most
 
 static const double longest_s = 1e5, largest = 1e12;
 
-// Which keys a quantity takes; a key without effect is a fault.
+// The keys that a quantity takes; a key without effect is a fault.
 typedef struct Needs {
     bool s, range, axis_must, axis_may, origin, tool;
 } Needs;
@@ -54,8 +54,8 @@ static void read_place(const YamlMap *map, const VerifyTools *tools, VerifyCase 
     Needs need = needs[c->quantity];
     const char *quantity = verify_quantity_name[c->quantity];
     char because[96];
-    snprintf(because, sizeof because, "'%s' is not asked for with it", quantity);
-    bool together = tools->names.count > 1 && !need.tool;    // of all tools, which have no arc length in common
+    snprintf(because, sizeof because, "the quantity '%s' does not use it", quantity);
+    bool together = tools->names.count > 1 && !need.tool;    // for the quantity of all tools together, which have no common arc length
     if (need.tool && yaml_has(map, "tool"))
         c->tool = yaml_choice(yaml_get(map, "tool", false), tools->names.name);
     else
@@ -64,7 +64,7 @@ static void read_place(const YamlMap *map, const VerifyTools *tools, VerifyCase 
     double total_length = tools->length[c->tool] > 0 ? tools->length[c->tool] : 1e5;
     if (together && need.range) {
         need.range = false;
-        snprintf(because, sizeof because, "'%s' of several tools is that of all of them", quantity);
+        snprintf(because, sizeof because, "'%s' of several tools covers all of them", quantity);
     }
     c->s_mm = together ? HUGE_VAL : total_length;
     if (need.s || need.range)
@@ -101,7 +101,7 @@ static void read_time(const YamlMap *map, VerifyCase *c)
     if (c->take == TAKE_FREQUENCY || c->take == TAKE_DECAY)
         yaml_map_number(map, "level", false, (NumberRange){-largest, largest, false}, &c->level);
     else
-        refuse(map, "level", "it goes with 'take' frequency or decay");
+        refuse(map, "level", "it applies only to 'take' frequency or decay");
 }
 
 // `tolerance` or `tolerance_percent` of the reference: a number, or a list with one for each number of elements.
@@ -179,7 +179,7 @@ void verify_read(YamlValue value, const VerifyTools *tools, bool has_script, Ver
     count = yaml_count(list, 1, VERIFY_MOST_CASES);
     plan->cases = count > 0 ? calloc((size_t)count, sizeof *plan->cases) : NULL;
     if (count > 0 && !plan->cases)
-        yaml_fault(list, "no memory");
+        yaml_fault(list, "out of memory");
     plan->case_count = plan->cases ? count : 0;
     for (int i = 0; i < plan->case_count; i++)
         read_case(yaml_item(list, i), tools, plan, &plan->cases[i]);

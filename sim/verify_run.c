@@ -41,7 +41,7 @@ static void drive(VerifyRun *run, const Scene *scene, Simulator *simulator)
     DriveOptions options = drive_default_options();
     options.script = scene->script;
     options.duration_s = watch.driven_s;
-    // rest is found by after_step, which is stricter than what `run` takes for it
+    // rest is detected by after_step, which is stricter than the criterion of `run`
     bool settles = plan->rest_s > 0;
     options.context = &watch;
     options.after_step = after_step;

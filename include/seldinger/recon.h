@@ -1,4 +1,4 @@
-// Reconstruction: from an angiogram to a vessel tree (tracking from a point) and to a model of the wall (fit).
+// Reconstruction: from an angiogram to a vessel tree (tracked from a point) and to a model of the wall (fit).
 // These are offline computations: they use several threads and take seconds to minutes. Their results do not depend on the number of threads.
 #ifndef SELDINGER_PUBLIC_RECON_H
 #define SELDINGER_PUBLIC_RECON_H
@@ -15,7 +15,7 @@ typedef struct SelVolume SelVolume;
 
 // Reads NRRD, MetaImage, NIfTI-1 or DICOM (a folder or a file), by content. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT, SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_volume_open(SelContext *context, const char *path, SelVolume **volume);
-// A copy of values in memory, x fastest. origin_mm: centre of voxel (0,0,0); axis_mm: the steps from voxel to voxel along x, y and z.
+// Copies values from memory, x fastest. origin_mm: centre of voxel (0,0,0); axis_mm: steps from voxel to voxel along x, y and z.
 // Errors: SEL_ERROR_ARGUMENT (sizes below 1, more than 2^31 voxels, axes in one plane, values that are not finite), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_volume_create(SelContext *context, const int size[3], const double origin_mm[3], const double axis_mm[3][3], const float *value,
                                     SelVolume **volume);
@@ -25,18 +25,18 @@ SEL_API double sel_volume_voxel_mm(const SelVolume *volume);             // mean
 
 // --- trees and models ---
 
-// Centreline nodes with points on the wall; a model once it is fitted.
+// Centreline nodes with points on the wall; after a fit, also a model of the wall.
 typedef struct SelTree SelTree;
 
 typedef struct SelSegmentOptions {
     size_t size;
-    double start_mm[3];          // a point in a vessel: the whole tree is found from it …
+    double start_mm[3];          // a point in a vessel: the whole tree is tracked from it …
     const char *trace;           // … or the path of a trace file (`seldinger segment --help`); NULL (default): start_mm
     int until_count;             // points, xyz one after the other, at which the tree ends; default none
     const double *until_mm;
-    int not_count;               // points in vessels that are not wanted; default none
+    int not_count;               // points in unwanted vessels; default none
     const double *not_mm;
-    double seed;                 // of the random numbers, a whole number; < 0 (default): 1, or the trace's
+    double seed;                 // seed of the random numbers, a whole number; < 0 (default): 1, or the trace's
     int threads;                 // 0 (default): all cores
 } SelSegmentOptions;
 SEL_API void sel_segment_options_init(SelSegmentOptions *options, size_t size);
@@ -47,15 +47,15 @@ static inline SelSegmentOptions sel_segment_defaults(void)
     return options;
 }
 
-// Tracks the vessels of a volume. Doubts about the result come through the context's message callback.
+// Tracks the vessels of a volume. Doubts about the result are reported by the context's message callback.
 // Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (the start lies in no vessel, or the trace is wrong), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_segment(SelContext *context, const SelVolume *volume, const SelSegmentOptions *options, SelTree **tree);
 
 typedef struct SelFitOptions {
     size_t size;
-    double target_mm;            // how near points should be to the wall; 0 (default): chosen from the voxels
-    double voxel_mm;             // of the angiogram; < 0 (default): what the tree knows, 0: not known
-    double edge_blur_mm;         // blur that has moved the points inwards; < 0 (default): what the tree knows, 0: none
+    double target_mm;            // largest distance wanted between points and wall; 0 (default): chosen from the voxels
+    double voxel_mm;             // of the angiogram; < 0 (default): the tree's value, 0: unknown
+    double edge_blur_mm;         // blur that has moved the points inwards; < 0 (default): the tree's value, 0: none
     int threads;                 // 0 (default): all cores
 } SelFitOptions;
 SEL_API void sel_fit_options_init(SelFitOptions *options, size_t size);
@@ -66,7 +66,7 @@ static inline SelFitOptions sel_fit_defaults(void)
     return options;
 }
 
-// Fits a wall to a tree's points: a new tree with a model. `options` may be NULL.
+// Fits a wall to a tree's points and returns a new tree with a model. `options` may be NULL.
 // Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (too few points), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_fit(SelContext *context, const SelTree *tree, const SelFitOptions *options, SelTree **model);
 
@@ -84,9 +84,9 @@ typedef struct SelTreeNode {
 } SelTreeNode;
 SEL_API int sel_tree_node_count(const SelTree *tree);
 SEL_API int64_t sel_tree_point_count(const SelTree *tree);
-SEL_API int sel_tree_is_model(const SelTree *tree);                      // 1: it has a wall
+SEL_API int sel_tree_is_model(const SelTree *tree);                      // 1: it has a model of the wall
 SEL_API SelStatus sel_tree_node(const SelTree *tree, int index, SelTreeNode *node);
-// As sel_scene_query(), of a model. Error: SEL_ERROR_STATE (the tree has no model).
+// As sel_scene_query(), for a model. Error: SEL_ERROR_STATE (the tree has no model).
 SEL_API SelStatus sel_tree_query(SelContext *context, const SelTree *tree, int count, const double *point_mm, double *gap_mm, double *normal);
 
 #ifdef __cplusplus

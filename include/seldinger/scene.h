@@ -1,4 +1,4 @@
-// Scenes: a vessel, one to four tools, where they enter, and a script of the hand. From a file (docs/scene-format.md), from text, or built in code.
+// Scenes: a vessel, one to four tools, the place where they enter, and a script of the hand. From a file (docs/scene-format.md), from text, or built in code.
 // A scene is immutable; any number of simulators may share it.
 #ifndef SELDINGER_PUBLIC_SCENE_H
 #define SELDINGER_PUBLIC_SCENE_H
@@ -11,15 +11,15 @@ extern "C" {
 
 enum { SEL_TOOLS_MOST = 4 };
 
-// What one hand does. A tool's name stands in the scene.
+// The command of one hand. Tool names are defined in the scene.
 typedef struct SelCommand {
     double push_mm_s;            // > 0 into the patient; -1000 to 1000
     double twist_deg_s;          // right-handed about the direction of advance; -36000 to 36000
     int released;                // 1: no hand holds the tool, only the friction of its valve
-    int device;                  // which of the scene's devices is asked for: 0 the tool itself, 1, 2, … those of its `exchange:`
+    int device;                  // the device requested: 0 the tool itself, 1, 2, … those of its `exchange:`
 } SelCommand;
 
-// What all hands do, the outermost tool first. All zero: every tool is held still.
+// The commands of all hands, the outermost tool first. All zero: every tool is held still.
 typedef struct SelHand {
     SelCommand tool[SEL_TOOLS_MOST];
     double contrast_ml_s;        // contrast agent, 0 to 50 …
@@ -49,7 +49,7 @@ typedef struct SelPiece {
     double length_mm;            // of a line, > 0
     double radius_mm;            // of an arc, greater than the tube's
     double angle_deg;            // of an arc, > 0
-    double plane_deg;            // of an arc: its plane is first turned by this about the tangent
+    double plane_deg;            // of an arc: its plane is first rotated by this about the tangent
 } SelPiece;
 
 typedef struct SelVesselOptions {
@@ -60,14 +60,14 @@ typedef struct SelVesselOptions {
     double friction;             // Coulomb coefficient of wall and tool, 0 to 10; default 0
     double start_mm[3];          // tube: where it begins; plane: a point on it
     double direction[3];         // tube: its first tangent; default x
-    double normal[3];            // tube: to which arcs turn; plane: into the lumen; default y
+    double normal[3];            // tube: direction towards which arcs turn; plane: into the lumen; default y
     double radius_mm;            // tube: of the lumen, > 0
     int has_closed_ends;         // tube: 1: hemispheres; 0 (default): open ends
     int piece_count;             // tube
     const SelPiece *piece;
 } SelVesselOptions;
 
-// A length of a tool with one cross-section.
+// A part of a tool with one cross-section.
 typedef struct SelSection {
     double length_mm;            // > 0
     double diameter_mm;          // > 0
@@ -76,23 +76,23 @@ typedef struct SelSection {
     double poisson_ratio;        // -0.99 to 0.5; metals: 0.3
     double density_g_cm3;        // > 0; nitinol: 6.45
     double rest_curvature_1_mm;  // 0: straight at rest
-    double rest_plane_deg;       // in which direction it is bent, about the tool
+    double rest_plane_deg;       // direction of the rest curvature, about the tool
 } SelSection;
 
 typedef enum SelToolKind { SEL_WIRE = 0, SEL_MICROCATHETER = 1, SEL_CATHETER = 2, SEL_GUIDE_CATHETER = 3 } SelToolKind;
 
-// Numbers below 0 stand for what a scene file has where it says nothing.
+// Numbers below 0 mean the defaults of the scene format.
 typedef struct SelToolOptions {
     size_t size;
     SelToolKind kind;            // default: wire
     const char *name;            // at most 31 letters without dot, comma or space; NULL: "tool1", "tool2", …
-    const char *device;          // a device file, relative to the scene's path, that gives what is not given here; NULL: none
+    const char *device;          // a device file, relative to the scene's path, for the values not given here; NULL: none
     int section_count;           // proximal to distal; 0: the device's
     const SelSection *section;
     double length_mm;            // shortens or lengthens the first section
-    double inserted_mm;          // length beyond the sheath at the start; default: as the tool around it, the outermost 0
+    double inserted_mm;          // length beyond the sheath at the start; default: that of the tool around it; the outermost 0
     int elements;                // 1 to 10000
-    double damping_mass_1_s, damping_stiffness_s;    // Rayleigh damping; both are given or none
+    double damping_mass_1_s, damping_stiffness_s;    // Rayleigh damping; give both or neither
     double hand_limit_n;         // push or pull at which the hand slips; 0: never
     double valve_n;              // friction of the valve that holds the tool while no hand does
     double friction_inside;      // Coulomb coefficient of its lumen with the tool within
@@ -104,7 +104,7 @@ typedef struct SelTarget {
     double radius_mm;
 } SelTarget;
 
-// What the hands do from t_s until the next row. The last row ends the script.
+// The commands of the hands from t_s until the next row. The last row ends the script.
 typedef struct SelScriptRow {
     double t_s;
     SelCommand tool[SEL_TOOLS_MOST];
@@ -112,7 +112,7 @@ typedef struct SelScriptRow {
 
 typedef struct SelSceneOptions {
     size_t size;
-    const char *path;            // stands in messages, and relative files are looked for in its folder; default "scene.yaml". It is not read
+    const char *path;            // used in messages, and relative files are looked for in its folder; default "scene.yaml". It is not read
     const SelVesselOptions *vessel;      // NULL: no wall
     int tool_count;              // 1 to 4, the outermost first
     const SelToolOptions *tool;
@@ -156,7 +156,7 @@ typedef struct SelOpenOptions {
     size_t size;
     const char *contact;         // instead of the scene's own; NULL (default): the scene's
     const char *script;          // path of a script (CSV) instead of the scene's own; NULL (default): the scene's
-    int threads;                 // of a fit; 0 (default): all cores. The result does not depend on it
+    int threads;                 // threads of a fit; 0 (default): all cores. The result does not depend on it
 } SelOpenOptions;
 SEL_API void sel_open_options_init(SelOpenOptions *options, size_t size);
 static inline SelOpenOptions sel_open_defaults(void)
@@ -166,28 +166,28 @@ static inline SelOpenOptions sel_open_defaults(void)
     return options;
 }
 
-// Reads a scene and opens its vessel, which may take seconds where a shape has to be fitted. `options` may be NULL.
+// Reads a scene and opens its vessel, which may take seconds if a shape has to be fitted. `options` may be NULL.
 // Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (all faults with line and column), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_scene_open(SelContext *context, const char *path, const SelOpenOptions *options, SelScene **scene);
-// The same from text of `length` bytes; `path` stands in messages, and relative files are looked for in its folder.
+// The same for text of `length` bytes; `path` is used in messages, and relative files are looked for in its folder.
 SEL_API SelStatus sel_scene_parse(SelContext *context, const char *text, size_t length, const char *path, const SelOpenOptions *options, SelScene **scene);
-// The same in code: the structure is written as a scene's text and then read as one, so that the same rules hold, and recordings of it can be replayed.
-// Rigs, rest shapes, exercises and exchanges have no structure here: use sel_scene_parse().
+// The same for a structure, which is written as a scene's text and then read: so the same rules hold, and recordings of it can be replayed. Rigs, rest shapes,
+// exercises and exchanges have no structure here: use sel_scene_parse().
 SEL_API SelStatus sel_scene_build(SelContext *context, const SelSceneOptions *scene_options, const SelOpenOptions *options, SelScene **scene);
 SEL_API void sel_scene_destroy(SelScene *scene);
 
 // --- reading ---
 
 SEL_API const char *sel_scene_text(const SelScene *scene);               // YAML; lives as long as the scene
-SEL_API double sel_scene_step_s(const SelScene *scene);                  // [s] of a simulation step
+SEL_API double sel_scene_step_s(const SelScene *scene);                  // [s] duration of a simulation step
 SEL_API double sel_scene_script_s(const SelScene *scene);                // [s] duration of the script; 0: there is none
 SEL_API int sel_scene_tool_count(const SelScene *scene);
 SEL_API const char *sel_scene_tool_name(const SelScene *scene, int tool);        // "wire" of a scene with one unnamed tool; NULL: no such tool
-// Where the tools come in: the sheath's mouth and the unit direction of advance.
+// Where the tools enter: the sheath's mouth and the unit direction of advance.
 SEL_API SelStatus sel_scene_entry(const SelScene *scene, double point_mm[3], double direction[3]);
-// Of each of `count` points, xyz one after the other: the distance to the wall [mm], positive in the lumen, infinite beyond an open end, and the unit normal
-// into the lumen (zero where there is none). Far outside the wall the answer depends on the contact: a grid knows no more than its lattice's depth. `normal` may
-// be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_STATE (the scene has no wall), SEL_ERROR_MEMORY.
+// For each of `count` points, xyz one after the other: the distance to the wall [mm], positive in the lumen, infinite beyond an open end, and the unit normal
+// into the lumen (zero where there is none). Far outside the wall the result depends on the contact: a grid is limited to its lattice's depth. `normal` may be
+// NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_STATE (the scene has no wall), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_scene_query(SelContext *context, const SelScene *scene, int count, const double *point_mm, double *gap_mm, double *normal);
 
 #ifdef __cplusplus

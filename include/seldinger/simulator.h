@@ -1,4 +1,4 @@
-// The simulator: steps a scene by commands and says where the tools are, which forces act, and how the run is judged.
+// The simulator: advances a scene by commands and returns the poses of the tools, the forces and the score.
 // A step allocates nothing, takes no lock and opens no file. The same commands give the same bits on every machine and with any number of threads, as long as
 // the host leaves the floating-point environment at its default (round to nearest, denormals kept).
 #ifndef SELDINGER_PUBLIC_SIMULATOR_H
@@ -24,22 +24,23 @@ static inline SelSimulatorOptions sel_simulator_defaults(void)
     return options;
 }
 
-// At time 0 of the scene. `options` may be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (the scene cannot be simulated), SEL_ERROR_MEMORY.
+// Starts at time 0 of the scene. `options` may be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (the scene cannot be simulated), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_simulator_create(SelContext *context, const SelScene *scene, const SelSimulatorOptions *options, SelSimulator **simulator);
-// Ends a recording that still runs; its errors are then lost (sel_simulator_end_recording()).
+// Ends a recording that is still running; its errors are then lost (use sel_simulator_end_recording()).
 SEL_API void sel_simulator_destroy(SelSimulator *simulator);
 
-// One step of sel_scene_step_s(). `hand` NULL: every tool is held still. A step in which the numerical solution is in trouble still succeeds: see `flags`.
-// Errors: SEL_ERROR_ARGUMENT (a command is not finite or out of range; no step was taken), SEL_ERROR_OUTPUT (the recording cannot be written; the step was taken).
+// Makes one step of sel_scene_step_s(). `hand` NULL: every tool is held still. A step with a failed or unreliable numerical solution still succeeds: see
+// `flags`. Errors: SEL_ERROR_ARGUMENT (a command is not finite or out of range; no step was taken), SEL_ERROR_OUTPUT (the recording cannot be written; the step
+// was taken).
 SEL_API SelStatus sel_simulator_step(SelSimulator *simulator, const SelHand *hand);
-// What the scene's script asks for in the next step; zero commands where there is no script or it has ended.
+// The command of the scene's script for the next step; zero if there is no script or it has ended.
 SEL_API SelStatus sel_simulator_script_hand(SelSimulator *simulator, SelHand *hand);
 
-// --- reading; none of these changes what later steps do ---
+// --- reading; none of these functions affects later steps ---
 
-// In `flags` of a report.
+// Bits of `flags` in a report.
 enum {
-    SEL_STEP_DIVERGED = 1,           // the state was kept; the run cannot be trusted
+    SEL_STEP_DIVERGED = 1,           // the solution diverged and the previous state was kept; the run cannot be trusted
     SEL_STEP_NOT_CONVERGED = 2,      // the contact solution stopped at its limit of iterations
     SEL_STEP_DEEP = 4,               // a node is more than 0.2 mm outside the wall
     SEL_STEP_FULLY_INSERTED = 8,     // the whole tool is in: the rest of the advance was refused
@@ -48,17 +49,17 @@ enum {
     SEL_STEP_DETECTION_UNSURE = 64,  // a projection to the wall did not converge
     SEL_STEP_LIMITED = 128,          // the motion was cut short; later steps complete it
     SEL_STEP_MODEL_DISAGREES = 256,  // two parts of the vessel's model put the wall at different places
-    SEL_STEP_HAND_SLIPS = 512        // the tool asked for more force than the hand holds
+    SEL_STEP_HAND_SLIPS = 512        // the tool's resistance exceeded the force that the hand holds
 };
 
 typedef struct SelReport {
     size_t size;                     // set by sel_simulator_report()
     unsigned flags;                  // SEL_STEP_ of the last step …
-    unsigned flags_ever;             // … and of any step so far
-    int contacts;                    // with force
+    unsigned flags_ever;             // … and of all steps so far
+    int contacts;                    // number of contacts with force
     int self_contacts;               // places where a tool presses on itself
-    int iterations;                  // of the contact solution
-    double residual;                 // of the contact forces
+    int iterations;                  // iterations of the contact solution
+    double residual;                 // residual of the contact forces
     double penetration_mm;           // deepest, >= 0
     double wall_force_max_n;         // largest contact force
     double wall_force_sum_n;         // sum of the magnitudes
@@ -74,7 +75,7 @@ SEL_API int64_t sel_simulator_steps(const SelSimulator *simulator);      // so f
 SEL_API double sel_simulator_time_s(const SelSimulator *simulator);
 // Hash of the state, bit for bit: equal hashes are equal runs. It is the `state_hash` of `seldinger run --summary`.
 SEL_API uint64_t sel_simulator_hash(const SelSimulator *simulator);
-// Of the last step; forces are 0 before the first. `size`: sizeof(SelReport). Error: SEL_ERROR_ARGUMENT.
+// Reports the last step; forces are 0 before the first. `size`: sizeof(SelReport). Error: SEL_ERROR_ARGUMENT.
 SEL_API SelStatus sel_simulator_report(const SelSimulator *simulator, SelReport *report, size_t size);
 
 // A node of a tool, proximal to distal.
@@ -85,28 +86,28 @@ typedef struct SelNode {
     double radius_mm;
     int carrier;                     // the outermost tool at this place, 0 the first; -1: in the sheath or behind the hub
 } SelNode;
-// Room for all nodes of a tool, whichever device is in; 0: no such tool.
+// Capacity needed for the nodes of a tool with any of its devices; 0: no such tool.
 SEL_API int sel_simulator_node_capacity(const SelSimulator *simulator, int tool);
 // Writes up to `capacity` nodes of a tool and their number. Errors: SEL_ERROR_ARGUMENT (no such tool, or too little room).
 SEL_API SelStatus sel_simulator_nodes(SelSimulator *simulator, int tool, SelNode *node, int capacity, int *count);
-// The place of a tool's tip.
+// The position of a tool's tip.
 SEL_API SelStatus sel_simulator_tip(SelSimulator *simulator, int tool, double position_mm[3]);
 
-// A place where the wall presses on the tools. With several tools it lies on the outermost one there.
+// A place where the wall presses on the tools; with several tools, on the outermost one at that place.
 typedef struct SelContact {
-    int node;                        // of the line that all tools share, from the sheath to the foremost tip
-    double s_mm;                     // along that line
+    int node;                        // of the centreline that all tools share, from the sheath to the foremost tip
+    double s_mm;                     // along that centreline
     double position_mm[3];
     double force_n[3];               // from the wall on the tool
     double gap_mm;                   // negative in penetration
 } SelContact;
-// Writes up to `capacity` contacts and the number that there are, which may be larger. It asks the vessel anew, about 20 us: for displays, not for each step.
+// Writes up to `capacity` contacts and the number available, which may be larger. Queries the vessel again, about 20 us: for displays, not for each step.
 SEL_API SelStatus sel_simulator_contacts(SelSimulator *simulator, SelContact *contact, int capacity, int *count);
 
-// How near the foremost tip came to a target of the scene.
+// How close the foremost tip came to a target of the scene.
 typedef struct SelTargetReach {
     double distance_mm;              // least so far
-    double time_s;                   // when that was, or when the target was first reached
+    double time_s;                   // time of that distance, or the time when the target was first reached
     int is_reached;
 } SelTargetReach;
 SEL_API int sel_simulator_target_count(const SelSimulator *simulator);
@@ -119,11 +120,11 @@ typedef enum SelScoreState { SEL_SCORE_WAITING = 0, SEL_SCORE_RUNNING = 1, SEL_S
 typedef struct SelScore {
     size_t size;                     // set by sel_simulator_score()
     SelScoreState state;
-    double points;                   // 0 to 100; 0 where the scene has no exercise
+    double points;                   // 0 to 100; 0 if the scene has no exercise
     double time_s;                   // since the first movement
     double path_mm;                  // of the tip
-    double way_mm;                   // from the tip's start to the target along the vessel; 0 without an exercise
-    double remaining_mm;             // of it, now
+    double way_mm;                   // length of the path from the tip's start to the target along the vessel; 0 without an exercise
+    double remaining_mm;             // remaining length of that path
     double inserted_mm, withdrawn_mm;    // of all tools in sum, both >= 0
     double wall_force_peak_n;
     double wall_impulse_n_s;         // sum of all contact forces over time
@@ -151,10 +152,10 @@ static inline SelRecordingOptions sel_recording_defaults(void)
     return options;
 }
 
-// Records all steps from now on to an HDF5 file that any reader can open while it is written. A thread of its own writes. `options` may be NULL.
+// Records all steps from now on to an HDF5 file that any HDF5 reader can open while it is written; a separate thread writes it. `options` may be NULL.
 // Errors: SEL_ERROR_STATE (after the first step, or a recording runs), SEL_ERROR_OUTPUT, SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_simulator_record(SelSimulator *simulator, const char *path, const SelRecordingOptions *options);
-// Writes what is left and closes the file. Errors: SEL_ERROR_STATE (nothing is recorded), SEL_ERROR_OUTPUT.
+// Writes the remaining data and closes the file. Errors: SEL_ERROR_STATE (nothing is recorded), SEL_ERROR_OUTPUT.
 SEL_API SelStatus sel_simulator_end_recording(SelSimulator *simulator);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE   // a stream of our own
+#define _GNU_SOURCE   // fopencookie
 #include "sim/library/allocator.h"
 
 #include "seldinger/base.h"
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// What the linker calls the true ones, and ours that take their place.
+// The linker's names of the original functions, and of the replacements.
 void *__real_malloc(size_t bytes);
 void *__real_calloc(size_t count, size_t size);
 void *__real_realloc(void *memory, size_t bytes);
@@ -103,7 +103,7 @@ char *__wrap_strdup(const char *text)
     return copy ? memcpy(copy, text, bytes) : NULL;
 }
 
-// cJSON has an allocator of its own; whoever asked for the text gives it to free().
+// cJSON has its own allocator, but the caller releases the text with free().
 char *__wrap_cJSON_Print(const cJSON *item)
 {
     char *text = __real_cJSON_Print(item), *copy = text ? __wrap_strdup(text) : NULL;
@@ -111,7 +111,7 @@ char *__wrap_cJSON_Print(const cJSON *item)
     return copy;
 }
 
-// --- open_memstream: the text grows with each write; it is whole, and ends in NUL, once the stream is closed ---
+// --- open_memstream: the text grows with each write; it is complete and NUL-terminated once the stream is closed ---
 
 typedef struct TextStream {
     char **text;

@@ -121,7 +121,7 @@ static void former_locale(locale_t former)
         freelocale(uselocale(former));
 }
 
-// The settings of HDF5 are put back where the call is broken off, too. Asking for them begins to use the library, whose own closing at the host's end then stays.
+// Restores the HDF5 settings even if the call is aborted. Reading them initialises the HDF5 library, whose own shutdown at the host's exit then remains.
 static bool try_call(Call *call, size_t *lacking)
 {
     Hdf5Silence silence = hdf5_silence_begin();
@@ -145,11 +145,11 @@ SelStatus context_call(SelContext *context, Work work, void *what, SelStatus oth
     former_locale(former);
     current = around;
     if (!is_whole)
-        faults_add(&context->faults, "seldinger", 0, 0, "not enough memory; %zu bytes were asked for at least", lacking);
+        faults_add(&context->faults, "seldinger", 0, 0, "out of memory: a request for at least %zu bytes failed", lacking);
     return !is_whole ? SEL_ERROR_MEMORY : call.is_good && context->faults.count == 0 ? SEL_OK : otherwise;
 }
 
-// For a call that does no work of its own: its faults are none. False where the context is NULL.
+// For a call that does no work of its own: clears the faults. Returns false if the context is NULL.
 static bool context_begin(SelContext *context)
 {
     if (context)

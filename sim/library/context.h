@@ -1,4 +1,4 @@
-// What the parts of the public library share: the handles, and how a call is made. The public headers say what each function does.
+// Shared by the parts of the public library: the handles and the execution of a call. The public headers document the functions.
 #ifndef SELDINGER_SIM_LIBRARY_CONTEXT_H
 #define SELDINGER_SIM_LIBRARY_CONTEXT_H
 
@@ -31,30 +31,30 @@ SelContext *context_held(SelContext *context);
 void context_let_go(SelContext *context);
 const SelScene *scene_held(const SelScene *scene);
 void scene_let_go(const SelScene *scene);
-// Takes the parsed scene, opens its vessel; false with faults, then nothing is left of it.
+// Takes ownership of the parsed scene and opens its vessel. Returns false with faults, after freeing everything.
 bool scene_open_parsed(SelContext *context, Scene *scene, const SelOpenOptions *options, SelScene **out);
 
-// Work that may fail by its faults. Runs in the "C" locale, with HDF5 silent; memory that lacks breaks it off (base/heap.h). `otherwise` where it adds faults or
-// returns false.
+// Work that reports failure by faults. context_call runs it in the "C" locale with HDF5 messages off; if out of memory, the work is aborted (base/heap.h).
+// Returns `otherwise` if the work adds faults or returns false.
 typedef bool (*Work)(SelContext *context, void *what);
 SelStatus context_call(SelContext *context, Work work, void *what, SelStatus otherwise);
 // Adds `FUNCTION: words` and returns `status`. The context may be NULL.
 SelStatus context_refuse(SelContext *context, SelStatus status, const char *function, const char *words);
 
-// Progress of a call to the host; `call` NULL where nobody asks.
+// Reports the progress of a call to the host; `call` is NULL if the host has no callback.
 Progress context_progress(SelContext *context);
-// Notes to the host, of the call that this thread is in; a NoteFunction.
+// Passes notes to the host of the call in which this thread is; a NoteFunction.
 void context_note(const char *path, const char *text);
 void context_say(SelContext *context, SelMessageLevel level, const char *path, const char *text);
 
-// The given options over the defaults that `own` holds. False where their `size` cannot be one.
+// Copies the given options over the defaults in `own`. Returns false if their `size` is invalid.
 bool options_take(void *own, size_t own_size, const void *given);
-// A structure to the host as far as it knows it; its first member is the size.
+// Copies a structure to the host, up to the size that the host knows; its first member is the size.
 void result_give(void *out, size_t size, void *own, size_t own_size);
 
 ToolCommands commands_of(const SelHand *hand);
 SelHand hand_of(const ToolCommands *commands);
-// NULL, or what is wrong with it.
+// Returns NULL, or a description of what is wrong with the hand.
 const char *hand_trouble(const SelHand *hand);
 
 #endif

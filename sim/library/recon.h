@@ -8,16 +8,16 @@
 
 struct SelVolume {
     Volume *volume;
-    char *path;              // for the tree's file
+    char *path;              // used when the tree is saved
 };
 
 struct SelTree {
     VesselTree *tree;
-    TreeFileInfo info;       // what its file says of it
+    TreeFileInfo info;       // metadata of its file
     Vessel *vessel;          // of a model; else NULL
 };
 
-// Takes the tree and the texts of `info`; breaks off where memory lacks.
+// Takes ownership of the tree and of the texts of `info`; aborts the call if out of memory.
 SelTree *tree_handle(VesselTree *tree, TreeFileInfo info);
 
 #endif

@@ -34,7 +34,7 @@ static void add_points(Trace *trace, const char *key, int count, const double *p
             heap_is_empty(sizeof(RbtRegion), __FILE__);
 }
 
-// One way in which all starts are read: the words of a trace file.
+// Converts all forms of starts to the text of a trace file, so that there is one reader.
 static Trace *trace_of(const SelSegmentOptions *o, Faults *faults)
 {
     char text[160];
@@ -113,7 +113,7 @@ typedef struct Fitting {
     SelTree *model;
 } Fitting;
 
-// Nodes and points: all that a fit reads.
+// A copy with nodes and points only, the input of a fit.
 static VesselTree *points_of(const VesselTree *from)
 {
     VesselTree *tree = vessel_tree_create(from->node_count, from->point_count, 0);

@@ -14,7 +14,7 @@ void sel_open_options_init(SelOpenOptions *options, size_t size)
 
 // --- holding ---
 
-// The number of holders is all of a scene that changes.
+// Only the number of holders of a scene ever changes.
 const SelScene *scene_held(const SelScene *scene)
 {
     atomic_fetch_add(&((SelScene *)(size_t)scene)->holders, 1);

@@ -51,7 +51,7 @@ static void put(Writer *w, const char *format, ...)
     va_end(list);
 }
 
-// In double quotes any text can stand; controls become spaces.
+// Any text can be in double quotes; control characters become spaces.
 static void put_text(Writer *w, const char *text)
 {
     fputc('"', w->stream);
@@ -70,7 +70,7 @@ static void put_number(Writer *w, const char *key, double value)
     put(w, "%s: %.17g", key, value);
 }
 
-// Below 0 a number is not given.
+// A number below 0 means "not given".
 static void put_given(Writer *w, const char *key, double value)
 {
     if (value >= 0)
@@ -179,7 +179,7 @@ static void put_tool_name(Writer *w, const SelToolOptions *tool, int index, cons
 {
     char name[2 * TOOL_NAME_SIZE];
     if (tool->name)
-        snprintf(name, sizeof name, "%.32s%s", tool->name, end);      // one letter too long is for the reader to refuse
+        snprintf(name, sizeof name, "%.32s%s", tool->name, end);      // a name that is one letter too long is refused by the reader
     else
         snprintf(name, sizeof name, "tool%d%s", index + 1, end);
     put_text(w, name);
@@ -219,7 +219,7 @@ static void put_tool(Writer *w, const SelToolOptions *tool, int index)
         put_section(w, &tool->section[i]);
 }
 
-// The size of the first holds for all: it is the step from one to the next.
+// The `size` of the first tool applies to all: it is the stride of the array.
 static bool tool_at(const SelSceneOptions *options, int index, SelToolOptions *tool)
 {
     sel_tool_options_init(tool, sizeof *tool);

@@ -1,4 +1,4 @@
-// A scene in code as the text of a scene file.
+// Writes a scene built in code as the text of a scene file.
 #ifndef SELDINGER_SIM_LIBRARY_SCENE_TEXT_H
 #define SELDINGER_SIM_LIBRARY_SCENE_TEXT_H
 
@@ -6,7 +6,8 @@
 
 #include <stdbool.h>
 
-// The text, which the caller frees; NULL where memory lacks, or with what is wrong in `*trouble`. Ranges are for the reader of the text to check.
+// Returns the text, which the caller frees; NULL if out of memory, or with a description of the error in `*trouble`. Ranges are checked by the reader of the
+// text.
 char *scene_text(const SelSceneOptions *options, size_t *length, const char **trouble);
 
 #endif

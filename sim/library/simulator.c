@@ -2,7 +2,7 @@
 
 #include "base/base.h"
 #include "sim/library/context.h"
-#include "sim/lesson.h"
+#include "sim/session_tracker.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -24,13 +24,13 @@ struct SelSimulator {
     SelContext *context;
     const SelScene *scene;
     Simulator *simulator;
-    Lesson *lesson;          // NULL: no score
+    SessionTracker *tracker; // NULL: no score
     Recording *recording;    // NULL: none
-    bool has_lost_rows;      // of the recording: its file cannot be written
+    bool has_lost_rows;      // the recording's file cannot be written
     int script_cursor;
     int node_capacity;       // of the shared centreline
     NodeReport *node;        // (node_capacity) scratch
-    int own_capacity;        // of the tool with the most nodes
+    int own_capacity;        // for the tool with the most nodes
     ToolNode *own;           // (own_capacity) scratch
 };
 
@@ -44,7 +44,7 @@ void sel_simulator_options_init(SelSimulatorOptions *options, size_t size)
 
 static void free_simulator(SelSimulator *s)
 {
-    lesson_free(s->lesson);
+    session_tracker_free(s->tracker);
     simulator_destroy(s->simulator);
     free(s->node);
     free(s->own);
@@ -81,7 +81,7 @@ static bool make(SelContext *context, void *what)
     if (!s->simulator)
         return false;
     make_scratch(s);
-    if (making->options.keeps_score && !(s->lesson = lesson_create(s->simulator, scene->open.tree)))
+    if (making->options.keeps_score && !(s->tracker = session_tracker_create(s->simulator, scene->open.tree)))
         heap_is_empty(0, __FILE__);
     return true;
 }
@@ -129,8 +129,8 @@ SelStatus sel_simulator_step(SelSimulator *s, const SelHand *hand)
         return context_refuse(s->context, SEL_ERROR_ARGUMENT, __func__, trouble);
     const ToolCommands commands = commands_of(hand);
     simulator_step(s->simulator, &commands);
-    if (s->lesson)
-        lesson_step(s->lesson, s->simulator, &commands, NULL);
+    if (s->tracker)
+        session_tracker_step(s->tracker, s->simulator, &commands, NULL);
     return record_step(s, &commands);
 }
 
@@ -262,9 +262,9 @@ SelStatus sel_simulator_score(const SelSimulator *s, SelScore *score, size_t siz
 {
     if (!s || !score || size < sizeof size)
         return SEL_ERROR_ARGUMENT;
-    if (!s->lesson)
+    if (!s->tracker)
         return context_refuse(s->context, SEL_ERROR_STATE, __func__, "the simulator was created without a score");
-    const ScoreFigures f = score_figures(lesson_score(s->lesson));
+    const ScoreFigures f = score_figures(session_tracker_score(s->tracker));
     SelScore own = {.state = (SelScoreState)f.state,
                     .points = f.points,
                     .time_s = f.time_s,
@@ -291,7 +291,7 @@ static bool print_score(SelContext *context, void *what)
 {
     (void)context;
     Printing *printing = what;
-    const ScoreFigures figures = score_figures(lesson_score(printing->simulator->lesson));
+    const ScoreFigures figures = score_figures(session_tracker_score(printing->simulator->tracker));
     printing->text = score_json(&figures, printing->simulator->scene->scene);
     return printing->text != NULL;
 }
@@ -300,7 +300,7 @@ SelStatus sel_simulator_score_json(const SelSimulator *s, char **json)
 {
     if (!s || !json)
         return SEL_ERROR_ARGUMENT;
-    if (!s->lesson)
+    if (!s->tracker)
         return context_refuse(s->context, SEL_ERROR_STATE, __func__, "the simulator was created without a score");
     Printing printing = {.simulator = s};
     SelStatus status = context_call(s->context, print_score, &printing, SEL_ERROR_MEMORY);

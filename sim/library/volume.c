@@ -11,7 +11,7 @@ typedef struct Loading {
     SelVolume *volume;
 } Loading;
 
-// Takes the volume.
+// Takes ownership of the volume.
 static SelVolume *handle_of(Volume *volume, const char *path)
 {
     SelVolume *handle = HEAP_ZEROED(1, sizeof *handle);
@@ -60,7 +60,7 @@ typedef struct Filling {
 
 static Vec3 vector_of(const double v[3]) { return vec3(v[0], v[1], v[2]); }
 
-// The first value that is no number; `count`: none.
+// Index of the first value that is not finite; `count` if there is none.
 static size_t find_trouble(const float *value, size_t count)
 {
     size_t i = 0;

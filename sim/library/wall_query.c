@@ -9,7 +9,7 @@ typedef struct Query {
     double *gap, *normal;
 } Query;
 
-// Each point is located afresh: no answer depends on another's.
+// Each point is located separately, so that no result depends on another.
 static VesselHit hit_at(const Vessel *vessel, Vec3 x)
 {
     VesselMemory memory = {.node = vessel->locate(vessel, x, -1)};

@@ -392,7 +392,7 @@ static void bad_tubes(void **state)
     o = good, o.point = points, o.point_count = 2, refuse(&o, "exactly one");
     o = good, bad = line, bad.length = -1, o.piece = &bad, refuse(&o, "path[0] is -1 mm");
     o = good, bad = arc, bad.arc_radius = 1, o.piece = &bad, refuse(&o, "larger than the lumen");
-    o = good, bad = arc, bad.angle = -1, o.piece = &bad, refuse(&o, "angle is above 0");
+    o = good, bad = arc, bad.angle = -1, o.piece = &bad, refuse(&o, "angle above 0");
     o = good, bad = arc, bad.angle = 1e9, o.piece = &bad, refuse(&o, "quarter turns");
     o = good, bad = arc, bad.plane = NAN, o.piece = &bad, refuse(&o, "plane");
     o = good, o.direction = vec3(0, 0, 0), refuse(&o, "direction");

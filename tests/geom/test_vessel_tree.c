@@ -122,7 +122,7 @@ static void rules(void **state)
     BREAK(t->height[2], -1, "nodes/height[2]");
     BREAK(t->parent[0], 0, "nodes/parent[0]");
     BREAK(t->parent[6], -1, "one root");
-    BREAK(t->parent[6], 6, "parents stand before children");
+    BREAK(t->parent[6], 6, "parents come before children");
     BREAK(t->parent[6], INT32_MIN, "nodes/parent[6]");
     BREAK(t->kind[1], 2, "nodes/kind[1]");
     BREAK(t->point[9].z, INFINITY, "points/xyz[9]");

@@ -7,9 +7,9 @@
 #include <cmocka.h>
 
 #include "render/playback.h"
-#include "sim/lesson.h"
 #include "sim/replay.h"
 #include "sim/session.h"
+#include "sim/session_tracker.h"
 
 #include <hdf5.h>
 #include <stdio.h>
@@ -41,21 +41,21 @@ static RecordedRun *record(const char *name, bool is_watched)
 {
     Simulator *simulator = simulator_create(scene, NULL, &faults);
     assert_non_null(simulator);
-    Lesson *lesson = lesson_create(simulator, NULL);
+    SessionTracker *tracker = session_tracker_create(simulator, NULL);
     RecordingOptions options = recording_default_options();
     Recording *recording = recording_create(in_folder(name), simulator, &options, &faults);
-    assert_true(lesson && recording);
-    LessonView *view = malloc(lesson_view_bytes(lesson));
+    assert_true(tracker && recording);
+    TrackerView *view = malloc(session_tracker_view_bytes(tracker));
     int cursor = 0;
     for (int i = 0; i < STEPS; i++) {
         ToolCommands commands = script_tools_at(scene->script, i * 0.001, &cursor);
         XrayControl xray = {.contrast_ml_s = (float)commands.contrast_ml_s, .contrast_tool = (float)commands.contrast_tool};
         simulator_step(simulator, &commands);
-        lesson_step(lesson, simulator, &commands, &xray);
+        session_tracker_step(tracker, simulator, &commands, &xray);
         xray.field_mm = 100;
         assert_true(recording_step(recording, simulator, &commands, is_watched ? &xray : NULL));
         if ((i + 1) % EACH == 0) {
-            lesson_publish(lesson, view);
+            session_tracker_publish(tracker, view);
             nodes = view->filling_count;
             assert_true(view->node_count == 0 && nodes == 52 && nodes <= 64);
             for (int j = 0; j < nodes; j++)
@@ -65,7 +65,7 @@ static RecordedRun *record(const char *name, bool is_watched)
     }
     free(view);
     assert_true(recording_close(recording, simulator, &faults));
-    lesson_free(lesson);
+    session_tracker_free(tracker);
     simulator_destroy(simulator);
     RecordedRun *run = recorded_run_load(in_folder(name), &faults);
     if (!run)

@@ -43,15 +43,15 @@ static RecordedRun *record(TrainerScene *it, int64_t steps, bool is_watched, con
 {
     Simulator *simulator = simulator_create(it->scene, it->open.vessel, &faults);
     assert_non_null(simulator);
-    Lesson *lesson = lesson_create(simulator, it->open.tree);
+    SessionTracker *tracker = session_tracker_create(simulator, it->open.tree);
     RecordingOptions options = recording_default_options();
     options.frame_ms = 33;
     Recording *recording = recording_create(in_folder(name), simulator, &options, &faults);
-    assert_true(lesson && recording);
-    LessonView *view = malloc(lesson_view_bytes(lesson));
+    assert_true(tracker && recording);
+    TrackerView *view = malloc(session_tracker_view_bytes(tracker));
     for (int64_t i = 0; i <= steps; i++) {
         if (is_watched && i % EACH_S == 0) {
-            lesson_publish(lesson, view);
+            session_tracker_publish(tracker, view);
             live[i / EACH_S] = view->score;
             live_injected_ml[i / EACH_S] = view->injected_ml;
         }
@@ -59,12 +59,12 @@ static RecordedRun *record(TrainerScene *it, int64_t steps, bool is_watched, con
             break;
         XrayControl xray = controls_at(i);
         simulator_step_one_tool(simulator, hand_at(i));
-        lesson_step(lesson, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL);
+        session_tracker_step(tracker, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL);
         assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL));
     }
     free(view);
     assert_true(recording_close(recording, simulator, &faults));
-    lesson_free(lesson);
+    session_tracker_free(tracker);
     simulator_destroy(simulator);
     RecordedRun *made = recorded_run_load(in_folder(name), &faults);
     if (!made)

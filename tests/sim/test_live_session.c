@@ -48,7 +48,7 @@ static ScoreFigures stop(LiveSession *session)
     RealtimeFigures figures;
     if (!live_session_stop(session, &figures, &faults))
         fail_msg("%s", faults.text[0]);
-    ScoreFigures score = score_figures(lesson_score(session->lesson));
+    ScoreFigures score = score_figures(session_tracker_score(session->tracker));
     live_session_free(session);
     return score;
 }
@@ -64,7 +64,7 @@ static RecordedRun *load(const char *name)
 
 static bool score_again(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    lesson_step(context, simulator, commands, xray);
+    session_tracker_step(context, simulator, commands, xray);
     return true;
 }
 
@@ -72,13 +72,13 @@ static bool score_again(void *context, Simulator *simulator, const ToolCommands 
 static void assert_replays(const RecordedRun *run, const ScoreFigures *score)
 {
     Simulator *simulator = simulator_create(trainer.scene, trainer.open.vessel, &faults);
-    Lesson *lesson = lesson_create(simulator, trainer.open.tree);
-    ReplayVerdict verdict = replay_verify(simulator, run, -1, false, score_again, lesson);
+    SessionTracker *tracker = session_tracker_create(simulator, trainer.open.tree);
+    ReplayVerdict verdict = replay_verify(simulator, run, -1, false, score_again, tracker);
     assert_int_equal(verdict.first_different, -1);
     assert_int_equal(verdict.steps, run->step_count);
-    ScoreFigures again = score_figures(lesson_score(lesson));
+    ScoreFigures again = score_figures(session_tracker_score(tracker));
     assert_same_figures(&again, score);
-    lesson_free(lesson);
+    session_tracker_free(tracker);
     simulator_destroy(simulator);
 }
 
@@ -192,7 +192,7 @@ static void assert_refused(const LiveSessionOptions *options, const char *reason
     assert_int_equal(faults.count, 1);
     if (!strstr(faults.text[0], reason))
         fail_msg("said: %s", faults.text[0]);
-    assert_true(!session.simulator && !session.lesson && !session.recording && !session.realtime);
+    assert_true(!session.simulator && !session.tracker && !session.recording && !session.realtime);
 }
 
 static const char coaxial_text[] =

@@ -3,9 +3,9 @@
 #define SELDINGER_TESTS_TRAINER_SCENE_H
 
 #include "recon/fit/lim_fit.h"
-#include "sim/lesson.h"
 #include "sim/open_vessel.h"
 #include "sim/recording.h"
+#include "sim/session_tracker.h"
 #include "sim/tube_tree.h"
 
 #include <string.h>

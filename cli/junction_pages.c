@@ -1,5 +1,5 @@
-// See junction_sheets.h.
-#include "cli/junction_sheets.h"
+// See junction_pages.h.
+#include "cli/junction_pages.h"
 
 #include "geom/geom.h"
 #include "recon/recon.h"
@@ -43,10 +43,10 @@ static int choose_compared(const VesselTree *model, const Reach *reach, const Ve
     return good ? count : -1;
 }
 
-static bool draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume, Faults *faults)
+static bool draw(const JunctionPages *wanted, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume, Faults *faults)
 {
     ReachOptions flood = reach_default_options();
-    flood.tool_radius = sheets->tool_radius;
+    flood.tool_radius = wanted->tool_radius;
     Reach *reach = reach_create(model, &flood);
     ReachJunction chosen[COMPARED];
     PictureOptions options = picture_default_options();
@@ -57,9 +57,9 @@ static bool draw(const JunctionSheets *sheets, const char *title, const VesselTr
     options.width = 1920, options.height = 1360;
     if (reach) {
         PictureJunctions what = {
-            .tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = sheets->tool_radius, .before = before};
+            .tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = wanted->tool_radius, .before = before};
         if (before) {
-            int count = choose_compared(model, reach, before, sheets->tool_radius, chosen);
+            int count = choose_compared(model, reach, before, wanted->tool_radius, chosen);
             what.junction_count = count > 0 ? count : 0;
             what.junction = chosen;
         }
@@ -69,38 +69,38 @@ static bool draw(const JunctionSheets *sheets, const char *title, const VesselTr
             what.origin = volume->origin;
             what.value = volume->value;
         }
-        drawn = picture_of_junctions(sheets->picture, &options, &what, &pages, message, sizeof message);
+        drawn = picture_of_junctions(wanted->picture, &options, &what, &pages, message, sizeof message);
     }
     if (!drawn)
-        faults_add(faults, sheets->picture, 0, 0, "no picture: %s", message);
+        faults_add(faults, wanted->picture, 0, 0, "no picture: %s", message);
     reach_free(reach);
     return drawn;
 }
 #endif
 
-bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, Faults *faults)
+bool junction_pages_draw(const JunctionPages *wanted, const char *title, const VesselTree *model, Faults *faults)
 {
-    if (!sheets->picture)
+    if (!wanted->picture)
         return true;
     if (!vessel_tree_is_model(model)) {
-        faults_add(faults, sheets->picture, 0, 0, "no picture: the tree has no fitted model to draw");
+        faults_add(faults, wanted->picture, 0, 0, "no picture: the tree has no fitted model to draw");
         return false;
     }
 #ifdef SELDINGER_RENDER
-    VesselTree *before = sheets->before ? tree_file_load(sheets->before, NULL, faults) : NULL;
-    Volume *volume = sheets->volume ? volume_load(sheets->volume, faults) : NULL;
-    bool good = (!sheets->before || before) && (!sheets->volume || volume);
+    VesselTree *before = wanted->before ? tree_file_load(wanted->before, NULL, faults) : NULL;
+    Volume *volume = wanted->volume ? volume_load(wanted->volume, faults) : NULL;
+    bool good = (!wanted->before || before) && (!wanted->volume || volume);
     if (before && !vessel_tree_is_model(before)) {
-        faults_add(faults, sheets->before, 0, 0, "is a tree without a model; `seldinger fit` makes one");
+        faults_add(faults, wanted->before, 0, 0, "is a tree without a model; `seldinger fit` makes one");
         good = false;
     }
-    good = good && draw(sheets, title, model, before, volume, faults);
+    good = good && draw(wanted, title, model, before, volume, faults);
     volume_free(volume);
     vessel_tree_free(before);
     return good;
 #else
     (void)title;
-    faults_add(faults, sheets->picture, 0, 0, "no picture: built without pictures");
+    faults_add(faults, wanted->picture, 0, 0, "no picture: built without pictures");
     return false;
 #endif
 }
