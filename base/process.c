@@ -67,8 +67,8 @@ static void check_output(void)
     _exit(exit_code != EXIT_DONE ? exit_code : EXIT_BAD_INPUT);
 }
 
-// Opens /dev/null for each closed standard stream, with the opposite access mode so that reading and writing still fail. Otherwise the next file opened would get the
-// descriptor of a standard stream and receive printed text.
+// Opens /dev/null for each closed standard stream, with the opposite access mode so that reading and writing still fail. Otherwise the next file opened would
+// get the descriptor of a standard stream and receive printed text.
 static void fill_standard_streams(void)
 {
     for (int i = 0; i < 3; i++)
