@@ -188,7 +188,7 @@ static void lies_are_refused_with_the_reason(void **state)
         {"05010904a101150a2505750895010930810 2c0", "range from 10 to 5"},
         {"05010904a10115ff25fe750895010930810 2c0", "range from -1 to -2"},
         {"05010904a10115002501750895010930810 2", "not closed"},
-        {"05010904a10115002501750895010930810 2c0c0", "not begun"},
+        {"05010904a10115002501750895010930810 2c0c0", "without its beginning"},
         {"05010904a101b4c0", "a pop without a push"},
         {"05010904a101a415002501750895010930810 2c0", "not popped"},
         {"05010904a1011500250175089501093081028501093181 02c0", "after fields without one"},
