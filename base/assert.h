@@ -1,11 +1,12 @@
-// Assumptions that the code makes, checked. For defects of ours only; bad input is reported (base/faults.h), numerical trouble is a flag of the step.
+// Checked assumptions of the code. They detect programming errors only: bad input is reported as a fault (base/faults.h), numerical trouble as a flag of the
+// step.
 //
-//   SEL_ASSERT(condition, "what was assumed")     in debug, sanitised and CI builds (SELDINGER_ASSERTS); elsewhere it is compiled, but costs nothing
-//   SEL_REQUIRE(condition, "what was assumed")    in every build: cheap, and a broken one would overwrite memory or falsify results
-//   SEL_VALIDATE(condition, "what was assumed")   in builds with SELDINGER_VALIDATE: loops over all that a step has left behind
+//   SEL_ASSERT(condition, "what is assumed")     in debug, sanitized and CI builds (SELDINGER_ASSERTS); elsewhere it is compiled but never evaluated
+//   SEL_REQUIRE(condition, "what is assumed")    in every build: cheap checks whose violation would overwrite memory or falsify results
+//   SEL_VALIDATE(condition, "what is assumed")   in builds with SELDINGER_VALIDATE: loops over everything that a step has produced
 //
-// A broken one prints `FILE:LINE: assertion failed: CONDITION; assumed: WHAT` to stderr and aborts, so that a debugger or a core file shows where.
-// A condition has no side effects.
+// A violated assumption prints `FILE:LINE: assertion failed: CONDITION; assumed: TEXT` to stderr and aborts, so that a debugger or a core file shows where.
+// A condition must have no side effects.
 #ifndef SELDINGER_BASE_ASSERT_H
 #define SELDINGER_BASE_ASSERT_H
 

@@ -1,4 +1,5 @@
-// A value that threads share without locks, in headers that C++ reads too: ATOMIC(int) count. gcc and clang give it the same size and layout in both.
+// A value that threads share without locks, for headers that C++ also includes: ATOMIC(int) count. With gcc and clang it has the same size and layout in C and
+// C++.
 #ifndef SELDINGER_BASE_ATOMIC_H
 #define SELDINGER_BASE_ATOMIC_H
 

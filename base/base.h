@@ -1,6 +1,6 @@
-// base: what every folder needs and the C library does not have. Faults, assertions, memory, files read and written whole or not at all, YAML, numbers in
-// tables, options of verbs, signals and exit codes, parallel loops, instruction sets, elementary functions that give the same bits everywhere.
-// Uses no other folder. Reading order: faults.h and assert.h, which all others use; then what is needed.
+// base: what every folder needs and the C library does not provide. Faults, assertions, memory, files that are read or written completely or not at all, YAML,
+// tables of numbers, command-line options, signals and exit codes, parallel loops, instruction sets, and elementary functions with bit-identical results.
+// Uses no other folder. Read faults.h and assert.h first (all others use them), then whatever you need.
 #ifndef SELDINGER_BASE_BASE_H
 #define SELDINGER_BASE_BASE_H
 

@@ -1,4 +1,4 @@
-// Disjoint sets (union-find): parent[i] leads to the lowest member of i's set, which is its own parent. At first parent[i] = i.
+// Disjoint sets (union-find): following parent[i] leads to the lowest member of i's set, which is its own parent. Initially parent[i] = i.
 #ifndef SELDINGER_BASE_DISJOINT_SETS_H
 #define SELDINGER_BASE_DISJOINT_SETS_H
 

@@ -17,7 +17,7 @@ typedef struct Trial {
 
 static _Thread_local Trial *trial;
 
-// No value of this function is needed after the jump but those that lie in memory.
+// Local variables of this function are indeterminate after longjmp() unless they are in memory; `own` is.
 bool heap_try(void (*call)(void *context), void *context, size_t *lacking)
 {
     Trial own = {.around = trial};
@@ -33,19 +33,20 @@ bool heap_try(void (*call)(void *context), void *context, size_t *lacking)
 
 bool heap_is_tried(void) { return trial != NULL; }
 
-// Other threads may be at work: nothing that they use is taken down.
+// Other threads may be running: resources that they use are not released.
 void heap_is_empty(size_t bytes, const char *file)
 {
     if (trial) {
-        trial->lacking = bytes > 0 ? bytes : 1;      // 0 stands for nothing lacking
+        trial->lacking = bytes > 0 ? bytes : 1;      // 0 means that no allocation failed
         longjmp(trial->back, 1);
     }
     const char *folder = strrchr(file, '/'), *from = folder;
-    while (from && from > file && from[-1] != '/')      // with its folder: "fit/field_fit.c"
+    while (from && from > file && from[-1] != '/')      // keep the last folder: "fit/field_fit.c"
         from--;
     char message[200];
-    int length = snprintf(message, sizeof message, "seldinger: out of memory (asked for %zu bytes in %.100s); free some, or give it less to do\n", bytes,
-                          from ? from : file);
+    int length =
+        snprintf(message, sizeof message, "seldinger: out of memory (could not allocate %zu bytes in %.60s); close other programs or use a smaller input\n",
+                 bytes, from ? from : file);
     ssize_t said = write(STDERR_FILENO, message, (size_t)length);
     (void)said;
     part_files_remove();

@@ -5,7 +5,7 @@
 
 enum { LONGEST_NAME = 40 };
 
-// Edit distance (Levenshtein), ignoring case; large if a name is longer than any of ours.
+// Edit distance (Levenshtein), ignoring case; 1000 if a name is longer than LONGEST_NAME.
 static int edit_distance(const char *a, const char *b)
 {
     int n = (int)strnlen(a, LONGEST_NAME + 1), m = (int)strnlen(b, LONGEST_NAME + 1), row[LONGEST_NAME + 2];

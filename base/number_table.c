@@ -80,7 +80,7 @@ static bool next_line(Cursor *cursor, const char **line, const char **end)
     return false;
 }
 
-// A byte-order mark does not belong to the header.
+// A UTF-8 byte-order mark is not part of the header.
 static void skip_mark(Cursor *cursor)
 {
     if (cursor->end - cursor->at >= 3 && !memcmp(cursor->at, "\xef\xbb\xbf", 3))
@@ -146,7 +146,7 @@ NumberTable *number_table_parse(const char *text, size_t length, const char *fil
     int faults_before = faults->count, capacity = 0;
     NumberTable *table = calloc(1, sizeof *table);
     if (!table) {
-        faults_add(faults, file, 0, 0, "no memory for its rows");
+        faults_add(faults, file, 0, 0, "out of memory");
         return NULL;
     }
     const char *line, *end;
@@ -171,7 +171,7 @@ NumberTable *number_table_parse(const char *text, size_t length, const char *fil
                 good = false;
             }
         if (good && !append_row(table, &capacity, row, cursor.line)) {
-            faults_add(faults, file, cursor.line, 1, "no memory for more rows");
+            faults_add(faults, file, cursor.line, 1, "out of memory");
             break;
         }
     }

@@ -50,7 +50,7 @@ void *options_defaults(const OptionTable *table)
     return structure;
 }
 
-// The default in words: as the table gives it, or as it stands in `defaults`. "" where none is to be shown.
+// Writes the default in words: from the table, or from `defaults`. "" if it is not to be shown.
 static void option_default(const Option *option, const void *defaults, char *text, size_t capacity)
 {
     const char *place = (const char *)defaults + option->at;

@@ -31,7 +31,7 @@ static int __attribute__((format(printf, 2, 3))) options_refuse(const OptionTabl
 
 // --- values ---
 
-// False with what is valid.
+// Returns false and writes what is valid to `valid`.
 static bool take_number(const Option *option, const char *text, void *place, char *valid, size_t capacity)
 {
     double value;
@@ -75,7 +75,7 @@ static size_t size_of(const Option *option)
     }
 }
 
-// False with what is valid.
+// Returns false and writes what is valid to `valid`.
 static bool take_value(const Option *option, void *structure, const char *text, void *place, char *valid, size_t capacity)
 {
     if (option->take) {
@@ -120,7 +120,8 @@ static bool has_value(const Option *option) { return option->type != OPTION_FLAG
 
 static const Option help_option = {.name = "help", .letter = 'h'};
 
-// By its whole name, or by a beginning that no other has (second spellings of the same value do not count); NULL, *others where there were several.
+// Finds an option by its full name or by an unambiguous prefix (second spellings of the same value do not count). NULL if none; *others is set if several
+// match.
 static const Option *find_long(const OptionTable *table, const char *name, size_t length, bool *others)
 {
     const Option *found = NULL;
@@ -171,7 +172,7 @@ static int take_following(Parse *parse, const Option *option)
     return code;
 }
 
-// `value`: what is attached to the name; NULL: the next argument is the value.
+// `value`: the text attached to the name, or NULL if the next argument is the value.
 static int take_option(Parse *parse, const Option *option, const char *value)
 {
     if (option == &help_option) {
@@ -247,7 +248,7 @@ int options_parse(const OptionTable *table, int argc, char **argv, void *structu
         if (!ended && !strcmp(text, "--"))
             ended = true;
         else if (ended || text[0] != '-' || !text[1])
-            argv[++parse.arguments] = text;      // arguments come to the front: their places have been read
+            argv[++parse.arguments] = text;      // arguments move to the front: the entries there have already been read
         else
             code = text[1] == '-' ? take_long(&parse, text + 2) : take_letters(&parse, text + 1);
     }

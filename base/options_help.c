@@ -7,7 +7,7 @@
 
 enum { WIDTH = 112, COLUMN_MOST = 28 };
 
-// Characters, not bytes, of UTF-8.
+// Counts UTF-8 characters, not bytes.
 static int width_of(const char *text, size_t length)
 {
     int width = 0;
@@ -16,7 +16,7 @@ static int width_of(const char *text, size_t length)
     return width;
 }
 
-// Words from the column `at` on, further lines from `indent` on; ends the line.
+// Prints words starting at column `at`, with further lines indented by `indent`; ends the line.
 static void print_words(FILE *out, const char *text, int at, int indent)
 {
     for (bool first = true;; first = false) {

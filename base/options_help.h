@@ -1,4 +1,4 @@
-// --help of a table of options.
+// Prints the --help text of a table of options.
 #ifndef SELDINGER_BASE_OPTIONS_HELP_H
 #define SELDINGER_BASE_OPTIONS_HELP_H
 

@@ -6,7 +6,7 @@
 
 // --- manual pages ---
 
-// Text of a page: dashes that stay dashes, no request where a line begins with a point or a quote.
+// Escapes a text for troff: dashes are printed literally, and a line that begins with a full stop or a quote is not read as a request.
 static void print_text(FILE *out, const char *text, size_t length)
 {
     if (length > 0 && (*text == '.' || *text == '\''))
@@ -41,7 +41,7 @@ static void print_paragraphs(FILE *out, const char *text)
         print_text(out, text, length);
         fputc('\n', out);
         text += length + (text[length] == '\n');
-        text += !is_plain && *text == '\n';      // an empty line: the paragraph does that
+        text += !is_plain && *text == '\n';      // skip an empty line: .PP already separates paragraphs
     }
     if (is_plain)
         fputs(".fi\n", out);
@@ -154,7 +154,7 @@ void options_overview(const OptionTable *program, const OptionTable *const *verb
 
 // --- completion ---
 
-// What completes an option's value, as a case of bash.
+// Prints the completion of the value of an option, as a case of the bash script.
 static void print_value_case(FILE *out, const OptionTable *table, const Option *option)
 {
     if (!option->metavar)

@@ -1,4 +1,4 @@
-// What installs beside a program, made from its tables of options: manual pages, and completion for bash.
+// Files that are installed with a program, made from its tables of options: manual pages and bash completion.
 #ifndef SELDINGER_BASE_OPTIONS_MANUAL_H
 #define SELDINGER_BASE_OPTIONS_MANUAL_H
 
@@ -6,12 +6,13 @@
 
 #include <stdio.h>
 
-// One page of section 1 (troff, man macros), named like the program with dashes: seldinger-fit(1). `version` stands at its foot.
+// Writes one page of section 1 (troff, man macros), named after the program with dashes: seldinger-fit(1). `version` appears in the footer.
 void options_manual(const OptionTable *table, const char *version, FILE *out);
-// The page of the program that has these verbs: what each does, and where its own page is. `verb` ends with NULL; each one's program is "PROGRAM VERB".
+// Writes the page of a program with verbs: what each verb does and where its own page is. `verb` ends with NULL; each of its tables has the program name
+// "PROGRAM VERB".
 void options_overview(const OptionTable *program, const OptionTable *const *verb, const char *version, FILE *out);
-// A script for bash that completes `program VERB OPTION VALUE`: choices by their words, files and folders by those that are there.
-// `table` ends with NULL; each table's program is "PROGRAM VERB".
+// Writes a bash script that completes `program VERB OPTION VALUE`: choices by their words, files and folders by the existing ones.
+// `table` ends with NULL; each of its tables has the program name "PROGRAM VERB".
 void options_completion(const char *program, const OptionTable *const *table, FILE *out);
 
 #endif

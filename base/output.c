@@ -58,7 +58,7 @@ bool output_write(const char *path, const void *bytes, size_t length, Faults *fa
     if (file && file != stdout && fclose(file) != 0 && good)
         good = false, reason = errno;
     if (!good)
-        faults_add(faults, path, 0, 0, "cannot be written: %s; choose a place with free space", strerror(reason));
+        faults_add(faults, path, 0, 0, "cannot be written: %s; choose a folder with free space", strerror(reason));
     return good;
 }
 

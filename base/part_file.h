@@ -8,23 +8,23 @@
 #include <stdio.h>
 
 typedef struct PartFile {
-    int descriptor;          // reads and writes
-    FILE *stream;            // by part_file_stream; else NULL
+    int descriptor;          // open for reading and writing
+    FILE *stream;            // from part_file_stream(), else NULL
     char *path, *name;       // final path, temporary path
-    int slot;                // among those that part_files_remove removes; -1: too many at once
+    int slot;                // index in the table used by part_files_remove(); -1: the table was full
 } PartFile;
 
-// Whether `path` must be written directly, because renaming would replace it: a device, a pipe, /dev/stdout.
+// True if `path` must be written directly because renaming would replace it: a device, a pipe, /dev/stdout.
 bool part_file_is_through(const char *path);
-// Begins an empty temporary file for `path`. Its mode will be that of the existing file, else 0666 less the umask. False with errno; nothing to undo.
+// Creates an empty temporary file for `path`. Its mode becomes that of the existing file, or 0666 minus the umask. Returns false with errno; nothing to undo.
 bool part_file_begin(PartFile *part, const char *path);
-// A buffered stream, closed when the part ends. NULL with errno.
+// A buffered stream, closed when the part is finished or dropped. Returns NULL with errno.
 FILE *part_file_stream(PartFile *part);
 bool part_file_write(PartFile *part, const void *bytes, size_t length);
-// Renames the part into place; `_synced` flushes its bytes to disk first. False with errno: the part is removed and the old file unchanged.
+// Renames the part to its final path; `_synced` first flushes its bytes to disk. Returns false with errno: the part is removed and the old file unchanged.
 bool part_file_finish_synced(PartFile *part);
 bool part_file_finish(PartFile *part);
-void part_file_drop(PartFile *part);    // errno stays
+void part_file_drop(PartFile *part);    // preserves errno
 
 // Removes all unfinished parts of the process. Async-signal-safe; the process must end afterwards.
 void part_files_remove(void);

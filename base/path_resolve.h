@@ -1,11 +1,13 @@
-// What a path means, also of a file that is not there yet.
+// Resolves a path, even if the file does not exist yet.
 #ifndef SELDINGER_BASE_PATH_RESOLVE_H
 #define SELDINGER_BASE_PATH_RESOLVE_H
 
 #include <limits.h>
 #include <stdbool.h>
 
-// Absolute and without links. Of a file that is not there its folder is; a link that leads nowhere yet is the file at its end. False where there is no such folder.
+// Writes the absolute path without symbolic links. If the file does not exist, its folder is resolved; a dangling link resolves to the file it points to. False
+// if the folder
+// does not exist or the path is too long.
 bool path_resolve(const char *path, char whole[PATH_MAX]);
 
 #endif

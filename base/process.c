@@ -1,4 +1,4 @@
-#define _GNU_SOURCE   // the stack size of threads
+#define _GNU_SOURCE   // pthread_setattr_default_np
 #include "base/process.h"
 
 #include "base/heap.h"
@@ -15,7 +15,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-// Output files are complete or absent (base/part_file.h); the exit status is the signal's, 130 in a shell for SIGINT.
+// The exit status is that of the signal: 130 in a shell for SIGINT.
 void process_stop(int number)
 {
     part_files_remove();
@@ -30,7 +30,7 @@ static volatile sig_atomic_t stop_requested;
 
 static void request_stop(int number)
 {
-    // a second one ends the program at once
+    // a second signal ends the program at once
     if (stop_requested)
         process_stop(number);
     stop_requested = 1;
@@ -54,8 +54,8 @@ static void install_stop(int number)
 
 static int exit_code = EXIT_DONE;
 
-// However the program ends. Some file systems tell only at the end that they are full; a standard output that was
-// closed from the start has lost nothing that was not written.
+// Registered with atexit(). Some file systems report only on close that they are full. EBADF is not an error: a standard output that was closed from
+// the start has lost no written data.
 static void check_output(void)
 {
     bool lost = fflush(stdout) != 0 || ferror(stdout);
@@ -67,7 +67,8 @@ static void check_output(void)
     _exit(exit_code != EXIT_DONE ? exit_code : EXIT_BAD_INPUT);
 }
 
-// Without this the next opened file would take the number of a closed standard stream and receive printed text. Reading and writing still fail.
+// Opens /dev/null for each closed standard stream, with the opposite access mode so that reading and writing still fail. Otherwise the next file opened would
+// get the descriptor of a standard stream and receive printed text.
 static void fill_standard_streams(void)
 {
     for (int i = 0; i < 3; i++)
@@ -75,13 +76,13 @@ static void fill_standard_streams(void)
             _exit(EXIT_BAD_INPUT);
 }
 
-// The usual limit, for all threads: with less a program may crash in the middle of its work.
+// Sets the usual stack limit of 8 MB for all threads: with a smaller one the program may crash during a computation.
 static bool take_stack(void)
 {
     enum { USUAL = 8 << 20, LEAST = 1 << 20 };
     struct rlimit stack;
     pthread_attr_t thread;
-    if (getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= USUAL)      // RLIM_INFINITY is the largest of all
+    if (getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= USUAL)      // RLIM_INFINITY is the largest value
         return true;
     stack.rlim_cur = stack.rlim_max < USUAL ? stack.rlim_max : USUAL;
     if (stack.rlim_cur < LEAST || setrlimit(RLIMIT_STACK, &stack) != 0) {
@@ -96,7 +97,7 @@ static bool take_stack(void)
     return true;
 }
 
-// Otherwise cJSON silently drops items when out of memory.
+// Without this hook cJSON silently drops items if out of memory.
 static void *json_memory(size_t bytes) { return HEAP_ZEROED(bytes, 1); }
 
 int process_run(int argc, char **argv, int (*call)(int argc, char **argv))
@@ -108,7 +109,7 @@ int process_run(int argc, char **argv, int (*call)(int argc, char **argv))
     install_stop(SIGINT);
     install_stop(SIGTERM);
     install_stop(SIGHUP);
-    // a file-size limit then causes a failed write with a message, and no partial file remains
+    // exceeding the file-size limit then makes write() fail with a message, and no partial file remains
     sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
     atexit(check_output);
     exit_code = call(argc, argv);

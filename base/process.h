@@ -1,4 +1,4 @@
-// Start and end of our programs: streams, stack, signals, and removal of unfinished files.
+// Start and end of the programs of this project: streams, stack, signals, and removal of unfinished files.
 #ifndef SELDINGER_BASE_PROCESS_H
 #define SELDINGER_BASE_PROCESS_H
 
@@ -6,21 +6,24 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-// Exit codes. EXIT_UNTRUSTED: the simulation cannot be trusted.
+// Exit codes. EXIT_UNTRUSTED: the result of the simulation cannot be trusted.
 enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3 };
 
-// From main(): sets the process up, calls `call` and returns its exit code. EXIT_BAD_INPUT if the stack is too small.
+// Called from main(): sets the process up, runs `call` and returns its exit code. Returns EXIT_BAD_INPUT if the stack limit is too low.
 int process_run(int argc, char **argv, int (*call)(int argc, char **argv));
-// Handler of terminating signals: removes unfinished files.
+// Handler of terminating signals: removes unfinished files, then ends the process by the same signal.
 void process_stop(int signal_number);
-// From now on SIGINT and SIGTERM ask the program to end in order: what is returned becomes 1. A second one is process_stop().
+// From now on SIGINT and SIGTERM request an orderly end: the returned flag becomes 1. A second signal calls process_stop().
 const volatile sig_atomic_t *process_stop_in_order(void);
-// From a child process that reads what may break it: it says nothing on standard error, writes no file and no core, and ends by a signal after so much time.
+// For a child process that reads input that may crash it: silences standard error, forbids writing files and core dumps, and ends the child by a signal after
+// this much
+// processor time or wall-clock time [s].
 void process_be_expendable(unsigned processor_s, unsigned wall_s);
-// The path of the program `name` in this program's own folder, there or not; in a library, where it is not there, that in `bin` beside the library's folder or
-// the one above it. False where this program's path cannot be had or is too long.
+// The path of the program `name` in the folder of the running program, whether it exists or not. If it is not there and this code is in a library: in the
+// folder `bin`
+// beside the library's folder or beside its parent. False if the path of the running program is unknown or the result is too long.
 bool process_beside(const char *name, char *path, size_t capacity);
-// The file that this code was loaded from: the program, or the library where it is one. False where that cannot be had.
+// The file that this code was loaded from: the program, or the library that contains it. False if unknown.
 bool process_code_file(char *path, size_t capacity);
 
 #endif

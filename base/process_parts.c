@@ -1,4 +1,4 @@
-// What of process.h a library of ours uses too: nothing here touches the process's streams, signals or end, but in a child of its own.
+// The part of process.h that the library uses too. Nothing here changes the streams, signals or end of the calling process, except in its own child.
 #include "base/process.h"
 
 #include <fcntl.h>
@@ -12,7 +12,7 @@
 void process_be_expendable(unsigned processor_s, unsigned wall_s)
 {
     int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    dup2(nowhere, STDERR_FILENO);     // what is said of a broken heap
+    dup2(nowhere, STDERR_FILENO);     // silences glibc's messages about a corrupted heap
     setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
     setrlimit(RLIMIT_FSIZE, &(struct rlimit){0, 0});
     setrlimit(RLIMIT_CPU, &(struct rlimit){processor_s, processor_s});

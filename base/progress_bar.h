@@ -1,4 +1,4 @@
-// Progress of long work, on a terminal.
+// Progress of long computations, shown on a terminal.
 #ifndef SELDINGER_BASE_PROGRESS_BAR_H
 #define SELDINGER_BASE_PROGRESS_BAR_H
 
@@ -6,7 +6,7 @@
 
 #include <stdbool.h>
 
-// A progress bar on standard error: drawn where that is a terminal and not --quiet, else nothing.
+// A progress bar on standard error: drawn only if that is a terminal and --quiet is not given.
 typedef struct ProgressBar {
     const char *label;
     bool shown;

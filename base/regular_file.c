@@ -9,7 +9,7 @@ static const char irregular[] = "it is not a regular file but a folder, a pipe o
 
 int regular_file_open(const char *path, struct stat *status, const char **why)
 {
-    // opening some devices has side effects, so they are not even opened
+    // opening some devices has side effects, so a device is not opened at all
     if (stat(path, status) == 0 && !S_ISREG(status->st_mode)) {
         *why = irregular;
         return -1;
@@ -17,7 +17,7 @@ int regular_file_open(const char *path, struct stat *status, const char **why)
     int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (descriptor >= 0 && fstat(descriptor, status) == 0 && S_ISREG(status->st_mode))
         return descriptor;
-    // the path may have changed meanwhile
+    // the path may have changed since stat()
     *why = descriptor < 0 ? strerror(errno) : irregular;
     if (descriptor >= 0)
         close(descriptor);

@@ -1,6 +1,8 @@
-// Series are those of Taylor, cut where the next term is below a tenth of the last bit; arguments are brought near to zero first. Where that, or a sum, would
-// cost more than the last bit, numbers are carried as a sum of two doubles, high + low with |low| at most half a last bit of high (Dekker, A floating-point
-// technique for extending the available precision, Numerische Mathematik 18, 1971).
+// Taylor series, truncated where the next term is below a tenth of the last bit; arguments are first reduced to near zero. Where the reduction or a sum would
+// lose more than
+// the last bit, numbers are kept as a sum of two doubles, high + low, with |low| at most half a unit in the last place of high (Dekker, A floating-point
+// technique for
+// extending the available precision, Numerische Mathematik 18, 1971).
 #include "base/same_math.h"
 
 #include <float.h>
@@ -19,7 +21,7 @@ static Pair sum_of(double a, double b)
     return (Pair){s, (a - (s - part)) + (b - part)};
 }
 
-// The same where |a| >= |b|.
+// a + b, exactly, if |a| >= |b|.
 static Pair quick_sum(double a, double b)
 {
     double s = a + b;
@@ -36,7 +38,7 @@ static double first_half(double x)
     return x;
 }
 
-// a b, exactly unless a part is below the smallest double.
+// a b, exactly unless a partial product underflows.
 static Pair product_of(double a, double b)
 {
     double p = a * b, ah = first_half(a), al = a - ah, bh = first_half(b), bl = b - bh;
@@ -71,7 +73,7 @@ static double power_of_two(int k)
     return x;
 }
 
-// The nearest whole number, |x| below 2^51; in round-to-nearest, which nothing here leaves.
+// The nearest integer to x, |x| below 2^51. Assumes rounding to nearest, which no code here changes.
 static double nearest(double x)
 {
     const double shift = 0x1.8p52;
@@ -89,7 +91,7 @@ static const uint32_t two_over_pi[42] = {0,          0,          0xa2f9836e, 0x4
                                          0x5a0a6d1f, 0x6d367ecf, 0x27cb09b7, 0x4f463f66, 0x9e5fea2d, 0x7527bac7, 0xebe5f17b, 0x3d0739f7, 0x8a5292ea,
                                          0x6bfb5fb1, 0x1f8d5d08, 0x56033046, 0xfc7b6bab, 0xf0cfbc20, 0x9af4361d};
 
-// x = m 2^e, m whole. Of m 2^e 2 / pi modulo 4 only 192 bits of 2 / pi matter, those that weigh 2^(1 - e) and less (Payne and Hanek, Radian reduction for
+// x = m 2^e, m an integer. Only 192 bits of 2 / pi affect m 2^e 2 / pi modulo 4: those of weight 2^(1 - e) and less (Payne and Hanek, Radian reduction for
 // trigonometric functions, SIGNUM Newsletter 18, 1983).
 static int reduce_large(double x, Pair *rest)
 {
@@ -110,7 +112,7 @@ static int reduce_large(double x, Pair *rest)
     double part[5];
     for (int i = 0; i < 5; i++)
         part[i] = (double)(uint32_t)(product[i] << 2 | product[i + 1] >> 30);
-    double beyond = part[0] >= 0x1p31;                                // nearer to the next quarter
+    double beyond = part[0] >= 0x1p31;                                // nearer to the next quadrant
     Pair turn = sum_of(part[0] * 0x1p-32 - beyond, part[1] * 0x1p-64);
     turn = sum_of(turn.high, turn.low + (part[2] * 0x1p-96 + (part[3] * 0x1p-128 + part[4] * 0x1p-160)));
     *rest = pair_mul(turn, half_pi);
@@ -120,10 +122,10 @@ static int reduce_large(double x, Pair *rest)
     return quarter & 3;
 }
 
-// x = quarter pi / 2 + rest, |rest| at most pi / 4 and a little; modulo four quarters.
+// x = quarter pi / 2 + rest, |rest| at most slightly above pi / 4. Returns quarter modulo 4.
 static int reduce(double x, Pair *rest)
 {
-    // pi / 2 in three parts of 33 bits and what is left of it: k times a part is exact
+    // pi / 2 as three parts of 33 bits and a remainder: k times a part is exact
     const double part1 = 0x1.921fb544p+0, part2 = 0x1.0b4611a6p-34, part3 = 0x1.3198a2ep-69, part4 = 0x1.b839a252049c1p-104;
     if (fabs(x) > 1e6)
         return reduce_large(x, rest);
@@ -163,7 +165,7 @@ static double sine_from(double x, int quarters)
 double same_sin(double x) { return x == 0 ? x : sine_from(x, 0); }      // keeps the sign of zero
 double same_cos(double x) { return sine_from(x, 1); }
 
-// --- arcs ---
+// --- arc functions ---
 
 // atan(i / 16)
 static const Pair arc[17] = {{0, 0},
@@ -184,7 +186,7 @@ static const Pair arc[17] = {{0, 0},
                              {0x1.819d0b7158a4dp-1, -0x1.bf76229d3b917p-56},
                              {0x1.921fb54442d18p-1, 0x1.1a62633145c07p-55}};
 
-// z - atan z, |z| below 1 / 31.
+// z - atan z, for |z| below 1 / 31.
 static double beyond_arc(double z)
 {
     double q = z * z;
@@ -196,7 +198,7 @@ double same_atan2(double y, double x)
 {
     double least = fabs(y), most = fabs(x);
     bool steep = least > most;
-    // the common case, the twist of an element: as below with i = 0, in half the time
+    // fast path for the common case, the twist of an element: as below with i = 0, in half the time
     if (least < 0x1p-5 * x && x < 0x1p1000 && x > 0x1p-900) {
         if (y == 0)
             return y;
@@ -230,12 +232,12 @@ double same_atan(double x) { return same_atan2(x, 1); }
 double same_asin(double x) { return same_atan2(x, sqrt((1 - x) * (1 + x))); }
 double same_acos(double x) { return same_atan2(sqrt((1 - x) * (1 + x)), x); }
 
-// --- powers and logarithms ---
+// --- exponentials and logarithms ---
 
-// log 2 in parts of 42 and 53 bits, and what is left
+// log 2 as parts of 42 and 53 bits and a remainder
 static const double log2_part1 = 0x1.62e42fefa38p-1, log2_part2 = 0x1.ef35793c7673p-45, log2_part3 = 0x1.f97b57a079a19p-103;
 
-// e^r - 1, |r| at most log(2) / 2 and a little, but for the rounding of the last sum.
+// e^r - 1 - r.high for |r| at most slightly above log(2) / 2, before the rounding of the last sum.
 static double near_power(Pair r)
 {
     double x = r.high, series = 1.0 / 3628800 + x * (1.0 / 39916800 + x * (1.0 / 479001600 + x * (1.0 / 6227020800 + x * (1.0 / 87178291200))));
@@ -244,7 +246,7 @@ static double near_power(Pair r)
     return r.low * (1 + x) + x * x * (0.5 + x * series);
 }
 
-// 2^k e^rest = e^x, |x| below 1100.
+// Splits x = k log 2 + rest, so that 2^k e^rest = e^x, for |x| below 1100. Returns k.
 static int halvings(Pair x, Pair *rest)
 {
     double k = nearest(x.high * (1 / 0x1.62e42fefa39efp-1));
@@ -263,7 +265,7 @@ static double power_of_e(Pair x)
     int k = halvings(x, &rest);
     Pair one = quick_sum(1, rest.high);
     double m = one.high + (one.low + near_power(rest));
-    // in two steps: 2^k alone may be beyond the largest or below the smallest double
+    // in two steps: 2^k alone may overflow or underflow
     return m * power_of_two(k / 2) * power_of_two(k - k / 2);
 }
 
@@ -297,7 +299,7 @@ double same_log(double x)
     return k * log2_part1 - ((half - (s * (half + series) + k * (log2_part2 + log2_part3))) - f);
 }
 
-// log x to 2^-68, 0 < x.
+// log x with error 2^-68, x > 0.
 static Pair long_log(double x)
 {
     int k;
@@ -314,7 +316,7 @@ static Pair long_log(double x)
     return k == 0 ? twice : pair_add(whole, (Pair){twice.high, twice.low + k * log2_part3});
 }
 
-// 0: no whole number; 1: odd; 2: even.
+// 0: not an integer; 1: odd; 2: even.
 static int parity(double y)
 {
     if (fabs(y) >= 0x1p53)
@@ -344,7 +346,7 @@ double same_pow(double x, double y)
     return sign * power_of_e(fabs(rough) < 800 ? pair_mul(power, (Pair){y, 0}) : (Pair){rough, 0});
 }
 
-// Newton from a line near m^(1/3); the last step with the rest of y^3 exact but for its own last bits.
+// Newton's method from a linear estimate of m^(1/3). In the last step the residual of y^3 is exact except for its last bits.
 double same_cbrt(double x)
 {
     int exponent;
@@ -361,7 +363,7 @@ double same_cbrt(double x)
     return copysign(y * power_of_two(third + 1), x);
 }
 
-// 1 - erf x, 2 < x: a continued fraction, x + (1/2) / (x + (2/2) / (x + (3/2) / …)), cut where an erf of 2 has all its bits.
+// 1 - erf x for x > 2, by the continued fraction x + (1/2) / (x + (2/2) / (x + (3/2) / …)), truncated where erf 2 is exact to the last bit.
 static double upper_erf(double x, double power)
 {
     double below = x;
@@ -370,7 +372,7 @@ static double upper_erf(double x, double power)
     return power * 0x1.20dd750429b6dp-1 / below;
 }
 
-// 2 / sqrt(pi) e^(-x^2) (x + 2 x^3 / 3 + 4 x^5 / 15 + …): no term is negative, so none cancels another.
+// erf x = 2 / sqrt(pi) e^(-x^2) (x + 2 x^3 / 3 + 4 x^5 / 15 + …): no term is negative, so there is no cancellation.
 double same_erf(double x)
 {
     double size = fabs(x), term = 1, sum = 0;

@@ -8,7 +8,7 @@
 
 const char *const simd_name[SIMD_COUNT] = {"sse2", "avx2", "avx512"};
 
-// Threads of offline work may ask first together; each finds the same.
+// Several threads of an offline computation may call first; each finds the same level.
 static atomic_int forced = -1;
 
 SimdLevel simd_widest(void)

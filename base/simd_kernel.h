@@ -1,20 +1,21 @@
-// What kernels are written with: loops compiled once for each instruction set. Their text is a file that base/each_simd.inc includes; a call goes
-// through a table, by simd_level() or simd_choose():
+// Macros for kernels: loops compiled once for each instruction set. The code of a kernel is a file that base/each_simd.inc includes; it is called through a
+// table indexed by
+// simd_level() or simd_choose():
 //
 //   #define KERNEL_TEXT "solver/node_turn_kernel.inc"     // TARGET static void KERNEL(turn)(...) { ... }
 //   #include "base/each_simd.inc"
 //   static void (*const turn_on[SIMD_COUNT])(...) = SIMD_FORMS(turn);
 //   ... turn_on[simd_level()](...);
 //
-// Several kernels with one signature of use are a structure: SIMD_EACH(MACRO), where MACRO(set) makes its initialiser of names that end in _##set.
+// Several kernels that are used together can be grouped in a structure: SIMD_EACH(MACRO), where MACRO(set) makes the initialiser from names that end in _##set.
 #ifndef SELDINGER_BASE_SIMD_KERNEL_H
 #define SELDINGER_BASE_SIMD_KERNEL_H
 
 #include "base/simd.h"
 
-// A kernel's helpers are compiled for its instruction set only where they are inlined.
+// The helper functions of a kernel are compiled for its instruction set only if they are inlined.
 #define INLINE static inline __attribute__((always_inline))
-// Before a loop over lanes that do not see each other.
+// Placed before a loop whose lanes are independent.
 #if defined(__GNUC__) && !defined(__clang__)
 #define VECTOR_LOOP _Pragma("GCC ivdep")
 #else

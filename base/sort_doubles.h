@@ -1,4 +1,4 @@
-// Numbers in rising order, for medians and percentiles.
+// Sorts numbers in ascending order, for medians and percentiles.
 #ifndef SELDINGER_BASE_SORT_DOUBLES_H
 #define SELDINGER_BASE_SORT_DOUBLES_H
 

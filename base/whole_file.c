@@ -31,7 +31,7 @@ char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults
     int reason = errno;
     close(file);
     if (!bytes || got < size) {
-        faults_add(faults, path, 0, 0, "cannot be read: %s", !bytes ? "not enough memory" : reason ? strerror(reason) : "it ends early");
+        faults_add(faults, path, 0, 0, "cannot be read: %s", !bytes ? "out of memory" : reason ? strerror(reason) : "it ends early");
         free(bytes);
         return NULL;
     }

@@ -4,11 +4,11 @@
 
 #include "base/faults.h"
 
-// The bytes of a regular file, NUL-terminated beyond `length`; NULL with a fault. The caller frees.
+// The bytes of a regular file, followed by a NUL that `length` does not count. The caller frees them. Returns NULL with a fault.
 char *whole_file_read(const char *path, size_t *length, Faults *faults);
-// The same; a file of more than `most` bytes is a fault and not read.
+// As whole_file_read(), but a file of more than `most` bytes is a fault and is not read.
 char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults *faults);
-// False with a fault: `path` is then unchanged. An existing device or pipe is written directly, not replaced.
+// Returns false with a fault; `path` is then unchanged. An existing device or pipe is written directly, not replaced.
 bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults);
 
 #endif

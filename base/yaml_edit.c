@@ -5,7 +5,7 @@
 #include <string.h>
 #include <yaml.h>
 
-// The byte offset of a mark, which counts characters without the byte order mark.
+// Converts a libyaml mark, which counts characters without the byte-order mark, to a byte offset.
 static size_t byte_of(const char *text, size_t characters)
 {
     size_t at = strncmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
@@ -15,7 +15,7 @@ static size_t byte_of(const char *text, size_t characters)
     return at;
 }
 
-// An item of a list by its number, from 0.
+// An item of a list by its index, counted from 0.
 static yaml_node_t *item_of(yaml_document_t *document, const yaml_node_t *list, const char *number)
 {
     char *end;
@@ -70,7 +70,7 @@ static char *spliced(const char *text, size_t from, size_t to, const char *befor
     return NULL;
 }
 
-// The map that holds the last key of a path, which becomes *key; NULL if it is not there.
+// Finds the map that contains the last key of a path and sets *key to that key; NULL if the map does not exist.
 static const yaml_node_t *map_of(yaml_document_t *document, const char *path, const char **key)
 {
     const yaml_node_t *map = yaml_document_get_root_node(document);
@@ -80,7 +80,7 @@ static const yaml_node_t *map_of(yaml_document_t *document, const char *path, co
     return map && map->type == YAML_MAPPING_NODE ? map : NULL;
 }
 
-// Adds a missing key, before the others of its map.
+// Adds a missing key before the other keys of its map.
 static char *with_key(const char *text, const yaml_node_t *map, const char *key, const char *opening, const char *value, bool is_quoted, const char *closing)
 {
     char before[256], after[300] = "";
@@ -105,12 +105,12 @@ static char *edit_document(yaml_document_t *document, const char *text, const ch
     if (!node)
         return map && add ? with_key(text, map, key, "", value, true, "") : NULL;
     size_t from = byte_of(text, node->start_mark.index), to = byte_of(text, node->end_mark.index);
-    bool ends_line = to > from && text[to - 1] == '\n';   // a block's end is the next token
-    // an empty value begins right behind its colon
+    bool ends_line = to > from && text[to - 1] == '\n';   // the end mark of a block value is the next token
+    // an empty value begins directly after its colon
     return spliced(text, from, to, from == to ? " " : "", value, true, ends_line ? "\n" : "");
 }
 
-// Behind the last item's last line: what follows it, comments and blank lines, belongs to what comes next.
+// The end of the last line of the last item: comments and blank lines after it belong to what follows the list.
 static size_t end_of_block(const char *text, size_t from, size_t to)
 {
     size_t end = from;
@@ -151,7 +151,7 @@ static bool is_at_end(yaml_parser_t *parser)
     return ended;
 }
 
-// The only document of a text; the caller deletes it.
+// Loads the only document of a text; the caller deletes it.
 static bool load(const char *text, yaml_document_t *document)
 {
     yaml_parser_t parser;
@@ -165,8 +165,7 @@ static bool load(const char *text, yaml_document_t *document)
     return good;
 }
 
-// Whether the edited text has the intended value. Aliases of the replaced value, tags and keys that begin with `?` can lead to something else, or to
-// invalid YAML.
+// True if the edited text has the intended value. Aliases of the replaced value, tags, and keys that begin with `?` can give a different value or invalid YAML.
 static bool has_value(const char *text, const char *path, const char *value, bool is_item)
 {
     yaml_document_t document;

@@ -1,4 +1,4 @@
-// libyaml's document API keeps the line and column of every node but accepts duplicate keys; they are refused here.
+// libyaml's document API keeps the line and column of every node but accepts duplicate keys; this reader refuses them.
 #include "base/yaml_reader.h"
 
 #include "base/nearest_name.h"
@@ -42,7 +42,7 @@ static bool is_unit(const char *text)
     return false;
 }
 
-// Length of the name without its unit: the shortest stem whose rest is one unit; the whole name if there is none.
+// Length of the name without its unit: the shortest stem followed by exactly one unit; the whole name if it has none.
 static size_t stem_length(const char *name)
 {
     for (const char *at = strchr(name, '_'); at; at = strchr(at + 1, '_'))
@@ -106,24 +106,25 @@ static int line_of_offset(const char *text, size_t length, size_t offset)
 
 static void fault_syntax(const yaml_parser_t *parser, const char *text, size_t length, const char *file, Faults *faults)
 {
-    const char *problem = parser->problem ? parser->problem : "it cannot be read";
+    const char *problem = parser->problem ? parser->problem : "the text cannot be parsed";
     if (parser->error == YAML_READER_ERROR)
         faults_add(faults, file, line_of_offset(text, length, parser->problem_offset), 1, "is not YAML: %s (byte %zu); expected UTF-8 text", problem,
                    parser->problem_offset);
     else if (parser->error == YAML_MEMORY_ERROR)
-        faults_add(faults, file, 0, 0, "no memory to read it");
+        faults_add(faults, file, 0, 0, "out of memory");
     else
         faults_add(faults, file, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1, "is not YAML: %s%s%s", problem,
                    parser->context ? " " : "", parser->context ? parser->context : "");
 }
 
-// libyaml's time grows with the square of the depth of nested [ and {: a first pass over the events stops if they are too deep. False with a fault
-// then, or if the text is not YAML.
+// libyaml's time grows with the square of the nesting depth of [ and {, so a first pass over the events refuses deep nesting. Returns false with a fault in
+// that case, or if
+// the text is not YAML.
 static bool check_depth(const char *text, size_t length, const char *file, Faults *faults)
 {
     yaml_parser_t parser;
     if (!yaml_parser_initialize(&parser)) {
-        faults_add(faults, file, 0, 0, "no memory to read it");
+        faults_add(faults, file, 0, 0, "out of memory");
         return false;
     }
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, length);
@@ -157,7 +158,7 @@ YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, 
         return NULL;
     YamlReader *reader = calloc(1, sizeof *reader);
     if (!reader || !(reader->file = strdup(file)) || !yaml_parser_initialize(&parser)) {
-        faults_add(faults, file, 0, 0, "no memory to read it");
+        faults_add(faults, file, 0, 0, "out of memory");
         if (reader)
             free(reader->file);
         free(reader);
@@ -178,7 +179,7 @@ YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, 
         } else {
             good = !yaml_document_get_root_node(&second);
             if (!good)
-                faults_add(faults, file, line, 1, "a second document begins; expected one");
+                faults_add(faults, file, line, 1, "a second YAML document begins here; expected only one");
             yaml_document_delete(&second);
         }
     }
@@ -225,7 +226,7 @@ void yaml_fault(YamlValue value, const char *format, ...)
     faults_add(value.reader->faults, value.reader->file, line, column, "%s", text);
 }
 
-// Counts a visit; false (with one fault) once far more nodes are visited than a scene can have.
+// Counts a visit. Returns false (with one fault) after far more visits than a scene needs.
 static bool may_visit(YamlValue value)
 {
     if (value.reader->visits++ == VISIT_BUDGET)
@@ -372,7 +373,7 @@ bool yaml_text(YamlValue value, const char **text)
     return true;
 }
 
-// The scalar as a number; otherwise a fault with what was expected.
+// Reads the scalar as a number; otherwise adds a fault with what was expected.
 static bool scalar_number(YamlValue value, const char *valid, double *number)
 {
     const yaml_node_t *node = node_of(value);

@@ -1,4 +1,4 @@
-// Values of the command line that many verbs take.
+// Values of command-line options that several verbs take.
 #include "cli/cli.h"
 
 const char *const cli_view_name[] = {"fluoroscopy", "3d", "angioscopy", "all", NULL};

@@ -1,4 +1,4 @@
-// seldinger bench: the benchmarks are a program of their own, which lies beside this one.
+// seldinger bench: the benchmarks are a separate program in the same folder.
 #include "cli/cli.h"
 
 #include <errno.h>
@@ -8,11 +8,10 @@
 
 static const OptionTable table = {
     .program = "seldinger bench",
-    .does = "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs",
+    .does = "timings of step, fit, track, peer, collision, drawing and wall, all in one run; torture: random runs",
     .usage = "TABLE [options]",
-    .intro = "Timing tables and campaigns, by the program seldinger-bench beside this one. `seldinger bench --help` names them, `seldinger bench TABLE --help` "
-             "explains "
-             "their options.",
+    .intro = "Timing tables and random tests by the program seldinger-bench in the same folder. `seldinger bench --help` lists them; "
+             "`seldinger bench TABLE --help` lists their options.",
     .exits = "0 done; 1 a comparison failed; 2 wrong usage or bad input",
 };
 
@@ -25,9 +24,9 @@ static int forward(int argc, char **argv)
         execv(program, argv);
     }
     if (errno == ENOENT)
-        fprintf(stderr, "seldinger bench: the benchmarks are not installed: there is no %s; build the target seldinger-bench\n", program);
+        fprintf(stderr, "seldinger bench: the benchmarks are not installed: %s does not exist; build the target seldinger-bench\n", program);
     else
-        fprintf(stderr, "seldinger bench: seldinger-bench, beside this program, cannot be started: %s\n", strerror(errno));
+        fprintf(stderr, "seldinger bench: cannot start seldinger-bench in the folder of this program: %s\n", strerror(errno));
     return EXIT_BAD_INPUT;
 }
 

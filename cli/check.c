@@ -1,5 +1,6 @@
-// seldinger check: every scene that has a golden tool path (X.yaml with X.golden.csv beside it) is run headless and compared with it;
-// every scene with a `verify:` key is measured against its references (check_verify.c).
+// seldinger check: runs every scene with a golden tool path (X.yaml with X.golden.csv in the same folder) headless and compares the paths; measures every scene
+// with a
+// `verify:` key against its references (check_verify.c).
 #include "cli/check_golden.h"
 #include "cli/check_verify.h"
 
@@ -16,8 +17,9 @@ typedef struct CheckOptions {
 #define AT(member) OPTION_AT(CheckOptions, member)
 static const Option rows[] = {
     {"tolerance-mm", "X", OPTION_NUMBER, AT(golden.tolerance_mm),
-     "largest distance [mm] between golden and run that passes; other machines pass, one per cent of a parameter does not", .most = 1e6},
-    {"update", NULL, OPTION_FLAG, AT(golden.update), "rewrites the goldens; a scene named itself gets one that had none"},
+     "largest distance [mm] between golden and run that passes; rounding on other machines stays below the default, a change of a parameter by 1 % does not",
+     .most = 1e6},
+    {"update", NULL, OPTION_FLAG, AT(golden.update), "rewrites the golden paths; a scene given as PATH gets one if it has none"},
     {"duration-s", "S", OPTION_NUMBER, AT(golden.duration_s), "with --update: simulated time [s] of the golden", .most = SCRIPT_LONGEST_S,
      .otherwise = "the script's, else the old golden's, else 1"},
     CLI_THREADS(CheckOptions, golden.threads),
@@ -28,15 +30,14 @@ static void set_defaults(void *structure) { *(CheckOptions *)structure = (CheckO
 
 static const OptionTable table = {
     .program = "seldinger check",
-    .does = "runs every scene that has a golden tool path and compares",
+    .does = "runs every scene that has a golden tool path and compares the paths",
     .usage = "PATH... [options]",
-    .intro = "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares point by point over time. The table names each "
-             "scene, its "
-             "worst distance, and the first time, node and distance beyond the tolerance.\n"
-             "Then every scene below PATH with the key `verify:` is measured against exact solutions, at several numbers of elements: case, reference, result, "
-             "error, "
-             "tolerance, and the order in which the error falls. The key is described in scenes/verify/README.md.",
-    .notes = "Scenes whose vessel file is not there are skipped by name.",
+    .intro =
+        "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares the two paths point by point over time. The table shows "
+        "each scene, its worst distance, and the first time, node and distance beyond the tolerance.\n"
+        "Then every scene below PATH with the key `verify:` is measured against exact solutions, at several numbers of elements: case, reference, result, "
+        "error, tolerance, and the order of convergence of the error. The key is described in scenes/verify/README.md.",
+    .notes = "Scenes whose vessel file is missing are skipped and listed.",
     .exits = "0 all pass; 1 a path differs or a tolerance is missed; 2 wrong usage or a scene or golden that cannot be read; 3 a run diverged",
     CLI_OPTIONS(rows, CheckOptions),
     .set_defaults = set_defaults,
@@ -52,13 +53,13 @@ static void gather(const CheckOptions *options, SceneList *list, Faults *faults)
         const char *path = options->path[i];
         struct stat status;
         if (stat(path, &status) != 0)
-            faults_add(faults, path, 0, 0, "is not there; give a scene (X.yaml) or a folder");
+            faults_add(faults, path, 0, 0, "does not exist; give a scene (X.yaml) or a folder");
         else if (S_ISDIR(status.st_mode))
             scene_list_add_folder(list, path);
         else if (options->golden.update || scene_has_golden(path) || scene_has_verify(path))
             scene_list_add(list, path);
         else
-            faults_add(faults, path, 0, 0, "has no golden tool path beside it and no key `verify:`; `seldinger check --update` makes a golden path");
+            faults_add(faults, path, 0, 0, "has no golden tool path in its folder and no key `verify:`; `seldinger check --update` makes a golden path");
     }
 }
 
@@ -71,12 +72,12 @@ static int call(void *structure, Faults *faults)
     bool headed = options->quiet || options->update;
     gather(wanted, &list, faults);
     if (list.count == 0 && faults->count == 0) {
-        // a check that checks nothing has not passed
-        fprintf(stderr, "seldinger check: no scene with a golden tool path or the key `verify:` below what was given; `--update` with a scene makes a path\n");
+        // a check without any comparison has not passed
+        fprintf(stderr, "seldinger check: no given scene or folder has a golden tool path or the key `verify:`; `--update SCENE` makes a golden path\n");
         worst = EXIT_BAD_INPUT;
     }
     for (int i = 0; i < list.count; i++) {
-        // --update given a folder renews what is there; given a scene it makes one
+        // --update with a folder renews the existing golden paths; with a scene it also creates one
         if (!scene_has_golden(list.path[i]) && scene_has_verify(list.path[i]))
             continue;
         if (!headed)

@@ -37,7 +37,7 @@ static int update(const char *golden_path, bool there, const Scene *scene, const
     return EXIT_DONE;
 }
 
-// A run of the scene, compared or written; an exit code. `golden_path` may lack.
+// Runs the scene and compares or writes its golden path; returns an exit code. The file `golden_path` may be missing.
 static int check_path(const GoldenOptions *options, Scene *scene, const char *golden_path, Faults *faults)
 {
     const char *path = scene->path;
@@ -45,7 +45,7 @@ static int check_path(const GoldenOptions *options, Scene *scene, const char *go
     int before = faults->count, code = EXIT_BAD_INPUT;
     ToolPath *golden = there ? golden_load(golden_path, faults) : NULL, *run = NULL;
     OpenVessel open = {0};
-    // a golden that cannot be read is rewritten by --update all the same
+    // --update rewrites a golden path even if it cannot be read
     if (options->update && !golden)
         faults->count = before;
     double duration = golden ? golden->duration_s : 1;
@@ -77,7 +77,7 @@ int check_golden(const char *path, const GoldenOptions *options, Faults *faults)
     if (!golden_path) {
         faults_add(faults, path, 0, 0, "out of memory");
     } else if (needed && access(needed, F_OK) != 0) {
-        printf("%-44s skipped   %s is not there\n", path, needed);
+        printf("%-44s skipped   %s is missing\n", path, needed);
         code = EXIT_DONE;
     } else if (scene) {
         code = check_path(options, scene, golden_path, faults);

@@ -1,4 +1,4 @@
-// The rows of `seldinger check` for golden tool paths: a scene is run and compared with what lies beside it, or that is rewritten.
+// The rows of `seldinger check` for golden tool paths: a scene is run and compared with the golden path in its folder, or that path is rewritten.
 #ifndef SELDINGER_CLI_CHECK_GOLDEN_H
 #define SELDINGER_CLI_CHECK_GOLDEN_H
 
@@ -10,7 +10,7 @@ typedef struct GoldenOptions {
     int threads;
 } GoldenOptions;
 
-// One scene; prints its row. An exit code.
+// Checks one scene and prints its row. Returns an exit code.
 int check_golden(const char *path, const GoldenOptions *options, Faults *faults);
 
 #endif

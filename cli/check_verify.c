@@ -1,6 +1,7 @@
-// A row of the table is a case at one number of elements: reference, result, error, tolerance, and the order p with which the error falls from the
-// row above, error = C N^-p. Where an error is at its floor (rounding, the digits of a reference, a term that the reference leaves out) it falls
-// no further: the order is then at least what brought it there.
+// A row of the table is a case at one number of elements: reference, result, error, tolerance, and the order of convergence p computed from this row and the
+// one above,
+// error = C N^-p. At the floor of an error (rounding, the digits of the reference, a term that the reference omits) the error falls no further; the order
+// shown is then a lower bound.
 #include "cli/check_verify.h"
 
 #include "sim/sim.h"
@@ -13,10 +14,10 @@
 
 static void print_heading(void) { printf("%-40s %5s %16s %16s %9s %9s %6s\n", "case", "N", "reference", "result", "error", "tolerance", "order"); }
 
-// What is wrong with a row, "" for nothing; `order_text` is how the error fell from the row above.
+// Returns what is wrong with a row, "" for nothing; `order_text` is the order of convergence from the row above.
 static const char *judge(const VerifyCase *c, double error, double tolerance, double ratio, double error_before, char order_text[16])
 {
-    // rounding of a result of this size
+    // rounding error of a result of this size
     double floor_error = fmax(c->floor, 1e-11 * fmax(fabs(c->reference), 1e-3));
     order_text[0] = 0;
     if (isnan(error))
@@ -32,7 +33,7 @@ static const char *judge(const VerifyCase *c, double error, double tolerance, do
     return "";
 }
 
-// True where every row passes.
+// Returns true if every row passes.
 static bool print_case(const VerifyRun *run, int runs, int index, bool quiet)
 {
     const VerifyCase *c = &run[0].of->scene->verify.cases[index];
@@ -93,7 +94,7 @@ static bool open_scene(const char *path, int threads, bool quiet, VerifyScene *o
         return false;
     const char *needed = scene_needed_file(scene);
     if (needed && access(needed, F_OK) != 0) {
-        printf("# %s: skipped, %s is not there\n", path, needed);
+        printf("# %s: skipped, %s is missing\n", path, needed);
         return false;
     }
     return cli_open_vessel(scene, threads, quiet, &out->open, faults) && open_vessel_inlet(scene, &out->open, faults) && faults->count == before;

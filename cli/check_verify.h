@@ -4,7 +4,8 @@
 
 #include "cli/cli.h"
 
-// Runs those of the scenes that have it, on `threads` threads (0: all cores), and prints the table; with `quiet` only rows that fail. An exit code.
+// Runs those of the scenes that have the key on `threads` threads (0: one per processor) and prints the table; with `quiet` only rows that fail. Returns an
+// exit code.
 int check_verify(int count, char *const *path, int threads, bool quiet, Faults *faults);
 
 #endif

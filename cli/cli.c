@@ -1,4 +1,4 @@
-// What the verbs share: how faults, notes and progress are printed.
+// Functions that the verbs share: printing of faults, notes and progress.
 #include "cli/cli.h"
 
 #include "base/base.h"
@@ -41,7 +41,7 @@ int cli_call(const Verb *verb, int argc, char **argv)
     return code;
 }
 
-// The last word of its program.
+// The last word of the program name of its options.
 static const char *cli_verb_name(const Verb *verb) { return strrchr(verb->options->program, ' ') + 1; }
 
 const Verb *cli_find_verb(const Verb *const *list, const char *name)
@@ -87,7 +87,7 @@ bool cli_write_json(const char *path, const cJSON *root, Faults *faults)
 {
     char *text = cJSON_Print(root);
     if (!text)
-        faults_add(faults, path, 0, 0, "not enough memory");
+        faults_add(faults, path, 0, 0, "out of memory");
     bool good = text && output_write(path, text, strlen(text), faults);
     cJSON_free(text);
     return good;

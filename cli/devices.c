@@ -1,4 +1,4 @@
-// seldinger devices: what is plugged in, what of it can drive the tool, and why the rest cannot.
+// seldinger devices: lists the connected devices, which of them can drive the tool, and why the others cannot.
 #include "cli/cli.h"
 
 #include "base/base.h"
@@ -11,40 +11,39 @@ typedef struct DevicesCommand {
     const char *json, *map[LIST_MAPS];
     int map_count;
     bool watch, quiet;
-    double duration_s;               // of --watch; 0: until it is stopped
+    double duration_s;               // of --watch; 0: until stopped
 } DevicesCommand;
 
 #define AT(member) OPTION_AT(DevicesCommand, member)
 static const Option options[] = {
     {"map", "F.yaml", OPTION_FILE, AT(map),
-     "a device map of yours (input/device_map.h explains; examples in scenes/devices); may be given several times; the first that fits a device is taken, then "
-     "the "
-     "built-in ones for joysticks, gamepads and multi-axis controllers",
+     "your own device map (format: input/device_map.h; examples: scenes/devices); may be repeated; the first map that fits a device is used, before the "
+     "built-in maps for joysticks, gamepads and multi-axis controllers",
      .count = offsetof(DevicesCommand, map_count), .times = LIST_MAPS},
     {"json", "F.json", OPTION_FILE, AT(json), "the list as JSON; - is standard output"},
     CLI_QUIET(DevicesCommand, quiet, "no list"),
     {"watch", NULL, OPTION_FLAG, AT(watch),
-     "then prints each control's raw value, its least and most so far, and what the tool would be asked; Ctrl-C ends. For calibrating: let go for the centre, "
-     "move "
-     "each axis to its ends"},
-    {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "ends --watch by itself after S seconds", .least = 0.01, .most = 86400, .otherwise = ""},
+     "then prints each control's raw value, its minimum and maximum so far, and the resulting tool command; Ctrl-C ends. To calibrate: release for the "
+     "centre, then move each axis to both ends"},
+    {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "ends --watch after S seconds", .least = 0.01, .most = 86400, .otherwise = ""},
 };
 
 static const char *check(void *structure)
 {
     const DevicesCommand *command = structure;
-    return command->duration_s > 0 && !command->watch ? "--duration-s goes with --watch" : NULL;
+    return command->duration_s > 0 && !command->watch ? "--duration-s needs --watch" : NULL;
 }
 
 static const OptionTable table = {
     .program = "seldinger devices",
-    .does = "what is plugged in, what of it drives the tool, and why the rest does not",
+    .does = "lists connected devices, which of them can drive the tool, and why the others cannot",
     .usage = "[options]",
-    .intro = "Lists HID devices, USB serial encoders and joysticks: which can drive the tool, by which map, with force or not, and why not.",
-    .exits = "0 done, also where no device is there; 2 wrong usage or a map with faults",
+    .intro = "Lists HID devices, USB serial encoders and joysticks: which of them can drive the tool, by which map, whether with force feedback, and why the "
+             "others cannot.",
+    .exits = "0 done, also if no device is connected; 2 wrong usage or a map with faults",
     CLI_OPTIONS(options, DevicesCommand),
     .check = check,
-    .too_many = "takes no file but by --map",
+    .too_many = "takes files only with --map",
 };
 
 static bool plan_files(const DevicesCommand *command, Faults *faults)
@@ -70,7 +69,7 @@ static int call(void *structure, Faults *faults)
         if (!command->quiet && !cli_is_standard_output(command->json))
             device_list_print(stdout, list);
         if (command->watch && transport && !devices_watch(transport, list->hid, list->hid_count, command->duration_s))
-            fprintf(stderr, "seldinger devices: no device to watch that may be read\n");
+            fprintf(stderr, "seldinger devices: no readable device to watch\n");
     }
     device_list_free(list);
     hid_transport_hidapi_free(transport);

@@ -1,4 +1,4 @@
-// seldinger export: surfaces, centrelines and recordings for other programs.
+// seldinger export: writes surfaces, centrelines and recordings for other programs.
 #include "cli/cli.h"
 
 #include "base/base.h"
@@ -13,8 +13,8 @@ typedef enum { WHAT_SURFACE, WHAT_CENTRELINE, WHAT_CENTERLINE } What;
 
 typedef struct ExportOptions {
     const char *in, *out;
-    int what;                // -1: as the file's extension says
-    int frame;               // of `frames`
+    int what;                // -1: by the file's extension
+    int frame;               // index in `frames`
     int threads;
     ModelSurfaceOptions surface;
     bool quiet;
@@ -25,42 +25,42 @@ static const char *const whats[] = {"surface", "centreline", "centerline", NULL}
 static const Option rows[] = {
     {"what", "surface|centreline", OPTION_CHOICE, AT(what), "what a .vtp holds", .choices = whats,
      .otherwise = "the surface of a model, the centreline of a tree"},
-    {"cell-mm", "X", OPTION_NUMBER, AT(surface.cell_mm), "size of the surface's cells [mm]", .least = 0.001, .most = 1000,
-     .otherwise = "about ten to twenty cells round the thinnest branch"},
+    {"cell-mm", "X", OPTION_NUMBER, AT(surface.cell_mm), "cell size of the surface [mm]", .least = 0.001, .most = 1000,
+     .otherwise = "about ten to twenty cells around the thinnest branch"},
     {"keep-floating", NULL, OPTION_FLAG, AT(surface.keep_floating),
-     "also the parts of a surface to which no point gets from the inlet; dropped otherwise, which is said"},
-    {"open-inlet", NULL, OPTION_FLAG, AT(surface.open_inlet), "the surface is cut open at the root's plane; blobs close it otherwise"},
-    {"frame", "RAS|LPS", OPTION_CHOICE, AT(frame), "coordinate system that a .mrk.json names; coordinates are never converted", .choices = frames},
+     "keeps parts of the surface that are not connected to the inlet; by default they are dropped and reported"},
+    {"open-inlet", NULL, OPTION_FLAG, AT(surface.open_inlet), "cuts the surface open at the plane of the root; otherwise blobs close it"},
+    {"frame", "RAS|LPS", OPTION_CHOICE, AT(frame), "coordinate system written into a .mrk.json; coordinates are never converted", .choices = frames},
     {"output", "OUT", OPTION_FILE, AT(out), "the file to write", .letter = 'o'},
-    CLI_QUIET(ExportOptions, quiet, "does not print what a surface is: parts, open edges, Euler characteristic, area, volume"),
-    {"threads", "N", OPTION_INT, AT(threads), "accepted as everywhere; nothing here takes long", .most = 256, .otherwise = ""},
+    CLI_QUIET(ExportOptions, quiet, "does not print the figures of a surface: parts, open edges, Euler characteristic, area, volume"),
+    {"threads", "N", OPTION_INT, AT(threads), "accepted for uniformity, has no effect", .most = 256, .otherwise = ""},
 };
 
 static void set_defaults(void *structure) { *(ExportOptions *)structure = (ExportOptions){.what = -1}; }
 
-static const char *check(void *structure) { return ((ExportOptions *)structure)->out ? NULL : "one file and `-o OUT` are needed"; }
+static const char *check(void *structure) { return ((ExportOptions *)structure)->out ? NULL : "expected one file and `-o OUT`"; }
 
 static const OptionTable table = {
     .program = "seldinger export",
-    .does = "surface, centreline or recording for other programs",
+    .does = "writes a surface, centreline or recording for other programs",
     .usage = "FILE -o OUT [options]",
-    .intro = "Writes what FILE (a tree, model or recording) holds for other programs; the extension of OUT says how. Lengths mm.\n\n"
-             "  model, surface         .stl (binary)  .ply  .obj  .vtp; .ply and .vtp also hold for each vertex\n"
-             "                         node      whose local model it lies on\n"
+    .intro = "Converts FILE (a tree, model or recording) for other programs; the extension of OUT selects the format. Lengths are in mm.\n\n"
+             "  model, surface         .stl (binary)  .ply  .obj  .vtp; .ply and .vtp also contain for each vertex\n"
+             "                         node      node whose local model the vertex lies on\n"
              "                         error_mm  signed distance of the nearest data point to that model, > 0 inside: the model is too wide there\n"
-             "                         data_mm   distance of the vertex to that data point: large where there are no data, as on caps\n"
-             "                         (.stl and .obj have no place for these)\n"
+             "                         data_mm   distance of the vertex to that data point: large where there are no data, such as on caps\n"
+             "                         (.stl and .obj cannot store these)\n"
              "  tree or model, centreline  .vtp (lines with Radius)  .mrk.json (3D Slicer curves)  .swc\n"
-             "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them); of several\n"
-             "                         tools all nodes of each, with what carries them: a column of the .csv, numbers (0 outermost) in a .vtp",
+             "  recording              .csv (a row per node and frame)  .vtp or .pvd (one .vtp per frame and a .pvd that lists them); with several\n"
+             "                         tools all nodes of each, and the tool that carries them: a column of the .csv, numbers (0 outermost) in a .vtp",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(rows, ExportOptions),
     .set_defaults = set_defaults,
     .check = check,
     .takes_argument = true,
     .argument = offsetof(ExportOptions, in),
-    .missing = "one file and `-o OUT` are needed",
-    .too_many = "one file and `-o OUT` are needed, not also ",
+    .missing = "expected one file and `-o OUT`",
+    .too_many = "expected one file and `-o OUT`, not also ",
 };
 
 static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
@@ -97,7 +97,7 @@ static bool export_tree(const ExportOptions *options, const char *extension, Fau
     bool surface_only = !strcmp(extension, ".stl") || !strcmp(extension, ".ply") || !strcmp(extension, ".obj");
     bool surface = options->what >= 0 ? options->what == WHAT_SURFACE : surface_only || (model && !line_only);
     if (!line_only && !surface_only && strcmp(extension, ".vtp"))
-        faults_add(faults, options->out, 0, 0, "extension '%s' is no format of a tree or model; valid: .stl .ply .obj .vtp .mrk.json .swc", extension);
+        faults_add(faults, options->out, 0, 0, "unknown extension '%s' for a tree or model; expected .stl .ply .obj .vtp .mrk.json .swc", extension);
     else if (surface ? line_only : surface_only)
         faults_add(faults, options->out, 0, 0, "'%s' cannot hold a %s; valid: %s", extension, surface ? "surface" : "centreline",
                    surface ? ".stl .ply .obj .vtp" : ".vtp .mrk.json .swc");
@@ -114,8 +114,8 @@ static bool export_recording(const ExportOptions *options, const char *extension
 {
     bool is_table = !strcmp(extension, ".csv"), series = !strcmp(extension, ".vtp") || !strcmp(extension, ".pvd");
     if (!is_table && !series) {
-        faults_add(faults, options->out, 0, 0, "extension '%s' is no format of a recording here%s; valid: .csv .vtp .pvd", extension,
-                   !strcmp(extension, ".vtkhdf") || !strcmp(extension, ".hdf") ? " (VTKHDF is not built yet)" : "");
+        faults_add(faults, options->out, 0, 0, "unknown extension '%s' for a recording%s; expected .csv .vtp .pvd", extension,
+                   !strcmp(extension, ".vtkhdf") || !strcmp(extension, ".hdf") ? " (VTKHDF is not supported yet)" : "");
         return false;
     }
     RecordedRun *run = recorded_run_load(options->in, faults);
@@ -139,7 +139,7 @@ static int call(void *structure, Faults *faults)
     case FILE_TREE: export_tree(options, extension, faults); break;
     case FILE_RECORDING: export_recording(options, extension, faults); break;
     case FILE_MISSING: faults_add(faults, options->in, 0, 0, "cannot be opened; give a tree, model or recording"); break;
-    default: faults_add(faults, options->in, 0, 0, "is no tree, model or recording; those can be exported");
+    default: faults_add(faults, options->in, 0, 0, "cannot be exported; expected a tree, model or recording");
     }
     return EXIT_DONE;
 }

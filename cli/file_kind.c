@@ -15,7 +15,7 @@ static FileKind kind_of_hdf5(const char *path)
     Faults unread = {0};
     Hdf5Reader *reader = hdf5_reader_open(path, "", &unread);
     if (!reader)
-        return errno ? FILE_MISSING : FILE_TREE;   // cut off or damaged: the reader of trees says so
+        return errno ? FILE_MISSING : FILE_TREE;   // truncated or damaged: the tree reader reports what is wrong
     FileKind kind = hdf5_has(reader, "/nodes") ? FILE_TREE : hdf5_has(reader, "/wire") ? FILE_RECORDING : FILE_UNKNOWN;
     hdf5_reader_close(reader);
     return unread.count == 0 ? kind : FILE_MISSING;
@@ -47,6 +47,6 @@ FileKind file_kind(const char *path)
     if (strstr(text, "seldinger:") || (name && (!strcmp(name, ".yaml") || !strcmp(name, ".yml"))))
         return FILE_SCENE;
     if (strstr(text, "t_s,") && (strstr(text, ".push_mm_s") || strstr(text, ".released") || strstr(text, ".exchange")))
-        return FILE_SCRIPT;  // of several tools
+        return FILE_SCRIPT;  // script of several tools
     return surface_is_known(head, length, path) ? FILE_SURFACE : FILE_UNKNOWN;
 }

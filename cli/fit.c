@@ -1,4 +1,4 @@
-// seldinger fit: a tree of point sets to a model (LIM), with the figures of the paper's tables 3 and 4.
+// seldinger fit: fits a model (LIM) to a tree of point sets, and prints the figures of tables 3 and 4 of the paper (Kerrien et al. 2017).
 #include "cli/cli.h"
 
 #include "cli/fit_options.h"
@@ -23,7 +23,7 @@ static VesselTree *load_tree(const FitCommand *command, TreeFileInfo *info, Faul
     output_plan_read_volume(&plan, "--volume", command->junctions.volume);
     VesselTree *tree = tree_file_load(command->tree, info, faults);
     if (tree && tree->point_count < 4)
-        faults_add(faults, command->tree, 0, 0, "has %d nodes and %lld points; at least 4 points on the wall are needed", tree->node_count,
+        faults_add(faults, command->tree, 0, 0, "has %d nodes and %lld points; expected at least 4 points on the wall", tree->node_count,
                    (long long)tree->point_count);
     if (tree && !command->output && !vessel_tree_is_model(tree))
         faults_add(faults, command->tree, 0, 0, "is a tree without a model; fit it with -o MODEL.h5");
@@ -39,7 +39,7 @@ static bool save(const FitCommand *command, const VesselTree *model, const TreeF
     return good;
 }
 
-// Figures to standard output and as JSON. False with faults.
+// Prints the figures to standard output and writes them as JSON. False with faults.
 static bool tell(const FitCommand *command, const TreeFit *fit, Faults *faults)
 {
     bool spoken = !command->quiet && !cli_is_standard_output(command->json);
@@ -48,7 +48,7 @@ static bool tell(const FitCommand *command, const TreeFit *fit, Faults *faults)
     figures.left_out = (long)fit->left_out;
     ModelMeasure measure;
     if (command->measure && !model_measure(fit->model, NULL, command->fit.local.threads, &measure)) {
-        faults_add(faults, command->tree, 0, 0, "not enough memory to measure the model");
+        faults_add(faults, command->tree, 0, 0, "out of memory while measuring the model");
         return false;
     }
     if (spoken)

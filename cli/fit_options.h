@@ -1,4 +1,4 @@
-// What can be asked of `fit`.
+// The options of `fit`.
 #ifndef SELDINGER_CLI_FIT_OPTIONS_H
 #define SELDINGER_CLI_FIT_OPTIONS_H
 
@@ -9,7 +9,7 @@
 typedef struct FitCommand {
     const char *tree, *output, *json, *picture;
     TreeFitOptions fit;
-    JunctionPages junctions;    // and the radius of the tool that is led through the model
+    JunctionSheets junctions;    // also contains the radius of the tool for the reach report
     bool has_alpha, has_beta, has_max_blobs, has_max_points, quiet, measure;
 } FitCommand;
 extern const OptionTable fit_options;

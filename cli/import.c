@@ -1,4 +1,4 @@
-// seldinger import: a surface, with centrelines or alone, to the tree of nodes and local points that `fit` takes (recon/surface/import_surface.h).
+// seldinger import: makes from a surface, with or without centrelines, the tree of nodes and local points that `fit` takes (recon/surface/import_surface.h).
 #include "cli/cli.h"
 
 #include "cli/import_options.h"
@@ -20,7 +20,7 @@ static CurveSet *get_curves(const ImportCommand *command, const SurfaceMesh *mes
     for (int i = 0; set && i < command->centreline_count; i++)
         good = centreline_load(command->centreline[i], set, faults) && good;
     if (!set)
-        faults_add(faults, command->surface, 0, 0, "not enough memory");
+        faults_add(faults, command->surface, 0, 0, "out of memory");
     if (good && import_place_curves(mesh, command->scale, set, report, command->centreline[0], faults))
         return set;
     curve_set_free(set);
@@ -78,7 +78,7 @@ static void plan_files(const ImportCommand *command, Faults *faults)
         output_plan_read(&plan, "--centreline", command->centreline[k]);
 }
 
-// The tree of `mesh`, written; false with faults.
+// Makes the tree of `mesh` and writes it; false with faults.
 static bool import(const ImportCommand *command, const SurfaceMesh *mesh, ImportFigures *found, Faults *faults)
 {
     CurveSet *set = get_curves(command, mesh, &found->report, faults);
@@ -86,7 +86,7 @@ static bool import(const ImportCommand *command, const SurfaceMesh *mesh, Import
     double unseen = 100.0 * (double)found->report.left_points / (double)(found->report.sampled_points + 1);
     if (tree && found->computed && unseen > UNSEEN_MAX_PERCENT)
         faults_add(faults, command->surface, 0, 0,
-                   "the computed centrelines leave %.0f %% of the surface out, more than %d %%: no tree is written; give --centerline F", unseen,
+                   "the computed centrelines miss %.0f %% of the surface, more than %d %%: no tree is written; give --centerline F", unseen,
                    UNSEEN_MAX_PERCENT);
     bool good = tree && faults->count == 0 && save(command, tree, faults) && (!command->centreline_out || write_curves(command, set, faults));
     if (good) {

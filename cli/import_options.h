@@ -1,4 +1,4 @@
-// What can be asked of `import`.
+// The options of `import`.
 #ifndef SELDINGER_CLI_IMPORT_OPTIONS_H
 #define SELDINGER_CLI_IMPORT_OPTIONS_H
 

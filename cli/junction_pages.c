@@ -1,5 +1,4 @@
-// See junction_pages.h.
-#include "cli/junction_pages.h"
+#include "cli/junction_sheets.h"
 
 #include "geom/geom.h"
 #include "recon/recon.h"
@@ -24,7 +23,9 @@ static int by_before(const void *a, const void *b)
     return x->before != y->before ? (x->before > y->before) - (x->before < y->before) : (x->index > y->index) - (x->index < y->index);
 }
 
-// Those that are narrowest in the other model, which may have other nodes: by the joining lines of this one. Returns their number, -1 without memory.
+// Chooses the junctions that are narrowest in the other model. That model may have other nodes, so the joining lines of this model are used. Returns their
+// number, or -1 if out
+// of memory.
 static int choose_compared(const VesselTree *model, const Reach *reach, const VesselTree *before, double tool_radius, ReachJunction chosen[COMPARED])
 {
     Compared *list = malloc(((size_t)reach->junction_count + 1) * sizeof *list);
@@ -50,7 +51,7 @@ static bool draw(const JunctionPages *wanted, const char *title, const VesselTre
     Reach *reach = reach_create(model, &flood);
     ReachJunction chosen[COMPARED];
     PictureOptions options = picture_default_options();
-    char message[512] = "not enough memory";
+    char message[512] = "out of memory";
     int pages = 0;
     bool drawn = false;
     options.title = title;
@@ -91,7 +92,7 @@ bool junction_pages_draw(const JunctionPages *wanted, const char *title, const V
     Volume *volume = wanted->volume ? volume_load(wanted->volume, faults) : NULL;
     bool good = (!wanted->before || before) && (!wanted->volume || volume);
     if (before && !vessel_tree_is_model(before)) {
-        faults_add(faults, wanted->before, 0, 0, "is a tree without a model; `seldinger fit` makes one");
+        faults_add(faults, sheets->before, 0, 0, "is a tree without a model; make one with `seldinger fit`");
         good = false;
     }
     good = good && draw(wanted, title, model, before, volume, faults);

@@ -5,14 +5,14 @@
 #include "base/base.h"
 #include "geom/geom.h"
 
-typedef struct JunctionPages {
-    const char *picture;     // the first page; NULL: none are wanted
-    const char *volume;      // what lies behind them; NULL
-    const char *before;      // another model of the same vessels, drawn beside this one; the ten narrowest in it; NULL
-    double tool_radius;      // [mm]
-} JunctionPages;
+typedef struct JunctionSheets {
+    const char *picture;     // path of the first page; NULL: no pictures
+    const char *volume;      // the volume shown behind the sections; NULL: none
+    const char *before;      // another model of the same vessels, drawn beside this one for its ten narrowest junctions; NULL: none
+    double tool_radius;      // [mm] radius of the tool
+} JunctionSheets;
 
-// A picture is never worth a failed command: what stops it is said on standard error. False with a fault where a file that is named cannot be read.
-bool junction_pages_draw(const JunctionPages *wanted, const char *title, const VesselTree *model, Faults *faults);
+// Draws the pages. Returns false with a fault if an input cannot be read or a picture cannot be drawn.
+bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, Faults *faults);
 
 #endif

@@ -22,8 +22,8 @@ static const OptionTable program = {
     .intro =
         "Simulates guide wires and catheters in blood vessels in real time, makes vessel models from angiograms or surfaces, and trains their navigation under "
         "simulated fluoroscopy. Not a medical device.",
-    .notes = "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); run ends in order.",
-    .exits = "0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted",
+    .notes = "When stopped (SIGINT, SIGTERM, SIGHUP), a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends normally.",
+    .exits = "0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation cannot be trusted",
 };
 
 static void print_help(FILE *out)
@@ -31,11 +31,10 @@ static void print_help(FILE *out)
     fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
             SELDINGER_VERSION);
     cli_list_verbs(out, verbs, 34);
-    fprintf(out,
-            "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
-            "`seldinger --completion` a script by which bash completes verbs and options.\n"
-            "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
-            "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
+    fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
+                 "`seldinger --completion` a bash script that completes verbs and options.\n"
+                 "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation cannot be trusted.\n"
+                 "When stopped (SIGINT, SIGTERM, SIGHUP), a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends normally.\n");
 }
 
 static int refuse_name(const char *name) { return cli_refuse_verb("seldinger", "verb", name, verbs); }
@@ -47,7 +46,7 @@ static const OptionTable *const *tables_of_verbs(const OptionTable *table[VERB_C
     return table;
 }
 
-// `name`: of a verb; NULL: the page of the program.
+// `name`: name of a verb; NULL: the page of the program.
 static int print_manual(const char *name)
 {
     const OptionTable *table[VERB_COUNT + 1] = {0};

@@ -18,24 +18,24 @@ typedef struct NavOptions {
 #define AT(member) OPTION_AT(NavOptions, member)
 static const Option rows[] = {
     {"device", "F.yaml", OPTION_FILE, AT(map),
-     "map of a device (scenes/devices has examples, `seldinger devices` lists what is there); up to 8. Joysticks, gamepads and haptic devices have maps "
-     "already",
+     "device map (examples: scenes/devices; `seldinger devices` lists the connected devices); up to 8. Joysticks, gamepads and haptic devices have built-in "
+     "maps",
      .count = offsetof(NavOptions, map_count), .times = TRAINER_MAPS},
-    {"only-mapped", NULL, OPTION_CLEARED, AT(trainer.has_built_in_maps), "no device without a map given here"},
-    {"trainee", "NAME", OPTION_TEXT, AT(trainer.trainee), "for the report"},
-    {"sessions", "FOLDER", OPTION_FOLDER, AT(sessions), "where sessions go",
+    {"only-mapped", NULL, OPTION_CLEARED, AT(trainer.has_built_in_maps), "uses only devices whose map is given with --device"},
+    {"trainee", "NAME", OPTION_TEXT, AT(trainer.trainee), "name of the trainee, for the report"},
+    {"sessions", "FOLDER", OPTION_FOLDER, AT(sessions), "where sessions are stored",
      .otherwise = "$XDG_DATA_HOME/seldinger/sessions, else ~/.local/share/seldinger/sessions"},
-    {"no-record", NULL, OPTION_CLEARED, AT(trainer.is_recorded), "leaves no recording and no session file"},
-    {"resume", "REC.h5", OPTION_FILE, AT(resume), "goes on where a recording of this scene ended …"},
+    {"no-record", NULL, OPTION_CLEARED, AT(trainer.is_recorded), "writes no recording and no session file"},
+    {"resume", "REC.h5", OPTION_FILE, AT(resume), "continues at the end of this recording of the scene …"},
     {"at", "S", OPTION_NUMBER, AT(trainer.resume_s), "… or at this moment of it [s of simulated time]", .most = SCRIPT_LONGEST_S, .otherwise = ""},
     {"tools", "FOLDER", OPTION_FOLDER, AT(trainer.library),
-     "device files that the tray offers where the scene names none under exchange:", .otherwise = "scenes/tools"},
-    {"cine", "F.cine", OPTION_FILE, AT(trainer.cine), "a saved cine loop of this scene, to be replayed"},
+     "device files that the tray offers if the scene lists none under exchange:", .otherwise = "scenes/tools"},
+    {"cine", "F.cine", OPTION_FILE, AT(trainer.cine), "a saved cine loop of this scene to replay"},
     CLI_VIEW(NavOptions, trainer.view, "first view"),
-    CLI_SIZE(NavOptions, trainer.width, "of the window"),
+    CLI_SIZE(NavOptions, trainer.width, "size of the window"),
     {"full-screen", NULL, OPTION_FLAG, AT(trainer.is_full_screen), "fills the screen"},
-    {"duration-s", "S", OPTION_NUMBER, AT(trainer.duration_s), "ends by itself after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
-    {"figures", "F.json", OPTION_FILE, AT(figures), "at the end: frames, their CPU time, lateness of the 1 kHz thread, memory; - is standard output"},
+    {"duration-s", "S", OPTION_NUMBER, AT(trainer.duration_s), "ends after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
+    {"figures", "F.json", OPTION_FILE, AT(figures), "written at the end: frames, their CPU time, delay of the 1 kHz thread, memory; - is standard output"},
     CLI_THREADS(NavOptions, trainer.threads),
     CLI_QUIET(NavOptions, quiet, "no progress"),
 };
@@ -49,17 +49,16 @@ static void set_defaults(void *structure)
 static const char *check(void *structure)
 {
     const NavOptions *nav = structure;
-    return nav->trainer.resume_s < SCRIPT_LONGEST_S && !nav->resume ? "--at goes with --resume REC.h5" : NULL;
+    return nav->trainer.resume_s < SCRIPT_LONGEST_S && !nav->resume ? "--at needs --resume REC.h5" : NULL;
 }
 
 static const OptionTable table = {
     .program = "seldinger nav",
-    .does = "the trainer: a window, keys and devices steer the tool, sessions are recorded and scored",
+    .does = "opens the trainer: steer the tools in a window; sessions are recorded and scored",
     .usage = "SCENE [options]",
-    .intro = "Opens the trainer's window: steer the tools by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its score "
-             "written "
-             "beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.",
-    .exits = "0 done; 2 wrong usage, bad input or no display; 3 the simulation diverged or the recording is not whole",
+    .intro = "Opens the trainer's window: steer the tools by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its "
+             "score written beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.",
+    .exits = "0 done; 2 wrong usage, bad input or no display; 3 the simulation diverged or the recording is incomplete",
     CLI_OPTIONS(rows, NavOptions),
     .set_defaults = set_defaults,
     .check = check,

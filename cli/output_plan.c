@@ -21,7 +21,7 @@ static bool is_same_file(const PlannedOutput *output, const char *path)
     return path_resolve(path, whole) && !strcmp(whole, output->whole);
 }
 
-// NAME, a number after - or _, the ending.
+// True for NAME, a number after - or _, and the ending.
 static bool is_of_series(const PlannedOutput *output, const char *path)
 {
     char whole[PATH_MAX];

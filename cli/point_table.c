@@ -22,7 +22,7 @@ static bool append(PointTable *table, Vec3 p)
     return true;
 }
 
-// Cuts a line at its commas (in place), blanks around cells removed. Returns the number of cells, at most COLUMNS_MOST + 1.
+// Splits a line at its commas (in place) and removes blanks around the cells. Returns the number of cells, at most COLUMNS_MOST + 1.
 static int cut_cells(char *line, char *cell[COLUMNS_MOST + 1])
 {
     int count = 0;
@@ -51,11 +51,11 @@ static bool read_header(char *const *cell, int count, int which[3], const char *
         for (int i = 0; i < count; i++)
             if (!strcmp(cell[i], name[k])) {
                 if (which[k] >= 0)
-                    faults_add(faults, path, line, 0, "column %s stands twice; once is valid", name[k]);
+                    faults_add(faults, path, line, 0, "column %s appears twice; expected once", name[k]);
                 which[k] = i;
             }
         if (which[k] < 0)
-            faults_add(faults, path, line, 0, "the header has no column %s; valid: x_mm,y_mm,z_mm", name[k]);
+            faults_add(faults, path, line, 0, "the header has no column %s; expected x_mm,y_mm,z_mm", name[k]);
     }
     return faults->count == before;
 }
@@ -65,7 +65,7 @@ bool point_table_parse(char *text, size_t length, const char *path, PointTable *
     int before = faults->count, which[3], columns = 0, line = 0;
     char *next = text;
     if (memchr(text, '\0', length)) {
-        faults_add_at_byte(faults, path, strlen(text), "a zero byte; valid: text");
+        faults_add_at_byte(faults, path, strlen(text), "unexpected zero byte; expected text");
         return false;
     }
     if (!strncmp(next, "\xEF\xBB\xBF", 3))
@@ -91,23 +91,23 @@ bool point_table_parse(char *text, size_t length, const char *path, PointTable *
         double x[3];
         bool good = count == columns;
         if (!good)
-            faults_add(faults, path, line, 0, "%d cells; valid: %d, as in the header", count, columns);
+            faults_add(faults, path, line, 0, "has %d cells; expected %d, as in the header", count, columns);
         for (int k = 0; k < 3 && good; k++) {
             char *stop;
             const char *from = cell[which[k]];
             x[k] = strtod(from, &stop);
             if (stop == from || *stop || !isfinite(x[k]) || fabs(x[k]) > 1e9) {
-                faults_add(faults, path, line, (int)(from - line_begin) + 1, "'%.40s' is no coordinate; valid: a finite number of mm", from);
+                faults_add(faults, path, line, (int)(from - line_begin) + 1, "'%.40s' is not a coordinate; expected a finite number of mm", from);
                 good = false;
             }
         }
         if (good && !append(table, vec3(x[0], x[1], x[2]))) {
-            faults_add(faults, path, line, 0, "not enough memory");
+            faults_add(faults, path, line, 0, "out of memory");
             break;
         }
     }
     if (columns == 0 && faults->count == before)
-        faults_add(faults, path, 1, 1, "is empty; a header x_mm,y_mm,z_mm is needed");
+        faults_add(faults, path, 1, 1, "is empty; expected a header x_mm,y_mm,z_mm");
     return faults->count == before;
 }
 

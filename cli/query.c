@@ -1,4 +1,4 @@
-// seldinger query: field, gradient and Taubin distance of a model at points (CSV in, CSV out).
+// seldinger query: evaluates field, gradient and Taubin distance of a model at points (CSV in, CSV out).
 #include "cli/cli.h"
 
 #include "base/base.h"
@@ -19,7 +19,7 @@ typedef struct QueryOptions {
 
 static const Option options[] = {
     {"points", "F.csv", OPTION_FILE, OPTION_AT(QueryOptions, points),
-     "a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment; at most 1 GB"},
+     "CSV with columns x_mm,y_mm,z_mm in any order (others are ignored), one point per line; # begins a comment; at most 1 GB"},
     {"output", "F.csv", OPTION_FILE, OPTION_AT(QueryOptions, output), "x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output", .letter = 'o'},
     CLI_THREADS(QueryOptions, threads),
     CLI_QUIET(QueryOptions, quiet, "no summary"),
@@ -31,7 +31,7 @@ static const char *check(void *structure)
     return !query->points ? "missing --points F.csv" : !query->output ? "missing -o F.csv" : NULL;
 }
 
-// --- answers ---
+// --- results ---
 
 typedef struct Text {
     char *bytes;
@@ -65,7 +65,7 @@ typedef struct Answers {
     Vec3 *gradient;
 } Answers;
 
-enum { CHUNK = 256 };        // points of a job
+enum { CHUNK = 256 };        // points per job
 
 static void answer_chunk(void *context, long chunk)
 {
@@ -90,7 +90,7 @@ static bool answer(const VesselTree *tree, const PointTable *table, int threads,
     for (int i = 0; i < table->count && !text.failed; i++) {
         Vec3 x = table->point[i], g = a.gradient[i];
         double f = a.f[i], slope = vec3_norm(g);
-        double distance = slope > 0 ? f / slope : f > 0 ? HUGE_VAL : -HUGE_VAL;   // on a top of the field, or beyond its reach
+        double distance = slope > 0 ? f / slope : f > 0 ? HUGE_VAL : -HUGE_VAL;   // at a maximum of the field, or beyond its support
         print_to(&text, "%.17g,%.17g,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%d\n", x.x, x.y, x.z, a.node[i], f, g.x, g.y, g.z, distance, f > 0);
     }
     free(a.node);
@@ -98,7 +98,7 @@ static bool answer(const VesselTree *tree, const PointTable *table, int threads,
     free(a.gradient);
     bool good = !text.failed && output_write(output, text.bytes, text.length, faults);
     if (text.failed)
-        faults_add(faults, output, 0, 0, "not enough memory for %d points", table->count);
+        faults_add(faults, output, 0, 0, "out of memory for %d points", table->count);
     free(text.bytes);
     return good;
 }

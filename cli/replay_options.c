@@ -6,29 +6,31 @@
 
 #define AT(member) OPTION_AT(ReplayOptions, member)
 static const Option options[] = {
-    {"verify", NULL, OPTION_FLAG, AT(verify), "simulates it again headless, with the recorded hand, and compares the state's hash at each step"},
+    {"verify", NULL, OPTION_FLAG, AT(verify),
+     "simulates it again headless, with the recorded commands of the hand, and compares the state's hash at each step"},
     {"scene", "FOLDER", OPTION_FOLDER, AT(scene_folder),
-     "makes a regression scene of it: scene.yaml, hand.csv and the golden tool path, for `seldinger check FOLDER`"},
-    {"movie", "F.mp4", OPTION_FILE, AT(movie), "all of it as a film (H.264 by ffmpeg), off screen"},
-    {"picture", "F.png", OPTION_FILE, AT(picture), "what the trainee saw at the end, off screen …"},
-    {"at", "S", OPTION_NUMBER, AT(at_s), "… or at this moment [s of simulated time]; the window begins there", .most = SCRIPT_LONGEST_S, .otherwise = ""},
-    {"from", "S", OPTION_NUMBER, AT(from_s), "begin of a film [s of simulated time]", .most = SCRIPT_LONGEST_S},
-    {"to", "S", OPTION_NUMBER, AT(to_s), "end of a film [s of simulated time]", .most = SCRIPT_LONGEST_S, .otherwise = "the recording's"},
-    {"fps", "N", OPTION_NUMBER, AT(fps), "frames a second of a film", .least = 1, .most = 240},
-    {"speed", "X", OPTION_NUMBER, AT(speed), "simulated seconds a second of film", .least = 0.01, .most = 1000},
-    CLI_VIEW(ReplayOptions, view, "what is seen"),
-    CLI_SIZE(ReplayOptions, width, "of pictures, films and the window"),
-    {"no-panels", NULL, OPTION_FLAG, AT(no_panels), "the views alone"},
+     "makes a regression scene from it: scene.yaml, hand.csv and the golden tool path, for `seldinger check FOLDER`"},
+    {"movie", "F.mp4", OPTION_FILE, AT(movie), "the whole recording as a video (H.264 by ffmpeg), rendered off screen"},
+    {"picture", "F.png", OPTION_FILE, AT(picture), "what the trainee saw at the end, rendered off screen …"},
+    {"at", "S", OPTION_NUMBER, AT(at_s), "… or at this moment [s of simulated time]; the window opens there", .most = SCRIPT_LONGEST_S, .otherwise = ""},
+    {"from", "S", OPTION_NUMBER, AT(from_s), "start of a video [s of simulated time]", .most = SCRIPT_LONGEST_S},
+    {"to", "S", OPTION_NUMBER, AT(to_s), "end of a video [s of simulated time]", .most = SCRIPT_LONGEST_S, .otherwise = "the end of the recording"},
+    {"fps", "N", OPTION_NUMBER, AT(fps), "frames per second of a video", .least = 1, .most = 240},
+    {"speed", "X", OPTION_NUMBER, AT(speed), "simulated seconds per second of video", .least = 0.01, .most = 1000},
+    CLI_VIEW(ReplayOptions, view, "the view shown"),
+    CLI_SIZE(ReplayOptions, width, "size of pictures, videos and the window"),
+    {"no-panels", NULL, OPTION_FLAG, AT(no_panels), "shows only the views"},
     {"close-up", "MM", OPTION_NUMBER, AT(close_up_mm),
-     "so much around the tools' tips, as they are at the beginning: in 3D, and in X-ray (40 at least) where nobody looked at it", .least = 5, .most = 400,
-     .otherwise = ""},
-    {"lao", "DEG", OPTION_NUMBER, AT(lao_deg), "C-arm for a recording that nobody looked at (`run --record`); negative: RAO", .least = -90, .most = 90,
-     .otherwise = "the scene's"},
-    {"cra", "DEG", OPTION_NUMBER, AT(cra_deg), "the same towards the head; negative: CAU", .least = -45, .most = 45, .otherwise = "the scene's"},
-    {"sessions", "FOLDER", OPTION_FOLDER, AT(sessions), "where a session that goes on is recorded, as for `nav`"},
-    {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "the window closes by itself after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
+     "shows this many mm around the initial positions of the tool tips: in 3D, and, for a recording without a viewer, in fluoroscopy (at least 40)", .least = 5,
+     .most = 400, .otherwise = ""},
+    {"lao", "DEG", OPTION_NUMBER, AT(lao_deg), "C-arm angle for a recording without a viewer (`run --record`); negative: RAO", .least = -90, .most = 90,
+     .otherwise = "that of the scene"},
+    {"cra", "DEG", OPTION_NUMBER, AT(cra_deg), "cranial C-arm angle for such a recording; negative: CAU", .least = -45, .most = 45,
+     .otherwise = "that of the scene"},
+    {"sessions", "FOLDER", OPTION_FOLDER, AT(sessions), "where a continued session is recorded, as for `nav`"},
+    {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "the window closes after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
     CLI_THREADS(ReplayOptions, threads),
-    CLI_QUIET(ReplayOptions, quiet, "no progress; --verify says only what differs"),
+    CLI_QUIET(ReplayOptions, quiet, "no progress; --verify reports only differences"),
 };
 
 static void set_defaults(void *structure)
@@ -39,11 +41,10 @@ static void set_defaults(void *structure)
 
 const OptionTable replay_options = {
     .program = "seldinger replay",
-    .does = "a recording shown, simulated again and compared, or made into a scene",
+    .does = "shows a recording, simulates it again and compares, or makes a scene from it",
     .usage = "REC.h5 [options]",
-    .intro = "Shows a recording that `nav` or `run --record` wrote, in a window: play, stop, search (Left, Right, the strip below), and go on from any moment "
-             "(F5) as a "
-             "new session. With one of the first four options no window is opened.",
+    .intro = "Shows a recording of `nav` or `run --record` in a window: play, pause, seek (Left, Right, the strip below), and continue from any moment (F5) "
+             "as a new session. With one of the first four options no window is opened.",
     .exits = "0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged",
     CLI_OPTIONS(options, ReplayOptions),
     .set_defaults = set_defaults,

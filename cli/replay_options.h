@@ -1,4 +1,4 @@
-// What can be asked of `replay`.
+// The options of `replay`.
 #ifndef SELDINGER_CLI_REPLAY_OPTIONS_H
 #define SELDINGER_CLI_REPLAY_OPTIONS_H
 
@@ -7,7 +7,7 @@
 typedef struct ReplayOptions {
     const char *recording, *scene_folder, *picture, *movie, *sessions;
     double duration_s, at_s, from_s, to_s, fps, speed, lao_deg, cra_deg, close_up_mm;
-    int width, height, view;         // of cli_view_name
+    int width, height, view;         // index in cli_view_name
     int threads;
     bool verify, quiet, no_panels;
 } ReplayOptions;

@@ -1,4 +1,4 @@
-// seldinger report: a session's file, its recording beside it and earlier sessions of the same trainee as one page, and that printed by a browser.
+// seldinger report: makes one page from a session file, its recording and earlier sessions of the same trainee; a browser prints it as PDF.
 #include "cli/cli.h"
 
 #include "base/base.h"
@@ -13,17 +13,17 @@
 
 typedef struct ReportOptions {
     const char *session, *html, *pdf, *with;
-    const char *recording;   // NULL where a session file was given
+    const char *recording;   // NULL if a session file was given
     bool quiet;
     char own_html[4096], own_folder[4096], beside[4096];
 } ReportOptions;
 
 static const Option rows[] = {
-    {"html", "F.html", OPTION_FILE, OPTION_AT(ReportOptions, html), "the page, one file that needs nothing else",
+    {"html", "F.html", OPTION_FILE, OPTION_AT(ReportOptions, html), "the page, a single self-contained file",
      .otherwise = "SESSION.html, unless --pdf is given"},
-    {"pdf", "F.pdf", OPTION_FILE, OPTION_AT(ReportOptions, pdf), "the same on paper, printed by chromium where that is installed"},
-    {"with", "FOLDER", OPTION_FOLDER, OPTION_AT(ReportOptions, with), "where earlier sessions lie", .otherwise = "the session's own folder"},
-    CLI_QUIET(ReportOptions, quiet, "says nothing where all went well"),
+    {"pdf", "F.pdf", OPTION_FILE, OPTION_AT(ReportOptions, pdf), "the page as PDF, printed by chromium if that is installed"},
+    {"with", "FOLDER", OPTION_FOLDER, OPTION_AT(ReportOptions, with), "folder of earlier sessions", .otherwise = "the session's own folder"},
+    CLI_QUIET(ReportOptions, quiet, "prints nothing if all went well"),
 };
 
 static const char *check(void *structure)
@@ -32,7 +32,7 @@ static const char *check(void *structure)
     const char *slash = strrchr(options->session, '/'), *dot = strrchr(options->session, '.');
     int stem = dot && (!slash || dot > slash) ? (int)(dot - options->session) : (int)strlen(options->session);
     if (strlen(options->session) > sizeof options->own_html - 16)
-        return "takes one session file or recording; the path of this one is too long";
+        return "the path of the session file or recording is too long";
     snprintf(options->own_html, sizeof options->own_html, "%.*s.html", stem, options->session);
     snprintf(options->own_folder, sizeof options->own_folder, "%.*s", slash ? (int)(slash - options->session + 1) : 1, slash ? options->session : ".");
     if (!options->html && !options->pdf)
@@ -44,23 +44,22 @@ static const char *check(void *structure)
 
 static const OptionTable table = {
     .program = "seldinger report",
-    .does = "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF",
+    .does = "makes a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF",
     .usage = "SESSION.json|REC.h5 [options]",
     .intro =
-        "A page about a trainee's session: points and how they came about, errors, plots over time, the tip's path over the vessel, and earlier sessions of "
-        "the same "
-        "trainee at the same exercise. The recording is looked for where the session says, beside it. Of a recording without a session file, as of a program "
-        "that was killed, the session file is made first, by simulating it again.",
-    .exits = "0 done (also where recording, vessel or scene lack and the page is shorter for it); 2 wrong usage or bad input",
+        "A page about a trainee's session: points and how they were earned, errors, plots over time, the tip's path through the vessel, and earlier sessions "
+        "of the same trainee at the same exercise. The recording is searched for at the path given in the session file, relative to that file. For a "
+        "recording without a session file, such as that of a program that was killed, the session file is made first by simulating the recording again.",
+    .exits = "0 done (also if recording, vessel or scene are missing and the page is therefore shorter); 2 wrong usage or bad input",
     CLI_OPTIONS(rows, ReportOptions),
     .check = check,
     .takes_argument = true,
     .argument = offsetof(ReportOptions, session),
-    .missing = "takes one session file or recording",
-    .too_many = "takes one session file or recording, not also ",
+    .missing = "expected one session file or recording",
+    .too_many = "expected one session file or recording, not also ",
 };
 
-// Of a recording: the session file beside it, which may have to be made first.
+// Finds the session file of a recording, in the same folder; it may have to be made first.
 static void name_session_file(ReportOptions *options)
 {
     if (file_kind(options->session) != FILE_RECORDING)

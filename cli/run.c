@@ -1,4 +1,4 @@
-// seldinger run: a scene headless, with what it leaves: summary, final state, recording, picture.
+// seldinger run: runs a scene headless and writes summary, final state, recording, picture.
 #include "cli/cli.h"
 
 #include "base/base.h"
@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-// Scene, script and all output files: everything that can be wrong before the run, in one pass.
+// Reads scene and script and checks all output files, so that one pass reports everything that is wrong before the run.
 static Scene *prepare_scene(const RunOptions *run, Faults *faults)
 {
     Scene *scene = scene_load(run->scene, faults);
@@ -26,7 +26,7 @@ static Scene *prepare_scene(const RunOptions *run, Faults *faults)
     return scene;
 }
 
-typedef struct Run {         // all that the verb takes and gives back
+typedef struct Run {         // state of one call of the verb
     Scene *scene;
     OpenVessel open;
     HeadlessRun headless;
@@ -43,7 +43,7 @@ static void watch_step(void *context, const HeadlessRun *headless)
         run_chart_step(run->chart, headless->simulator);
 }
 
-// Simulator, chart and hands. False with faults.
+// Opens simulator, chart and hands. False with faults.
 static bool begin(Run *run, const RunOptions *wanted, Faults *faults)
 {
     if (!headless_open(&run->headless, &wanted->headless, run->scene, &run->open, faults))
@@ -64,9 +64,9 @@ static int simulate(Run *run, const RunOptions *wanted, Faults *faults)
     if (!headless_drive(headless, run->hands ? run_hands_command : NULL, run->hands, faults))
         return EXIT_BAD_INPUT;
     if (wanted->headless.paced && !headless->report.real_time_priority && !wanted->quiet)
-        fprintf(stderr, "seldinger run: without real-time priority (SCHED_FIFO is not permitted here; see `ulimit -r` and CAP_SYS_NICE) other programs "
+        fprintf(stderr, "seldinger run: SCHED_FIFO is not permitted here (see `ulimit -r` and CAP_SYS_NICE); without real-time priority other programs "
                         "delay steps\n");
-    // what a recording that could not go on has broken off is another run than was asked for
+    // a run that ended early because its recording failed is not the requested run: write no other files
     bool good = headless->is_broken_off || run_files_write(&wanted->files, headless, &run->open, run->chart, contact, faults);
     if (!wanted->quiet)
         run_print(wanted->files.summary && !strcmp(wanted->files.summary, "-") ? stderr : stdout, headless->simulator, &headless->report, headless->node);

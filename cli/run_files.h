@@ -1,4 +1,4 @@
-// What `run` leaves: the recording, figures, the last state, pictures.
+// The output files of `run`: the recording, figures, the last state, pictures.
 #ifndef SELDINGER_CLI_RUN_FILES_H
 #define SELDINGER_CLI_RUN_FILES_H
 
@@ -6,12 +6,13 @@
 #include "cli/run_chart.h"
 #include "sim/sim.h"
 
-typedef struct RunFiles {    // NULL: not wanted
+typedef struct RunFiles {    // NULL: not requested
     const char *record, *summary, *final, *score, *picture, *chart;
 } RunFiles;
 
 void run_files_plan(const RunFiles *files, OutputPlan *plan);
-// After the run. False with faults where one could not be written. `contact`: what was asked for, for the title of the picture; NULL: the scene's.
+// Writes the files after the run. Returns false with faults if one could not be written. `contact`: the requested contact kind, for the title of the picture;
+// NULL: the scene's.
 bool run_files_write(const RunFiles *files, HeadlessRun *run, OpenVessel *open, const RunChart *chart, const char *contact, Faults *faults);
 
 #endif

@@ -8,13 +8,13 @@
 #include <string.h>
 #include <time.h>
 
-static const double patience_s = 5;      // for the first device
+static const double patience_s = 5;      // wait for the first device
 
 struct RunHands {
     Hands *hands;
     HandSet set;
     double dt;
-    unsigned buttons;            // held in the last step
+    unsigned buttons;            // pressed in the last step
     pthread_t speaker;
     _Atomic int ending;
 };
@@ -89,7 +89,7 @@ RunHands *run_hands_open(int map_count, const char *const *map, const Scene *sce
         nap(10);
     if (!is_any_ready(hands->hands)) {
         say_all(hands->hands);
-        faults_add(faults, "--device", 0, 0, "no device that fits came within %g s; `seldinger devices` lists what is there", patience_s);
+        faults_add(faults, "--device", 0, 0, "no matching device was connected within %g s; `seldinger devices` lists the connected devices", patience_s);
         hands_close(hands->hands);
         free(hands);
         return NULL;
@@ -99,7 +99,7 @@ RunHands *run_hands_open(int map_count, const char *const *map, const Scene *sce
         hand_set_add(&hands->set, hands_port(hands->hands, i / MAP_HANDS) + i % MAP_HANDS);
     if (pthread_create(&hands->speaker, NULL, speak, hands) == 0)
         return hands;
-    faults_add(faults, "--device", 0, 0, "no thread for the devices' messages");
+    faults_add(faults, "--device", 0, 0, "cannot start a thread for the messages of the devices");
     hands_close(hands->hands);
     free(hands);
     return NULL;

@@ -1,4 +1,4 @@
-// What can be asked of `run`.
+// The options of `run`.
 #ifndef SELDINGER_CLI_RUN_OPTIONS_H
 #define SELDINGER_CLI_RUN_OPTIONS_H
 
@@ -11,12 +11,12 @@ typedef struct RunOptions {
     RunFiles files;
     HeadlessOptions headless;
     int device_count, threads;
-    int contact;                     // of run_contact; -1: the scene's
+    int contact;                     // index in run_contact; -1: the scene's
     bool quiet;
 } RunOptions;
 
-extern const char *const run_contact[];      // as they are written …
-extern const ContactKind run_contact_kind[]; // … and what they stand for
+extern const char *const run_contact[];      // names of the contact kinds …
+extern const ContactKind run_contact_kind[]; // … and their values
 extern const OptionTable run_options;
 
 #endif

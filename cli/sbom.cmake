@@ -1,7 +1,9 @@
-# Writes what the program consists of beside it, as SPDX 2.3 in JSON (https://spdx.github.io/spdx-spec/v2.3): itself with its SHA-256, what it is linked to as
-# Debian packages with their versions, and the compiler. Called after each link:
+# Writes the software bill of materials of the program into its folder, as SPDX 2.3 in JSON
+# (https://spdx.github.io/spdx-spec/v2.3): the program with its SHA-256,
+# the libraries it is linked to, as Debian packages with their versions, and the compiler. Called after each link:
 #   cmake -DPROGRAM=... -DVERSION=... -DOUTPUT=... -DSTATIC="PACKAGE;..." -DCOMPILER=/usr/bin/gcc -DSOURCE=FOLDER -P cli/sbom.cmake
-# Packages come from ldd and dpkg; where these are absent, libraries are named by their files and without a version. The time is SOURCE_DATE_EPOCH, else that of
+# Packages come from ldd and dpkg; if these are missing, libraries are listed by their files and without a version. The
+# time is SOURCE_DATE_EPOCH, or else that of
 # the last commit, so that two builds of the same source write the same bytes.
 cmake_minimum_required(VERSION 3.25)
 
@@ -10,7 +12,7 @@ function(output_of variable)
   set(${variable} "${text}" PARENT_SCOPE)
 endfunction()
 
-# --- what is linked ---
+# --- linked libraries ---
 
 set(ENV{LC_ALL} C)
 output_of(listed ldd "${PROGRAM}")
@@ -34,7 +36,7 @@ foreach(line ${owners})
   endif()
 endforeach()
 
-# A relation of `package`; the first one given stays.
+# Records a relation of `package`; the first one recorded is kept.
 macro(relate package relation)
   if(NOT DEFINED "relation_${package}")
     set("relation_${package}" ${relation})
@@ -69,7 +71,7 @@ list(SORT packages)
 output_of(known dpkg-query -W "-f=\${Package}\t\${Version}\t\${Architecture}\t\${source:Package}\n" ${packages})
 string(REPLACE "\n" ";" known "${known}")
 
-# --- when ---
+# --- time ---
 
 set(time "$ENV{SOURCE_DATE_EPOCH}")
 if(NOT time)
@@ -101,7 +103,7 @@ foreach(package ${packages})
     list(GET about 1 version)
     list(GET about 2 architecture)
     list(GET about 3 source)
-    string(REPLACE "+" "%2B" encoded "${version}")     # as a package URL wants it
+    string(REPLACE "+" "%2B" encoded "${version}")     # as the package URL specification requires
     string(REPLACE ":" "%3A" encoded "${encoded}")
     string(REPLACE "+" "%2B" encoded_name "${package}")
     string(CONCAT facts "\"versionInfo\": \"${version}\", \"supplier\": \"Organization: Debian\", \"sourceInfo\": \"built from ${source}\", "

@@ -1,4 +1,4 @@
-// seldinger segment: RBT, a volume to a tree of centreline nodes with local point sets (recon/track/rbt_track.h).
+// seldinger segment: tracks a volume with RBT to a tree of centreline nodes with local point sets (recon/track/rbt_track.h).
 #include "cli/cli.h"
 
 #include "cli/segment_options.h"
@@ -19,7 +19,7 @@ static double seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-// What makes the result doubtful stands on standard error, with --quiet too.
+// Prints what makes the result doubtful on standard error, even with --quiet.
 static void print_warnings(const char *volume, const RbtStartCheck *check)
 {
     for (int i = 0; i < check->warning_count; i++)
@@ -37,7 +37,7 @@ static bool write_json(const SegmentCommand *command, const VesselTree *tree, co
     return good;
 }
 
-// False with a fault where there is none; the tree is written all the same.
+// Returns false with a fault if no picture can be drawn; the tree is written all the same.
 static bool draw_picture(const SegmentCommand *command, const Volume *volume, const VesselTree *tree, Faults *faults)
 {
     char message[512] = "built without pictures";

@@ -1,4 +1,4 @@
-// What can be asked of `segment`.
+// The options of `segment`.
 #ifndef SELDINGER_CLI_SEGMENT_OPTIONS_H
 #define SELDINGER_CLI_SEGMENT_OPTIONS_H
 
@@ -12,7 +12,7 @@ typedef struct SegmentCommand {
     Vec3 start_mm, until[SEGMENT_POINTS], rival[SEGMENT_POINTS];
     int until_count, rival_count;
     int threads;
-    double seed;             // -1: the trace's
+    double seed;             // -1: that of the trace
     bool quiet;
 } SegmentCommand;
 extern const OptionTable segment_options;

@@ -1,4 +1,4 @@
-// seldinger synth: synthetic shapes with known truth, as point sets, surfaces or noisy volumes; and a fitted model measured against truth.
+// seldinger synth: makes synthetic shapes with known truth, as point sets, surfaces or noisy volumes; measures a fitted model against the truth.
 #include "cli/cli.h"
 
 #include "cli/synth_options.h"
@@ -16,7 +16,7 @@ static bool measure(const SynthCommand *command, const Shape *shape, Faults *fau
         faults_add(faults, command->measure, 0, 0, "is a tree without a model; make one with `seldinger fit`");
     bool good = faults->count == 0 && shape_measure(shape, model, &figures);
     if (!good && faults->count == 0)
-        faults_add(faults, command->measure, 0, 0, "not enough memory");
+        faults_add(faults, command->measure, 0, 0, "out of memory");
     cJSON *root = cJSON_CreateObject();
     if (good && command->json) {
         shape_measure_add(root, &figures);

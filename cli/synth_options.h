@@ -1,4 +1,4 @@
-// What can be asked of `synth`.
+// The options of `synth`.
 #ifndef SELDINGER_CLI_SYNTH_OPTIONS_H
 #define SELDINGER_CLI_SYNTH_OPTIONS_H
 

@@ -20,11 +20,11 @@ bool device_list_load_maps(DeviceList *list, int map_count, const char *const *p
     list->own_map_count = list->map_count;
     for (int i = 0; i < BUILT_IN_COUNT; i++)
         if (!(list->map[list->map_count++] = device_map_built_in((BuiltInMap)i)))
-            faults_add(faults, "devices", 0, 0, "no memory for the built-in maps");
+            faults_add(faults, "devices", 0, 0, "out of memory for the built-in maps");
     return faults->count == 0;
 }
 
-// Names of the usages of a device's inputs, "X Y wheel button_1 … button_8"; the number of axes.
+// Writes the usages of a device's inputs, "X Y wheel button_1 … button_8", and returns the number of axes.
 static int describe_inputs(const HidDescriptor *descriptor, char *out, size_t capacity)
 {
     int axes = 0, buttons = 0;
@@ -71,7 +71,7 @@ static void explain_force(HidListing *listing)
     if (!pid_find(listing->descriptor, &layout, why, sizeof why))
         snprintf(listing->force, sizeof listing->force, "none: %s", why);
     else
-        snprintf(listing->force, sizeof listing->force, "constant force, %lld steps each way%s", (long long)layout.magnitude.field.logical_max,
+        snprintf(listing->force, sizeof listing->force, "constant force, %lld steps in each direction%s", (long long)layout.magnitude.field.logical_max,
                  listing->map && listing->map->force.is_wanted ? "" : "; its map has no 'force'");
 }
 
@@ -113,7 +113,7 @@ static void look_at_hid(const DeviceList *list, const HidTransport *transport, H
         snprintf(listing->why, sizeof listing->why, "%s", why);
 }
 
-// Names of /dev/input's nodes of one kind by sysfs, sorted as the system gives them.
+// Reads the names of the /dev/input nodes of one kind from sysfs, in the kernel's order.
 static int look_at_nodes(const char *prefix, InputNode *out)
 {
     int count = 0;

@@ -1,4 +1,4 @@
-// What is plugged in: HID devices, USB serial encoders, joysticks; what of it can drive the tool, and why the rest cannot.
+// Lists the connected devices (HID devices, USB serial encoders, joysticks), which of them can drive the tool, and why the others cannot.
 #ifndef SELDINGER_INPUT_DEVICE_LIST_H
 #define SELDINGER_INPUT_DEVICE_LIST_H
 
@@ -11,8 +11,8 @@ enum { LIST_DEVICES = 64, LIST_MAPS = 16, LIST_NODES = 64 };
 
 typedef struct HidListing {
     HidDeviceInfo info;
-    HidDescriptor *descriptor;       // NULL: `why` says why
-    const DeviceMap *map;            // NULL: none fits
+    HidDescriptor *descriptor;       // NULL: see `why`
+    const DeviceMap *map;            // NULL: no map fits
     bool is_usable;
     char why[1024], force[160];
 } HidListing;
@@ -32,11 +32,11 @@ typedef struct DeviceList {
     int map_count, own_map_count;
 } DeviceList;
 
-// Maps of one's own (at most LIST_MAPS files), then the built-in ones: the first that fits a device is taken. False with faults.
+// Loads the user's maps (at most LIST_MAPS files) and adds the built-in ones after them: the first map that fits a device is used. False with faults.
 bool device_list_load_maps(DeviceList *list, int map_count, const char *const *path, Faults *faults);
-// Fills the rest of a list that was zero but for its maps. `transport` NULL: no HID devices. Each device that has a map is opened once.
+// Fills the rest of a list that was zero except for its maps. `transport` NULL: no HID devices. Each device that has a map is opened once.
 void device_list_look(DeviceList *list, const HidTransport *transport);
-// Frees what it holds, and the list itself.
+// Frees the contents of the list and the list itself.
 void device_list_free(DeviceList *list);
 
 #endif

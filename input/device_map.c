@@ -35,7 +35,7 @@ static void copy_name(YamlValue value, char *out, size_t capacity)
 
 // --- which device ---
 
-// Vendor and product ids are written as lsusb does, 0x046d; decimal is good too.
+// Vendor and product ids may be hexadecimal as in lsusb, 0x046d, or decimal.
 static void read_id(YamlValue value, int least, int most, int *id)
 {
     const char *text;
@@ -83,14 +83,14 @@ static void read_device(YamlValue value, DeviceMap *map)
     if (yaml_has(&device, "usb") && yaml_choice(yaml_get(&device, "usb", false), buses) == 0)
         out->kind = MAP_FTDI;
     if (gamepad + yaml_has(&device, "joystick") + yaml_has(&device, "usb") > 1)
-        yaml_fault(value, "'device' is one of gamepad, joystick and usb");
+        yaml_fault(value, "'device' has several of gamepad, joystick and usb; expected one");
     bool has_ids = yaml_has(&device, "vendor_id") || yaml_has(&device, "product_id") || yaml_has(&device, "serial");
     if (out->kind == MAP_HID && !has_ids && !yaml_has(&device, "usage"))
-        yaml_fault(value, "'device' selects no device; expected vendor_id and product_id, or usage, or gamepad: true, joystick: \"name\", usb: ftdi");
+        yaml_fault(value, "'device' selects nothing; expected vendor_id and product_id, or usage, or gamepad: true, joystick: \"name\", usb: ftdi");
     if ((out->kind == MAP_GAMEPAD || out->kind == MAP_JOYSTICK) && (has_ids || yaml_has(&device, "usage")))
         yaml_fault(value, "gamepads and joysticks read through GLFW have no ids or usages; select one by joystick: \"part of its name\"");
     if (out->kind == MAP_FTDI && yaml_has(&device, "usage"))
-        yaml_fault(usage_value, "'%s' goes with HID devices", usage_value.name);
+        yaml_fault(usage_value, "'%s' is only valid for HID devices", usage_value.name);
 }
 
 // --- which tool ---
@@ -113,7 +113,7 @@ static void read_tool(YamlValue value, MapHand *hand)
     hand->drives = !strcmp(text, "outer") ? DRIVES_OUTER : !strcmp(text, "inner") ? DRIVES_INNER : DRIVES_CHOSEN;
 }
 
-// The map's hand that moves the tool, a new one where none does yet.
+// Index of the map's hand that moves this tool; adds one if there is none.
 static int hand_for(const YamlMap *control, DeviceMap *map, const MapHand *usual)
 {
     MapHand hand = *usual;
@@ -123,7 +123,7 @@ static int hand_for(const YamlMap *control, DeviceMap *map, const MapHand *usual
         if (!strcmp(map->hand[i].tool, hand.tool))
             return i;
     if (map->hand_count == MAP_HANDS) {
-        yaml_fault(control->value, "'%s' would move one tool too many; expected at most %d per device", control->value.name, MAP_HANDS);
+        yaml_fault(control->value, "'%s' moves one tool more than the limit; expected at most %d per device", control->value.name, MAP_HANDS);
         return 0;
     }
     map->hand[map->hand_count] = hand;
@@ -181,10 +181,10 @@ static void read_source(const DeviceMap *map, const YamlMap *control, MapSource 
     if (map->device.kind == MAP_HID && yaml_has(control, "index"))
         yaml_integer(yaml_get(control, "index", false), 0, HID_FIELD_LIMIT, &source->index);
     else if (yaml_has(control, "index"))
-        yaml_fault(yaml_get(control, "index", false), "'index' goes with HID usages");
+        yaml_fault(yaml_get(control, "index", false), "'index' is only valid with HID usages");
 }
 
-// A flag that may be left out.
+// Reads an optional flag.
 static void read_flag(const YamlMap *map, const char *key, bool *flag)
 {
     if (yaml_has(map, key))
@@ -203,23 +203,23 @@ static void read_calibration(const YamlMap *control, MapAxis *axis)
                    control->value.name);
 }
 
-// What goes only with a rate, or only with counts.
+// Checks keys that are valid only with a rate or only with counts.
 static void check_kind(const YamlMap *control, const DeviceMap *map, const MapAxis *axis)
 {
     static const char *const of_rates[] = {"logical_min", "logical_centre", "logical_max", "dead_zone", "exponent", NULL};
     for (int i = 0; !axis->is_rate && of_rates[i]; i++)
         if (yaml_has(control, of_rates[i]))
-            yaml_fault(yaml_get(control, of_rates[i], false), "'%s' goes with a deflection (mm_s, deg_s), not with counts", of_rates[i]);
+            yaml_fault(yaml_get(control, of_rates[i], false), "'%s' is only valid with a deflection (mm_s, deg_s), not with counts", of_rates[i]);
     if (axis->is_rate && (axis->kind == AXIS_RELATIVE || axis->kind == AXIS_COUNTER))
         yaml_fault(yaml_get(control, "kind", false), "a rate needs 'kind: deflection'; counts need mm_per_count or deg_per_count");
     if (!axis->is_rate && axis->kind == AXIS_DEFLECTION)
         yaml_fault(yaml_get(control, "kind", false), "counts need 'kind: relative' or 'kind: counter'; a deflection needs mm_s or deg_s");
     if (axis->is_rate && yaml_has(control, "counts_per_wrap"))
-        yaml_fault(yaml_get(control, "counts_per_wrap", false), "'counts_per_wrap' goes with counts");
+        yaml_fault(yaml_get(control, "counts_per_wrap", false), "'counts_per_wrap' is only valid with counts");
     if (axis->is_rate && map->device.kind == MAP_FTDI)
-        yaml_fault(control->value, "an encoder gives counts: mm_per_count or deg_per_count");
+        yaml_fault(control->value, "an encoder gives counts; expected mm_per_count or deg_per_count");
     if (!axis->is_rate && (map->device.kind == MAP_GAMEPAD || map->device.kind == MAP_JOYSTICK))
-        yaml_fault(control->value, "GLFW's axes are deflections: mm_s or deg_s");
+        yaml_fault(control->value, "GLFW's axes are deflections; expected mm_s or deg_s");
 }
 
 static void read_axis(YamlValue value, DeviceMap *map, const MapHand *usual, bool is_twist)
@@ -251,7 +251,7 @@ static void read_axis(YamlValue value, DeviceMap *map, const MapHand *usual, boo
                       .exponent = 1};
     read_source(map, &control, &axis->source);
     if (axis->is_rate == yaml_has(&control, count))
-        yaml_fault(value, "'%s' has one of %s and %s", value.name, rate, count);
+        yaml_fault(value, "'%s' needs exactly one of %s and %s", value.name, rate, count);
     yaml_map_number(&control, rate, false, (NumberRange){0, is_twist ? SCRIPT_FASTEST_DEG_S : SCRIPT_FASTEST_MM_S, true}, &axis->scale);
     yaml_map_number(&control, count, false, (NumberRange){0, is_twist ? 360 : 100, true}, &axis->scale);
     if (yaml_has(&control, "kind"))
@@ -259,7 +259,7 @@ static void read_axis(YamlValue value, DeviceMap *map, const MapHand *usual, boo
     read_calibration(&control, axis);
     yaml_map_number(&control, "counts_per_wrap", false, (NumberRange){0, 4294967296.0, false}, &axis->counts_per_wrap);
     if (axis->counts_per_wrap != floor(axis->counts_per_wrap) && !isnan(axis->counts_per_wrap))
-        yaml_fault(yaml_get(&control, "counts_per_wrap", false), "'counts_per_wrap' is a whole number");
+        yaml_fault(yaml_get(&control, "counts_per_wrap", false), "'counts_per_wrap' is not a whole number");
     yaml_map_number(&control, "dead_zone", false, (NumberRange){0, 0.9, false}, &axis->dead_zone);
     yaml_map_number(&control, "exponent", false, (NumberRange){0.2, 5, false}, &axis->exponent);
     read_flag(&control, "invert", &axis->invert);
@@ -280,7 +280,7 @@ static void read_button(YamlValue value, DeviceMap *map, unsigned bit)
     MapButton *button = &map->button[map->button_count++];
     *button = (MapButton){.bit = bit, .above = 0.5};
     if (map->device.kind == MAP_FTDI)
-        yaml_fault(value, "an encoder has counts, no buttons");
+        yaml_fault(value, "an encoder has counts but no buttons");
     else
         read_source(map, &control, &button->source);
     yaml_map_number(&control, "above", false, (NumberRange){-1, 1, false}, &button->above);
@@ -288,7 +288,7 @@ static void read_button(YamlValue value, DeviceMap *map, unsigned bit)
     read_flag(&control, "optional", &button->source.optional);
 }
 
-// One control or a list of them; `bit` 0: an axis.
+// Reads one control or a list of them; `bit` 0: an axis.
 static void read_controls(YamlValue value, DeviceMap *map, const MapHand *usual, bool is_twist, unsigned bit)
 {
     int count = !value.node ? 0 : yaml_is_list(value) ? yaml_count(value, 1, MAP_BUTTONS) : 1;
@@ -337,7 +337,7 @@ static void read_serial(YamlValue value, DeviceMap *map)
     if (!serial.value.node)
         return;
     if (map->device.kind != MAP_FTDI)
-        yaml_fault(value, "'serial' goes with device: {usb: ftdi}");
+        yaml_fault(value, "'serial' is only valid with device: {usb: ftdi}");
     if (yaml_has(&serial, "baud"))
         yaml_integer(yaml_get(&serial, "baud", false), 300, 3000000, &out->baud);
     if (yaml_has(&serial, "bits"))
@@ -348,9 +348,9 @@ static void read_serial(YamlValue value, DeviceMap *map)
         YamlValue name = yaml_item(counts, i);
         copy_name(name, out->count[i], sizeof out->count[i]);
         if (strpbrk(out->count[i], "+-0123456789 \t"))
-            yaml_fault(name, "'%s' precedes a number; expected letters without digits, signs and spaces", out->count[i]);
+            yaml_fault(name, "'%s' comes before a number in each line; expected a name without digits, signs and spaces", out->count[i]);
         if (i && !strcmp(out->count[0], out->count[1]))
-            yaml_fault(name, "'%s' stands twice", out->count[1]);
+            yaml_fault(name, "'%s' appears twice", out->count[1]);
     }
     if (count > 0)
         out->count_count = count;
@@ -414,7 +414,7 @@ DeviceMap *device_map_parse(const char *text, size_t length, const char *file, F
         snprintf(map->file, sizeof map->file, "%s", file);
         read_map(reader, map);
     } else {
-        faults_add(faults, file, 0, 0, "not enough memory for the device map");
+        faults_add(faults, file, 0, 0, "out of memory for the device map");
     }
     yaml_reader_close(reader);
     if (faults->count > before) {

@@ -1,4 +1,4 @@
-// The default maps for devices. Forward (away from the user) pushes, right turns clockwise as seen from behind.
+// The built-in device maps. Forward (away from the user) pushes; right turns clockwise as seen from behind.
 #include "input/device_map.h"
 
 #include <string.h>

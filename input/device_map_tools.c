@@ -15,7 +15,7 @@ static int tool_named(const ToolNames *tools, const char *name)
     return -1;
 }
 
-// The tools of this kind: how many, and the outermost of them.
+// Counts the tools of this kind and finds the outermost of them.
 static int tools_of_kind(const ToolNames *tools, const char *kind, int *first)
 {
     int count = 0;

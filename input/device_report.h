@@ -1,4 +1,4 @@
-// A list of devices (input/device_list.h), for people and as JSON.
+// Prints a list of devices (input/device_list.h) for readers and as JSON.
 #ifndef SELDINGER_INPUT_DEVICE_REPORT_H
 #define SELDINGER_INPUT_DEVICE_REPORT_H
 
@@ -7,6 +7,6 @@
 #include <stdio.h>
 
 void device_list_print(FILE *out, const DeviceList *list);
-char *device_list_json(const DeviceList *list);      // to be freed; NULL: no memory
+char *device_list_json(const DeviceList *list);      // the caller frees it; NULL if out of memory
 
 #endif

@@ -1,4 +1,4 @@
-// devices --watch: raw values as they come, with their least and most, and what the map makes of them.
+// devices --watch: raw values as they arrive, with minimum and maximum, and the commands that the map makes from them.
 #include "input/devices_watch.h"
 
 #include "input/map_state.h"
@@ -15,7 +15,7 @@ enum { MOST_WATCHED = 8, MOST_SHOWN = 24, SHOW_MS = 100 };
 
 typedef struct WatchedControl {
     HidField field;
-    int64_t value, least, most, sum;     // `sum` of relative ones
+    int64_t value, least, most, sum;     // `sum`: of relative controls
     bool has_value;
 } WatchedControl;
 
@@ -92,7 +92,7 @@ static void show(Watched *watched)
 {
     printf("%s  %s  %ld reports", watched->listing->info.path, watched->listing->info.product, watched->reports);
     if (watched->bad_reports)
-        printf(", %ld that the descriptor does not describe", watched->bad_reports);
+        printf(", %ld not described by the descriptor", watched->bad_reports);
     printf("%s\n", watched->device ? "" : ", unplugged");
     for (int i = 0; i < watched->control_count; i++) {
         const WatchedControl *control = &watched->control[i];
@@ -101,7 +101,7 @@ static void show(Watched *watched)
         if (!control->has_value)
             continue;
         if (control->field.flags & HID_RELATIVE)
-            printf("  %-14s %8lld counts in all (last %lld)\n", name, (long long)control->sum, (long long)control->value);
+            printf("  %-14s %8lld counts in total (last %lld)\n", name, (long long)control->sum, (long long)control->value);
         else
             printf("  %-14s %8lld  logical_min %lld, logical_max %lld so far (descriptor: %lld to %lld)\n", name, (long long)control->value,
                    (long long)control->least, (long long)control->most, (long long)control->field.logical_min, (long long)control->field.logical_max);
@@ -137,7 +137,7 @@ bool devices_watch(const HidTransport *transport, const HidListing *listing, int
         for (int i = 0; i < open_count; i++) {
             int length = 0;
             for (int k = 0; watched[i].device && k < 64; k++) {
-                // the first one waits, so that the loop does not run hot
+                // the first device waits, so that the loop does not spin
                 length = transport->read(transport->context, watched[i].device, bytes, HID_REPORT_BYTES, k == 0 ? 10 : 0);
                 if (length <= 0)
                     break;

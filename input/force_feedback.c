@@ -37,12 +37,12 @@ enum {
     MANAGED = 0xa9,
     CREATE_NEW_EFFECT = 0xab
 };
-// once a millisecond; a tick slightly early after a late one is accepted, else every other report would be dropped
+// once a millisecond; a tick slightly early after a late one is accepted, otherwise every other report would be dropped
 enum { EFFECT_MS = 500, SHORTEST_MS = 10, LONGEST_MS = 1000, PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, STOP_ATTEMPTS = 2, MOST_FAILURES = 20 };
 
 // --- finding ---
 
-// The data field with `usage` within a collection; any kind but input.
+// The data field with `usage` within a collection, of any kind except input.
 static PidControl find_number(const HidDescriptor *descriptor, uint32_t usage, int collection)
 {
     PidControl control = {0};
@@ -56,7 +56,7 @@ static PidControl find_number(const HidDescriptor *descriptor, uint32_t usage, i
     return control;
 }
 
-// A choice: the value of an array that names it, or, where each choice has a bit of its own, that bit.
+// A choice: the value that selects it in an array or, if each choice has a bit of its own, that bit.
 static PidControl find_choice(const HidDescriptor *descriptor, uint32_t usage, int collection)
 {
     PidControl control = find_number(descriptor, usage, collection);
@@ -72,7 +72,7 @@ static PidControl find_choice(const HidDescriptor *descriptor, uint32_t usage, i
     return control;
 }
 
-// The first data field within a collection, whatever it is called (directions are numbered, Ordinal page).
+// The first data field within a collection, whatever its usage (directions are numbered on the Ordinal page).
 static PidControl find_first(const HidDescriptor *descriptor, int collection)
 {
     for (int i = 0; i < descriptor->field_count; i++) {
@@ -116,7 +116,7 @@ static void find_set_effect(const HidDescriptor *descriptor, PidLayout *layout)
         layout->direction = find_first(descriptor, direction);
 }
 
-// Within the collection of a report, where the device has it.
+// Finds a field or choice within the collection of a report, if the device has that report.
 static PidControl in_report(const HidDescriptor *descriptor, int report, int usage, bool is_choice)
 {
     int collection = hid_find_collection(descriptor, PID(report), 0);
@@ -127,23 +127,23 @@ static PidControl in_report(const HidDescriptor *descriptor, int report, int usa
 
 static int64_t all_ones(const HidField *field) { return ((int64_t)1 << field->size) - 1; }
 
-// A value beyond the field's bits would be truncated to another one.
+// A value beyond the bits of the field would be truncated to a different value.
 static bool range_fits(const HidField *field)
 {
     int64_t half = (all_ones(field) + 1) / 2;
     return field->logical_min < 0 ? field->logical_min >= -half && field->logical_max < half : field->logical_max <= all_ones(field);
 }
 
-// [ms] of one count of the duration; 0x1001 and 0x1003 are seconds, without a unit milliseconds are meant.
+// Time [ms] of one count of the duration; 0x1001 and 0x1003 are seconds; without a unit, milliseconds are meant.
 static double duration_unit_ms(const HidField *field)
 {
     return 1000 * same_pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
 }
 
-// An effect ends by itself and is restarted before that, so the force ends if the program dies or hangs.
+// An effect ends by itself and is restarted before that, so that the force ends if the program dies or hangs.
 static int64_t duration_value(const HidField *field)
 {
-    // all ones would mean: without end
+    // all ones would mean an infinite duration
     int64_t most = field->logical_max < all_ones(field) ? field->logical_max : all_ones(field) - 1;
     double value = ceil(EFFECT_MS / duration_unit_ms(field));
     return (int64_t)fmax(fmax(1, (double)field->logical_min), fmin(value, (double)most));
@@ -158,15 +158,15 @@ int pid_duration_ms(const PidLayout *layout)
     return ms >= 1 && ms < 1e9 ? (int)ms : 0;
 }
 
-// Why an effect would not end soon after the program; NULL: it would.
+// Returns why an effect would not end soon after the program does; NULL: it would end.
 static const char *why_endless(const PidLayout *layout)
 {
     if (!same_report(&layout->duration, &layout->effect_type))
-        return "no duration of effects in the descriptor: a force would go on after the program";
+        return "no duration of effects in the descriptor: a force would continue after the program has ended";
     if (!range_fits(&layout->duration.field))
-        return "the duration's range does not fit its bits in the descriptor";
+        return "the range of the duration does not fit its bits in the descriptor";
     int ms = pid_duration_ms(layout);
-    return ms < SHORTEST_MS || ms > LONGEST_MS ? "its effects cannot be made to end by themselves after 0.01 to 1 s" : NULL;
+    return ms < SHORTEST_MS || ms > LONGEST_MS ? "its effects cannot be limited to a duration of 0.01 to 1 s" : NULL;
 }
 
 static const char *what_is_missing(const PidLayout *layout)
@@ -175,7 +175,7 @@ static const char *what_is_missing(const PidLayout *layout)
     if (!layout->create_type.is_there || !layout->effect_type.is_there || !layout->magnitude.is_there)
         return "no constant force effect in the descriptor";
     if (!layout->load_index.is_there)
-        return "no PID Block Load report in the descriptor (an effect's number cannot be asked for)";
+        return "no PID Block Load report in the descriptor (the index of an effect cannot be queried)";
     if (!same_report(&layout->effect_index, &layout->effect_type) || !same_report(&layout->force_index, &layout->magnitude))
         return "its effect reports have no effect block index in the descriptor";
     if (!layout->start.is_there || !same_report(&layout->operation_index, &layout->start))
@@ -185,7 +185,7 @@ static const char *what_is_missing(const PidLayout *layout)
     if (magnitude->logical_min > 0)
         return "the magnitude of constant forces has no zero in the descriptor";
     if (!range_fits(magnitude))
-        return "the magnitude's range does not fit its bits in the descriptor";
+        return "the range of the magnitude does not fit its bits in the descriptor";
     return why_endless(layout);
 }
 
@@ -207,7 +207,7 @@ bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, siz
     layout->start = in_report(descriptor, EFFECT_OPERATION_REPORT, OP_START, true);
     layout->stop = in_report(descriptor, EFFECT_OPERATION_REPORT, OP_STOP, true);
     layout->loop_count = in_report(descriptor, EFFECT_OPERATION_REPORT, LOOP_COUNT, false);
-    // the control collection may be inside a report's or separate, so search everywhere
+    // the control collection may be inside that of a report or separate, so search everywhere
     layout->reset = find_choice(descriptor, PID(DEVICE_RESET), 0);
     layout->enable = find_choice(descriptor, PID(ENABLE_ACTUATORS), 0);
     layout->stop_all = find_choice(descriptor, PID(STOP_ALL), 0);
@@ -222,7 +222,7 @@ bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, siz
 
 // --- encoding ---
 
-// An empty message for the report that `control` belongs to; false if there is none or it is longer than any of this class.
+// Begins an empty message for the report that contains `control`; false if there is none or it is longer than PidMessage allows.
 static bool begin(const PidLayout *layout, const PidControl *control, PidMessage *out)
 {
     int id = control->field.report_id, length = control->is_there ? layout->report_bytes[control->field.kind][id] : 0;
@@ -280,7 +280,7 @@ bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length
            hid_field_read(&managed->field, managed->slot, bytes + 1, length - 1, &value) && value == 0;
 }
 
-// Outside the range is "no value", of a trigger: none.
+// A value outside the range means "no value"; for a trigger: no trigger.
 static bool has_null(const PidControl *control) { return control->field.logical_min >= 0 && all_ones(&control->field) > control->field.logical_max; }
 
 bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out)
@@ -304,7 +304,7 @@ bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg,
     return true;
 }
 
-// Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.
+// Without a direction field, a force > 0 comes from the positive end of its axis (east, south). Returns -1 for forces that come from north or west.
 static double pid_axis_sign(const PidLayout *layout, double direction_deg)
 {
     return !layout->direction.is_there && (direction_deg < 45 || direction_deg > 225) ? -1 : 1;
@@ -369,7 +369,7 @@ static bool send(const PidMessage *message, const HidTransport *transport, void 
     return sent >= message->length - (message->bytes[0] == 0);
 }
 
-// Allocates an effect block; 0: the device refuses.
+// Allocates an effect block; 0 if the device refuses.
 static int create_effect(const PidLayout *layout, const HidTransport *transport, void *device)
 {
     PidMessage message;
@@ -394,7 +394,7 @@ static bool needs_host(const PidLayout *layout, const HidTransport *transport, v
     return length > 0 && length <= (int)sizeof answer && pid_needs_host(layout, answer, (size_t)length);
 }
 
-// Uploads effect `which` at zero force; it is started by the first force_tick that may.
+// Uploads effect `which` at zero force; the first force_tick() that may send forces starts it.
 static bool upload(ForceFeedback *force, int which, const HidTransport *transport, void *device)
 {
     const PidLayout *layout = &force->layout;
@@ -427,7 +427,7 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
         return false;
     }
     if (needs_host(&force->layout, transport, device)) {
-        snprintf(force->text, sizeof force->text, "none: its memory of effects is not managed by the device, and the host's part is not here");
+        snprintf(force->text, sizeof force->text, "none: the device needs the host to manage its effect memory, which is not supported");
         return false;
     }
     if (pid_encode_reset(&force->layout, &message))
@@ -438,7 +438,7 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
         send(&message, transport, device);
     if (!upload(force, 0, transport, device)) {
         force->block[0] = 0;
-        snprintf(force->text, sizeof force->text, "none: the device did not take a constant force effect");
+        snprintf(force->text, sizeof force->text, "none: the device did not accept a constant force effect");
         return false;
     }
     bool has_torque = map->force.full_scale_n_mm > 0 && !isnan(force->direction_deg[1]) && force->layout.direction.is_there;
@@ -455,7 +455,7 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
     return true;
 }
 
-// Failures are counted, so that a device that accepts nothing is given up: each failure may block the thread for a whole transfer.
+// Counts consecutive failures so that a device that accepts nothing is abandoned: each failure may block the thread for a whole transfer.
 static bool try_send(ForceFeedback *force, const PidMessage *message, const HidTransport *transport, void *device)
 {
     bool is_sent = send(message, transport, device);
@@ -464,7 +464,7 @@ static bool try_send(ForceFeedback *force, const PidMessage *message, const HidT
     return is_sent;
 }
 
-// Sends an effect's magnitude as a fraction of full scale, unless the device already has it.
+// Sends the magnitude of an effect as a fraction of full scale, unless the device already has it.
 static bool write_force(ForceFeedback *force, int which, double part, const HidTransport *transport, void *device)
 {
     PidMessage message;
@@ -481,7 +481,7 @@ static bool write_force(ForceFeedback *force, int which, double part, const HidT
 static bool start_effects(ForceFeedback *force, int64_t now_us, const HidTransport *transport, void *device)
 {
     PidMessage message;
-    // even if the device reports otherwise
+    // assume that it plays, even if the device reports otherwise
     force->may_play = true;
     force->started_us = now_us;
     for (int i = 0; i < 2 && force->block[i]; i++)
@@ -490,7 +490,7 @@ static bool start_effects(ForceFeedback *force, int64_t now_us, const HidTranspo
     return true;
 }
 
-// Zero and stop for each effect; a failure does not prevent the others.
+// Sends zero and stop for each effect; a failure does not prevent the others.
 static bool rest(ForceFeedback *force, const HidTransport *transport, void *device)
 {
     PidMessage message;
@@ -504,7 +504,7 @@ static bool rest(ForceFeedback *force, const HidTransport *transport, void *devi
     return good;
 }
 
-// An effect is started only at a known zero, because the device's last magnitude is outdated.
+// An effect is started only at a known zero, because the last magnitude in the device is outdated.
 static bool play(ForceFeedback *force, int64_t now_us, const HidTransport *transport, void *device)
 {
     if (!force->may_play) {
@@ -531,8 +531,8 @@ static void let_go(ForceFeedback *force, const char *why)
 static void give_up(ForceFeedback *force, const HidTransport *transport, void *device)
 {
     force_stop(force, transport, device);
-    let_go(force, "the device takes no forces");
-    snprintf(force->text, sizeof force->text, "none: the device takes no forces (%d writes one after the other failed)", MOST_FAILURES);
+    let_go(force, "the device accepts no forces");
+    snprintf(force->text, sizeof force->text, "none: the device accepts no forces (%d consecutive writes failed)", MOST_FAILURES);
 }
 
 void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device)
@@ -542,17 +542,17 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
     double sign = force->map.invert ? -1 : 1;
     const double wanted[2] = {sign * atomic_load(&port->force_n), sign * atomic_load(&port->torque_n_mm)};
     int64_t writes = force->writes;
-    // an effect that has ended by itself exerts no force: the force grows from zero
+    // an effect that has ended exerts no force: the force grows again from zero
     bool has_ended = force->may_play && now_us - force->started_us >= force->effect_us;
     force_guard(&force->guard, &force->map, wanted, atomic_load(&port->step), now_us, report_us, paused);
     if (has_ended && !force->guard.why_zero[0])
-        let_go(force, "it ended before it was started again");
+        let_go(force, "the effect ended before it was restarted");
     else if (force->must_rest && !force->guard.why_zero[0])
-        let_go(force, "the device did not take a report");
+        let_go(force, "the device did not accept a report");
     bool is_played = !force->guard.why_zero[0] && play(force, now_us, transport, device);
     if (!is_played) {
         if (!force->guard.why_zero[0])
-            let_go(force, "the device did not take a report");
+            let_go(force, "the device did not accept a report");
         force->must_rest = !rest(force, transport, device);
     }
     if (force->failures >= MOST_FAILURES)
@@ -561,7 +561,7 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
         force->due_us = force->due_us + PERIOD_US > now_us + LEAST_GAP_US ? force->due_us + PERIOD_US : now_us + LEAST_GAP_US;
 }
 
-// Retried once on failure, because nothing follows.
+// Retries once on failure, because no later message follows.
 static void insist(const PidMessage *message, const HidTransport *transport, void *device)
 {
     for (int i = 0; i < STOP_ATTEMPTS && !send(message, transport, device); i++)

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { LONGEST_GAP_US = 50000 };    // a longer time between two looks counts as this much for the slew limit
+enum { LONGEST_GAP_US = 50000 };    // a longer interval between two calls counts as this long for the slew limit
 
 static double clamp(double value, double most) { return fmax(-most, fmin(most, value)); }
 
@@ -33,7 +33,7 @@ void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2],
     guard->why_zero = why_zero(guard, map, wanted, step, now_us, report_us, paused);
     guard->last_us = now_us;
     for (int i = 0; i < 2; i++) {
-        // a torque has the force's limits, relative to its own full scale
+        // a torque has the same relative limits as the force, scaled to its own full scale
         double unit = i == 0 ? 1 : map->full_scale_n_mm / map->full_scale_n;
         double most = map->max_n * unit, change = map->slew_n_s * unit * 1e-6 * (double)gap;
         if (guard->why_zero[0])

@@ -11,10 +11,10 @@ typedef struct ForceGuard {
     double sent[2];                  // force [N], torque [N mm]
     int64_t last_us, step, step_grew_us;
     bool has_started;
-    const char *why_zero;            // "" while forces may be sent
+    const char *why_zero;            // "" if forces may be sent
 } ForceGuard;
 
-// The force that may be sent now: `wanted` force [N] and torque [N mm] -> guard->sent. `step`: HandPort.step. `report_us`: time of the device's last
+// Computes from `wanted` (force [N], torque [N mm]) the force that may be sent now, guard->sent. `step`: HandPort.step. `report_us`: time of the device's last
 // report.
 void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2], int64_t step, int64_t now_us, int64_t report_us, bool paused);
 

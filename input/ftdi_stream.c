@@ -10,10 +10,10 @@ static const int64_t largest_count = (int64_t)1 << 32;
 
 uint32_t ftdi_baud_divisor(int baud, double *actual)
 {
-    // eighths of the divisor as the chip codes them: 0, 1/8, 1/4, 3/8, 1/2, 5/8, 3/4, 7/8
+    // the chip's codes for eighths of the divisor: 0, 1/8, 1/4, 3/8, 1/2, 5/8, 3/4, 7/8
     static const uint32_t code[] = {0, 3, 2, 4, 1, 5, 6, 7};
     long eighths = ((long)BASE_CLOCK * 16 / baud + 1) / 2;
-    // 1 and 1.5 are written 0 and 1; between 1 and 2 there is nothing else
+    // divisors 1 and 1.5 are written 0 and 1; nothing else exists between 1 and 2
     eighths = eighths < 8 ? 8 : eighths > 8 * 0x3fff + 7 ? 8 * 0x3fff + 7 : eighths;
     if (eighths < 16)
         eighths = eighths < 10 ? 8 : eighths < 14 ? 12 : 16;
@@ -30,7 +30,7 @@ void ftdi_set_up(int baud, int port, FtdiRequest request[FTDI_SET_UP])
     double actual;
     uint32_t divisor = ftdi_baud_divisor(baud, &actual);
     uint16_t index = (uint16_t)port;
-    // chips with one port take the divisor's highest bit in the low byte of the index, others in the high one beside the port
+    // chips with one port have the highest bit of the divisor in the low byte of the index, others in the high byte, with the port in the low byte
     uint16_t baud_index = port ? (uint16_t)(divisor >> 16 << 8 | index) : (uint16_t)(divisor >> 16);
     const FtdiRequest all[FTDI_SET_UP] = {{RESET, RESET_CHIP, index},
                                           {RESET, EMPTY_RECEIVED, index},
@@ -46,7 +46,7 @@ void ftdi_set_up(int baud, int port, FtdiRequest request[FTDI_SET_UP])
 
 static bool is_separator(char c) { return c == ' ' || c == '\t' || c == ',' || c == ';'; }
 
-// The name at `at`, its length in *used: the longest that fits; -1: none.
+// Finds the longest name at `at`, with its length in *used; -1: none.
 static int name_at(const MapSerial *serial, const char *at, size_t left, size_t *used)
 {
     int found = -1;
@@ -59,7 +59,7 @@ static int name_at(const MapSerial *serial, const char *at, size_t left, size_t 
     return found;
 }
 
-// A whole number with an optional sign; how many letters it takes, 0: none or too large.
+// Parses a whole number with an optional sign; returns its length in characters, 0 if there is none or it is too large.
 static size_t whole_number(const char *at, size_t left, int64_t *number)
 {
     size_t i = 0, first;

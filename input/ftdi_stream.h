@@ -1,5 +1,5 @@
-// The protocol of FTDI FT232-type USB serial chips: requests, and decoding of received bytes: lines of counts, "A1234 R-56\n". Pure functions;
-// usb_encoder.h has the device and the sources.
+// Protocol of FTDI FT232-type USB serial chips: requests, and decoding of the bytes received, which are lines of counts, "A1234 R-56\n". Pure functions;
+// usb_encoder.h accesses the device and cites the sources.
 #ifndef SELDINGER_INPUT_FTDI_STREAM_H
 #define SELDINGER_INPUT_FTDI_STREAM_H
 
@@ -11,17 +11,18 @@
 
 enum { ENCODER_LINE = 64, ENCODER_COUNTS = 2 };
 
-// A control request, bmRequestType 0x40 (vendor, to the device), no data.
+// A control request, bmRequestType 0x40 (vendor, to the device), without data.
 typedef struct FtdiRequest {
     uint8_t request;
     uint16_t value, index;
 } FtdiRequest;
 
 enum { FTDI_SET_UP = 7 };
-// The requests that set up a chip: reset, both buffers emptied, `baud`, 8 data bits no parity one stop bit, no flow control, latency 1 ms. `index`
-// low byte: the port, 0 for chips with one, 1 for the first of several.
+// The requests that set up a chip: reset, flush both buffers, `baud`, 8 data bits, no parity, one stop bit, no flow control, latency 1 ms. The low byte of
+// `index` is the
+// port: 0 for chips with one port, 1 for the first of several.
 void ftdi_set_up(int baud, int port, FtdiRequest request[FTDI_SET_UP]);
-// Value (low 16 bits) and index (bits 16 and up) of a baud rate: 3 MHz over a divisor in eighths; *actual: what comes out [baud].
+// Value (low 16 bits) and index (bits 16 and above) of a baud rate: 3 MHz divided in steps of one eighth; *actual: the resulting rate [baud].
 uint32_t ftdi_baud_divisor(int baud, double *actual);
 
 typedef struct FtdiStream {
@@ -31,20 +32,22 @@ typedef struct FtdiStream {
     int64_t lines, bad_lines, errors;    // overruns, parity, framing, breaks
 } FtdiStream;
 
-// One line: fresh[i] if it contained count i.
+// One line: fresh[i] is true if it contained count i.
 typedef struct EncoderLine {
     int64_t count[ENCODER_COUNTS];
     bool fresh[ENCODER_COUNTS];
 } EncoderLine;
 
-// Names and whole numbers in any order, "A12 R-3" or "R=7,A=-2": false if the line has anything else, a name twice, a number beyond +-2^32, or none.
+// Parses names and whole numbers in any order, "A12 R-3" or "R=7,A=-2". Returns false if the line contains anything else, a name twice, a number beyond +-2^32,
+// or none.
 bool encoder_parse_line(const MapSerial *serial, const char *line, size_t length, EncoderLine *out);
 
-// Decodes one bulk transfer: packets of `packet_size` bytes (64, or 512 of high-speed chips), the first two of each status. Each complete line is
-// passed to `take`. Lines may be split anywhere; bytes before the first line end are dropped, since they may be a partial line.
+// Decodes one bulk transfer: packets of `packet_size` bytes (64, or 512 for high-speed chips), whose first two bytes are status. Each complete line is passed
+// to `take`.
+// Lines may be split anywhere; bytes before the first line end are dropped, since they may be a partial line.
 typedef void EncoderTake(void *context, const EncoderLine *line);
 void ftdi_stream_take(FtdiStream *stream, const MapSerial *serial, const uint8_t *bytes, size_t length, size_t packet_size, EncoderTake *take, void *context);
-// As after opening: the first line may be partial.
+// Resets the state as after opening: the first line may be partial.
 void ftdi_stream_start(FtdiStream *stream);
 
 #endif

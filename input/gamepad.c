@@ -55,7 +55,7 @@ bool gamepad_ids_of_guid(const char *guid, int *vendor_id, int *product_id)
     if (strlen(guid) != 32)
         return false;
     int vendor = word_of_guid(guid, 4), product = word_of_guid(guid, 8);
-    // names instead of ids fill the bytes that are 0 here
+    // GUIDs that contain a name instead of ids use the bytes that are 0 here
     if (word_of_guid(guid, 2) != 0 || word_of_guid(guid, 6) != 0 || word_of_guid(guid, 10) != 0 || vendor <= 0 || product < 0)
         return false;
     *vendor_id = vendor;

@@ -10,7 +10,7 @@
 
 enum { DEVICES_LISTED = 64, MOST_MAPS = 16 };
 
-// A device that cannot be used: reported once, forgotten when unplugged.
+// A device that cannot be used: reported once, and forgotten when unplugged.
 typedef struct Refusal {
     HidDeviceInfo device;
     int attempts;
@@ -77,7 +77,7 @@ static void device_name(const HidDeviceInfo *device, char *out, size_t capacity)
         snprintf(out, capacity, "device %04x:%04x", device->vendor_id, device->product_id);
 }
 
-// The refusal of this device, a new one where there is none yet; NULL if too many are kept.
+// The refusal of this device, added if there is none yet; NULL if too many are stored.
 static Refusal *refusal_of(Hands *hands, const HidDeviceInfo *device)
 {
     Refusal *free_one = NULL;
@@ -104,7 +104,7 @@ static HidDescriptor *read_descriptor(const Hands *hands, const HidDeviceInfo *d
     return hid_descriptor_parse(bytes, (size_t)length, name, faults);
 }
 
-// A slot for the device: its former one, else a free one; NULL if all are in use.
+// A slot for the device: its previous one, else a free one; NULL if all are in use.
 static HandSlot *slot_for(Hands *hands, const HidDeviceInfo *device)
 {
     for (int i = 0; i < HANDS_MOST; i++) {
@@ -118,7 +118,8 @@ static HandSlot *slot_for(Hands *hands, const HidDeviceInfo *device)
     return NULL;
 }
 
-// Takes over the slot of its predecessor and starts a thread for the device. False with a fault if no thread can be started.
+// Keeps the displacements of the slot if the device has returned with the same map, and starts a thread. Returns false with a fault if no thread can be
+// started.
 static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const DeviceMap *map, const MapState *fresh, const char *name, Faults *faults)
 {
     HandShared *shared = slot->shared;
@@ -133,7 +134,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     slot->identity = *device;
     slot->map = map;
     slot->is_used = true;
-    map_publish(map, &slot->state, slot->port);      // the tool whose force it feeds back is known before its first report
+    map_publish(map, &slot->state, slot->port);      // sets the tool for force feedback before the first report
     atomic_store(&slot->has_ended, false);
     pthread_mutex_lock(&shared->lock);
     snprintf(slot->info.name, sizeof slot->info.name, "%s", name);
@@ -147,7 +148,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     if (slot->has_thread)
         hand_say(shared, is_back ? "%s is back (map '%s')" : "%s drives the tool (map '%s')", name, map->name);
     else
-        faults_add(faults, name, 0, 0, "no thread for it");
+        faults_add(faults, name, 0, 0, "cannot start a thread for it");
     return slot->has_thread;
 }
 
@@ -212,7 +213,7 @@ static void tell_refusal(Hands *hands, const HidDeviceInfo *device, const Faults
         return;
     refusal->is_listed = true;
     refusal->attempts += refusal->attempts < 3;
-    // permissions are set shortly after the device appears: retry at each scan, report at the second
+    // udev sets permissions shortly after the device appears: retry at each scan, report at the second
     for (int i = 0; refusal->attempts == 2 && i < faults->count && i < 4; i++)
         hand_say(&hands->shared, "not used: %s", faults->text[i]);
 }
@@ -227,7 +228,7 @@ static void try_device(Hands *hands, const HidDeviceInfo *device, const DeviceMa
     device_name(device, name, sizeof name);
     HandSlot *slot = slot_for(hands, device);
     if (!slot)
-        faults_add(&faults, name, 0, 0, "at most %d devices drive the tool", HANDS_MOST);
+        faults_add(&faults, name, 0, 0, "is not used: at most %d devices can drive the tools", HANDS_MOST);
     else if (is_encoder ? connect_encoder(hands, slot, device, map, name, &faults) : connect_hid(hands, slot, device, map, name, &faults))
         return;
     tell_refusal(hands, device, &faults);
@@ -249,7 +250,7 @@ static void look_for_encoders(Hands *hands)
         is_wanted |= hands->map[i]->device.kind == MAP_FTDI;
     if (!hands->use_usb || !is_wanted)
         return;
-    // libusb learns of new devices from udevd; without it (in a container) only a new libusb context sees them, which needs all devices closed
+    // libusb learns of new devices from udevd; without udevd (in a container) only a new libusb context sees them, which requires all devices to be closed
     for (int i = 0; i < HANDS_MOST; i++)
         is_one_open |= hands->slot[i].has_thread && hands->slot[i].encoder_runs;
     if (!is_one_open) {
@@ -323,7 +324,7 @@ static bool copy_maps(Hands *hands, const HandsOptions *options)
     return true;
 }
 
-// A signal delivered to a device thread would look like an unplugged device, so the threads block all signals.
+// The threads block all signals, because a signal delivered to a device thread would look like an unplugged device.
 static bool start_scanner(Hands *hands)
 {
     sigset_t all, before;
@@ -342,7 +343,7 @@ Hands *hands_open(const HandsOptions *options, Faults *faults)
         faults_add(faults, "devices", 0, 0, "out of memory");
         return NULL;
     }
-    // waits must not depend on the wall clock being set
+    // the monotonic clock: waits must not depend on changes of the wall clock
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
     pthread_mutex_init(&hands->shared.lock, NULL);
@@ -360,7 +361,7 @@ Hands *hands_open(const HandsOptions *options, Faults *faults)
         hands->shared.transport = *transport;
     hands->has_scanner = transport && copy_maps(hands, options) && start_scanner(hands);
     if (!hands->has_scanner) {
-        faults_add(faults, "devices", 0, 0, "%s", transport ? "not enough memory or no thread to look for them" : "hidapi cannot be started");
+        faults_add(faults, "devices", 0, 0, "%s", transport ? "out of memory, or cannot start a thread" : "hidapi cannot be started");
         hands_close(hands);
         return NULL;
     }

@@ -1,10 +1,11 @@
 // All HID and USB input devices ("hands") of a session: finds the devices that match a map (the user's, else a built-in one), opens them, and writes
 // their HandPorts, up to MAP_HANDS each: one for each tool that the map moves.
 //
-// One thread scans for devices every half second; one thread per device reads its reports and writes its forces. Ports exist from start to end,
-// HAND_ABSENT until a device is found, so the 1 kHz thread samples all of them and never waits. An unplugged device's (first) port turns HAND_LOST,
-// its rates and buttons zero, its displacements unchanged; when it comes back (same vendor, product, serial, interface) it has the same port and
-// continues. GLFW's gamepads and joysticks are not here (input/gamepad.h): GLFW wants the window's thread.
+// One thread scans for devices every half second; one thread per device reads its reports and sends its forces. Ports exist from start to end and are
+// HAND_ABSENT until a device is found, so the 1 kHz thread samples all of them and never waits. When a device is unplugged, its (first) port becomes HAND_LOST,
+// its rates and buttons zero, its displacements unchanged; when it returns (same vendor, product, serial, interface) it gets the same port and continues.
+// GLFW's
+// gamepads and joysticks are handled in input/gamepad.h, because GLFW must be called from the window's thread.
 #ifndef SELDINGER_INPUT_HAND_H
 #define SELDINGER_INPUT_HAND_H
 
@@ -22,16 +23,16 @@ enum { HANDS_MOST = 8 };
 typedef struct Hands Hands;
 
 typedef struct HandsOptions {
-    const DeviceMap *const *map;     // the user's, copied; the first match is used, before the built-in ones
+    const DeviceMap *const *map;     // the user's maps, copied; the first match is used, before the built-in ones
     int map_count;
     bool use_built_in;               // default true: joysticks, gamepads, multi-axis controllers and haptic devices without a user map
-    bool use_usb;                    // default true: look for USB serial encoders if a map names one
-    int rescan_ms;                   // 500
-    const HidTransport *transport;   // NULL: hidapi; else the caller's, kept until hands_close
+    bool use_usb;                    // default true: look for USB serial encoders if a map selects one
+    int rescan_ms;                   // interval between scans, default 500
+    const HidTransport *transport;   // NULL: hidapi; otherwise the caller's, which must outlive the Hands
 } HandsOptions;
 HandsOptions hands_default_options(void);
 
-// Starts the threads; NULL with faults on failure. The absence of devices is not a fault.
+// Starts the threads. Returns NULL with faults on failure. No connected device is not a fault.
 Hands *hands_open(const HandsOptions *options, Faults *faults);
 // Sets forces to zero, releases devices, ends threads (within about 0.3 s).
 void hands_close(Hands *hands);
@@ -40,16 +41,16 @@ HandPort *hands_port(Hands *hands, int index);           // the first of a devic
 // Sets forces to zero while paused (rates and displacements are still read); any thread.
 void hands_pause(Hands *hands, bool paused);
 
-void hands_info(Hands *hands, int index, HandInfo *info);    // any thread but the 1 kHz one (takes a lock)
+void hands_info(Hands *hands, int index, HandInfo *info);    // any thread except the 1 kHz one (takes a lock)
 
-// Whether a port here belongs to this device: then GLFW's joystick of the same ids is left alone, or it would count twice (gamepad_ids_of_guid).
+// True if a port belongs to this device. GLFW's joystick with the same ids must then be ignored, or it would count twice (gamepad_ids_of_guid).
 bool hands_drives(Hands *hands, int vendor_id, int product_id);
 
 // The first of `map` (NULL entries are skipped) that matches a HID device.
 const DeviceMap *hands_choose_map(const DeviceMap *const *map, int count, const HidDeviceInfo *device);
 
-// The next message for the user ("roller unplugged: the tool stops; plug it in again to continue"), oldest first; false if there is none. At most 32
-// are kept, none longer than HAND_MESSAGE_LENGTH with its NUL. Any thread but the 1 kHz one.
+// Returns the next message for the user ("roller unplugged: the tool stops; plug it in again to continue"), oldest first; false if there is none. At most 32
+// are kept, none longer than HAND_MESSAGE_LENGTH including its NUL. Any thread except the 1 kHz one.
 bool hands_message(Hands *hands, char *text, size_t capacity);
 
 #endif

@@ -15,10 +15,10 @@ typedef struct HandInfo {
     int vendor_id, product_id;
     char map[MAP_NAME];
     int hand_count;                  // ports in use (hands_port)
-    char force[160];                 // "constant force, 255 steps for 8 N" or why there is none
-    int64_t reports, bad_reports;    // read; short or of unknown id
-    double report_hz;                // over the last second or so
-    double force_n;                  // sent now
+    char force[160];                 // "constant force, 255 steps for 8 N", or why there is none
+    int64_t reports, bad_reports;    // reports read; reports too short or of unknown id
+    double report_hz;                // over about the last second
+    double force_n;                  // force sent now
 } HandInfo;
 
 #endif

@@ -65,7 +65,7 @@ static void show_force(HandSlot *slot)
     pthread_mutex_unlock(&slot->shared->lock);
 }
 
-// Reports arrive at any time; wait for a force due within the next millisecond, else it would wait for the report after next.
+// Reports arrive at any time. Waits for a force due within the next millisecond; otherwise it would be sent only after the report following the next one.
 static int64_t wait_for_force(const HandSlot *slot, int64_t now)
 {
     int64_t left = slot->force.block[0] ? slot->force.due_us - now : 0;
@@ -84,7 +84,7 @@ static void start_force(HandSlot *slot)
         hand_say(shared, "%s: force: %s", slot->info.name, slot->force.text);
 }
 
-// Reports a force removed by the watchdog, at most once per TELL_AGAIN_US, and, once, a device that accepts nothing more.
+// Reports when the watchdog has set the force to zero, at most once per TELL_AGAIN_US, and once when the device accepts nothing any more.
 static void tell_watchdog(HandSlot *slot, double sent_before, bool played_before, int64_t now)
 {
     if (played_before && !slot->force.block[0]) {
@@ -95,7 +95,7 @@ static void tell_watchdog(HandSlot *slot, double sent_before, bool played_before
     const char *why = slot->force.guard.why_zero;
     if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0 && now >= slot->tell_from_us) {
         hand_say(slot->shared, "%s: force to zero, %s%s", slot->info.name, why,
-                 strstr(why, "silent") ? " (force: {quiet_ms: 0} in its map where it reports only changes)" : "");
+                 strstr(why, "silent") ? "(if the device reports only changes, set force: {quiet_ms: 0} in its map)" : "");
         slot->tell_from_us = now + TELL_AGAIN_US;
     }
 }
@@ -136,7 +136,7 @@ void *hand_run_hid(void *argument)
     }
     map_release(slot->map, &slot->state);
     map_publish(slot->map, &slot->state, slot->port);
-    // also after a read failure: a device still connected must stop pushing
+    // also after a read failure: a device that is still connected must stop pushing
     force_stop(&slot->force, &shared->transport, slot->device);
     update_info(slot, HAND_LOST, 0);
     shared->transport.close(shared->transport.context, slot->device);
@@ -169,7 +169,7 @@ void *hand_run_encoder(void *argument)
         if (slot->state.reports > lines)
             map_publish(slot->map, &slot->state, slot->port);
         if (!has_told_bad && stream->bad_lines > 3 && stream->lines == 0) {
-            hand_say(shared, "%s sends no line of counts as its map expects; check serial: {baud, counts}", slot->info.name);
+            hand_say(shared, "%s sends no lines of counts as described in its map; check serial: {baud, counts}", slot->info.name);
             has_told_bad = true;
         }
         if (now - counted_from >= COUNT_RATE_US) {

@@ -1,4 +1,4 @@
-// One hand's port and the thread that serves its device: what input/hand.c starts for each device it finds. Internal to input.
+// The port of one hand and the thread that serves its device. input/hand.c starts one for each device it finds. Internal to input.
 #ifndef SELDINGER_INPUT_HAND_SLOT_H
 #define SELDINGER_INPUT_HAND_SLOT_H
 

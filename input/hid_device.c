@@ -1,4 +1,4 @@
-// hidapi 0.13 keeps its last error in one global string, so listing and opening take a lock; reading and writing touch only their own device.
+// hidapi 0.13 stores its last error in one global string, so listing and opening take a lock; reading and writing access only their own device.
 #include "input/hid_device.h"
 
 #include <errno.h>
@@ -18,7 +18,7 @@ typedef struct Hidapi {
     pthread_mutex_t lock;
 } Hidapi;
 
-// Wide characters of any value as UTF-8, cut where it does not fit.
+// Converts wide characters of any value to UTF-8, truncated if they do not fit.
 static void utf8(const wchar_t *wide, char *out, size_t capacity)
 {
     size_t used = 0;
@@ -47,7 +47,7 @@ static void add_usage(HidDeviceInfo *info, uint32_t usage)
         info->usage[info->usage_count++] = usage;
 }
 
-// hidapi lists a device once for each of its collections; here they are one.
+// hidapi lists a device once for each of its collections; this merges them into one.
 static int list(void *context, HidDeviceInfo *out, int capacity)
 {
     Hidapi *hidapi = context;
@@ -76,7 +76,7 @@ static int list(void *context, HidDeviceInfo *out, int capacity)
     return count;
 }
 
-// The udev rule that gives the logged-in user access to this device, and to no other (keyboards must stay private).
+// The udev rule that gives the logged-in user access to this device and to no other (keyboards must stay private).
 static void udev_rule(const char *path, char *out, size_t capacity)
 {
     char name[256], line[160];
@@ -101,7 +101,7 @@ static void *open_device(void *context, const char *path, char *why, size_t capa
         udev_rule(path, rule, sizeof rule);
         if (code == EACCES || code == EPERM)
             snprintf(why, capacity,
-                     "%s may not be read and written by you; as root: echo '%s' >> /etc/udev/rules.d/70-seldinger.rules && udevadm control --reload; "
+                     "you have no permission to read and write %s; as root: echo '%s' >> /etc/udev/rules.d/70-seldinger.rules && udevadm control --reload; "
                      "then plug it in again",
                      path, rule);
         else
@@ -112,7 +112,7 @@ static void *open_device(void *context, const char *path, char *why, size_t capa
     hid_device *device = hid_open_path(path);
     pthread_mutex_unlock(&hidapi->lock);
     if (!device)
-        snprintf(why, capacity, "%s cannot be opened by hidapi", path);
+        snprintf(why, capacity, "hidapi cannot open %s", path);
     return device;
 }
 

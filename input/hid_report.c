@@ -1,5 +1,5 @@
-// Items of a descriptor are read one by one (USB HID 1.11, section 6.2.2): global items hold until changed and can be pushed and popped, local items
-// hold until the next main item, main items make fields of what both say.
+// Items of a descriptor are read one by one (USB HID 1.11, section 6.2.2): global items apply until changed and can be pushed and popped, local items
+// apply until the next main item, and main items make fields from both.
 #include "input/hid_report.h"
 
 #include <limits.h>
@@ -27,7 +27,7 @@ enum {
 };
 enum { LOCAL_USAGE, LOCAL_USAGE_MIN, LOCAL_USAGE_MAX, LOCAL_DELIMITER = 10 };
 
-// A value that may be read as signed or not: which, is known only when the other end of the range is (a maximum of 255 is often one byte, FF).
+// A value that may be signed or unsigned. Which one is known only from the other end of the range (a maximum of 255 is often one byte, FF).
 typedef struct Either {
     int64_t as_signed, as_unsigned;
 } Either;
@@ -43,14 +43,14 @@ typedef struct Globals {
 
 typedef struct LocalUsage {
     uint32_t first, last;
-    bool has_page;           // else the page that holds at the main item is theirs
+    bool has_page;           // otherwise the page that applies at the main item is used
 } LocalUsage;
 
 typedef struct Reading {
     const char *name;
     Faults *faults;
     HidDescriptor *out;
-    size_t at;               // byte offset of the item that is read
+    size_t at;               // byte offset of the current item
     bool good;
     Globals global, pushed[DEEPEST_PUSH];
     int push_count;
@@ -58,7 +58,7 @@ typedef struct Reading {
     int usage_count;
     bool has_usage_min, usage_min_has_page;
     uint32_t usage_min;
-    int delimiter;           // 0 none, 1 in a set and its first usage still wanted, 2 in a set, others are left out
+    int delimiter;           // 0 none; 1 inside a delimiter set, its first usage not yet read; 2 inside a set, further usages are ignored
     int open[DEEPEST], open_count;
     bool has_field_without_id;
 } Reading;
@@ -115,7 +115,7 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
         break;
     case LOCAL_DELIMITER:
         if (value > 1 || (value == 1) == (reading->delimiter > 0))
-            refuse(reading, "a set of delimiters that is not opened and closed in turn");
+            refuse(reading, "delimiters that do not open and close alternately");
         else
             reading->delimiter = (int)value;
         break;
@@ -124,7 +124,7 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
     case 5:
     case 7:
     case 8:
-    case 9: break; // designators and strings say nothing about the bits
+    case 9: break; // designators and strings do not affect the bits
     default: refuse(reading, "an unknown local item, tag %d", tag);
     }
 }
@@ -132,7 +132,7 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
 static void end_locals(Reading *reading)
 {
     if (reading->delimiter)
-        refuse(reading, "a set of delimiters that is not closed");
+        refuse(reading, "a delimiter set that is not closed");
     if (reading->has_usage_min)
         refuse(reading, "a usage minimum without its maximum");
     reading->usage_count = 0;
@@ -167,7 +167,7 @@ static void read_global(Reading *reading, int tag, uint32_t value, int64_t as_si
     case GLOBAL_LOGICAL_MAX: global->logical_max = either; break;
     case GLOBAL_PHYSICAL_MIN: global->physical_min = either; break;
     case GLOBAL_PHYSICAL_MAX: global->physical_max = either; break;
-    // a nibble of two's complement; some devices write the whole byte (FD for -3)
+    // a nibble in two's complement; some devices write the whole byte (FD for -3)
     case GLOBAL_EXPONENT: global->unit_exponent = (int)((value & 15) ^ 8) - 8; break;
     case GLOBAL_UNIT: global->unit = value; break;
     case GLOBAL_SIZE: global->size = value; break;
@@ -209,7 +209,7 @@ static HidReport *find_report(HidDescriptor *out, HidReportKind kind, int id)
     return &out->report[out->report_count++];
 }
 
-// Signed where the minimum is negative; else the maximum counts from 0, and FF in one byte is 255.
+// Signed if the minimum is negative; otherwise the maximum is unsigned, and FF in one byte is 255.
 static void choose_sign(Either low, Either high, int64_t *min, int64_t *max)
 {
     *min = low.as_signed;
@@ -243,7 +243,7 @@ static void add_array(Reading *reading, HidField field)
     add_field(reading, field);
 }
 
-// Control i has usage i; the last usage serves all that are left, and those become one field.
+// Control i has usage i; all remaining controls have the last usage and become one field.
 static void add_variables(Reading *reading, HidField field)
 {
     int left = field.count, which = 0;
@@ -315,7 +315,7 @@ static void read_fields(Reading *reading, HidReportKind kind, uint32_t flags)
                (long long)field.logical_max);
         return;
     }
-    // 0 to 0, the state at the start, means that the physical range is the logical one (section 6.2.2.7)
+    // 0 to 0, the initial state, means that the physical range equals the logical one (section 6.2.2.7)
     if (field.physical_min >= field.physical_max)
         field.physical_min = field.logical_min, field.physical_max = field.logical_max;
     if (is_constant)
@@ -342,7 +342,7 @@ static void open_collection(Reading *reading, uint32_t type)
 
 static void read_main(Reading *reading, int tag, uint32_t value, size_t size)
 {
-    // zero bytes after the end, as some devices pad their descriptor
+    // zero bytes after the end, which some devices use as padding
     if (tag == 0 && size == 0 && reading->open_count == 0)
         return;
     switch (tag) {
@@ -352,7 +352,7 @@ static void read_main(Reading *reading, int tag, uint32_t value, size_t size)
     case MAIN_COLLECTION: open_collection(reading, value); break;
     case MAIN_END:
         if (reading->open_count == 0)
-            refuse(reading, "an end of a collection that was not begun");
+            refuse(reading, "an end of a collection without its beginning");
         else
             reading->open_count--;
         break;
@@ -362,16 +362,16 @@ static void read_main(Reading *reading, int tag, uint32_t value, size_t size)
         end_locals(reading);
 }
 
-// --- the whole ---
+// --- the descriptor ---
 
-// One item at reading->at; its length in bytes, 0 if it is cut or refused.
+// Reads one item at reading->at. Returns its length in bytes, or 0 if it is truncated or refused.
 static size_t read_item(Reading *reading, const uint8_t *bytes, size_t length)
 {
     const uint8_t *item = bytes + reading->at;
     size_t left = length - reading->at;
-    if (item[0] == 0xfe) {    // a long item: none is defined, it is passed over (section 6.2.2.3)
+    if (item[0] == 0xfe) {    // a long item: none is defined, so it is skipped (section 6.2.2.3)
         if (left < 3 || left < 3 + (size_t)item[1]) {
-            refuse(reading, "a long item is cut short");
+            refuse(reading, "a long item is truncated");
             return 0;
         }
         return 3 + (size_t)item[1];
@@ -414,7 +414,7 @@ HidDescriptor *hid_descriptor_parse(const uint8_t *bytes, size_t length, const c
     Reading *reading = calloc(1, sizeof *reading);
     HidDescriptor *out = calloc(1, sizeof *out);
     if (!reading || !out) {
-        faults_add(faults, name, 0, 0, "not enough memory for the report descriptor");
+        faults_add(faults, name, 0, 0, "out of memory for the report descriptor");
         free(reading);
         free(out);
         return NULL;
@@ -425,7 +425,7 @@ HidDescriptor *hid_descriptor_parse(const uint8_t *bytes, size_t length, const c
     while (reading->good && reading->at < length)
         reading->at += read_item(reading, bytes, length);
     if (reading->good && reading->open_count > 0)
-        refuse(reading, "%d collections are not ended", reading->open_count);
+        refuse(reading, "%d collections are not closed", reading->open_count);
     if (reading->good && reading->push_count > 0)
         refuse(reading, "%d pushes are not popped", reading->push_count);
     if (reading->good && out->field_count == 0)
@@ -573,7 +573,7 @@ static const struct UsageName {
 };
 enum { NAME_COUNT = sizeof usage_names / sizeof usage_names[0] };
 
-// A whole number, decimal or 0x…, up to `most`; the end of it in `end`.
+// Parses a whole number, decimal or 0x…, up to `most`; sets `end` to its end.
 static bool small_number(const char *text, unsigned long most, unsigned long *number, char **end)
 {
     if (text[0] < '0' || text[0] > '9')

@@ -1,5 +1,6 @@
-// input: what an operator does, as one command (push, twist) for each tool: from a script, or from a gamepad, HID or USB device through a device map. Uses
-// base only. Reading order: command.h, script.h; hand.h (a device that is open), hand_port.h (what the simulation reads of it).
+// input: the operator's commands (push, twist) for each tool, from a script, or from a gamepad, HID or USB device through a device map. Uses base only. Reading
+// order:
+// command.h, script.h; hand.h (an open device), hand_port.h (what the simulation reads from it).
 #ifndef SELDINGER_INPUT_INPUT_H
 #define SELDINGER_INPUT_INPUT_H
 

@@ -38,7 +38,7 @@ static void bind_fault(const DeviceMap *map, const MapSource *source, const char
     faults_add(faults, map->file, source->line, source->column, "%s: %s", device, what);
 }
 
-// The HID field of a source: a variable of that usage, else an array that can name it.
+// The HID field of a source: a variable of that usage, else an array that contains it.
 static bool find_field(const HidDescriptor *descriptor, const MapSource *source, BoundControl *bound)
 {
     uint32_t usage = source->kind == SOURCE_HID_USAGE ? source->usage : HID_USAGE(1, 0x39);
@@ -60,7 +60,7 @@ static bool find_field(const HidDescriptor *descriptor, const MapSource *source,
 
 static double given_or(double value, double otherwise) { return isnan(value) ? otherwise : value; }
 
-// Values missing in the map come from the device's range.
+// Values missing in the map come from the range of the device.
 static void calibrate(const MapAxis *axis, double least, double most, BoundControl *bound)
 {
     bound->min = given_or(axis->logical_min, least);
@@ -72,7 +72,7 @@ static bool check_calibration(const DeviceMap *map, const MapSource *source, con
 {
     if (bound->min <= bound->centre && bound->centre <= bound->max && bound->min < bound->max)
         return true;
-    faults_add(faults, map->file, source->line, source->column, "%s: logical minimum %g, centre %g, maximum %g do not follow each other", device, bound->min,
+    faults_add(faults, map->file, source->line, source->column, "%s: logical minimum %g, centre %g, maximum %g are not in increasing order", device, bound->min,
                bound->centre, bound->max);
     return false;
 }
@@ -84,7 +84,7 @@ static bool bind_hid_axis(const DeviceMap *map, const MapAxis *axis, const HidDe
     if (!find_field(descriptor, &axis->source, bound)) {
         if (axis->source.optional)
             return true;
-        snprintf(what, sizeof what, "has no input '%s' number %d; `seldinger devices` lists what it has", name, axis->source.index);
+        snprintf(what, sizeof what, "has no input '%s' number %d; `seldinger devices` lists its inputs", name, axis->source.index);
         bind_fault(map, &axis->source, device, what, faults);
         return false;
     }
@@ -93,7 +93,7 @@ static bool bind_hid_axis(const DeviceMap *map, const MapAxis *axis, const HidDe
     bound->is_there = true;
     bound->kind = axis->kind != AXIS_BY_DESCRIPTOR ? axis->kind : axis->is_rate ? AXIS_DEFLECTION : is_relative ? AXIS_RELATIVE : AXIS_COUNTER;
     if (axis->is_rate && is_relative && axis->kind == AXIS_BY_DESCRIPTOR) {
-        snprintf(what, sizeof what, "'%s' is relative: it gives counts, take mm_per_count or deg_per_count (or kind: deflection where it springs back)", name);
+        snprintf(what, sizeof what, "'%s' is relative and gives counts: use mm_per_count or deg_per_count (or kind: deflection if it springs back)", name);
         bind_fault(map, &axis->source, device, what, faults);
         return false;
     }
@@ -113,7 +113,7 @@ static bool bind_hid_axis(const DeviceMap *map, const MapAxis *axis, const HidDe
 static bool bind_hid_button(const DeviceMap *map, const MapButton *button, const HidDescriptor *descriptor, const char *device, BoundControl *bound,
                             Faults *faults)
 {
-    // as an axis without a scale; on above half of its range
+    // as an axis without a scale; on in the upper half of its range
     MapAxis axis = {.source = button->source,
                     .kind = AXIS_DEFLECTION,
                     .is_rate = true,
@@ -192,7 +192,7 @@ static void take_axis(const BoundControl *bound, double raw, AxisState *state)
     }
 }
 
-// A hat says one of 8 (or 4, or 360) directions clockwise from north, or none; right and forward are positive.
+// A hat gives one of 8 (or 4, or 360) directions clockwise from north, or none; right and forward are positive.
 static double hat_value(MapSourceKind kind, const HidField *field, int64_t value)
 {
     static const double east[] = {0, 1, 1, 1, 0, -1, -1, -1};
@@ -203,7 +203,7 @@ static double hat_value(MapSourceKind kind, const HidField *field, int64_t value
     return kind == SOURCE_HID_HAT_X ? east[eighth] : east[(eighth + 2) & 7];
 }
 
-// The raw value of a bound control in a report; false if it says nothing (null state of an axis).
+// Reads the raw value of a bound control from a report; false if it has none (null state of an axis).
 static bool raw_value(const HidDescriptor *descriptor, const MapSource *source, const BoundControl *bound, const uint8_t *payload, size_t length, double *raw)
 {
     int64_t value;
@@ -284,7 +284,7 @@ static double clamp(double value, double most) { return fmax(-most, fmin(most, v
 
 void map_publish(const DeviceMap *map, const MapState *state, HandPort *port)
 {
-    double rate[MAP_HANDS][2] = {{0}}, way[MAP_HANDS][2] = {{0}};
+    double rate[MAP_HANDS][2] = {{0}}, displacement[MAP_HANDS][2] = {{0}};
     unsigned buttons = 0;
     for (int i = 0; i < map->axis_count; i++) {
         const MapAxis *axis = &map->axis[i];
@@ -292,7 +292,7 @@ void map_publish(const DeviceMap *map, const MapState *state, HandPort *port)
         if (axis->is_rate)
             rate[axis->hand][axis->is_twist] += sign * axis->scale * map_shape(state->axis_state[i].deflection, axis->dead_zone, axis->exponent);
         else
-            way[axis->hand][axis->is_twist] += sign * axis->scale * (double)state->axis_state[i].counts;
+            displacement[axis->hand][axis->is_twist] += sign * axis->scale * (double)state->axis_state[i].counts;
     }
     for (int i = 0; i < map->button_count; i++)
         if (state->held[i] != map->button[i].invert && state->button[i].is_there)
@@ -301,8 +301,8 @@ void map_publish(const DeviceMap *map, const MapState *state, HandPort *port)
         atomic_store(&port[h].drives, map->hand[h].drives);
         atomic_store(&port[h].push_mm_s, clamp(rate[h][0], SCRIPT_FASTEST_MM_S));
         atomic_store(&port[h].twist_deg_s, clamp(rate[h][1], SCRIPT_FASTEST_DEG_S));
-        atomic_store(&port[h].advanced_mm, way[h][0]);
-        atomic_store(&port[h].turned_deg, way[h][1]);
+        atomic_store(&port[h].advanced_mm, displacement[h][0]);
+        atomic_store(&port[h].turned_deg, displacement[h][1]);
     }
     atomic_store(&port->buttons, buttons);
     atomic_store(&port->reports, state->reports);

@@ -11,7 +11,7 @@ enum { PUSH, TWIST, RELEASED, EXCHANGE, CONTRAST, QUANTITIES };
 static const char header[] = "t_s,push_mm_s,twist_deg_s", header_with_release[] = "t_s,push_mm_s,twist_deg_s,released";
 static const char *const quantity[QUANTITIES + 1] = {"push_mm_s", "twist_deg_s", "released", "exchange", "contrast_ml_s", NULL};
 
-// What the columns after t_s are: the tool of each, and which of its quantities.
+// The meaning of the columns after t_s: the tool and the quantity of each.
 typedef struct Columns {
     int count;
     int tool[QUANTITIES * TOOLS_MOST], quantity[QUANTITIES * TOOLS_MOST];
@@ -87,7 +87,7 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
         if (dot && (*tool = find_word(column->name, name_length, tools->name)) >= 0)
             example = tools->name[*tool];
         faults_add(faults, file, line, column->column,
-                   "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s, NAME.released, NAME.exchange or "
+                   "unknown column '%.*s'; with named tools expected NAME.push_mm_s, NAME.twist_deg_s, NAME.released, NAME.exchange or "
                    "NAME.contrast_ml_s, such as '%s.push_mm_s'",
                    shown, column->name, example);
         return false;
@@ -101,7 +101,7 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
     return *tool >= 0;
 }
 
-// A header that names tools; all its faults.
+// Reads a header with tool names and reports all its faults.
 static bool read_columns(const NumberColumn *field, int count, int line, const ToolNames *tools, const char *file, Columns *columns, Faults *faults)
 {
     int before = faults->count, place[TOOLS_MOST][QUANTITIES] = {{0}};
@@ -134,7 +134,7 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
     return faults->count == before;
 }
 
-// The columns of a text; only those of the first tool if the header has no names.
+// Reads the columns of a text; only those of the first tool if the header has no names.
 static bool find_columns(const char *text, size_t length, const char *file, const ToolNames *tools, Columns *columns, Faults *faults)
 {
     NumberColumn field[NUMBER_TABLE_COLUMNS];
@@ -177,7 +177,7 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
     if (script)
         script->row = calloc((size_t)table->row_count + 1, sizeof *script->row);
     if (!script || !script->row)
-        faults_add(faults, file, 0, 0, "not enough memory for its rows");
+        faults_add(faults, file, 0, 0, "out of memory");
     else if (table->row_count == 0)
         faults_add(faults, file, 1, 1, "has no row; expected at least one '%s' (the last row's time ends the script)", columns.header);
     else
@@ -219,7 +219,7 @@ Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faul
 
 Script *script_load(const char *path, Faults *faults) { return script_load_tools(path, NULL, faults); }
 
-// The names before the dots of a header. Surplus names are skipped here; parsing reports them.
+// Collects the names before the dots of a header. Surplus names are skipped here; parsing reports them.
 static void find_names(const char *text, size_t length, ScriptTools *tools)
 {
     NumberColumn field[NUMBER_TABLE_COLUMNS];
@@ -268,7 +268,7 @@ ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
     while (i + 1 < script->count && script->row[i + 1].t_s <= t_s)
         i++;
     *cursor = i;
-    // before the first row and from the last row's time on nothing moves, but exchanged tools stay inserted
+    // before the first row and after the end nothing moves, but exchanged tools stay inserted
     ToolCommands commands = {0};
     if (script->count == 0 || t_s < script->row[0].t_s)
         return commands;

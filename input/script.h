@@ -1,4 +1,4 @@
-// Commands over time, read from a file of comma-separated values.
+// Commands over time, read from a CSV file.
 #ifndef SELDINGER_INPUT_SCRIPT_H
 #define SELDINGER_INPUT_SCRIPT_H
 
@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last
+typedef struct ToolNames {   // tools of the scene that a script is for, outermost first; NULL after the last
     int count;
     const char *name[TOOLS_MOST + 1];
     const char *kind[TOOLS_MOST];    // "wire", "microcatheter" …
@@ -17,41 +17,43 @@ typedef struct ToolNames {   // of the scene that a script is for, outermost fir
 typedef struct ScriptRow {
     double t_s;
     Command command;                 // of the first tool
-    Command inner[TOOLS_MOST - 1];   // of those within it
+    Command inner[TOOLS_MOST - 1];   // of the tools inside it
     unsigned released;               // as in ToolCommands
     int fitted[TOOLS_MOST];          // as in ToolCommands
-    double contrast_ml_s[TOOLS_MOST];    // of each tool; at most one has any
+    double contrast_ml_s[TOOLS_MOST];    // for each tool; at most one is not 0
 } ScriptRow;
 
-typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
+typedef struct Script {      // each row applies from its time until the next row; the time of the last row ends the script
     int count;
     ScriptRow *row;
 } Script;
 
 enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400, SCRIPT_MOST_ML_S = 50 };
 
-// Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults: wrong header, not a number, times that
-// go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row. A fourth column, released, is 1 while the tool is released
+// Parses a script: CSV with the header t_s,push_mm_s,twist_deg_s and `#` comments. Returns NULL with faults: wrong header, not a number, times that
+// decrease, negative first time, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row. A fourth column, released, is 1 while the tool is released
 // and 0 (default) while it is held.
 Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
-// For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s, or
-// NAME.released, NAME.exchange and NAME.contrast_ml_s (contrast agent through that tool, 0 to 50, one tool at a time), for any of them, in any order.
+// As script_parse(), for the tools of a scene: the header above, which is that of the first tool, or t_s and, for any of them and in any order, NAME.push_mm_s
+// with
+// NAME.twist_deg_s, NAME.released, NAME.exchange and NAME.contrast_ml_s (contrast agent through that tool, 0 to 50 ml/s, one tool at a time).
 Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);
 Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults);
-// Without a scene: the tools are those named in the header, in its order; a single unnamed one if there are none.
+// For use without a scene: the tools are those in the header, in its order, or a single unnamed one if the header has no names.
 typedef struct ScriptTools {
-    ToolNames names;         // point into `text`
+    ToolNames names;         // pointing into `text`
     char text[TOOLS_MOST][TOOL_NAME_SIZE];
 } ScriptTools;
 Script *script_load_any(const char *path, ScriptTools *tools, Faults *faults);
 void script_free(Script *script);
 Command *script_row_command(ScriptRow *row, int tool);
-// Checks one row, also for rows from elsewhere (a scene's inline script); `before` is the row before it or NULL, `tools` NULL if there is one.
+// Checks one row, including rows from elsewhere (a scene's inline script). `before`: the previous row or NULL; `tools`: NULL if there is only one tool.
 bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults);
 double script_duration_s(const Script *script);
-// Commands at simulated time t (zero before the first row and after the end, but `fitted`, which stays as it was). `cursor` remembers the row between calls, start with 0.
+// Commands at simulated time t_s: zero before the first row and after the end, except `fitted`, which keeps its value. `cursor` stores the row between calls;
+// start with 0.
 ToolCommands script_tools_at(const Script *script, double t_s, int *cursor);
 Command script_at(const Script *script, double t_s, int *cursor);      // the first tool's
 

@@ -1,4 +1,4 @@
-// The thin layer to libusb: finding, claiming and reading; what the bytes mean is in ftdi_stream.c.
+// The interface to libusb: find, claim and read devices; ftdi_stream.c decodes the bytes.
 #include "input/usb_encoder.h"
 
 #include <libusb-1.0/libusb.h>
@@ -38,7 +38,7 @@ void usb_context_close(UsbContext *context)
     free(context);
 }
 
-// "usb 1-4.2": bus and the ports on the way, the same after a replug at the same place
+// "usb 1-4.2": the bus and the ports on the path to the device; the same when it is plugged in again at the same port
 static void device_path(libusb_device *device, char *out, size_t capacity)
 {
     uint8_t port[7];
@@ -86,7 +86,7 @@ int usb_encoder_list(UsbContext *context, UsbDeviceInfo *out, int capacity)
 
 bool usb_encoder_fits(const DeviceMap *map, const UsbDeviceInfo *device)
 {
-    // chips that are serial ports as they come; other products of this vendor id are something else unless the map names them
+    // chips that are serial ports by default; other products with this vendor id are used only if the map selects them
     static const uint16_t serial_chips[] = {0x6001, 0x6010, 0x6011, 0x6014, 0x6015};
     const MapDevice *wanted = &map->device;
     bool is_known = wanted->product_id == device->product_id || (wanted->serial[0] && wanted->product_id < 0);
@@ -110,7 +110,7 @@ static libusb_device_handle *open_path(UsbContext *context, const char *path, ch
         int code = libusb_open(all[i], &handle);
         if (code != 0) {
             handle = NULL;
-            snprintf(why, capacity, "%s cannot be opened: %s", path, libusb_strerror((enum libusb_error)code));
+            snprintf(why, capacity, "cannot open %s: %s", path, libusb_strerror((enum libusb_error)code));
         }
         break;
     }
@@ -119,7 +119,7 @@ static libusb_device_handle *open_path(UsbContext *context, const char *path, ch
     return handle;
 }
 
-// The bulk endpoint of interface 0 to the computer. False if there is none: no serial chip.
+// Finds the bulk-in endpoint of interface 0. Returns false if there is none: not a serial chip.
 static bool find_endpoint(UsbEncoder *encoder, int *port)
 {
     struct libusb_config_descriptor *config;
@@ -137,7 +137,7 @@ static bool find_endpoint(UsbEncoder *encoder, int *port)
     return encoder->packet_size > 2;
 }
 
-// 0, or libusb's code
+// Returns 0 or a libusb error code.
 static int set_up(UsbEncoder *encoder, int baud, int port)
 {
     FtdiRequest request[FTDI_SET_UP];
@@ -158,7 +158,7 @@ UsbEncoder *usb_encoder_open(UsbContext *context, const char *path, const MapSer
         free(encoder);
         return NULL;
     }
-    // failures (no detaching) show when the interface is claimed
+    // if detaching fails, claiming the interface reports it
     libusb_set_auto_detach_kernel_driver(encoder->handle, 1);
     bool has_endpoint = find_endpoint(encoder, &port);
     if (!has_endpoint || (code = libusb_claim_interface(encoder->handle, 0)) != 0) {
@@ -168,7 +168,7 @@ UsbEncoder *usb_encoder_open(UsbContext *context, const char *path, const MapSer
         return NULL;
     }
     if ((code = set_up(encoder, serial->baud, port)) != 0) {
-        snprintf(why, capacity, "%s does not take its set-up: %s", path, libusb_strerror((enum libusb_error)code));
+        snprintf(why, capacity, "cannot set up %s: %s", path, libusb_strerror((enum libusb_error)code));
         usb_encoder_close(encoder);
         return NULL;
     }
@@ -191,7 +191,7 @@ void usb_encoder_close(UsbEncoder *encoder)
 {
     if (!encoder)
         return;
-    libusb_release_interface(encoder->handle, 0);    // returns the port to ftdi_sio
+    libusb_release_interface(encoder->handle, 0);    // reattaches ftdi_sio
     libusb_close(encoder->handle);
     free(encoder);
 }

@@ -1,9 +1,11 @@
-// The wall is drawn in patches of neighbouring triangles (Morton order of their centroids), each with a bounding ball: those outside the view or
-// beyond the light are skipped, the others are drawn near ones first, so that the depth test hides what lies behind a wall before it is shaded. Outer
-// faces are culled: the eye is inside. A patch queries the vessel for its normals when it is first seen.
+// The wall is drawn in patches of neighbouring triangles (Morton order of their centroids), each with a bounding ball. Patches outside the view or beyond the
+// light are
+// skipped; the others are drawn from near to far, so that the depth test hides what lies behind a wall before it is shaded. Outer faces are culled: the eye
+// is inside. The normals of a patch are queried from the vessel when it is first seen.
 //
-// Light: with d the distance from lamp and eye and c the cosine between wall normal and ray, (ambient + c) / (1 + (d / 3 R)^2), R the lumen's radius at the tip,
-// and a fog exp(-(d / 8 R)^1.5) towards the dark.
+// Light: with d the distance from lamp and eye, and c the cosine between wall normal and ray: (ambient + c) / (1 + (d / 3 R)^2), R the radius of the lumen at
+// the tip,
+// and a fog exp(-(d / 8 R)^1.5) that fades to dark.
 #include "render/angioscope.h"
 
 #include "render/drawable_mesh.h"
@@ -32,7 +34,7 @@ typedef struct Patch {
 } Patch;
 
 typedef struct SeenPatch {
-    double distance;           // [mm] of its ball's near side from the eye
+    double distance;           // [mm] from the eye to the near side of its ball
     int patch;
 } SeenPatch;
 
@@ -44,9 +46,9 @@ struct Angioscope {
     int patch_count;
     Patch *patch;
     int vertex_count;
-    WallVertex *vertex;        // as uploaded
-    int *node;                 // (vertex_count) of the vessel, -1 where not known
-    SeenPatch *seen;           // (patch_count) scratch of a frame: patches to draw, near ones first
+    WallVertex *vertex;        // as uploaded to the GPU
+    int *node;                 // (vertex_count) node of the vessel, -1 if unknown
+    SeenPatch *seen;           // (patch_count) scratch memory of a frame: patches to draw, from near to far
     GLsizei *draw_count;
     const void **draw_offset;
     const ToolLooks *tools;
@@ -61,7 +63,7 @@ struct Angioscope {
 
 static const float dark[3] = {0.030f, 0.012f, 0.012f};
 static const double half_angle = 50 * PI / 180;   // of the shorter side
-static const double lamp_reach = 3, fog_reach = 8, fog_end = 2.3;   // of the lumen's radius; of the fog's reach, where it is black
+static const double lamp_reach = 3, fog_reach = 8, fog_end = 2.3;   // in radii of the lumen; in fog reaches, the distance at which it is black
 
 static const char *const VERTEX =
     "#version 330 core\n"
@@ -81,7 +83,7 @@ static const char *const FRAGMENT =
     // thin tissue glows where the lamp grazes it
     "  lit += shine.z * k * k * (1.0 - c) * (1.0 - c) * light + vec3(1.0, 0.93, 0.88) * (shine.x * s * light);\n"
     "  float f = d * lamp.y; lit = mix(dark * lamp.z, lit, exp(-f * sqrt(f)));\n"
-    // the tool's edge: c^2 falls linearly towards the outline, so this is the distance from it in pixels
+    // the edge of the tool: c^2 falls linearly towards the outline, so this is the distance from the outline in pixels
     "  float e = c * c; result = vec4(1.0 - exp(-1.25 * lit), edge > 0.0 ? clamp(e / max(fwidth(e), 1e-9), 0.0, 1.0) : 1.0);\n"
     "}\n";
 
@@ -100,7 +102,7 @@ static int by_key(const void *a, const void *b)
     return (x->triangle > y->triangle) - (x->triangle < y->triangle);
 }
 
-// The bits of a 20-bit number, two zeros between each.
+// Inserts two zeros between the bits of a 20-bit number.
 static uint64_t spread_bits(uint64_t x)
 {
     uint64_t result = 0;
@@ -150,7 +152,7 @@ static void enclose(Angioscope *scope, Patch *patch)
     }
 }
 
-// Each patch has its own copy of the vertices that it uses.
+// Each patch has its own copy of its vertices.
 static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const TriangleKey *key, int *copy_of, uint32_t *index)
 {
     for (int i = 0; i < mesh->vertex_count; i++)
@@ -185,7 +187,7 @@ static void measure(Angioscope *scope, const TriangleMesh *mesh)
         volume += vec3_dot(a, across) / 6;
         area += vec3_norm(across) / 2;
     }
-    // of an open sheet: a fraction of its width
+    // for an open sheet: a fraction of its width
     scope->mean_radius = area > 0 ? fmax(2 * volume / area, 0.02 * sqrt(area)) : 1;
 }
 
@@ -275,7 +277,7 @@ void angioscope_destroy(Angioscope *scope)
 
 // --- the eye ---
 
-// The tool's axis `back` mm behind its tip.
+// The axis of the tool `back` mm behind its tip.
 static Vec3 axis_behind_tip(const PoseTool *tool, double back)
 {
     int i = tool->node_count - 1;
@@ -295,7 +297,9 @@ static double lumen_at(const Angioscope *scope, const Pose *pose, int tool, doub
     return scope->tools && tool < scope->tools->count ? tool_look_at(tool_looks_of(scope->tools, tool, pose->tool[tool].fitted), s)->lumen : 0;
 }
 
-// The tool around the eye of `tool`, `back` mm behind its tip: the innermost whose lumen it lies in, or -1. `ahead` [mm]: how far the last one's end lies behind.
+// The tool around the eye of `tool`, `back` mm behind its tip: the innermost tool whose lumen contains the eye, or -1. `ahead` [mm]: distance of the eye beyond
+// the end of
+// the last tool that does not contain it.
 static int tool_around(const Angioscope *scope, const Pose *pose, int tool, double back, double *lumen, double *ahead)
 {
     double eye = pose->tool[tool].node[pose->tool[tool].node_count - 1].s - back;
@@ -359,16 +363,16 @@ bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, Angios
     Vec3 up = across(upright, forward, vec3_normal_to(forward)), normal;
     double gap, room = beside + margin, lumen, ahead;
     int node = vessel_node_at_tip(pose, tool), around = tool_around(scope, pose, tool, back, &lumen, &ahead);
-    // midway between the two inside another tool; rises to its normal place after leaving it
+    // inside another tool the eye is midway between the two; it rises to its normal place after leaving it
     double out = fmin(fmax(ahead / (4 * radius), 0), 1), near_axis = fmin((radius + lumen) / 2, beside);
     beside = near_axis + (beside - near_axis) * out * out * (3 - 2 * out);
-    // near a wall the eye rises off it, in the open it stays above the tool's own frame; in between both are blended
+    // near a wall the eye moves away from it; away from walls it stays above the tool in the tool's own frame; in between both are blended
     if (around < 0 && wall_at(scope, behind, node, 2 * room, &gap, &normal)) {
         double t = fmin(fmax(2 - gap / room, 0), 1), weight = 2 * t * t * (3 - 2 * t) * out;
         up = across(vec3_add_scaled(up, weight, normal), forward, up);
     }
     Vec3 eye = vec3_add_scaled(behind, beside, up);
-    // a tool inside the vessel puts it outside by less than `room`; one that has left it is not brought back
+    // a tool inside the vessel puts the eye outside by less than `room`; the eye of a tool that has left the vessel is not moved back
     for (int k = 0; k < 4 && around < 0 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin && gap > -room; k++)
         eye = vec3_add_scaled(eye, out * (margin - gap), normal);
     *view = (AngioscopeView){.eye = eye, .right = vec3_cross(forward, up), .up = up, .forward = forward, .half_angle_tan = tan(half_angle)};
@@ -412,7 +416,7 @@ static void ask_normals(Angioscope *scope, Patch *patch)
         VesselMemory memory = {.node = scope->node[i]};
         VesselHit hit;
         vessel_query(scope->vessel, 1, &p, 0.1 * scope->mean_radius, &memory, &hit);
-        // if another wall answers here, or none, keep the mesh's normal
+        // if a different wall is found here, or none, keep the normal of the mesh
         if (!hit.flags && vec3_is_finite(hit.normal) && vec3_dot(hit.normal, n) > 0.5)
             v->normal[0] = (float)hit.normal.x, v->normal[1] = (float)hit.normal.y, v->normal[2] = (float)hit.normal.z;
     }
@@ -429,7 +433,7 @@ static int nearer_first(const void *a, const void *b)
     return (x->patch > y->patch) - (x->patch < y->patch);
 }
 
-// Patches in the view and before the dark, near ones first. Returns how many.
+// Chooses the patches in the view and before the dark, from near to far. Returns their number.
 static int choose_patches(Angioscope *scope, const AngioscopeView *view, double aspect, double reach)
 {
     double tx = view->half_angle_tan * (aspect > 1 ? aspect : 1), ty = view->half_angle_tan / (aspect < 1 ? aspect : 1);
@@ -474,7 +478,7 @@ static void draw_wall(Angioscope *scope, const AngioscopeView *view, double aspe
     glMultiDrawElements(GL_TRIANGLES, scope->draw_count, GL_UNSIGNED_INT, scope->draw_offset, count);
 }
 
-// The stretch of a tool that is near enough to be seen.
+// Adds the part of a tool that is near enough to be visible.
 static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Vec3 eye, double reach)
 {
     enum { NODES = 160 };
@@ -483,7 +487,7 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
     double radius[NODES], lumen[NODES], nearest = HUGE_VAL;
     Color color[NODES];
     int last = tool->node_count - 1, middle = last, count = 0;
-    // the end of the own tool; of another tool the part around the eye
+    // the end of the own tool; for another tool the part around the eye
     for (int i = last; i >= 0 && !is_own; i--) {
         double distance = vec3_distance(tool->node[i].position, eye);
         middle = distance < nearest ? i : middle;

@@ -1,6 +1,6 @@
 // With theta = LAO, phi = CRA, and the patient's left L, anterior A, superior S:
 //   towards = cos phi (cos theta A + sin theta L) + sin phi S,  right = cos theta L - sin theta A,  up = cos phi S - sin phi (cos theta A + sin theta L).
-// A point at p from the isocentre lands at (right . p, up . p) D / ((D + towards . p) field), D the distance from source to isocentre.
+// A point at p from the isocentre is projected to (right . p, up . p) D / ((D + towards . p) field), D the distance from source to isocentre.
 #include "render/c_arm.h"
 
 #include <stdio.h>
@@ -53,7 +53,7 @@ Vec3 c_arm_ray(const CArm *c_arm, double x, double y)
 
 void c_arm_matrix(const CArm *c_arm, Vec3 origin, double near_mm, double far_mm, float matrix[16])
 {
-    // of the square's half side at the isocentre; relative to `origin`, so that the numbers are small
+    // in half sides of the square at the isocentre; relative to `origin`, so that the numbers are small
     double zoom = 2 * C_ARM_SOURCE_MM / c_arm->field_mm;
     Vec3 shift = vec3_sub(origin, c_arm->isocentre);
     double a = (far_mm + near_mm) / (far_mm - near_mm), b = -2 * far_mm * near_mm / (far_mm - near_mm);

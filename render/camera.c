@@ -41,7 +41,7 @@ void camera_principal_axes(const Sym3 *matrix, double value[3], Vec3 axis[3])
     }
 }
 
-// +y, -z or -x, whichever the axis is closest to, says its sign.
+// Chooses the sign for which the axis is closest to +y, -z or -x.
 static Vec3 signed_view(Vec3 axis)
 {
     double ax = fabs(axis.x), ay = fabs(axis.y), az = fabs(axis.z);
@@ -64,11 +64,11 @@ static Vec3 face_on(int count, const Vec3 *point)
     double value[3];
     Vec3 axis[3];
     camera_principal_axes(&spread, value, axis);
-    const double alike = 0.15;   // of the largest: an extent ratio of 0.39
+    const double alike = 0.15;   // relative to the largest: a ratio of extents of 0.39
     if (!(value[2] > 0) || value[2] - value[0] < alike * value[2])
         return front;
     if (value[1] - value[0] < alike * alike * value[2]) {
-        // a line: any direction across it will do
+        // a line: any direction perpendicular to it may be chosen
         Vec3 across = vec3_add_scaled(front, -vec3_dot(front, axis[2]), axis[2]);
         if (vec3_norm(across) < 0.3)
             across = vec3_add_scaled(vec3(-1, 0, 0), axis[2].x, axis[2]);

@@ -1,6 +1,7 @@
-// A ring buffer of images in preallocated arrays. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); with
-// several tools, which is version 3, their number and the most nodes of each of four; the images, field by field in the order of walk_frame(); FNV-1a
-// of all before (8 bytes).
+// A ring buffer of images in preallocated arrays. File format, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); with
+// several tools, which is version 3, the number of tools and the largest number of nodes of each of four; the images, field by field in the order of
+// walk_frame(); FNV-1a
+// of all preceding bytes (8 bytes).
 #include "render/cine.h"
 
 #include "render/message.h"
@@ -21,10 +22,10 @@ struct Cine {
     CineShape shape;
     int node_count;          // of all tools
     int capacity;
-    int first, count;        // ring
+    int first, count;        // ring buffer
     int64_t dropped;
     bool is_recording, is_locked;
-    Pose *pose;              // (capacity) into the arrays below
+    Pose *pose;              // (capacity) pointing into the arrays below
     uint32_t *pulse;         // (capacity)
     Vec3 *position;          // (capacity, node_count)
     Quat *quaternion;
@@ -233,9 +234,9 @@ int cine_player_step(CinePlayer *player, const Cine *cine, int images)
 
 // --- files ---
 
-// Reads or writes; turns bad permanently when bytes are missing.
+// Reads or writes; `good` becomes false permanently if bytes are missing.
 typedef struct Cursor {
-    uint8_t *out;            // NULL: reads
+    uint8_t *out;            // NULL: read
     const uint8_t *in;
     size_t at, length;
     bool good;
@@ -300,7 +301,7 @@ static void walk_tool(Cursor *cursor, PoseTool *tool)
     }
 }
 
-// The controls that affect an image: all but the tool for contrast agent.
+// The controls that affect an image: all except the tool for contrast agent.
 enum { XRAY_BYTES = XRAY_VALUES_BEFORE_TOOLS * (int)sizeof(float) };
 
 static void walk_frame(Cursor *cursor, Cine *cine, int place)
@@ -349,7 +350,7 @@ enum {
     TOOL_NODE_BYTES = 9 * 8 + 4
 };
 
-// Of a file of so many images whose centrelines have `line_nodes` nodes in all, and the tools, of several, `tool_nodes`.
+// Size of a file with `count` images whose centrelines have `line_nodes` nodes in total and whose tools, if there are several, `tool_nodes`.
 static uint64_t file_bytes(const CineShape *shape, uint32_t version, int count, uint64_t line_nodes, uint64_t tool_nodes)
 {
     bool has_several = shape->tool_count > 1;
@@ -404,7 +405,7 @@ uint8_t *cine_pack(const Cine *cine, size_t *length)
     if (!cursor.out)
         return NULL;
     int32_t count = cine->count;
-    Cine ring = *cine;   // walk_frame() writes where it reads a file, not here
+    Cine ring = *cine;   // walk_frame() writes to it only when it reads a file
     walk_head(&cursor, &ring.shape, &count);
     for (int i = 0; i < cine->count; i++)
         walk_frame(&cursor, &ring, slot(cine, i));
@@ -435,7 +436,7 @@ static bool tool_is_sound(const PoseTool *tool, int tools)
     return good;
 }
 
-// Checks what drawing relies on. NULL, or what is wrong.
+// Checks what drawing relies on. Returns NULL, or what was expected.
 static const char *frame_fault(const Cine *cine, int index)
 {
     const Pose *pose = &cine->pose[index];
@@ -453,25 +454,25 @@ static const char *frame_fault(const Cine *cine, int index)
                               pose->report.wall_force_sum};
     for (int i = 0; i < XRAY_VALUES; i++)
         if (!isfinite(xray[i]))
-            return "X-ray settings are finite numbers";
+            return "expected X-ray settings that are finite numbers";
     if (!(pose->xray.field_mm > 0) || !all_finite(figures, sizeof figures / sizeof *figures))
-        return "times, forces and lengths are finite numbers, a field is above 0";
+        return "expected finite times, forces and lengths, and a field above 0";
     if (pose->first_free_node < 0 || pose->first_free_node >= pose->node_count)
-        return "the first node outside of the sheath is one of the tool's";
+        return "expected the first node outside the sheath to be a node of the tool";
     for (int k = 0; k < pose->tool_count; k++)
         if (!tool_is_sound(&pose->tool[k], pose->tool_count))
-            return "the tools' nodes have finite places, radii above 0, unit quaternions, and lie in one of the tools, or in none (-1)";
+            return "expected tool nodes with finite positions, radii above 0 and unit quaternions, each in one of the tools or in none (-1)";
     for (int i = 0; i < pose->node_count; i++) {
         const NodeReport *node = &pose->node[i];
         if (!vec3_is_finite(pose->position[i]) || !vec3_is_finite(node->force) || !isfinite(node->s) || !(node->radius > 0) || !isfinite(node->radius) ||
             isnan(node->gap) || !is_unit(pose->quaternion[i]))
-            return "the tool's nodes have finite places and forces, radii above 0, unit quaternions";
+            return "expected tool nodes with finite positions and forces, radii above 0, and unit quaternions";
         if (node->vessel_node < -1 || (cine->shape.contrast_count > 0 && node->vessel_node >= cine->shape.contrast_count))
-            return "the tool's nodes lie at nodes of the vessel, or at none (-1)";
+            return "expected each tool node at a node of the vessel, or at none (-1)";
     }
     for (int i = 0; i < cine->shape.contrast_count; i++)
         if (!(contrast[i] >= 0 && contrast[i] <= 1))
-            return "concentrations are 0 to 1";
+            return "expected concentrations from 0 to 1";
     return NULL;
 }
 
@@ -482,28 +483,27 @@ Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults 
     CineShape shape = {0};
     walk_head(&cursor, &shape, &count);
     if (!cursor.good || cursor.version < ONE_TOOL || cursor.version > SEVERAL_TOOLS) {
-        faults_add_at_byte(faults, name, 0, "is not a cine loop of version %d to %d; expected a file saved by the trainer is expected", ONE_TOOL,
-                           SEVERAL_TOOLS);
+        faults_add_at_byte(faults, name, 0, "is not a cine loop of version %d to %d; expected a file saved by the trainer", ONE_TOOL, SEVERAL_TOOLS);
         return NULL;
     }
     if (count < 0 || cine_bytes(&shape, count > 0 ? count : 1) == 0 || (cursor.version > ONE_TOOL && shape.tool_count < 2)) {
         faults_add_at_byte(faults, name, 12,
                            "says %d tools of %d nodes, %d vessel nodes and %d images; 1 to %d (2 or more from version 2 on), each of 1 to %d nodes, 0 to %d, "
-                           "0 to %d, and 8 GB in all",
+                           "0 to %d, and 8 GB in total",
                            shape.tool_count, nodes_of(&shape), shape.contrast_count, (int)count, STEP_TOOLS_MAX, MOST_NODES, MOST_CONTRAST, MOST_FRAMES);
         return NULL;
     }
-    // with several tools centrelines have as many nodes as each image says, and so have the tools since version 3
+    // with several tools the number of centreline nodes is given by each image; since version 3 also the number of tool nodes
     uint64_t all = (uint64_t)count * (uint64_t)nodes_of(&shape);
     uint64_t expected = file_bytes(&shape, cursor.version, count, cursor.version == ONE_TOOL ? all : 0, cursor.version == SEVERAL_TOOLS ? 0 : all);
     if (cursor.version == ONE_TOOL ? expected != length : expected > length || file_bytes(&shape, cursor.version, count, all, all) < length) {
-        faults_add_at_byte(faults, name, length, "has %zu bytes, its counts make %llu%s: it was cut or has grown", length, (unsigned long long)expected,
+        faults_add_at_byte(faults, name, length, "has %zu bytes; its header requires %llu%s: the file is damaged", length, (unsigned long long)expected,
                            cursor.version == ONE_TOOL ? "" : " at least");
         return NULL;
     }
     Cine *cine = cine_create(&shape, count > 0 ? count : 1);
     if (!cine) {
-        faults_add(faults, name, 0, 0, "not enough memory for its %d images", (int)count);
+        faults_add(faults, name, 0, 0, "out of memory for its %d images", (int)count);
         return NULL;
     }
     const char *fault = NULL;
@@ -511,12 +511,12 @@ Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults 
     for (int i = 0; i < count && !fault; i++) {
         at = cursor.at;
         walk_frame(&cursor, cine, i);
-        fault = cursor.good ? frame_fault(cine, i) : "neither centreline nor a tool has more nodes than the file's head says";
+        fault = cursor.good ? frame_fault(cine, i) : "expected no more nodes of centreline and tools than the file header says";
     }
     uint64_t sum = 0;
     WALK(&cursor, sum);
     if (fault)
-        faults_add_at_byte(faults, name, at, "an image cannot be drawn: %s; the file is damaged", fault);
+        faults_add_at_byte(faults, name, at, "an image is invalid: %s; the file is damaged", fault);
     else if (cursor.at != length || sum != checksum(bytes, length - sizeof sum))
         faults_add_at_byte(faults, name, length - sizeof sum, "the checksum does not match; the file is damaged");
     else {
@@ -540,7 +540,7 @@ bool cine_movie(const Cine *cine, const char *path, int width, int height, CineD
     uint8_t *rgb = malloc((size_t)width * (size_t)height * 3);
     if (!rgb) {
         movie_file_abandon(movie);
-        return message_fail(message, capacity, "%s: not enough memory", path);
+        return message_fail(message, capacity, "%s: out of memory", path);
     }
     bool drawn = true, going = true;
     double shown = 0;   // the number of repeats is computed from the end of each image, to avoid drift

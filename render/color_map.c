@@ -2,7 +2,7 @@
 
 static Color from_table(const uint8_t (*table)[3], int count, double x)
 {
-    if (!(x > 0))   // NaN too
+    if (!(x > 0))   // also NaN
         x = 0;
     if (x > 1)
         x = 1;

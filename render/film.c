@@ -50,7 +50,7 @@ static void film_close(Film *film)
     free(film->rgb);
 }
 
-// The middle of the tools' tips at the beginning.
+// The centre of the tips of the tools at the beginning.
 static Vec3 middle_of_tips(Film *film)
 {
     Vec3 sum = {0, 0, 0};
@@ -97,7 +97,7 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
                 (film->views = scene_views_create(scene, open, &film->controls, message, sizeof message, faults));
     if (good) {
         good = open_playback(film, open->tree);
-        snprintf(message, sizeof message, "the recording holds no frame");
+        snprintf(message, sizeof message, "the recording contains no frame");
     }
     if (good) {
         film->controls.look.full_detail = true;
@@ -107,7 +107,7 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
         return true;
     }
     if (faults->count == before)
-        faults_add(faults, path, 0, 0, "nothing can be drawn: %s", *message ? message : "out of memory");
+        faults_add(faults, path, 0, 0, "cannot draw: %s", *message ? message : "out of memory");
     film_close(film);
     return false;
 }
@@ -118,12 +118,12 @@ static const ScoreFigures *score_now(Film *film)
     int64_t different = rescore_first_different(film->rescore);
     if (different >= 0 && !film->has_told_difference) {
         film->has_told_difference = true;
-        fprintf(stderr, "the simulation differs from the recording from step %lld on: the score stands still from there\n", (long long)different);
+        fprintf(stderr, "the simulation differs from the recording from step %lld on: the score is not updated after that step\n", (long long)different);
     }
     return rescore_at(film->rescore, playback_time_s(film->playback));
 }
 
-// Running plots as at `time_s`: 20 samples a second from the recorded steps.
+// Running plots at `time_s`: 20 samples a second from the recorded steps.
 static void sample_plots(Film *film, double time_s)
 {
     const RecordedRun *run = film->run;
@@ -153,7 +153,7 @@ static void film_draw(Film *film, double time_s)
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
     if (options->has_panels) {
         WindowInput input = {.width = options->width, .height = options->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
-        sample_plots(film, pose->time_s);   // a time beyond the end is the end
+        sample_plots(film, pose->time_s);   // the pose of a time beyond the end is the last one
         trainer_panel_show(&film->shown, film->scene, pose, score_now(film), NULL, &pose->xray);
         film->shown.state.now_s = pose->time_s;
         trainer_panel_views(&film->shown, &film->controls, film->views, &pose->xray);
@@ -164,7 +164,7 @@ static void film_draw(Film *film, double time_s)
     gl_canvas_read(&film->canvas, film->rgb);
 }
 
-// DSA and roadmap depend on earlier pulses: those of the last two minutes are simulated.
+// DSA and roadmap depend on earlier pulses, so those of the last two minutes are simulated.
 static void take_earlier_pulses(Film *film, double time_s)
 {
     const double most_s = 120;
@@ -196,7 +196,7 @@ bool film_picture(const char *path, const FilmOptions *options, const RecordedRu
         return false;
     take_earlier_pulses(&film, options->from_s);
     film_draw(&film, options->from_s);
-    film_draw(&film, options->from_s);   // a panel's layout is known only from the previous frame
+    film_draw(&film, options->from_s);   // drawn twice: the layout of a panel is known only from the previous frame
     bool good = png_file_write(path, options->width, options->height, film.rgb, message, sizeof message);
     if (!good)
         faults_add(faults, "--picture", 0, 0, "%s", message);
@@ -232,7 +232,7 @@ bool film_movie(const char *path, const FilmOptions *options, const RecordedRun 
     }
     good = movie_file_close(movie, message, sizeof message) && good;
     if (!good)
-        faults_add(faults, "--movie", 0, 0, "%s", *message ? message : "the film could not be written completely");
+        faults_add(faults, "--movie", 0, 0, "%s", *message ? message : "the video could not be written completely");
     film_close(&film);
     return good;
 }

@@ -1,4 +1,4 @@
-// Renders the trainer's window off screen: a moment of a recording as a picture, or the frames of a film.
+// Renders the trainer's window off screen: a moment of a recording as a picture, or a part of it as a video.
 #ifndef SELDINGER_RENDER_FILM_H
 #define SELDINGER_RENDER_FILM_H
 
@@ -9,17 +9,17 @@ typedef struct FilmOptions {
     int width, height;               // [pixel]
     PanelView view;
     bool has_panels;                 // figures and controls around the views
-    double from_s, to_s;             // of a film; simulated time
-    double fps, speed;               // frames per second; simulated seconds per second of film
+    double from_s, to_s;             // range of a video; simulated time
+    double fps, speed;               // frames per second; simulated seconds per second of video
     bool is_quiet;
     double lao_deg, cra_deg;         // for a recording without a viewer; NaN: as in the scene
-    double close_up_mm;              // field around the tools' tips at `from_s`: in 3D, and for a recording without a viewer in fluoroscopy; 0: everything
+    double close_up_mm;              // field around the tool tips at `from_s`: in 3D, and, for a recording without a viewer, in fluoroscopy; 0: everything
 } FilmOptions;
-FilmOptions film_default_options(void);  // 1280x720, fluoroscopy with panels, all of it, 30 a second
+FilmOptions film_default_options(void);  // 1280x720, fluoroscopy with panels, the whole recording, 30 frames per second
 
-// The moment `from_s`. False with faults, also where EGL is missing.
+// Draws the moment `from_s`. Returns false with faults, also if EGL is missing.
 bool film_picture(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults);
-// H.264 through ffmpeg.
+// Writes H.264 through ffmpeg.
 bool film_movie(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults);
 
 #endif

@@ -1,9 +1,9 @@
 // When each layer is drawn. Each new pulse is compared with the state of the layers:
-//   C-arm, table or field moved: all from scratch and coarse (half the resolution, the decimated lumen); fine with the first pulses at rest.
-//   contrast agent moved on: the lumen from scratch, decimated; fine once it stays.
-//   anything of these, blades, mode, mask: the base is baked from the layers.
-//   always: the base is copied back where the tools were, and the tools multiplied in.
-// Showing adds the noise of the pulse; that alone is done where the picture is held.
+//   C-arm, table or field moved: redraw everything coarsely (half the resolution, the decimated lumen); finely with the first pulses at rest.
+//   contrast agent moved: redraw the lumen from the decimated mesh; finely once it is stationary.
+//   any of these, blades, mode, mask: bake the base from the layers.
+//   always: copy the base back where the tools were, and multiply the tools in.
+// Showing adds the noise of the pulse; a held picture is only shown.
 #include "render/fluoroscope.h"
 
 #include "render/fluoroscope_parts.h"
@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const float least_contrast = 0.002f;      // concentration that can be seen
+static const float least_contrast = 0.002f;      // lowest visible concentration
 static const double median_transmission = 0.27;  // target of the automatic exposure: brightness 0.68
 
 FluoroscopeOptions fluoroscope_default_options(void)
@@ -42,7 +42,7 @@ static bool tool_is_sound(const ToolLook *tool, int index, char *message, size_t
 static bool options_are_sound(const FluoroscopeOptions *options, char *message, size_t capacity)
 {
     if (!patient_axes_are_sound(&options->patient))
-        return message_fail(message, capacity, "the patient's axes are not unit vectors perpendicular to each other");
+        return message_fail(message, capacity, "the patient's axes are not perpendicular unit vectors");
     if (options->tools && (!options->pose || options->pose->tool_count != options->tools->count))
         return message_fail(message, capacity, "the pose is not one of the %d tools", options->tools->count);
     for (int k = 0; options->tools && k < options->tools->count; k++)
@@ -67,35 +67,36 @@ static bool mesh_is_sound(const TriangleMesh *mesh, char *message, size_t capaci
     return mesh->triangle_count > 0;
 }
 
-// Whether rays through the wall can be evaluated; a remark if lids were needed.
+// Returns true if rays through the wall can be evaluated; adds a remark if lids were needed.
 static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure, MeshLids *lids, char *message, size_t capacity)
 {
     if (!options->vessel || !mesh_is_sound(options->vessel, message, capacity))
         return false;
     if (!mesh_closure(options->vessel, closure, lids))
-        return message_fail(message, capacity, "no contrast is drawn: not enough memory to look at the vessel's wall");
+        return message_fail(message, capacity, "no contrast is drawn: out of memory while checking the vessel's wall");
     if (closure->turned_edges > 0)
-        return message_fail(message, capacity, "no contrast is drawn: %lld edges of the vessel's wall lie between triangles that face opposite ways",
+        return message_fail(message, capacity, "no contrast is drawn: at %lld edges of the vessel's wall, neighbouring triangles have opposite orientations",
                             (long long)closure->turned_edges);
     double span = 0;
     for (int v = 0; v < options->vessel->vertex_count; v++)
         span = fmax(span, vec3_distance(options->vessel->vertex[v], options->vessel->vertex[0]));
     if (!(fabs(closure->volume) > 1e-9 * span * span * span))
-        return message_fail(message, capacity, "no contrast is drawn: the vessel's wall encloses nothing");
-    const char *facing = closure->volume < 0 ? "; its triangles face inwards, which is allowed for" : "";
+        return message_fail(message, capacity, "no contrast is drawn: the vessel's wall encloses no volume");
+    const char *facing = closure->volume < 0 ? "; its triangles face inwards, which is taken into account" : "";
     if (closure->rims > 0 && closure->unevenness > 0.25)
-        message_fail(message, capacity, "the vessel's wall is open at %d places, not all of them flat (to %.0f %% of their radius): contrast is wrong there%s",
-                     closure->rims, 100 * closure->unevenness, facing);
+        message_fail(message, capacity,
+                     "the vessel's wall is open at %d places, not all of them flat (up to %.0f %% of their radius): contrast is wrong there%s", closure->rims,
+                     100 * closure->unevenness, facing);
     else if (closure->rims > 0)
         message_fail(message, capacity, "the vessel's wall is open at %d places; flat lids close it for contrast%s", closure->rims, facing);
     else if (closure->volume < 0)
-        message_fail(message, capacity, "the triangles of the vessel's wall face inwards, which is allowed for");
+        message_fail(message, capacity, "the triangles of the vessel's wall face inwards, which is taken into account");
     return true;
 }
 
 static int lumen_nodes(const Fluoroscope *f) { return f->lumen.is_there ? f->lumen.node_count : 0; }
 
-// For a tool with an unchanged number of nodes; NULL if the number changed or memory runs out.
+// The path for a tool with an unchanged number of nodes; NULL if the number changed or if out of memory.
 static const RibbonPath *path_of(Fluoroscope *f, int k, const PoseTool *tool)
 {
     int fitted = tool->fitted >= 0 && tool->fitted <= EXCHANGES_MOST ? tool->fitted : 0;
@@ -143,7 +144,7 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     MeshLids lids = {0};
     bool good = f != NULL;
     if (!good)
-        message_fail(message, capacity, "not enough memory for fluoroscopy");
+        message_fail(message, capacity, "out of memory for fluoroscopy");
     bool has_wall = good && wall_is_fit(options, &closure, &lids, message, capacity);
     FluoroscopeOptions own = *options;
     if (!has_wall) {
@@ -155,7 +156,7 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     good = good && (!has_wall || lumen_layer_create(&f->lumen, &own, &closure, &lids, message, capacity));
     mesh_lids_free(&lids);
     if (good && !take_memory(f, options)) {
-        message_fail(message, capacity, "not enough memory for fluoroscopy");
+        message_fail(message, capacity, "out of memory for fluoroscopy");
         good = false;
     }
     if (!good) {
@@ -224,7 +225,7 @@ static bool has_these_tools(Fluoroscope *f, const Pose *pose)
     return same;
 }
 
-// What the pulse shows; mask and roadmap follow.
+// Stores what the pulse shows; updates mask and roadmap.
 static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
 {
     int nodes = lumen_nodes(f);
@@ -242,7 +243,7 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
     }
     for (int n = 0; n < nodes; n++) {
         float c = frame->contrast ? frame->contrast[n] : 0;
-        f->shown.contrast[n] = c > 0 ? fminf(c, 1) : 0;   // not a number: none
+        f->shown.contrast[n] = c > 0 ? fminf(c, 1) : 0;   // NaN counts as none
     }
     bool is_opacified = is_seen(f->shown.contrast, nodes);
     if (is_opacified && !f->was_opacified)
@@ -296,7 +297,7 @@ static void draw_coarse_anatomy(Fluoroscope *f, const CArm *c_arm)
         layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
 }
 
-// Draws the next strip of the fine anatomy, or all the rest. True if it is complete and in use.
+// Draws the next strip of the fine anatomy, or all the rest. Returns true if it is complete and in use.
 static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
 {
     int side = f->anatomy.level ? 256 : 384, rows = at_once ? side - f->anatomy_rows : side / ANATOMY_STRIPS;
@@ -335,8 +336,9 @@ typedef struct LayerChanges {
     bool anatomy, lumen;
 } LayerChanges;
 
-// Updates anatomy, lumen and roadmap to the exposure. After a turn the anatomy becomes fine over the next pulses, in strips, then the lumen: no frame
-// has to wait for all of it.
+// Updates anatomy, lumen and roadmap to the exposure. After a move of the C-arm the fine anatomy is drawn in strips over the next pulses, then the fine lumen,
+// so that no single
+// frame takes too long.
 static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 {
     CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
@@ -416,7 +418,7 @@ static void copy_box(const Layer *from, const Layer *to, const int low[2], const
 
 static void bake(Fluoroscope *f)
 {
-    // subtraction has its own dose
+    // DSA has its own dose
     f->tone.quanta = f->options.quanta * (f->tone.is_subtracted ? f->options.dsa_dose : 1);
     layers_bake(&f->programs, anatomy_of(f), f->tone.is_subtracted ? &f->mask : NULL, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->now->bare);
     f->baked = f->shown.xray;
@@ -439,7 +441,7 @@ static void opacify(Fluoroscope *f)
     layers_opacify(&f->programs, &f->now->bare, lumen, roadmap, &f->c_arm, &f->tone, low, high, &f->now->base);
 }
 
-// The picture without its noise, for the exposure that was taken.
+// Makes the picture without noise for the exposure taken.
 static void make_picture(Fluoroscope *f, bool is_fresh)
 {
     LayerChanges changes = update_layers(f, is_fresh);

@@ -1,10 +1,10 @@
 // Fluoroscopy: the first view of the trainer, drawn from a Pose and the settings of the X-ray system.
 //
-// Along each ray I = exp(-(anatomy + contrast + tools)); brightness 1.75 I^0.72, as an automatic exposure shows it; quantum noise whose sigma follows
-// from I, softened by the detector; four blades with a rounded soft edge. The picture is the largest square in the middle of the ViewPort; the rest
-// stays dark. Drawn in layers, each only when its input changes (docs/design.md, "Fluoroscopy"):
+// Along each ray I = exp(-(anatomy + contrast + tools)); the brightness is 1.75 I^0.72, as after automatic exposure; quantum noise with a sigma that follows
+// from I, softened by the detector; four collimator blades with a rounded soft edge. The picture is the largest square in the middle of the ViewPort; the rest
+// is dark. It is drawn in layers, each only when its input changes (docs/design.md, "Fluoroscopy"):
 //   anatomy and vessel thickness -> baked base (brightness, noise sigma) -> tools multiplied in -> noise by pulse.
-// While `xray.pedal` is 0, or `pulse` is unchanged, the last picture stays, whatever else changes (last image hold).
+// While `xray.pedal` is 0, or `pulse` is unchanged, the last picture is kept whatever else changes (last image hold).
 //
 // Needs a current OpenGL 3.3 context, the same in every call; one thread.
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_H
@@ -18,32 +18,32 @@ typedef struct Fluoroscope Fluoroscope;
 
 FluoroscopeOptions fluoroscope_default_options(void);
 
-// NULL with the reason in `message`. Otherwise `message` is empty or says what is missing in the picture (for example because a mesh is not closed).
+// Returns NULL with the reason in `message`. Otherwise `message` is empty or says what is missing in the picture (for example because a mesh is not closed).
 Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity);
 void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeFrame {
-    const Pose *pose;              // its tools' nodes are read, at most as many as the options' pose has room for. NULL: no tools
-    const float *filling;          // (nodes of all tools, one tool after the other, each with the room that it has in the options' pose) contrast agent over the
-                                   // whole lumen about each node, what else lies in it included: 0 to 1; NULL: none
+    const Pose *pose;              // the nodes of its tools are read, at most as many as the pose in the options has. NULL: no tools
+    const float *filling;          // (nodes of all tools, one tool after the other, each with the number of nodes in the options' pose) fraction of contrast
+                                   // agent in the whole lumen around each node, including anything inside it: 0 to 1; NULL: none
     XrayControl xray;
     const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
-    uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture
+    uint32_t pulse;                // number of the X-ray pulse: the seed of the noise; the same pulse gives the same picture
     bool leaves_surroundings;      // the area outside the square is already cleared: saves 1 ms of CPU without a GPU
 } FluoroscopeFrame;
 
 void fluoroscope_draw(Fluoroscope *fluoroscope, const FluoroscopeFrame *frame, ViewPort port);
-// Forgets held picture, mask and roadmap: after a jump in time. The next draw makes a picture even with the pedal off.
+// Forgets held picture, mask and roadmap: call after a jump in time. The next draw makes a picture even with the pedal off.
 void fluoroscope_forget(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeState {
-    bool is_held;                  // the last draw showed an earlier pulse's picture with the pedal off
+    bool is_held;                  // with the pedal off, the last draw showed the picture of an earlier pulse
     bool has_mask;                 // DSA: there is a mask …
     bool mask_has_moved;           // … but C-arm, table or field have moved since, so bones do not cancel
     bool has_roadmap;              // there is an opacified lumen to overlay
     bool is_out_of_beam;           // part of the vessel lies beside or behind the source at this position of C-arm and table: no contrast is drawn
     XrayControl shown;             // settings of the picture on the screen
-    int square[3];                 // x, y (from the port's lower left corner), side [pixel]: where the picture lies in the port
+    int square[3];                 // x, y (from the port's lower left corner), side [pixel]: the position of the picture in the port
 } FluoroscopeState;
 FluoroscopeState fluoroscope_state(const Fluoroscope *fluoroscope);
 

@@ -1,7 +1,8 @@
-// Attenuation chosen by appearance (docs/design.md, "X-ray attenuation"): 0.0045 / mm soft tissue, 0.028 / mm bone, a fifth and a half of the
-// physical values, so that the range of a picture without a doctor's window level is not exceeded.
-//   CT numbers H: 0.0045 (1 + H / 1000) up to 150, then straight up to 0.028 at 1000 HU.
-//   other volumes (angiograms, mostly cut off at 0): straight from their least value, 0, to 0.028 at their greatest; in a plain head, as they hold no tissue.
+// The attenuation is chosen for appearance (docs/design.md, "X-ray attenuation"): 0.0045 / mm soft tissue, 0.028 / mm bone, a fifth and a half of the
+// physical values, so that the range of the picture is not exceeded without a window level set by a physician.
+//   CT numbers H: 0.0045 (1 + H / 1000) up to 150, then linear up to 0.028 at 1000 HU.
+//   other volumes (angiograms, mostly cut off at 0): linear from 0 at their minimum to 0.028 at their maximum; shown in a simple head, as they contain no
+//   tissue.
 #include "render/fluoroscope_anatomy.h"
 
 #include "render/message.h"
@@ -11,7 +12,7 @@
 
 static const double soft = 0.0045, bone = 0.028;
 
-// --- plain bodies ---
+// --- simple bodies ---
 
 static void add_ellipsoid(Anatomy *anatomy, Vec3 center, Vec3 semi, double attenuation)
 {
@@ -36,7 +37,7 @@ static void add_head(Anatomy *anatomy)
     }
     add_ellipsoid(anatomy, vec3(0, 82, 22), vec3(22, 7, 14), -soft);                       // frontal sinus
     add_ellipsoid(anatomy, vec3(0, 30, -30), vec3(14, 22, 9), -soft);                      // sphenoid sinus
-    add_shell(anatomy, vec3(0, -28, -96), vec3(22, 20, 30), 3, 0.5 * bone);                // the neck's first vertebrae
+    add_shell(anatomy, vec3(0, -28, -96), vec3(22, 20, 30), 3, 0.5 * bone);                // first vertebrae of the neck
 }
 
 static void add_trunk(Anatomy *anatomy, Vec3 half)
@@ -50,7 +51,7 @@ static void add_trunk(Anatomy *anatomy, Vec3 half)
         add_shell(anatomy, vec3(0, behind, 29.0 * k), vec3(20, 16, 12.5), 2, 0.45 * bone);
 }
 
-// In the middle of the visible region, with half widths `half`, along the patient's axes.
+// Placed in the middle of the visible region, with half widths `half`, along the patient's axes.
 static void add_plain_body(Anatomy *anatomy, Vec3 half)
 {
     if (half.x < 66 && half.y < 86 && half.z < 104)
@@ -68,8 +69,9 @@ static double tissue_of(double value, double least, double greatest)
     return greatest > least ? bone * (value - least) / (greatest - least) : 0;
 }
 
-// Cells that lie inside the lumen, by counting walls along the grid's third axis: crossings of the middle of each column of cells are summed with
-// their direction. The columns are slightly off the cells' middles, to avoid vertices.
+// Finds the cells inside the lumen by counting walls along the third axis of the grid: for each column of cells, the wall crossings of its centre line are
+// summed with
+// their direction. The lines are slightly off the centres to avoid vertices.
 static void count_walls(const Anatomy *anatomy, const Vec3 corner[3], int8_t *change)
 {
     const double off[2] = {0.5 + 1.2345e-7, 0.5 + 2.3456e-7};
@@ -100,7 +102,7 @@ static void count_walls(const Anatomy *anatomy, const Vec3 corner[3], int8_t *ch
         }
 }
 
-// 1 where a cell's middle is inside the lumen, or next to such a cell (blur spreads its value).
+// 1 if the centre of a cell is inside the lumen, or next to such a cell (blur spreads its value).
 static bool find_lumen(const Anatomy *anatomy, const TriangleMesh *mesh, const MeshLids *lids, uint8_t *inside)
 {
     const size_t nx = (size_t)anatomy->size[0], ny = (size_t)anatomy->size[1], nz = (size_t)anatomy->size[2], cells = nx * ny * nz;
@@ -187,7 +189,7 @@ static void fill_grid(Anatomy *anatomy, const FluoroscopeOptions *options, const
 static bool take_volume(Anatomy *anatomy, const FluoroscopeOptions *options, const MeshLids *lids, char *message, size_t capacity)
 {
     if (!volume_is_sound(options))
-        return message_fail(message, capacity, "the volume behind the vessel has no sound size or axes");
+        return message_fail(message, capacity, "the volume behind the vessel has an invalid size or invalid axes");
     int part[3];
     size_t voxels = 1;
     for (int k = 0; k < 3; k++) {
@@ -198,7 +200,7 @@ static bool take_volume(Anatomy *anatomy, const FluoroscopeOptions *options, con
     for (size_t i = 0; i < voxels; i++) {
         double value = options->anatomy_value[i];
         if (!isfinite(value))
-            return message_fail(message, capacity, "the volume behind the vessel holds values that are not numbers");
+            return message_fail(message, capacity, "the volume behind the vessel contains values that are not finite");
         least = fmin(least, value);
         greatest = fmax(greatest, value);
     }
@@ -212,7 +214,7 @@ static bool take_volume(Anatomy *anatomy, const FluoroscopeOptions *options, con
         fill_grid(anatomy, options, part, inside, least, greatest);
     free(inside);
     if (!good)
-        return message_fail(message, capacity, "not enough memory for the volume behind the vessel");
+        return message_fail(message, capacity, "out of memory for the volume behind the vessel");
     if (least >= -200)
         add_head(anatomy);
     return true;

@@ -9,8 +9,8 @@ enum { ELLIPSOIDS_MOST = 40 };
 
 typedef struct Ellipsoid {
     Vec3 center;             // [mm] from Anatomy.middle, along right, anterior, superior
-    Vec3 semi;               // [mm] semi-axes along the same
-    double attenuation;      // [1/mm], added to the others: a hollow is an ellipsoid with negative sign
+    Vec3 semi;               // [mm] semi-axes along the same directions
+    double attenuation;      // [1/mm], added to that of the others: a cavity is an ellipsoid with negative attenuation
 } Ellipsoid;
 
 typedef struct Anatomy {
@@ -28,7 +28,7 @@ typedef struct Anatomy {
 
 enum { ANATOMY_GRID = 128 };
 
-// `vessel`'s lumen (closed: `lids`) is removed from the volume, where it may be full of contrast agent. False with a message.
+// The lumen of `vessel` (closed by `lids`) is removed from the volume, because it may be full of contrast agent there. Returns false with a message.
 bool anatomy_create(Anatomy *anatomy, const FluoroscopeOptions *options, const MeshLids *lids, char *message, size_t capacity);
 void anatomy_free(Anatomy *anatomy);
 // Integral of the attenuation along a ray, in double precision (slow: for exposure and tests).

@@ -1,8 +1,8 @@
-// With I = exp(-attenuation), 1 where exposure puts white:
+// With I = exp(-attenuation), 1 at the white level of the exposure:
 //   live: brightness 1.75 I^0.72; N = quanta I are detected, sigma_I = sqrt(I / quanta), so sigma of the brightness is 1.75 0.72 I^0.22 / sqrt(quanta)
-//   DSA: brightness 0.62 exp(-g D), D = attenuation now minus attenuation in the mask; sigma = brightness g sqrt(1 / N_now + 1 / N_mask): the part of the mask
-//   stays the same as long as the mask
-// The detector's blur is the 3 x 3 binomial kernel, on layers and on the noise; the noise has unit variance after it. It is applied to attenuation,
+//   DSA: brightness 0.62 exp(-g D), D = attenuation now minus attenuation in the mask; sigma = brightness g sqrt(1 / N_now + 1 / N_mask): the noise of the mask
+//   does not change as long as the mask
+// The blur of the detector is the 3 x 3 binomial kernel, on layers and on the noise, which has unit variance after it. It is applied to attenuation,
 // not to intensity: for neighbours that differ by 0.3 the error is 1 % of the difference.
 #include "render/fluoroscope_layers.h"
 
@@ -15,7 +15,7 @@
 
 static const double white = 1.75, live_power = 0.72, subtracted = 0.62;
 static const double weakest = 1.0 / 64;              // DSA: below this fraction of white, noise does not grow further
-static const double room[2] = {8, 4};                // headroom above white in the baked channels, which may still be darkened
+static const double room[2] = {8, 4};                // headroom above white in the baked channels, which may later be darkened
 
 static const char *const SQUARE_VERTEX = "#version 330 core\n"
                                          "out vec2 at;\n"   // 0..1 over the square
@@ -30,7 +30,7 @@ static const char *const ANATOMY_FRAGMENT =
     "void main() { vec2 f = at - 0.5;\n"
     "  vec3 d = ray[0] + f.x * ray[1] + f.y * ray[2]; float size = length(d), sum = 0.0;\n"
     "  for (int i = 0; i < count; i++) { vec3 p = (source - ellipsoid[i].xyz) * inverse_semi[i], v = d * inverse_semi[i];\n"
-    // from the point of the line closest to the centre: b^2 - a c of large numbers would lose the chord
+    // start from the point of the line closest to the centre: b^2 - a c of large numbers would cancel
     "    float a = dot(v, v); p -= dot(p, v) / a * v; float q = 1.0 - dot(p, p);\n"
     "    sum += q > 0.0 ? ellipsoid[i].w * 2.0 * sqrt(q / a) * size : 0.0; }\n"
     "  if (steps > 0) { vec3 g = grid_ray[0] + f.x * grid_ray[1] + f.y * grid_ray[2];\n"
@@ -42,7 +42,7 @@ static const char *const ANATOMY_FRAGMENT =
     "      sum += grid * most * step * size; } }\n"
     "  result = max(sum, 0.0); }\n";
 
-// Shared by the shaders that read the lumen. TAPS 4 is the detector's blur; a layer of half the resolution is blurred by its one tap. llvmpipe
+// Shared by the shaders that read the lumen. TAPS_4 is the blur of the detector; a layer of half the resolution is blurred by its single tap. llvmpipe
 // executes both sides of a branch, so variants are compiled separately.
 #define TAPS_4                                                                                                                                                 \
     "#version 330 core\n"                                                                                                                                      \
@@ -87,7 +87,7 @@ static const char *const TOOL_VERTEX = "#version 330 core\n"
                                        "layout(location = 0) in vec2 place; layout(location = 1) in vec3 profile; layout(location = 2) in vec2 density;\n"
                                        "uniform float side; out vec3 tube; out vec2 d;\n"
                                        "void main() { gl_Position = vec4(2.0 * place / side - 1.0, 0.0, 1.0); tube = profile; d = density; }\n";
-// of each circle the integral of sqrt(r^2 - x^2) between pixel borders, of three pixels for the detector's blur
+// for each circle the integral of sqrt(r^2 - x^2) between pixel borders, over three pixels for the blur of the detector
 static const char *const TOOL_FRAGMENT = "#version 330 core\n"
                                          "in vec3 tube; in vec2 d; out vec4 result; uniform vec2 power; uniform bool as_attenuation;\n"
                                          "float chord(float r) { vec4 u = clamp((tube.x + vec4(-1.5, -0.5, 0.5, 1.5)) / r, -1.0, 1.0);\n"
@@ -136,7 +136,7 @@ static bool make_noise(LayerPrograms *programs)
     uint8_t *tile = malloc(cells);
     bool good = raw && soft && tile;
     for (size_t i = 0; good && i < cells; i++) {
-        // Box and Muller
+        // Box-Muller method
         double u = (double)((mix_bits(2 * i) >> 11) + 1) / 9007199254740993.0, v = (double)(mix_bits(2 * i + 1) >> 11) / 9007199254740992.0;
         raw[i] = sqrt(-2 * log(u)) * cos(2 * PI * v);
     }
@@ -220,7 +220,7 @@ bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *messag
         if (!(*wanted[i].program = square_program(wanted[i].vertex, wanted[i].head, wanted[i].fragment, message, capacity)))
             return false;
     if (!make_noise(programs))
-        return message_fail(message, capacity, "not enough memory for the noise of fluoroscopy");
+        return message_fail(message, capacity, "out of memory for the noise of fluoroscopy");
     glGenVertexArrays(1, &programs->empty_array);
     make_tool_array(programs);
     if (anatomy->level)
@@ -392,7 +392,7 @@ void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Laye
     double edge[4];
     int offset[3];
     for (int k = 0; k < 4; k++) {
-        // open blades still frame the picture
+        // fully open blades still frame the picture
         double covered = isfinite(blades[k]) ? fmin(fmax(blades[k], 0), 0.95) : 0;
         edge[k] = (k % 2 ? 0.5 : -0.5) * fmin(1 - covered, 0.965);
     }
@@ -465,7 +465,7 @@ void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerT
     unsigned program = programs->show[tone->has_roadmap];
     int offset[3];
     noise_offset(pulse, offset);
-    // of a unit of the baked noise channel; the tile holds n / 8
+    // one unit of the baked noise channel; the tile stores n / 8
     double unit = tone->is_subtracted ? white * tone->gain / sqrt(weakest) : white * live_power;
     bind_layer(baked);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);

@@ -12,12 +12,12 @@ typedef struct Exposure {
     bool has_tools;
     const RibbonPath *tool[TOOLS_MOST];  // of the devices inserted
     Vec3 *position;              // (of all tools' nodes, one tool after the other)
-    float *filling;              // (the same)
+    float *filling;              // (as position)
     float *contrast;             // (N)
 } Exposure;
 
 typedef struct PictureLayers {
-    Layer bare, base, picture;   // without the lumen; with it; with the tools
+    Layer bare, base, picture;   // without the lumen; with it; with the tools too
 } PictureLayers;
 
 typedef struct Fluoroscope Fluoroscope;
@@ -25,23 +25,23 @@ struct Fluoroscope {
     FluoroscopeOptions options;  // its pointers are invalid
     int tool_count;
     const ToolLooks *looks;
-    int tool_room[TOOLS_MOST];   // nodes at most
+    int tool_room[TOOLS_MOST];   // upper limit of nodes
     RibbonPath tool[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device, made when it is first seen
     Anatomy anatomy;
     Lumen lumen;
     LayerPrograms programs;
     Layer anatomy_layer, anatomy_next, lumen_layer, roadmap_layer, mask;
     int anatomy_rows;            // rows drawn of anatomy_next, which replaces the coarse one when complete
-    PictureLayers still, turning, *now;   // of full and half the resolution; which of them is shown
+    PictureLayers still, turning, *now;   // at full and at half resolution; the one that is shown
     Ribbon ribbon;
     int drawn_low[2], drawn_high[2];   // box of the tools in `picture`
     Exposure shown;
     bool has_picture;
     // contents of the layers
     bool layers_are_stale, lumen_is_coarse, anatomy_is_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
-    CArm c_arm;                  // of the layers
-    float *lumen_contrast;       // (N) of the lumen layer
-    XrayControl baked;           // of the base
+    CArm c_arm;                  // C-arm of the layers
+    float *lumen_contrast;       // (N) contrast of the lumen layer
+    XrayControl baked;           // settings of the base
     LayerTone tone;
     int side;
     // mask and roadmap
@@ -49,7 +49,7 @@ struct Fluoroscope {
     float mask_count;
     uint32_t mask_pulse;
     CArm mask_c_arm;
-    float *bolus, *roadmap;      // (N) most there was in the last bolus; most in the roadmap
+    float *bolus, *roadmap;      // (N) maximum during the last bolus; maximum in the roadmap
     bool was_opacified, roadmap_has_changed;
     bool is_held;
     int corner[2];

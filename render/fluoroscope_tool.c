@@ -1,25 +1,25 @@
-// Between two points of the tool the ray's path through it is the chord of the shadow's cross-section times L / l, with L their distance in space and
-// l that of their shadows, both in the same measure: a foreshortened piece is darker, and the sum over the shadow stays mu pi r^2 L. Points whose
-// shadows fall within a pixel or the tool's radius are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers; a border
-// between stretches stays unless it is foreshortened, so that a marker band is as long as it is. A tube is an outer circle of its wall and an inner
-// one that takes the wall away again and puts in what fills the lumen.
+// Between two points of the tool, the path of a ray through it is the chord of the shadow's cross-section times L / l, where L is their distance in space and
+// l that of their shadows, in the same unit: a foreshortened piece is darker, and the sum over the shadow remains mu pi r^2 L. Points whose
+// shadows fall within a pixel or within the tool's radius are merged, so that a tool seen along its axis becomes a dark spot and not a row of slivers; a border
+// between stretches is kept unless it is foreshortened, so that a marker band has its true length. A tube is an outer circle of its wall and an inner
+// one that subtracts the wall and adds the filling of the lumen.
 #include "render/fluoroscope_tool.h"
 
 #include <stdlib.h>
 
 enum { PARTS = 4 };                      // between two nodes
-static const double margin = 2;          // [pixel] beside the shadow: half a pixel and the detector's blur
+static const double margin = 2;          // [pixel] on each side of the shadow: half a pixel and the blur of the detector
 
 typedef struct RibbonPoint {
     double x, y;                         // [pixel]
-    double pixel_mm;                     // of the square at its depth
-    double way;                          // [pixel] in space, from the point before …
-    double wall, filling;                // … and the integrals of the wall's attenuation and of the lumen's filling along it
-    double radius, lumen;                // [mm] of what lies before it
+    double pixel_mm;                     // [mm] size of a pixel at its depth
+    double way;                          // [pixel] distance in space from the previous point …
+    double wall, filling;                // … and the integrals of the wall's attenuation and of the lumen's filling along that distance
+    double radius, lumen;                // [mm] of the stretch before it
     bool begins;                         // first point of a stretch
 } RibbonPoint;
 
-// --- where there are points ---
+// --- positions of the points ---
 
 bool ribbon_path_make(RibbonPath *path, int node_count, const double *s, int stretch_count, const TubeStretch *stretch)
 {
@@ -52,9 +52,9 @@ void ribbon_path_free(RibbonPath *path)
     *path = (RibbonPath){0};
 }
 
-// --- laying ---
+// --- the ribbon ---
 
-// One side of the ribbon's end at p, by the tube of the piece that ends at `of`.
+// Adds one side of the ribbon's end at p, with the tube of the piece that ends at `of`.
 static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, const RibbonPoint *of, const double normal[2], double side, const double density[2])
 {
     if (ribbon->count == ribbon->capacity) {
@@ -74,7 +74,7 @@ static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, const RibbonPoint *
     return true;
 }
 
-// Along the tool's nodes: a curve through them (Catmull and Rom's), so that a bend seen edge-on is smooth.
+// A point of the curve through the nodes of the tool (Catmull-Rom), so that a bend seen edge-on is smooth.
 static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
 {
     Vec3 p[4];
@@ -92,10 +92,10 @@ static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
     return vec3_add_scaled(x, u * u * (u - 1), to);
 }
 
-// [pixel] Pieces shorter than their thickness would overlap where the shadow turns back.
+// Least length [pixel] of a piece: shorter pieces would overlap where the shadow turns back.
 static double least_length(const RibbonPoint *p) { return fmax(1, 1.5 * p->radius / p->pixel_mm); }
 static double shadow_length(const RibbonPoint *a, const RibbonPoint *b) { return hypot(b->x - a->x, b->y - a->y); }
-// Seen at more than 60 degrees from the side.
+// True if seen at more than 60 degrees from the side.
 static bool is_foreshortened(const RibbonPoint *a, const RibbonPoint *b) { return shadow_length(a, b) < 0.5 * b->way; }
 
 static double filling_at(const float *filling, const RibbonPlace *place)
@@ -103,7 +103,7 @@ static double filling_at(const float *filling, const RibbonPlace *place)
     return (double)filling[place->node] + place->u * ((double)filling[place->node + 1] - (double)filling[place->node]);
 }
 
-// The projected points, closer ones joined. Returns how many. `filling` NULL: none.
+// Projects the points and merges close ones. Returns their number. `filling` NULL: none.
 static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, const float *filling)
 {
     int points = 0;
@@ -126,7 +126,7 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
         last_filling = here;
         before = x;
         RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, way, wall, filled, place->radius, place->lumen, is_broken};
-        // merged with the point before: path and wall add up, the last position counts
+        // merged with the previous point: lengths and wall integrals are added, the last position is kept
         bool is_near = !is_broken && shadow_length(&out[points - 1], &point) < least_length(&point);
         bool is_joined = is_near && i + 1 < path->count && (!place->is_border || is_foreshortened(&out[points - 1], &point));
         is_broken = false;
@@ -138,7 +138,7 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
     return points;
 }
 
-// Unit normal of the shadow from a to b; of `otherwise` where they fall together.
+// Unit normal of the shadow from a to b; `otherwise` if they coincide.
 static void shadow_normal(const RibbonPoint *a, const RibbonPoint *b, double normal[2])
 {
     double dx = b->x - a->x, dy = b->y - a->y, l = hypot(dx, dy);
@@ -146,7 +146,7 @@ static void shadow_normal(const RibbonPoint *a, const RibbonPoint *b, double nor
     normal[1] = l > 1e-9 ? dx / l : 1;
 }
 
-// The mitre at b between a-b and b-c, as long as both sides need; their own normal where the path turns so sharply that the inner corner would lie
+// The mitre at b between a-b and b-c, with the length that both sides need; their own normals where the path turns so sharply that the inner corner would lie
 // behind the other end of a piece.
 static void mitre(const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *c, const double own[2], double out[2])
 {
@@ -168,7 +168,7 @@ static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoi
     double own[2], n[2][2], l = shadow_length(a, b), least = least_length(b);
     RibbonPoint end[2] = {*a, *b};
     if (l < least && is_foreshortened(a, b)) {
-        // all of it within one spot: spread over that
+        // all points are within one spot: spread over that spot
         double ux = l > 1e-9 ? (b->x - a->x) / l : 1, uy = l > 1e-9 ? (b->y - a->y) / l : 0, mx = (a->x + b->x) / 2, my = (a->y + b->y) / 2;
         end[0].x = mx - least * ux / 2, end[0].y = my - least * uy / 2;
         end[1].x = mx + least * ux / 2, end[1].y = my + least * uy / 2;

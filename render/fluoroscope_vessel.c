@@ -62,7 +62,7 @@ static void delete_mesh(LumenMesh *mesh)
     glDeleteVertexArrays(1, &mesh->array);
 }
 
-// --- the tree's nodes of vertices ---
+// --- tree nodes of the vertices ---
 
 static int nearest_node(const VesselTree *tree, Vec3 x)
 {
@@ -85,7 +85,7 @@ static int node_of_vertex(const FluoroscopeOptions *options, int v)
     return !tree ? 0 : node >= 0 && node < tree->node_count ? node : nearest_node(tree, options->vessel->vertex[v]);
 }
 
-// A copy with lids, whose nodes are known. NULL if out of memory.
+// A copy with lids whose nodes are known. Returns NULL if out of memory.
 static TriangleMesh *closed_copy(const FluoroscopeOptions *options, const MeshLids *lids)
 {
     const TriangleMesh *mesh = options->vessel;
@@ -173,9 +173,9 @@ bool lumen_layer_create(Lumen *lumen, const FluoroscopeOptions *options, const M
     GLint most = 0;
     glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
     if (options->tree && options->tree->node_count > most)
-        return message_fail(message, capacity, "a tree of %d nodes is too large for fluoroscopy here; %d", options->tree->node_count, (int)most);
+        return message_fail(message, capacity, "a tree of %d nodes is too large for fluoroscopy; this driver allows %d", options->tree->node_count, (int)most);
     if (!take_nodes(lumen, options->tree) || !send_both(lumen, options, lids))
-        return message_fail(message, capacity, "not enough memory for the vessel in fluoroscopy");
+        return message_fail(message, capacity, "out of memory for the vessel in fluoroscopy");
     lumen->is_there = true;
     return true;
 }
@@ -229,7 +229,7 @@ void lumen_box(const Lumen *lumen, const CArm *c_arm, int side, int low[2], int 
 
 static void send_nodes(Lumen *lumen, const CArm *c_arm, const float *concentration)
 {
-    // the integral of c dz along the tree, in double and from the isocentre's plane on, so that a long tree loses nothing
+    // the integral of c dz along the tree, in double precision and from the plane of the isocentre, so that a long tree loses no precision
     double *potential = malloc((size_t)lumen->node_count * sizeof *potential);
     if (!potential)
         return;
@@ -265,7 +265,7 @@ void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentratio
     glUniform1i(glGetUniformLocation(program, "nodes"), 0);
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_BUFFER, lumen->texture);
-    glEnable(GL_DEPTH_CLAMP);   // far walls count, however far
+    glEnable(GL_DEPTH_CLAMP);   // walls beyond the far plane count too
     glEnable(GL_BLEND);
     glBlendEquation(GL_FUNC_ADD);
     glBlendFunc(GL_ONE, GL_ONE);

@@ -1,11 +1,12 @@
-// Letters for Dear ImGui, C++ only: DejaVu Sans where it is installed (package fonts-dejavu-core), else ImGui's own.
+// Fonts for Dear ImGui, C++ only: DejaVu Sans if it is installed (package fonts-dejavu-core), else ImGui's built-in font.
 #ifndef SELDINGER_RENDER_FONT_H
 #define SELDINGER_RENDER_FONT_H
 
 #include <cstdio>
 #include <imgui.h>
 
-// `letters`: pairs of first and last code point, ended by 0; lives as long as the atlas. Once for each size, into the current context's atlas.
+// Adds a font to the atlas of the current context; call once for each size. `letters`: pairs of first and last code point, ended by 0; must live as long as the
+// atlas.
 inline ImFont *font_add(float pixels, const ImWchar *letters, ImFontConfig config = ImFontConfig())
 {
     static const char *const file[] = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", "/usr/share/fonts/TTF/DejaVuSans.ttf",

@@ -13,7 +13,7 @@ bool gl_canvas_create(GlCanvas *canvas, int width, int height, int samples, char
     glGetIntegerv(GL_MAX_SAMPLES, &most_samples);
     glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &most_pixels);
     if (width < 1 || height < 1 || width > most_pixels || height > most_pixels)
-        return message_fail(message, capacity, "a picture of %d x %d pixels cannot be drawn; expected 64 to %d per side", width, height, (int)most_pixels);
+        return message_fail(message, capacity, "cannot draw a picture of %d x %d pixels; expected 64 to %d per side", width, height, (int)most_pixels);
     if (samples > most_samples)
         samples = most_samples;
 
@@ -43,7 +43,7 @@ bool gl_canvas_create(GlCanvas *canvas, int width, int height, int samples, char
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, canvas->depth);
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE || glGetError() == GL_OUT_OF_MEMORY) {
         gl_canvas_destroy(canvas);
-        return message_fail(message, capacity, "the driver gives no framebuffer of %d x %d pixels", width, height);
+        return message_fail(message, capacity, "the driver cannot create a framebuffer of %d x %d pixels", width, height);
     }
     return true;
 }
@@ -90,7 +90,7 @@ void gl_framebuffer_read(unsigned framebuffer, int width, int height, uint8_t *r
     glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     size_t row = (size_t)width * 3;
-    // GL's rows go up, a file's go down
+    // rows go upwards in OpenGL and downwards in a file
     for (int y = 0; y < height; y++)
         glReadPixels(0, height - 1 - y, width, 1, GL_RGB, GL_UNSIGNED_BYTE, rgb + (size_t)y * row);
 }
@@ -130,7 +130,7 @@ unsigned gl_program_create(const char *vertex_shader, const char *fragment_shade
         glLinkProgram(program);
         glGetProgramiv(program, GL_LINK_STATUS, &linked);
         if (!linked)
-            message_fail(message, capacity, "the shaders do not link");
+            message_fail(message, capacity, "the shaders cannot be linked");
     }
     if (!linked) {
         glDeleteProgram(program);

@@ -1,7 +1,7 @@
 // EGL_PLATFORM_SURFACELESS_MESA needs no surface at all: everything is drawn into framebuffer objects.
 //
-// The display is one per process and stays open until the process ends: eglTerminate would end other contexts with it, and it unloads the
-// driver, which leaves a little of LLVM behind at every round and takes 50 ms to load again.
+// There is one display per process, which stays open until the process ends: eglTerminate would also end other contexts, and it unloads the
+// driver, which leaks some memory of LLVM each time and takes 50 ms to load again.
 #include "render/gl_context.h"
 
 #include "render/message.h"
@@ -20,7 +20,7 @@ struct GlContext {
     EGLSurface previous_draw, previous_read;
 };
 
-// epoxy opens these libraries at the first call and ends the process where one is missing.
+// epoxy opens these libraries at its first call and ends the process if one is missing.
 static bool has_libraries(char *message, size_t capacity)
 {
     if (!dlopen("libEGL.so.1", RTLD_LAZY))
@@ -36,12 +36,12 @@ static EGLDisplay open_display(char *message, size_t capacity)
     const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
     if (!extensions || !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base") ||
         !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless")) {
-        message_fail(message, capacity, "no surfaceless EGL here; install libegl-mesa0 and libgl1-mesa-dri");
+        message_fail(message, capacity, "no surfaceless EGL; install libegl-mesa0 and libgl1-mesa-dri");
         return EGL_NO_DISPLAY;
     }
     EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
     if (display == EGL_NO_DISPLAY || !eglInitialize(display, NULL, NULL)) {
-        message_fail(message, capacity, "EGL's surfaceless display does not start (error 0x%x); install libgl1-mesa-dri", (unsigned)eglGetError());
+        message_fail(message, capacity, "cannot initialise EGL's surfaceless display (error 0x%x); install libgl1-mesa-dri", (unsigned)eglGetError());
         return EGL_NO_DISPLAY;
     }
     return display;
@@ -50,7 +50,7 @@ static EGLDisplay open_display(char *message, size_t capacity)
 static bool make_context(GlContext *context, char *message, size_t capacity)
 {
     if (!eglBindAPI(EGL_OPENGL_API))
-        return message_fail(message, capacity, "EGL has no desktop OpenGL here; install libgl1-mesa-dri");
+        return message_fail(message, capacity, "EGL has no desktop OpenGL; install libgl1-mesa-dri");
     // a GLES-only EGL has no config for desktop GL; surfaceless contexts need no surface type
     const EGLint wanted[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, EGL_DONT_CARE, EGL_NONE};
     EGLConfig config = NULL;
@@ -73,7 +73,7 @@ GlContext *gl_context_create(char *message, size_t capacity)
 {
     GlContext *context = calloc(1, sizeof *context);
     if (!context) {
-        message_fail(message, capacity, "not enough memory for a picture");
+        message_fail(message, capacity, "out of memory for a picture");
         return NULL;
     }
     software_driver_without_threads();

@@ -7,9 +7,9 @@
 
 typedef struct GlContext GlContext;
 
-// Makes a context and makes it current in this thread; what was current before is current again after destroy. NULL with a reason.
+// Creates a context and makes it current in this thread; destroying it restores the context that was current before. Returns NULL with a reason.
 GlContext *gl_context_create(char *message, size_t capacity);
 void gl_context_destroy(GlContext *context);
-const char *gl_context_renderer(const GlContext *context);   // "llvmpipe (LLVM 15, 256 bits)", lives as long as the context
+const char *gl_context_renderer(const GlContext *context);   // "llvmpipe (LLVM 15, 256 bits)"; valid as long as the context
 
 #endif

@@ -1,5 +1,6 @@
-// On a software renderer the cost is blended pixels and triangles. Buttons, rows and bars are drawn here rather than by ImGui's widgets, square and
-// unsmoothed, for a third of the triangles. Windows that are KEPT are drawn into a texture, only when their vertices have changed, and copied from
+// On a software renderer the cost is in blended pixels and triangles. Buttons, rows and bars are drawn here, square and without antialiasing, instead of by
+// ImGui's widgets:
+// a third of the triangles. KEPT windows are drawn into a texture only when their vertices have changed, and copied from
 // there: 1 ms a frame instead of 5 at 1280x720.
 #include "render/gui.h"
 
@@ -22,7 +23,7 @@ struct KeptWindow {
     ImDrawList *list;                // of this frame, NULL: not shown in it
     GuiRect at;
     bool is_seldom, is_drawn;
-    uint64_t hash;                   // of the vertices that were drawn
+    uint64_t hash;                   // of the vertices drawn
     int age;                         // frames since
 };
 
@@ -31,17 +32,17 @@ struct Gui {
     ImFont *font[GUI_FONTS];
     float scale;
     bool has_backend, is_silent;
-    bool scrolls_to_end;             // the window that was begun last
+    bool scrolls_to_end;             // of the window begun last
     bool released[WINDOW_KEYS];
     KeptWindow kept[KEPT_WINDOWS];
     int kept_count;
     GLuint keep_texture, keep_framebuffer;
     int keep_width, keep_height;
-    bool is_turned;                  // kept upside down, for a window
+    bool is_turned;                  // stored upside down, for a window
 };
 
 static constexpr Color rgb(int r, int g, int b) { return Color{(uint8_t)r, (uint8_t)g, (uint8_t)b, 255}; }
-// marks: sky blue, bluish green, orange and vermilion of Okabe and Ito, lightened for a dark ground
+// marks: sky blue, bluish green, orange and vermilion of Okabe and Ito, lightened for a dark background
 extern "C" const GuiColors gui_colors = {rgb(12, 14, 18),    rgb(23, 26, 32),    rgb(40, 45, 55),   rgb(56, 63, 77),   rgb(32, 84, 128),  rgb(52, 58, 70),
                                          rgb(222, 226, 233), rgb(146, 154, 168), rgb(86, 180, 233), rgb(40, 190, 145), rgb(240, 172, 30), rgb(255, 112, 64)};
 
@@ -95,7 +96,7 @@ static void set_style(float scale)
 
 static void make_fonts(Gui *gui, float scale)
 {
-    // Latin with its extensions, Greek, Cyrillic, dashes and quotes, arrows, minus, the signs that the panel uses
+    // Latin with its extensions, Greek, Cyrillic, dashes and quotes, arrows, minus, and the signs used by the panel
     static const ImWchar letters[] = {0x20,   0x17f,  0x391,  0x3c9,  0x400,  0x45f,  0x2010, 0x2027, 0x2190, 0x2193, 0x2212,
                                       0x2212, 0x25a0, 0x25a0, 0x25b2, 0x25b2, 0x25cb, 0x25cf, 0x2713, 0x2717, 0};
     static const ImWchar large[] = {0x20, 0xff, 0x2010, 0x2027, 0x2212, 0x2212, 0};
@@ -137,7 +138,7 @@ extern "C" Gui *gui_create(char *message, size_t capacity)
     gui->has_backend = ImGui_ImplOpenGL3_Init("#version 330 core");
     ImGui::SetCurrentContext(previous);
     if (!gui->has_backend) {
-        std::snprintf(message, capacity, "Dear ImGui's OpenGL back end does not start");
+        std::snprintf(message, capacity, "cannot initialise Dear ImGui's OpenGL back end");
         gui_destroy(gui);
         return nullptr;
     }
@@ -159,7 +160,7 @@ extern "C" void gui_destroy(Gui *gui)
     delete gui;
 }
 
-// A key pressed and released between two frames is down for one of them.
+// A key pressed and released between two frames is pressed for one of them.
 static void feed_keys(Gui *gui, ImGuiIO &io, const WindowInput *input)
 {
     for (int key = 0; key < WINDOW_KEYS; key++)
@@ -216,8 +217,8 @@ extern "C" void gui_begin(Gui *gui, const WindowInput *input, double scale, bool
 
 // ---- cached windows
 
-// A copy is plain memory, a third of the cost, where nothing has to be converted or turned over: a window's own buffer has its bytes in the order
-// BGRA and its rows going down, one off screen RGBA and up. (With the sized GL_RGBA8 Mesa does not take the order from the last arguments.)
+// Where nothing has to be converted or turned over, a plain copy costs a third: the buffer of a window has the byte order
+// BGRA and rows downwards, one off screen RGBA and upwards. (With the sized GL_RGBA8 Mesa does not take the order from the last arguments.)
 static bool make_keep(Gui *gui, int width, int height, bool is_window)
 {
     if (gui->keep_width == width && gui->keep_height == height && gui->is_turned == is_window)
@@ -253,7 +254,7 @@ static void keep_window(Gui *gui, GuiRect at, unsigned flags)
     while (i < gui->kept_count && gui->kept[i].id != window->ID)
         i++;
     if (i == KEPT_WINDOWS)
-        return;   // drawn as any other, but for its ground
+        return;   // drawn like any other, except for its background
     if (i == gui->kept_count)
         gui->kept[gui->kept_count++] = KeptWindow{window->ID, nullptr, at, false, false, 0, 0};
     KeptWindow *kept = &gui->kept[i];
@@ -291,7 +292,7 @@ static void swap_clips(ImDrawList *drawn)
         std::swap(command.ClipRect.y, command.ClipRect.w);
 }
 
-// Upside down: the first row is the upper one.
+// Draws upside down: the first row is the top one.
 static void draw_upside_down(const ImDrawData *all, ImDrawList *drawn)
 {
     ImDrawData turned = *all;
@@ -331,7 +332,7 @@ static void refresh(Gui *gui, KeptWindow *kept, const ImDrawData *data)
 static void copy_kept(const Gui *gui, const KeptWindow *kept)
 {
     int left = (int)kept->at.x, right = left + (int)kept->at.width, top = (int)kept->at.y, bottom = top + (int)kept->at.height;
-    int to_top = gui->keep_height - top, to_bottom = gui->keep_height - bottom;   // OpenGL's rows go up
+    int to_top = gui->keep_height - top, to_bottom = gui->keep_height - bottom;   // rows go upwards in OpenGL
     glBlitFramebuffer(left, gui->is_turned ? top : to_top, right, gui->is_turned ? bottom : to_bottom, left, to_top, right, to_bottom, GL_COLOR_BUFFER_BIT,
                       GL_NEAREST);
 }
@@ -405,7 +406,7 @@ extern "C" void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned 
 
 extern "C" float gui_window_end(Gui *gui)
 {
-    // after the contents, so that "here" is their end; not where the user has scrolled up
+    // after the contents, so that "here" is their end; not if the user has scrolled up
     if (gui->scrolls_to_end && ImGui::GetScrollY() >= ImGui::GetScrollMaxY())
         ImGui::SetScrollHereY(1);
     const ImGuiWindow *window = ImGui::GetCurrentWindow();
@@ -478,7 +479,7 @@ extern "C" GuiPress gui_button(Gui *gui, const char *id, const char *label, cons
 
     char text[64];
     std::snprintf(text, sizeof text, is_on ? "\u2713 %s" : "%s", label);
-    // long labels on narrow buttons: small letters, then cut at the edge
+    // long labels on narrow buttons: small letters, then truncated at the edge
     GuiFont font = GUI_NORMAL;
     float text_width, text_height, key_width = 0, key_height = 0;
     gui_text_extent(gui, font, text, &text_width, &text_height);
@@ -502,7 +503,7 @@ extern "C" bool gui_slider(Gui *gui, const char *id, float *value, float least, 
 {
     ImGui::PushID(id);
     ImGui::SetNextItemWidth(width > 0 ? width : ImGui::GetContentRegionAvail().x);
-    // no typing into it (Ctrl and click): the keys are the trainer's
+    // no text input by Ctrl+click: the keys control the trainer
     bool is_moved = ImGui::SliderFloat("##value", value, least, most, format, ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput);
     ImGui::PopID();
     (void)gui;
@@ -539,7 +540,7 @@ extern "C" void gui_tooltip(Gui *gui, const char *title, const char *text, const
 
 extern "C" bool gui_tabs_begin(Gui *gui, const char *id)
 {
-    ImGui::PushFont(gui->font[GUI_SMALL]);   // five of them in a narrow column
+    ImGui::PushFont(gui->font[GUI_SMALL]);   // five tabs must fit into a narrow column
     bool is_open = ImGui::BeginTabBar(id, ImGuiTabBarFlags_NoTooltip | ImGuiTabBarFlags_FittingPolicyResizeDown);
     if (!is_open)
         ImGui::PopFont();

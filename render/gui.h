@@ -1,6 +1,6 @@
-// A thin C interface to Dear ImGui and its OpenGL 3 back end: windows at fixed places, text, buttons, sliders, tabs, a text field, and drawing. Fed
-// with WindowInput, so that it works the same in a window and off screen (and in tests); independent of GLFW. Pixels, y down. Needs a current GL
-// context. Other ImGui contexts (render/overlay.h) are left as they are: a Gui's own is current from gui_begin to gui_end only.
+// A thin C interface to Dear ImGui and its OpenGL 3 back end: windows at fixed places, text, buttons, sliders, tabs, a text field, and drawing. Its input is
+// WindowInput, so that it works the same in a window, off screen and in tests; independent of GLFW. Units are pixels, y down. Needs a current GL
+// context. Other ImGui contexts (render/overlay.h) are not affected: the context of a Gui is current only from gui_begin to gui_end.
 #ifndef SELDINGER_RENDER_GUI_H
 #define SELDINGER_RENDER_GUI_H
 
@@ -20,7 +20,7 @@ typedef struct GuiRect {
 } GuiRect;
 typedef enum { GUI_SMALL, GUI_NORMAL, GUI_LARGE, GUI_HUGE, GUI_FONTS } GuiFont;   // 13, 15, 19 and 28 pixels times the scale
 
-typedef struct GuiColors {     // of everything; the marks are distinguishable for the colour-blind, and never shown by colour alone
+typedef struct GuiColors {     // colours of all elements; the marks are distinguishable with colour-vision deficiency, and never shown by colour alone
     Color window, panel, frame, frame_hot, frame_on, line, text, dim, accent, good, warning, bad;
 } GuiColors;
 extern const GuiColors gui_colors;
@@ -28,19 +28,20 @@ extern const GuiColors gui_colors;
 Gui *gui_create(char *message, size_t capacity);
 void gui_destroy(Gui *gui);
 
-// A frame. `scale` of text and widgets; letters are made again where it changes by more than a twentieth. `is_silent`: lays out without input or
-// drawing (a window's contents are known from the previous frame).
+// Begins a frame. `scale`: of text and widgets; fonts are rebuilt if it changes by more than a twentieth. `is_silent`: lays out without input or
+// drawing (the contents of a window are known from the previous frame).
 void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent);
-// The last of them draws into `framebuffer`, which is `input->width` x `height` large and not multisampled. Leaves blending and scissor test off.
+// The last gui_end() of a frame draws into `framebuffer`, which has the size `input->width` x `input->height` and is not multisampled. Leaves blending and
+// scissor test off.
 void gui_end(Gui *gui, unsigned framebuffer);
-float gui_scale(const Gui *gui);        // of the current letters
+float gui_scale(const Gui *gui);        // scale of the current fonts
 
-// Windows at a fixed place. Overflowing contents scroll. NO_INPUT lets the mouse through; ON_TOP lies over the ones before and takes their clicks.
-// KEPT: opaque, overlapping no other but those on top; its pixels are cached and redrawn only when its contents changed. SELDOM: a cached window
-// updated in every third frame, for figures that nobody reads faster. FRAMED: a line around it. VEIL: translucent.
+// Windows at a fixed place. Overflowing contents scroll. NO_INPUT lets the mouse through; ON_TOP lies over the previous windows and takes their clicks.
+// KEPT: opaque, overlapping only windows on top; its pixels are cached and redrawn only when its contents change. SELDOM: a cached window
+// updated in every third frame, for figures that change faster than anyone can read. FRAMED: with a border line. VEIL: translucent.
 enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8, GUI_KEPT = 16, GUI_SELDOM = 32, GUI_FRAMED = 64, GUI_VEIL = 128 };
 void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned flags);
-// Missing height [pixel] of the contents; negative: free height.
+// Missing height of the contents [pixel]; negative: free height.
 float gui_window_end(Gui *gui);
 
 // Flow layout: each item goes below the last one, or next to it.
@@ -48,7 +49,7 @@ GuiRect gui_place(Gui *gui, float width, float height);   // reserves space (wid
 void gui_beside(Gui *gui, float gap);
 void gui_space(Gui *gui, float height);
 void gui_scroll_here(Gui *gui);                           // scrolls to the last item
-float gui_width(Gui *gui);                                // left in this line
+float gui_width(Gui *gui);                                // remaining width of this line
 float gui_line_height(const Gui *gui, GuiFont font);
 
 void gui_text(Gui *gui, GuiFont font, Color color, const char *text);
@@ -58,9 +59,9 @@ void gui_row(Gui *gui, GuiFont font, const char *label, Color color, const char 
 typedef struct GuiPress {
     bool pressed, held;
 } GuiPress; // clicked in this frame; the mouse is down on it
-// `width` 0: all there is. `key` at its right end in small letters, where both fit. `is_on`: filled, with a tick.
+// `width` 0: all available. `key` is shown at the right end in small letters if both fit. `is_on`: filled, with a tick.
 GuiPress gui_button(Gui *gui, const char *id, const char *label, const char *key, float width, bool is_on);
-// True while it is being moved. `format` as for printf of one double.
+// Returns true while it is being moved. `format`: printf format for one double.
 bool gui_slider(Gui *gui, const char *id, float *value, float least, float most, const char *format, float width);
 void gui_progress(Gui *gui, double part, const char *text);
 // A tooltip for the last item. NULL texts are left out.
@@ -71,10 +72,10 @@ bool gui_tab_begin(Gui *gui, const char *name);           // true: fill it, then
 void gui_tab_end(Gui *gui);
 void gui_tabs_end(Gui *gui);
 
-// One line of UTF-8. True when Enter was pressed. Takes the keyboard when `take_focus`.
+// One line of UTF-8. Returns true when Enter was pressed. Takes the keyboard focus if `take_focus`.
 bool gui_text_field(Gui *gui, const char *id, char *text, size_t capacity, bool take_focus);
 
-// Drawing, in the window that is open.
+// Drawing in the current window.
 void gui_draw_fill(Gui *gui, GuiRect at, Color color);
 void gui_draw_line(Gui *gui, float x0, float y0, float x1, float y1, Color color, float thickness);
 void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color color, const char *text);

@@ -1,5 +1,4 @@
-// Makes Dear ImGui end the program when memory runs out, instead of continuing with a null pointer. C++ only; to be included before a context is
-// made.
+// Makes Dear ImGui end the program if out of memory, instead of continuing with a null pointer. C++ only; include before a context is created.
 #ifndef SELDINGER_RENDER_IMGUI_HEAP_H
 #define SELDINGER_RENDER_IMGUI_HEAP_H
 

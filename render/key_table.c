@@ -1,6 +1,6 @@
-// One row per action, in the order of ActionId. A trainee's left hand lies on A S D W, C, E and F (C-arm, contrast, X-ray), the right one on the
-// arrows (tool), as they lie on the table's controls and on the wire in the angio suite. With a second tool to move the left hand goes to U H J K,
-// which lie as the arrows do on every layout of Latin letters; what is set once in a while (table, blades) is a letter with Alt.
+// One row per action, in the order of ActionId. A trainee's left hand is on A S D W, C, E and F (C-arm, contrast, X-ray) and the right hand on the
+// arrows (tool), arranged like the controls on the table and the wire in the angio suite. To move a second tool the left hand goes to U H J K,
+// which are arranged like the arrows on every Latin keyboard layout; rarely used settings (table, blades) are letters with Alt.
 #include "render/key_table.h"
 
 #include <stdio.h>
@@ -19,31 +19,31 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, KEY(RIGHT), "Twist right", "turn the tool right (clockwise, seen from behind) while held"},
     {ACTION_FAST, GROUP_TOOL, ACTION_HOLD, KEY(SHIFT), "Fast", "with push, pull or twist: faster"},
     {ACTION_SLOW, GROUP_TOOL, ACTION_HOLD, KEY(CTRL), "Slow", "with push, pull or twist: slower, for the last millimetres"},
-    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "all tools stand still while held, whatever other hands ask for"},
-    {ACTION_OTHER_PUSH, GROUP_TOOL, ACTION_HOLD, K('U'), "Push other", "push the next tool inside, of the innermost the one around it, while held"},
-    {ACTION_OTHER_PULL, GROUP_TOOL, ACTION_HOLD, K('J'), "Pull other", "pull that tool, the other of the pair, back while held"},
-    {ACTION_OTHER_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, K('H'), "Other left", "turn the pair's other tool left while held"},
-    {ACTION_OTHER_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, K('K'), "Other right", "turn the pair's other tool right while held"},
-    {ACTION_TOOL_1, GROUP_TOOL, ACTION_PRESS, K('1'), "Tool 1", "take the outermost tool: it is moved, the others are pinned"},
-    {ACTION_TOOL_2, GROUP_TOOL, ACTION_PRESS, K('2'), "Tool 2", "take the second tool, from the outermost inwards"},
-    {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "take the third tool"},
-    {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "take the fourth tool"},
-    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock", "lock the pair (tool and next inside, or around the last): they move as one"},
+    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "stop all tools while held, whatever other devices request"},
+    {ACTION_OTHER_PUSH, GROUP_TOOL, ACTION_HOLD, K('U'), "Push other", "push the next tool inside (for the innermost: the one around it) while held"},
+    {ACTION_OTHER_PULL, GROUP_TOOL, ACTION_HOLD, K('J'), "Pull other", "pull that tool, the other one of the pair, back while held"},
+    {ACTION_OTHER_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, K('H'), "Other left", "turn the other tool of the pair left while held"},
+    {ACTION_OTHER_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, K('K'), "Other right", "turn the other tool of the pair right while held"},
+    {ACTION_TOOL_1, GROUP_TOOL, ACTION_PRESS, K('1'), "Tool 1", "select the outermost tool: it is moved, the others are pinned"},
+    {ACTION_TOOL_2, GROUP_TOOL, ACTION_PRESS, K('2'), "Tool 2", "select the second tool, counted from the outermost"},
+    {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "select the third tool"},
+    {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "select the fourth tool"},
+    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock", "lock the pair (the tool and the next one inside or around it): they move as one"},
     {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Release", "release the tool: only its valve holds it; again: hold it"},
     {ACTION_EXCHANGE, GROUP_TOOL, ACTION_PRESS, K('X'), "Exchange", "open the tray: another device for the tool, a tip to shape; again: close"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; the last image stays on release"},
-    {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},
-    {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent through the chosen tool; only X-ray shows it"},
-    {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('T'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
-    {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "vessels of the last injection over the live image; again: off"},
-    {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "new mask for DSA and roadmap, after C-arm or table have moved"},
-    {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('I'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 a second"},
+    {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again, without holding the pedal"},
+    {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent through the selected tool; only X-ray shows it"},
+    {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('T'), "DSA", "subtract the mask: shows only contrast and tool; again: live image"},
+    {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "show the vessels of the last injection over the live image; again: off"},
+    {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "take a new mask for DSA and roadmap, after C-arm or table have moved"},
+    {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('I'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 per second"},
     {ACTION_MAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_ADD, 0, '+', "Magnify", "smaller field, larger picture"},
     {ACTION_DEMAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_SUBTRACT, 0, '-', "Demagnify", "larger field, smaller picture"},
-    {ACTION_CINE_RECORD, GROUP_XRAY, ACTION_PRESS, F(6), "Record cine", "record the X-ray images as a cine loop; again to stop"},
-    {ACTION_CINE_REPLAY, GROUP_XRAY, ACTION_PRESS, F(7), "Replay cine", "show the recorded loop; again for the live image"},
-    {ACTION_CINE_SAVE, GROUP_XRAY, ACTION_PRESS, F(8), "Save cine", "save the recorded loop as a film"},
+    {ACTION_CINE_RECORD, GROUP_XRAY, ACTION_PRESS, F(6), "Record cine", "record the X-ray images as a cine loop; again: stop"},
+    {ACTION_CINE_REPLAY, GROUP_XRAY, ACTION_PRESS, F(7), "Replay cine", "show the recorded loop; again: live image"},
+    {ACTION_CINE_SAVE, GROUP_XRAY, ACTION_PRESS, F(8), "Save cine", "save the recorded loop as a video"},
 
     {ACTION_RAO, GROUP_C_ARM, ACTION_HOLD, K('A'), "RAO", "C-arm to the patient's right (right anterior oblique) while held"},
     {ACTION_LAO, GROUP_C_ARM, ACTION_HOLD, K('D'), "LAO", "C-arm to the patient's left (left anterior oblique) while held"},
@@ -61,14 +61,14 @@ const KeyAction key_table[ACTION_COUNT] = {
 
     {ACTION_VIEW_FLUOROSCOPY, GROUP_VIEW, ACTION_PRESS, K('5'), "X-ray view", "fluoroscopy as the main view"},
     {ACTION_VIEW_3D, GROUP_VIEW, ACTION_PRESS, K('6'), "3D view", "the vessel in 3D as the main view"},
-    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('7'), "Angioscopy", "the view from the chosen tool's tip as the main view"},
+    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('7'), "Angioscopy", "the view from the tip of the selected tool as the main view"},
     {ACTION_VIEW_ALL, GROUP_VIEW, ACTION_PRESS, K('8'), "All views", "all three views side by side"},
     {ACTION_CAMERA_RESET, GROUP_VIEW, ACTION_PRESS, KEY(HOME), "Reset camera", "3D: the whole vessel from the front"},
-    {ACTION_CAMERA_FOLLOW, GROUP_VIEW, ACTION_PRESS, K('V'), "Follow tip", "3D: the camera keeps to the tool's tip"},
-    {ACTION_SECTION, GROUP_VIEW, ACTION_PRESS, K('N'), "Section", "3D: cut the vessel open by a plane"},
+    {ACTION_CAMERA_FOLLOW, GROUP_VIEW, ACTION_PRESS, K('V'), "Follow tip", "3D: the camera follows the tip of the tool"},
+    {ACTION_SECTION, GROUP_VIEW, ACTION_PRESS, K('N'), "Section", "3D: cut the vessel open with a plane"},
     {ACTION_SECTION_NEARER, GROUP_VIEW, ACTION_HOLD, KEY(INSERT), "Plane nearer", "3D: move the section plane towards you while held"},
     {ACTION_SECTION_FARTHER, GROUP_VIEW, ACTION_HOLD, KEY(DELETE), "Plane farther", "3D: move the section plane away while held"},
-    {ACTION_MODEL, GROUP_VIEW, ACTION_PRESS, K('Q'), "Local model", "3D: the wall's local model at the tip, as a wireframe"},
+    {ACTION_MODEL, GROUP_VIEW, ACTION_PRESS, K('Q'), "Local model", "3D: show the local model of the wall at the tip as a wireframe"},
     {ACTION_ARROWS, GROUP_VIEW, ACTION_PRESS, K('Z'), "Force arrows", "3D: wall forces as arrows"},
     {ACTION_ORBIT_UP, GROUP_VIEW, ACTION_HOLD, ALT(UP), "Orbit up", "3D: turn the camera up while held; or drag in the view"},
     {ACTION_ORBIT_DOWN, GROUP_VIEW, ACTION_HOLD, ALT(DOWN), "Orbit down", "3D: turn the camera down while held; or drag in the view"},
@@ -77,13 +77,13 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_CAMERA_NEARER, GROUP_VIEW, ACTION_HOLD, KEY(PAGE_UP), "Nearer", "3D: camera nearer while held; or the mouse wheel in the view"},
     {ACTION_CAMERA_FARTHER, GROUP_VIEW, ACTION_HOLD, KEY(PAGE_DOWN), "Farther", "3D: camera farther while held; or the mouse wheel in the view"},
 
-    {ACTION_PAUSE, GROUP_SESSION, ACTION_PRESS, K('P'), "Pause", "stop the simulation's time; again to go on"},
+    {ACTION_PAUSE, GROUP_SESSION, ACTION_PRESS, K('P'), "Pause", "pause the simulation; again: continue"},
     {ACTION_RESTART, GROUP_SESSION, ACTION_PRESS, F(4), "Restart", "restart the exercise (asks first)"},
-    {ACTION_BOOKMARK, GROUP_SESSION, ACTION_PRESS, K('B'), "Bookmark", "mark this moment in the recording, to come back to"},
+    {ACTION_BOOKMARK, GROUP_SESSION, ACTION_PRESS, K('B'), "Bookmark", "mark this moment in the recording, to return to it"},
     {ACTION_SAVE, GROUP_SESSION, ACTION_PRESS, F(5), "Save session", "save recording and score so far"},
     {ACTION_TRAINEE, GROUP_SESSION, ACTION_PRESS, F(3), "Trainee", "enter the trainee's name for the report"},
     {ACTION_SCREENSHOT, GROUP_SESSION, ACTION_PRESS, F(12), "Screenshot", "save the window as a picture"},
-    {ACTION_FULL_SCREEN, GROUP_SESSION, ACTION_PRESS, F(11), "Full screen", "fill the screen; again for a window"},
+    {ACTION_FULL_SCREEN, GROUP_SESSION, ACTION_PRESS, F(11), "Full screen", "fill the screen; again: window"},
     {ACTION_PANELS, GROUP_SESSION, ACTION_PRESS, KEY(TAB), "Panels", "hide or show the panels around the views"},
     {ACTION_HINTS, GROUP_SESSION, ACTION_PRESS, F(9), "Hints", "hide or show the hints at the bottom"},
     {ACTION_BRIEFING, GROUP_SESSION, ACTION_PRESS, K('O'), "Instructions", "show or hide the whole text of the exercise"},
@@ -118,7 +118,7 @@ const char *key_table_text(ActionId id, char *text, size_t capacity)
     const KeyAction *action = &key_table[id];
     char one[8];
     const char *key = key_name(action->key, one, sizeof one), *alt = action->modifiers & WINDOW_ALT ? "Alt+" : "";
-    // of a sign and its key on the keypad the sign says both
+    // a keypad key whose sign is also the character is shown once
     if (action->character && (action->key == WINDOW_KEY_KEYPAD_ADD || action->key == WINDOW_KEY_KEYPAD_SUBTRACT))
         snprintf(text, capacity, "%c", action->character);
     else if (action->character)
@@ -128,7 +128,7 @@ const char *key_table_text(ActionId id, char *text, size_t capacity)
     return text;
 }
 
-// Related keys share a line.
+// Related keys share a line in the list.
 static const struct {
     ActionId first, last;
     const char *help;
@@ -136,9 +136,9 @@ static const struct {
     {ACTION_PUSH, ACTION_PULL, "push the tool into the patient, pull it back, while held"},
     {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, "turn the tool left, right (clockwise, seen from behind) while held"},
     {ACTION_FAST, ACTION_SLOW, "with push, pull or twist: faster; slower, for the last millimetres"},
-    {ACTION_OTHER_PUSH, ACTION_OTHER_TWIST_RIGHT, "push, pull, turn left, right the pair's other tool while held"},
-    {ACTION_TOOL_1, ACTION_TOOL_4, "choose the tool to move, outermost first; the others are pinned"},
-    {ACTION_MAGNIFY, ACTION_DEMAGNIFY, "larger picture of a smaller field; smaller of a larger one"},
+    {ACTION_OTHER_PUSH, ACTION_OTHER_TWIST_RIGHT, "push, pull, turn left, turn right the other tool of the pair while held"},
+    {ACTION_TOOL_1, ACTION_TOOL_4, "select the tool to move, outermost first; the others are pinned"},
+    {ACTION_MAGNIFY, ACTION_DEMAGNIFY, "larger picture of a smaller field; smaller picture of a larger field"},
     {ACTION_RAO, ACTION_LAO, "C-arm to the patient's right (RAO), left (LAO) while held"},
     {ACTION_CRA, ACTION_CAU, "tilt the C-arm towards the head (CRA), the feet (CAU) while held"},
     {ACTION_TABLE_UP, ACTION_TABLE_RIGHT, "move the picture up, down, left, right (the table) while held"},
@@ -161,7 +161,7 @@ int key_table_line(ActionId first, char *keys, size_t capacity, const char **hel
         char text[32];
         const char *key = key_table_text((ActionId)id, text, sizeof text);
         if (id > (int)first && key_table[id].modifiers & WINDOW_ALT)
-            key += strlen("Alt+");       // described by the first one
+            key += strlen("Alt+");       // shown once, with the first key
         used += (size_t)snprintf(keys + used, capacity - used, "%s%s", id > (int)first ? " " : "", key);
     }
     return last - (int)first + 1;
@@ -197,7 +197,7 @@ static void character_typed(KeyState *state, unsigned character)
 {
     for (int i = 0; i < ACTION_COUNT; i++) {
         const KeyAction *action = &key_table[i];
-        // the keypad's own sign came as a key already
+        // the keypad key of this sign has already come as a key event
         if (action->character && (unsigned)action->character == character && action->kind == ACTION_PRESS)
             state->pressed[i]++;
     }
@@ -211,7 +211,7 @@ void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured)
         switch (event->kind) {
         case WINDOW_KEY_DOWN_EVENT:
             is_keypad = event->key == WINDOW_KEY_KEYPAD_ADD || event->key == WINDOW_KEY_KEYPAD_SUBTRACT;
-            // a repeat starts nothing: actions released by loss of focus or a dialogue need a new press
+            // a key repeat starts nothing: actions released by loss of focus or a dialogue need a new press
             if (!event->is_repeat && ((!is_captured && !(event->modifiers & WINDOW_SUPER)) || passes_capture(event->key)))
                 key_down(state, event);
             break;

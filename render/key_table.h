@@ -1,5 +1,5 @@
 // All user actions in one table, from which keys, help overlay, tooltips and panel buttons are made, so that none is undocumented; and the state of
-// the actions, from key events. No window, no GL, no clock.
+// the actions, computed from key events. No window, no GL, no clock.
 #ifndef SELDINGER_RENDER_KEY_TABLE_H
 #define SELDINGER_RENDER_KEY_TABLE_H
 
@@ -94,34 +94,34 @@ typedef enum { ACTION_HOLD, ACTION_PRESS } ActionKind;   // active while held, o
 typedef enum { GROUP_TOOL, GROUP_XRAY, GROUP_C_ARM, GROUP_VIEW, GROUP_SESSION, ACTION_GROUPS } ActionGroup;
 
 typedef struct KeyAction {
-    ActionId id;             // its place in the table
+    ActionId id;             // its index in the table
     ActionGroup group;
     ActionKind kind;
     int key;                 // WindowKey
-    unsigned modifiers;      // WINDOW_ALT or 0: Shift and Ctrl only change the speed of the tool and are no part of a key
+    unsigned modifiers;      // WINDOW_ALT or 0. Shift and Ctrl only change the speed of the tool and are not part of a key
     char character;          // alternative typed character, independent of the layout; 0: none
-    const char *name;        // on the button, at most 18 bytes
+    const char *name;        // the text on the button, at most 18 bytes
     const char *help;        // one line
 } KeyAction;
 
 extern const KeyAction key_table[ACTION_COUNT];
 extern const char *const action_group_name[ACTION_GROUPS];
 
-// "Alt+Up", "F1 or ?", as shown to the user; returns text.
+// Writes the keys as shown to the user, "Alt+Up", "F1 or ?"; returns text.
 const char *key_table_text(ActionId id, char *text, size_t capacity);
-// A line of the list of keys, from this action on: "Alt+Up Down" and its description. Returns the number of actions covered, 1 or more.
+// Writes a line of the list of keys, starting at this action: "Alt+Up Down" and its description. Returns the number of actions covered, 1 or more.
 int key_table_line(ActionId first, char *keys, size_t capacity, const char **help);
 
-// Which actions are on. Start from zeros.
+// The actions that are on. Initialise with zeros.
 typedef struct KeyState {
     bool held[ACTION_COUNT];       // ACTION_HOLD: its key is down
-    int pressed[ACTION_COUNT];     // ACTION_PRESS: how often since key_state_begin
+    int pressed[ACTION_COUNT];     // ACTION_PRESS: number of presses since key_state_begin
 } KeyState;
 
 void key_state_begin(KeyState *state);   // at the start of a frame: clears presses, keeps held actions
-// Feeds a window's events: keys, typed characters, loss of focus (releases everything). A key that went down with Alt keeps its meaning until it
-// comes up. `is_captured`: a text field has the keyboard; releases still count, presses do not, except for Escape and the function keys.
+// Takes the events of a window: keys, typed characters, loss of focus (releases everything). A key pressed with Alt keeps its meaning until it is released.
+// `is_captured`: a text field has the keyboard; releases still count, presses do not, except for Escape and the function keys.
 void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured);
-void key_state_release(KeyState *state); // all keys up: the tool stops
+void key_state_release(KeyState *state); // releases all keys: the tool stops
 
 #endif

@@ -1,4 +1,4 @@
-// The one-line reason that a drawing function leaves for its caller.
+// The one-line reason that a drawing function returns to its caller.
 #ifndef SELDINGER_RENDER_MESSAGE_H
 #define SELDINGER_RENDER_MESSAGE_H
 
@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-// Always false, so that a function can `return message_fail(…)`. `message` may be NULL.
+// Writes the message. Always returns false, so that a function can `return message_fail(…)`. `message` may be NULL.
 __attribute__((format(printf, 3, 4))) static inline bool message_fail(char *message, size_t capacity, const char *format, ...)
 {
     if (message && capacity > 0) {

@@ -1,6 +1,6 @@
-// The encoder writes into an unnamed file in the movie's folder, so nothing is left over, whichever process ends first. Frames go through a socket,
-// so that an encoder that has died is an error of a send and no SIGPIPE; its standard error is read concurrently, so that it never blocks. Colours
-// are BT.709 in studio range and say so, as players expect of high definition.
+// The encoder writes into an unnamed file in the folder of the video, so that nothing is left behind, whichever process ends first. Frames go through a socket,
+// so that a dead encoder causes an error of send() and not SIGPIPE; its standard error is read concurrently, so that it never blocks. Colours
+// are BT.709 in studio range and are tagged so, as players expect for high definition.
 #include "render/movie_file.h"
 
 #include "base/base.h"
@@ -22,11 +22,11 @@ enum { LEAST_SIDE = 2, MOST_SIDE = 8192, OUTPUT = 3, WORDS = 400, PATIENCE_S = 6
 
 struct MovieFile {
     char *path;
-    int width, height;           // given
+    int width, height;           // as given
     int even_width, even_height;
     uint8_t *even;               // (even_height, even_width, 3); NULL if the given size is even
     pid_t encoder;
-    int frames, words, output;   // descriptors: our end of both sockets, the file without a name
+    int frames, words, output;   // descriptors: our ends of both sockets, and the unnamed file
     int count;
     bool failed, late;
     char last_words[WORDS + 1];
@@ -46,7 +46,7 @@ static void forget(MovieFile *movie)
     free(movie);
 }
 
-// A file in the folder of `path` that has no name any more; -1 with errno.
+// A file in the folder of `path` without a name; -1 with errno.
 static int nameless_file(const char *path)
 {
     PartFile part;
@@ -124,7 +124,7 @@ static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
     sigaddset(&plain, SIGTERM);
     posix_spawnattr_setsigmask(&attributes, &none);
     posix_spawnattr_setsigdefault(&attributes, &plain);
-    posix_spawnattr_setpgroup(&attributes, 0);   // Ctrl-C is for us: we may still finish the movie
+    posix_spawnattr_setpgroup(&attributes, 0);   // Ctrl-C is for this process only, which may still finish the video
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
     int why = posix_spawnp(&movie->encoder, argument[0], &actions, &attributes, argument, environ);
     posix_spawnattr_destroy(&attributes);
@@ -132,7 +132,7 @@ static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
     return why;
 }
 
-// Sockets and process. False with errno.
+// Creates the sockets and starts the encoder. Returns false with errno.
 static bool start_encoder(MovieFile *movie, double fps)
 {
     int frames[2], words[2];
@@ -155,11 +155,11 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
 {
     struct stat status;
     if (width < LEAST_SIDE || height < LEAST_SIDE || width > MOST_SIDE || height > MOST_SIDE) {
-        message_fail(message, capacity, "%s: a movie of %d x %d pixels; expected sides of %d to %d", path, width, height, LEAST_SIDE, MOST_SIDE);
+        message_fail(message, capacity, "%s: cannot make a video of %d x %d pixels; expected sides of %d to %d", path, width, height, LEAST_SIDE, MOST_SIDE);
         return NULL;
     }
     if (!(fps >= 0.001) || fps > 1000) {
-        message_fail(message, capacity, "%s: %g frames a second; expected above 0 to 1000", path, fps);
+        message_fail(message, capacity, "%s: cannot make a video with %g frames per second; expected above 0, at most 1000", path, fps);
         return NULL;
     }
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
@@ -179,7 +179,7 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
         }
     }
     if (!movie) {
-        message_fail(message, capacity, "%s: not enough memory", path);
+        message_fail(message, capacity, "%s: out of memory", path);
         return NULL;
     }
     movie->output = nameless_file(path);
@@ -187,9 +187,9 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
         message_fail(message, capacity, "%s: cannot be written: %s; give a file in a folder with write permission", path, strerror(errno));
     } else if (!start_encoder(movie, fps)) {
         if (errno == ENOENT)
-            message_fail(message, capacity, "%s: the program ffmpeg, which encodes movies, was not found: install ffmpeg", path);
+            message_fail(message, capacity, "%s: the program ffmpeg, which encodes videos, was not found: install ffmpeg", path);
         else
-            message_fail(message, capacity, "%s: ffmpeg cannot be started: %s", path, strerror(errno));
+            message_fail(message, capacity, "%s: cannot start ffmpeg: %s", path, strerror(errno));
     } else {
         return movie;
     }
@@ -197,7 +197,7 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
     return NULL;
 }
 
-// Reads the encoder's output so far or, with `wait`, until it ends; keeps the last part.
+// Reads the encoder's messages so far or, with `wait`, until it ends; keeps the last part.
 static void listen_to_encoder(MovieFile *movie, bool wait)
 {
     for (;;) {
@@ -214,7 +214,7 @@ static void listen_to_encoder(MovieFile *movie, bool wait)
     }
 }
 
-// Reads the encoder's messages meanwhile, to avoid a deadlock.
+// Also reads the encoder's messages meanwhile, to avoid a deadlock.
 static bool send_all(MovieFile *movie, const uint8_t *bytes, size_t size)
 {
     struct pollfd ends[] = {{.fd = movie->frames, .events = POLLOUT}, {.fd = movie->words, .events = POLLIN}};
@@ -228,7 +228,7 @@ static bool send_all(MovieFile *movie, const uint8_t *bytes, size_t size)
         if (ends[1].revents & POLLIN)
             listen_to_encoder(movie, false);
         else if (ends[1].revents)
-            return false;   // it has ended
+            return false;   // the encoder has ended
         if (!ends[0].revents)
             continue;
         ssize_t count = send(movie->frames, bytes, size, MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -264,7 +264,7 @@ bool movie_file_add(MovieFile *movie, const uint8_t *rgb)
 
 int movie_file_count(const MovieFile *movie) { return movie->count; }
 
-// Waits for the encoder's end; its exit status as of waitpid.
+// Waits for the end of the encoder; returns its status as from waitpid().
 static int end_encoder(MovieFile *movie, bool kill_it)
 {
     int status = -1;
@@ -277,7 +277,7 @@ static int end_encoder(MovieFile *movie, bool kill_it)
     return status;
 }
 
-// Links the unnamed file to its name. False with errno.
+// Links the unnamed file to its final path. Returns false with errno.
 static bool publish(const MovieFile *movie)
 {
     size_t room = 1 << 20;
@@ -297,7 +297,7 @@ static bool publish(const MovieFile *movie)
     return good;
 }
 
-// The last non-empty line of the encoder's output, for a message.
+// The last non-empty line of the encoder's messages.
 static const char *last_line(MovieFile *movie)
 {
     char *text = movie->last_words;
@@ -315,15 +315,15 @@ bool movie_file_close(MovieFile *movie, char *message, size_t capacity)
     const char *words = last_line(movie);
     bool good = false;
     if (movie->late)
-        message_fail(message, capacity, "%s: ffmpeg took no frame for %d s; no movie was made", movie->path, PATIENCE_S);
+        message_fail(message, capacity, "%s: ffmpeg accepted no frame for %d s; no video was written", movie->path, PATIENCE_S);
     else if (movie->count == 0 && !movie->failed)
-        message_fail(message, capacity, "%s: the movie has no frames; expected at least one", movie->path);
+        message_fail(message, capacity, "%s: the video has no frames; expected at least one", movie->path);
     else if (WIFSIGNALED(ended))
-        message_fail(message, capacity, "%s: ffmpeg was ended by signal %d after %d frames; no movie was made", movie->path, WTERMSIG(ended), movie->count);
+        message_fail(message, capacity, "%s: ffmpeg was ended by signal %d after %d frames; no video was written", movie->path, WTERMSIG(ended), movie->count);
     else if (movie->failed || !WIFEXITED(ended) || WEXITSTATUS(ended) != 0 || words[0])
-        message_fail(message, capacity, "%s: ffmpeg failed: %s; no movie was made", movie->path, words[0] ? words : "it ended early and says nothing");
+        message_fail(message, capacity, "%s: ffmpeg failed: %s; no video was written", movie->path, words[0] ? words : "it ended early without a message");
     else if (fstat(movie->output, &status) != 0 || status.st_size == 0)
-        message_fail(message, capacity, "%s: ffmpeg wrote nothing; no movie was made", movie->path);
+        message_fail(message, capacity, "%s: ffmpeg wrote nothing; no video was written", movie->path);
     else if (!(good = publish(movie)))
         message_fail(message, capacity, "%s: cannot be written: %s", movie->path, strerror(errno));
     forget(movie);

@@ -1,6 +1,6 @@
 #include "render/operator_controls.h"
 
-// Speeds while a key is held.
+// Speeds of changes while a key is held.
 static const double arm_deg_s = 25, table_fields_s = 0.4, blade_s = 0.5, orbit_px_s = 220, section_mm_s = 15;
 static const float pulse_rates[] = {7.5F, 10, 15, 30};
 static const double field_step = 1.25;
@@ -26,7 +26,7 @@ OperatorControls controls_create(const VesselScene *scene, int tool_count, int c
         }
     for (int k = 0; k < 3; k++)
         controls.xray.table_mm[k] = (float)(((&low.x)[k] + (&high.x)[k]) / 2);
-    // the largest extent with a margin: whichever way the C-arm turns it is in the field
+    // the largest extent with a margin, so that the points are in the field for every angle of the C-arm
     controls.xray.field_mm = clamped(1.15 * vec3_distance(low, high), 40, 400);
     return controls;
 }
@@ -35,7 +35,7 @@ static double held(const PanelActions *actions, ActionId more, ActionId less) { 
 
 static void obey_sliders(XrayControl *xray, const PanelActions *actions)
 {
-    float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are only valid while held
+    float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two apply only while held
     *xray = actions->xray;
     xray->pedal = pedal;
     xray->contrast_ml_s = contrast;
@@ -48,7 +48,7 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
     xray->cra_deg = clamped((double)xray->cra_deg + turn * held(actions, ACTION_CRA, ACTION_CAU), -45, 45);
     if (actions->pressed[ACTION_AP])
         xray->lao_deg = xray->cra_deg = 0;
-    // the patient moves in the key's direction, so the isocentre moves the other way
+    // the patient moves in the direction of the key, so the isocentre moves in the opposite direction
     CArm arm = c_arm_place(xray, patient);
     double way = table_fields_s * (double)xray->field_mm * seconds;
     Vec3 moved = vec3_add(vec3_scale(arm.right, way * held(actions, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT)),
@@ -82,7 +82,7 @@ static void obey_xray(OperatorControls *controls, const PanelActions *actions)
     }
     if (actions->pressed[ACTION_ROADMAP] & 1) {
         xray->mode = xray->mode == XRAY_ROADMAP ? XRAY_LIVE : XRAY_ROADMAP;
-        xray->mask += xray->mode == XRAY_ROADMAP;   // the vessels of the last injection
+        xray->mask += xray->mode == XRAY_ROADMAP;   // the roadmap starts with the vessels of the last injection
     }
     xray->mask += (float)actions->pressed[ACTION_MASK];
 }
@@ -100,14 +100,14 @@ static void obey_mouse(OperatorControls *controls, const VesselScene *scene, con
             free_camera_orbit(camera, dx, dy);
         else if (mouse->buttons && (mouse->drag_x != 0 || mouse->drag_y != 0)) {
             if (controls->look.follow_tip)
-                *camera = vessel_scene_camera(scene);   // continues from the present view
+                *camera = vessel_scene_camera(scene);   // continue from the present view
             controls->look.follow_tip = false;
             free_camera_pan(camera, dx, dy, port->width, port->height);
         }
         if (mouse->scroll != 0)
             free_camera_zoom(camera, mouse->scroll, mouse->x * port->width, (1 - mouse->y) * port->height, port->width, port->height);
     } else if (mouse->view == VIEW_FLUOROSCOPY) {
-        // dragging turns the C-arm as if holding the detector
+        // dragging rotates the C-arm as if the mouse held the detector
         if (mouse->buttons & WINDOW_MOUSE_LEFT) {
             controls->xray.lao_deg = clamped((double)controls->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
             controls->xray.cra_deg = clamped((double)controls->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
@@ -137,7 +137,7 @@ static void obey_views(OperatorControls *controls, const PanelActions *actions, 
     free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);
 }
 
-// The last selection of a frame counts; other presses apply to that tool.
+// The last selection of a frame applies; other presses apply to that tool.
 static void obey_grip(OperatorControls *controls, const PanelActions *actions)
 {
     for (int k = 0; k < controls->tool_count; k++)
@@ -151,7 +151,7 @@ static void obey_grip(OperatorControls *controls, const PanelActions *actions)
 
 void controls_obey(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
 {
-    // first: sliders hold all controls as shown, and keys are applied on top
+    // first, because sliders contain all controls as shown; keys are applied on top
     if (actions->xray_set)
         obey_sliders(&controls->xray, actions);
     obey_arm(&controls->xray, &controls->patient, actions, seconds);

@@ -1,4 +1,4 @@
-// The operator's controls: how keys, buttons and mouse change the tool's speed, the X-ray system and the views. No window, no GL, no clock.
+// The operator's controls: how keys, buttons and mouse change the speed of the tool, the X-ray system and the views. No window, no GL, no clock.
 #ifndef SELDINGER_RENDER_OPERATOR_CONTROLS_H
 #define SELDINGER_RENDER_OPERATOR_CONTROLS_H
 
@@ -9,27 +9,26 @@
 #include "sim/sim.h"
 
 typedef struct OperatorControls {
-    XrayControl xray;            // pedal and contrast of keys and panel; buttons of input devices are added by controls_xray
+    XrayControl xray;            // pedal and contrast from keys and panel; controls_xray adds the buttons of input devices
     PatientAxes patient;         // in the model's frame
     bool pedal_latched;
     PanelView view;
-    VesselSceneLook look;        // of the 3D view
-    double contrast_ml_s;        // while injected, default 3
-    double push_mm_s, twist_deg_s;   // of the keys at ordinary speed, default 10 and 120
+    VesselSceneLook look;        // settings of the 3D view
+    double contrast_ml_s;        // during injection, default 3
+    double push_mm_s, twist_deg_s;   // of the keys at normal speed, default 10 and 120
     int tool_count;
-    HandGrip grip;               // the selected tool, and which are locked or released
+    HandGrip grip;               // the selected tool, and the locked and released ones
 } OperatorControls;
 
-// Sets the isocentre to the middle of `points`, and the field around them.
+// Sets the isocentre to the middle of `points`, and the field so that they are visible.
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
 
-// One frame of `seconds`: applies held and pressed actions. `layout`: positions of the views for the mouse.
+// One frame of `seconds`: applies held and pressed actions. `layout`: positions of the views, for the mouse.
 void controls_obey(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds);
-// The speeds that held keys request of the selected tool and of its partner (0 if there is none): fast is 3 times, slow a fifth of the ordinary
-// speed.
+// The speeds that held keys request for the selected tool and its partner (0 if there is none): fast is three times and slow a fifth of the normal speed.
 Command controls_command(const OperatorControls *controls, const PanelActions *actions);
 Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions);
-// The controls including input devices (HAND_ bits) and held keys: pedal, contrast through the selected tool.
+// The X-ray controls including input devices (HAND_ bits) and held keys: pedal, contrast through the selected tool.
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons);
 
 #endif

@@ -75,7 +75,7 @@ extern "C" void overlay_line(Overlay *overlay, double x0, double y0, double x1, 
 
 extern "C" void overlay_polyline(Overlay *overlay, int count, const float (*point)[2], Color color, double thickness)
 {
-    // ImGui's 16-bit indices hold one line of at most some 16,000 points
+    // ImGui's 16-bit indices limit a line to about 16,000 points
     const int most = 4000;
     for (int first = 0; first + 1 < count; first += most - 1) {
         int part = count - first < most ? count - first : most;

@@ -36,7 +36,7 @@ const char page_style[] =
     "print{:root{--paper:#fff;--ink:#000;--muted:#444;--rule:#bbb;--panel:#fff;--o1:#0b5fa5;--o2:#a8480a;--o3:#00725a;--o4:#8a2d73;--o5:#6b5a00;--o6:#4a4f57;"
     "--bad:#b3001b;--wide:#8a5a00;--sac:#7a2ba0}body{max-width:none;padding:0;font-size:11pt}figure,tr,svg{break-inside:avoid}h2{break-after:avoid}}\n";
 
-// The length of the UTF-8 character at s, 0 if there is none that HTML may hold.
+// The length of the UTF-8 character at s; 0 if it is invalid or not allowed in HTML.
 static int character_length(const unsigned char *s)
 {
     if (s[0] < 0x80)

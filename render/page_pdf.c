@@ -10,14 +10,14 @@
 #include <time.h>
 #include <unistd.h>
 
-// A stop by the user that waits for the folder to be removed.
+// True if a signal to stop is pending; it is delivered after the folder has been removed.
 static bool is_stopped(void)
 {
     sigset_t pending;
     return sigpending(&pending) == 0 && (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGHUP) == 1);
 }
 
-// Of the browser and what it has started, which are a group of their own; stopped with us.
+// Waits for the browser and its children, which form their own process group; kills the group if this process is stopped.
 static bool has_succeeded(pid_t child)
 {
     int status = -1;
@@ -30,7 +30,7 @@ static bool has_succeeded(pid_t child)
     return ended == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-// Runs a browser without a shell; its own chatter is not ours. False if it cannot be run or fails.
+// Runs a browser without a shell and discards its messages. Returns false if it cannot be run or fails.
 static bool browser_prints(const char *browser, const char *html, const char *pdf, const sigset_t *signals)
 {
     char print[4200], url[4200], profile[4200];
@@ -73,7 +73,7 @@ static void remove_folder(const char *path)
         waitpid(child, NULL, 0);
 }
 
-// The PDF's bytes; NULL if no browser made it. The caller frees.
+// The bytes of the PDF; NULL if no browser printed it. The caller frees them.
 static char *print_page(const char *folder, const char *path, const char *page, size_t length, const sigset_t *signals, size_t *pdf_length, Faults *faults)
 {
     static const char *const browsers[] = {"chromium", "chromium-browser", "google-chrome"};
@@ -99,7 +99,7 @@ bool page_write_pdf(const char *path, const char *page, size_t length, Faults *f
     char folder[] = "/tmp/seldinger-page-XXXXXX";
     sigset_t stops, before;
     size_t pdf_length = 0;
-    // the folder holds a trainee's page: a stop waits until it is removed
+    // the folder contains a trainee's page, so a stop is deferred until it is removed
     sigemptyset(&stops);
     sigaddset(&stops, SIGINT);
     sigaddset(&stops, SIGTERM);
@@ -110,7 +110,7 @@ bool page_write_pdf(const char *path, const char *page, size_t length, Faults *f
     if (is_made)
         remove_folder(folder);
     else
-        faults_add(faults, path, 0, 0, "no folder for the browser could be made in /tmp");
+        faults_add(faults, path, 0, 0, "cannot make a folder for the browser in /tmp");
     sigprocmask(SIG_SETMASK, &before, NULL);
     bool good = pdf && output_write(path, pdf, pdf_length, faults);
     free(pdf);

@@ -4,7 +4,7 @@
 
 #include "base/base.h"
 
-// Writes the page as PDF, printed by chromium. False with a fault: also if chromium is not installed. SIGINT, SIGTERM and SIGHUP are deferred until
+// Writes the page as PDF, printed by chromium. Returns false with a fault, also if chromium is not installed. SIGINT, SIGTERM and SIGHUP are deferred until the
 // temporary copies of the page are removed.
 bool page_write_pdf(const char *path, const char *page, size_t length, Faults *faults);
 

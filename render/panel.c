@@ -53,7 +53,7 @@ static void open_dialogue(Panel *panel, Dialogue dialogue)
     memset(panel->mouse_held, 0, sizeof panel->mouse_held);
 }
 
-// Printable text without blanks at its ends; control characters of a pasted or typed name are left out.
+// Printable text without leading and trailing blanks; control characters of a pasted or typed name are removed.
 static void trim_name(const char *from, char *to, size_t capacity)
 {
     size_t length = 0;
@@ -80,7 +80,7 @@ static void confirm(Panel *panel, PanelActions *actions)
     panel->dialogue = DIALOGUE_NONE;
 }
 
-// How often a key went down in this frame.
+// Number of presses of a key in this frame.
 static int presses(const WindowInput *input, int key)
 {
     int count = 0;
@@ -91,7 +91,7 @@ static int presses(const WindowInput *input, int key)
 
 static bool has_key(const WindowInput *input, int key) { return presses(input, key) > 0; }
 
-// X closes the box that X has opened.
+// X closes the box that X opened.
 static void take_tray(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table[ACTION_EXCHANGE].key);
@@ -113,7 +113,7 @@ static void take_tray(Panel *panel, const WindowInput *input, PanelActions *acti
 static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     bool is_refused = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0;   // Escape, or the button
-    // a second click on the title bar's cross confirms
+    // a second click on the close button of the window confirms
     bool is_confirmed = panel->answer > 0 || (panel->dialogue != DIALOGUE_TRAINEE && has_key(input, WINDOW_KEY_ENTER)) ||
                         (panel->dialogue == DIALOGUE_QUIT && input->close == WINDOW_CLOSE_ASKED);
     if (panel->dialogue == DIALOGUE_TRAY)
@@ -134,7 +134,7 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
     panel->answer = 0;
 }
 
-// The text of the exercise disappears by itself after the first actions.
+// The text of the exercise is hidden after the first actions.
 static void take_briefing(Panel *panel, PanelActions *actions)
 {
     static const ActionId follows[] = {ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, ACTION_PEDAL, ACTION_PEDAL_LATCH};
@@ -152,7 +152,7 @@ static void take_briefing(Panel *panel, PanelActions *actions)
         panel->briefing = is_shown ? BRIEFING_CLOSED : BRIEFING_OPEN;
 }
 
-// Handles the panel's own actions. Restart and quit ask for confirmation first.
+// Handles the actions of the panel itself. Restart and quit ask for confirmation first.
 static void take_own_actions(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     int *pressed = actions->pressed;
@@ -327,7 +327,7 @@ void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state,
     panel->height = input->height;
     if (is_new) {
         panel->is_dense = false;
-        // the contents' size is known only after layout, and a scroll bar changes it
+        // the size of the contents is known only after the layout, and a scroll bar changes it
         for (int i = 0; i < 4; i++) {
             gui_begin(panel->gui, input, layout.scale, true);
             panel_draw_all(panel, input, state);

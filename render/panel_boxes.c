@@ -1,11 +1,11 @@
-// Boxes over everything: the exercise's instructions, the list of keys, dialogues.
+// Boxes over everything: the instructions of the exercise, the list of keys, dialogues.
 #include "render/panel_internal.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-// Lines that a file's editor broke are joined: a break counts after the end of a sentence, before a list's mark and at an empty line.
+// Joins lines that were broken by the editor of the scene file: a break counts only after the end of a sentence, before a list mark and at an empty line.
 void panel_reflow(const char *from, char *to, size_t capacity)
 {
     size_t length = 0;
@@ -14,7 +14,7 @@ void panel_reflow(const char *from, char *to, size_t capacity)
             to[length++] = *from++;
             continue;
         }
-        const char *next = from + 1 + strspn(from + 1, " \t\r");   // an indent comes from the editor too
+        const char *next = from + 1 + strspn(from + 1, " \t\r");   // the indent also comes from the editor
         bool ends_sentence = length > 0 && strchr(".!?:\n", to[length - 1]);
         to[length++] = ends_sentence || !*next || strchr("\n-*0123456789", *next) ? '\n' : ' ';
         from = next;
@@ -88,7 +88,7 @@ void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *s
     gui_beside(gui, margin);
     panel_action_button(panel, state, ACTION_HELP, "help", floorf(120 * s));
     gui_window_end(gui);
-    // larger letters where the longer column and the widest line have room for them
+    // larger letters if the longer column and the widest line have room for them
     float half = floorf(at.width / 2);
     int lines = 0;
     float widest = 0;
@@ -116,9 +116,9 @@ void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *s
 void panel_draw_dialogue(Panel *panel, const WindowInput *input)
 {
     static const PanelQuestion own[] = {
-        [DIALOGUE_QUIT] = {"End the session?", "The session is saved as it is now.", "End", "Go on"},
-        [DIALOGUE_RESTART] = {"Begin anew?", "The exercise starts again from the beginning; this attempt is kept in the recording.", "Begin anew", "Go on"},
-        [DIALOGUE_TRAINEE] = {"Who is practising?", "The name is shown in the report, which compares earlier sessions of the same name.", "Take", "Leave it"}};
+        [DIALOGUE_QUIT] = {"End the session?", "The session is saved as it is now.", "End", "Continue"},
+        [DIALOGUE_RESTART] = {"Restart?", "The exercise starts again from the beginning; this attempt is kept in the recording.", "Restart", "Continue"},
+        [DIALOGUE_TRAINEE] = {"Who is practising?", "The name is shown in the report, which compares earlier sessions of the same name.", "Accept", "Cancel"}};
     const PanelQuestion *question = panel->dialogue == DIALOGUE_QUESTION ? &panel->question : &own[panel->dialogue];
     Gui *gui = panel->gui;
     float s = gui_scale(gui), width = floorf(fminf(420 * s, (float)input->width - 20 * s));

@@ -1,4 +1,4 @@
-// The controls at the right: buttons, all from the table of keys, and the X-ray system's sliders.
+// The controls at the right: buttons, all from the table of keys, and the sliders of the X-ray system.
 #include "render/panel_internal.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 
 static const float pulse_rate[] = {7.5f, 10, 15, 30};
 
-// Row by row; the X-ray and C-arm tabs put their sliders between (draw_tab).
+// Row by row; the X-ray and C-arm tabs have their sliders in between (draw_tab).
 enum { TAB_TOOL, TAB_XRAY, TAB_C_ARM, TAB_VIEWS, TAB_SESSION };
 static const char *const tab_name[PANEL_TABS] = {"Tool", "X-ray", "C-arm", "Views", "Session"};
 static const ButtonRow panel_button_row[] = {
@@ -120,7 +120,7 @@ static void button_row(Panel *panel, const PanelState *state, const ButtonRow *b
     }
 }
 
-// A slider over a value of the X-ray control; `label` is part of what it shows.
+// A slider for a value of the X-ray controls; `label` is part of its text.
 static void xray_slider(Panel *panel, const PanelState *state, float *value, float least, float most, const char *format, const char *tip, float width)
 {
     char id[24];
@@ -150,7 +150,7 @@ static void collimator_sliders(Panel *panel, const PanelState *state)
     for (int i = 0; i < 4; i++) {
         if (i % 2)
             gui_beside(panel->gui, gap);
-        xray_slider(panel, state, &panel->xray.collimator[i], 0, 0.95f, name[i], "collimator blade: part of half the field that it covers", width);
+        xray_slider(panel, state, &panel->xray.collimator[i], 0, 0.95f, name[i], "collimator blade: fraction of half the field that it covers", width);
     }
 }
 
@@ -168,7 +168,7 @@ static void pulse_buttons(Panel *panel, const PanelState *state)
             panel->xray.pulses_s = pulse_rate[i];
             panel->xray_set = true;
         }
-        gui_tooltip(panel->gui, NULL, "fluoroscopy pulses a second: fewer is less dose, more is smoother", NULL);
+        gui_tooltip(panel->gui, NULL, "fluoroscopy pulses per second: fewer give less dose, more a smoother picture", NULL);
     }
 }
 

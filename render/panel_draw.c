@@ -1,5 +1,6 @@
-// What the panel looks like: columns left and right, a bar above and one below; letters over the views (panel_views.c), boxes (panel_boxes.c). Signs go
-// with colours everywhere: a tick, a triangle or a cross for a mark, a tick and a bar for a button that is on.
+// Appearance of the panel: columns left and right, a bar above and one below; text over the views (panel_views.c), boxes (panel_boxes.c). Colours are always
+// accompanied by
+// signs: a tick, a triangle or a cross for a mark, a tick and a bar for a button that is on.
 #include "render/panel_internal.h"
 
 #include <math.h>
@@ -28,7 +29,7 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     if (panel_first_line(state->instructions, text, sizeof text)) {
         gui_text_wrapped(gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, gui_colors.text, text);
         if (panel_has_more_lines(state->instructions)) {
-            snprintf(text, sizeof text, "All of it: %s", key_table_text(ACTION_BRIEFING, value, sizeof value));
+            snprintf(text, sizeof text, "Full text: %s", key_table_text(ACTION_BRIEFING, value, sizeof value));
             gui_text(gui, GUI_SMALL, gui_colors.dim, text);
         }
     }
@@ -37,7 +38,7 @@ static void draw_exercise(Panel *panel, const PanelState *state)
         if (state->hold_s > 0)
             snprintf(text, sizeof text, "%s: held %.1f of %.1f s", target, fmin(state->hold_s, state->hold_needed_s), state->hold_needed_s);
         else
-            snprintf(text, sizeof text, "to reach: %s", target);
+            snprintf(text, sizeof text, "target: %s", target);
         gui_progress(gui, state->hold_s / state->hold_needed_s, text);
     }
     for (int i = 0; i < state->figure_count; i++) {
@@ -51,7 +52,7 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     }
 }
 
-// All tools in small: a dot for the one whose figures follow, its insertion, its reaction, its note.
+// All tools in short: a dot for the one whose figures follow, its insertion, its reaction force, its note.
 static void draw_tools(Panel *panel, const PanelState *state)
 {
     char name[64], text[96], value[48], other[48];
@@ -90,7 +91,7 @@ static void draw_tool(Panel *panel, const PanelState *state)
 
 static void draw_hands(Panel *panel, const PanelState *state)
 {
-    static const char *const device_state[] = {"not there", "ready", "lost"};
+    static const char *const device_state[] = {"absent", "ready", "lost"};
     static const PanelMark device_mark[] = {MARK_NONE, MARK_GOOD, MARK_BAD};
     panel_heading(panel, "HANDS");
     for (int i = 0; i < state->device_count; i++) {
@@ -113,7 +114,7 @@ static void draw_left(Panel *panel, const PanelState *state)
     draw_hands(panel, state);
     // the plots take the remaining height; if that is too little the rows shrink, and finally the column scrolls
     float room = panel->plot_height * (float)panel->plots - gui_window_end(gui) - 2;
-    panel->is_dense = panel->is_dense || room < 2 * least;   // until the window is resized: no flicker between the two
+    panel->is_dense = panel->is_dense || room < 2 * least;   // until the window is resized, to avoid flicker
     panel->plots = room >= 3 * 70 * s ? 3 : 2;
     panel->plot_height = floorf(fminf(fmaxf(room / (float)panel->plots, least), 120 * s));
 }
@@ -201,11 +202,11 @@ static void draw_machine(Panel *panel, const PanelState *state, GuiRect at)
     small_row(panel, "Step, median / p99.9", MARK_NONE, text);
     snprintf(text, sizeof text, "\u00d7%s, %lld missed", panel_figure(one, sizeof one, state->real_time_factor, 2, ""), (long long)state->missed_deadlines);
     small_row(panel, "Real time, deadlines", state->warnings & (WARN_SLOW | WARN_STALLED) ? MARK_WARNING : MARK_NONE, text);
-    small_row(panel, "Drawing", MARK_NONE, panel_figure(one, sizeof one, state->frame_ms, 1, "ms a frame"));
+    small_row(panel, "Drawing", MARK_NONE, panel_figure(one, sizeof one, state->frame_ms, 1, "ms per frame"));
     gui_window_end(panel->gui);
 }
 
-// Hint, messages, machine.
+// Draws hint, messages and figures of the machine.
 static void draw_bottom(Panel *panel, const PanelState *state)
 {
     Gui *gui = panel->gui;

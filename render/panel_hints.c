@@ -1,14 +1,14 @@
-// Hints for new users, shown until the action was used.
+// Hints for new users, each shown until its action has been used.
 #include "render/panel_internal.h"
 
 #include <stdio.h>
 
 typedef struct Hint {
-    ActionId done_by[4];           // any of them, ACTION_COUNT: none
+    ActionId done_by[4];           // any of these; ACTION_COUNT: none
     double enough_s;
-    ActionId key[4];               // for the %s of the text, in this order
+    ActionId key[4];               // for the %s in the text, in this order
     const char *text;
-    bool is_of_several;            // tools
+    bool is_of_several;            // only if there are several tools
 } Hint;
 
 #define NO ACTION_COUNT
@@ -26,7 +26,7 @@ static const Hint hint[] = {
     {{ACTION_TOOL_1, ACTION_TOOL_2, ACTION_TOOL_3, ACTION_TOOL_4},
      1,
      {ACTION_TOOL_1, ACTION_TOOL_2, NO, NO},
-     "%s, %s \u2026 choose the tool that you move, outermost first. The others stay where they are.",
+     "%s, %s \u2026 select the tool that you move, outermost first. The others stay where they are.",
      true},
     {{ACTION_LOCK, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, NO},
      0.5,
@@ -46,7 +46,7 @@ static const Hint hint[] = {
     {{ACTION_ROADMAP, ACTION_DSA, NO, NO},
      1,
      {ACTION_ROADMAP, ACTION_DSA, NO, NO},
-     "%s keeps the vessels of the injection on the picture as a roadmap; %s shows contrast alone.",
+     "%s keeps the vessels of the injection on the picture as a roadmap; %s shows only contrast.",
      false},
     {{ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, NO, NO},
      0.5,

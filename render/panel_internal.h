@@ -6,7 +6,7 @@
 #include "render/plot.h"
 #include "render/window.h"
 
-typedef enum { BRIEFING_AT_BEGIN, BRIEFING_OPEN, BRIEFING_CLOSED } Briefing;   // AT_BEGIN: until the tool or the X-ray is used
+typedef enum { BRIEFING_AT_BEGIN, BRIEFING_OPEN, BRIEFING_CLOSED } Briefing;   // AT_BEGIN: until the tool or the X-ray system is used
 typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE, DIALOGUE_QUESTION, DIALOGUE_TRAY } Dialogue;
 enum { PANEL_MESSAGES = 100, PANEL_TABS = 5, BUTTONS_IN_ROW = 5 };
 
@@ -21,19 +21,19 @@ struct Panel {
     Gui *gui;
     KeyState keys;
     PanelLayout layout;            // as last drawn
-    bool is_drawn;                 // layout and contents' sizes are known
+    bool is_drawn;                 // layout and sizes of the contents are known
     int width, height;
     // mouse on buttons and sliders, until the next panel_take_input
     bool mouse_held[ACTION_COUNT];
-    bool latched[ACTION_COUNT];    // Fast and Slow are toggled by mouse, which cannot hold two buttons
+    bool latched[ACTION_COUNT];    // Fast and Slow are toggled by the mouse, which cannot hold two buttons
     int mouse_pressed[ACTION_COUNT];
     bool xray_set;
     XrayControl xray;
-    bool held[ACTION_COUNT];       // as last returned: buttons light up with their keys
+    bool held[ACTION_COUNT];       // as last returned: buttons light up together with their keys
     // mouse in a view
     int drag_view;
     unsigned drag_buttons;
-    double mouse_x, mouse_y, dragged;   // dragged distance since the press [pixel]
+    double mouse_x, mouse_y, dragged;   // dragged: distance since the press [pixel]
     // open boxes
     Dialogue dialogue;
     bool dialogue_is_new;
@@ -41,8 +41,8 @@ struct Panel {
     int answer;                    // a click on its yes (1) or no (-1)
     char name[64];                 // the text field
     PanelTrayChoice tray;
-    int tray_count, tray_shown;    // tray_shown: which was brought into sight
-    float tray_over;               // [pixel] missing height of its contents; < 0: free
+    int tray_count, tray_shown;    // tray_shown: the device last scrolled into view
+    float tray_over;               // [pixel] height of its contents that does not fit; < 0: free height
     float tray_value[3];           // of its sliders: length, angle, mandrel
     bool has_help, has_panels, has_hints;
     Briefing briefing;
@@ -53,20 +53,20 @@ struct Panel {
     RunningPlot force[PANEL_TOOLS], torque[PANEL_TOOLS], wall;
     int plots;
     float plot_height;
-    bool is_dense;                 // the left column's rows in small letters, where they would not fit otherwise
-    int message_count;             // of all; the last PANEL_MESSAGES are kept
+    bool is_dense;                 // the rows of the left column are in small letters because they would not fit otherwise
+    int message_count;             // number of all messages; the last PANEL_MESSAGES are kept
     PanelMessage message[PANEL_MESSAGES];
 };
 
-// The buttons of each tab, row by row: every action is in one (a test reports it).
+// The buttons of each tab, row by row. Every action is in one of them (checked by a test).
 typedef struct ButtonRow {
     int tab, count;
     ActionId action[BUTTONS_IN_ROW];
-    bool is_of_several;            // not shown with one tool
+    bool is_of_several;            // hidden if there is only one tool
 } ButtonRow;
 
 // panel_text.c
-extern const char *const panel_sign[MARK_BAD + 1];         // a tick, a triangle or a cross, before a marked text
+extern const char *const panel_sign[MARK_BAD + 1];         // a tick, a triangle or a cross before a marked text
 extern const char *const panel_mode_name[PANEL_CINE + 1];
 Color panel_mark_color(PanelMark mark);
 const char *panel_text(const char *text);                  // "" for NULL
@@ -76,12 +76,12 @@ bool panel_has_more_lines(const char *text);
 bool panel_first_line(const char *text, char *line, size_t capacity);
 void panel_heading(Panel *panel, const char *text);
 
-// Positions for labels, at `wanted` or as close as possible above or below it, without overlap.
+// A position for a label without overlap: `wanted`, or the nearest free one above or below it.
 GuiRect panel_free_place(GuiRect wanted, const GuiRect *taken, int count);
 
 void panel_reflow(const char *from, char *to, size_t capacity);
 
-// One button of the table of keys; `where` tells buttons of one action apart.
+// Draws the button of an action; `where` distinguishes several buttons of one action.
 void panel_action_button(Panel *panel, const PanelState *state, ActionId id, const char *where, float width);
 void panel_draw_controls(Panel *panel, const PanelState *state);
 void panel_draw_over_views(Panel *panel, const PanelState *state);

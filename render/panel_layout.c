@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-// 1 at 1280x720, growing slower than the window so that views gain more than letters do; a display's density on top, as far as 1024x600 of its
-// points fit into the window.
+// 1 at 1280x720; grows more slowly than the window so that views gain more than text. Multiplied by the display density, as far as 1024x600 points fit into the
+// window.
 static double text_scale(double width, double height, double density)
 {
     double fits = fmin(width / 1024, height / 600);
@@ -21,7 +21,7 @@ static PanelRect place_view(PanelLayout *layout, PanelView view, PanelRect rect,
     return layout->view_rect[view] = (PanelRect){(float)left, (float)top, (float)(right - left), (float)(bottom - top)};
 }
 
-// The main one at the left, the two others one above the other.
+// The main view at the left, the other two one above the other.
 static void place_all_views(PanelLayout *layout, PanelRect centre, float gap, int window_height)
 {
     float main_width = floorf(centre.width * 0.62f), side = centre.width - main_width - gap, half = floorf((centre.height - gap) / 2);
@@ -46,7 +46,7 @@ PanelLayout panel_layout(int width, int height, double scale, PanelView view, bo
     float bottom = floorf(66 * s), y = layout.top.height + gap, middle = h - y - bottom - gap;
     layout.bottom = (PanelRect){0, h - bottom, w, bottom};
     float left = floorf(268 * s);
-    // the main view keeps a little more than a square, the insets take what is over
+    // the main view keeps slightly more than a square; the insets take the remaining width
     float most = view == VIEW_ALL ? 268 * s : 380 * s;
     float right = floorf(fminf(fmaxf(w - left - 1.15f * middle, 268 * s), most)), right_x = w - right;
     layout.left = (PanelRect){0, y, left, middle};

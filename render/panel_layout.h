@@ -1,4 +1,4 @@
-// Where the trainer's views and panels are.
+// The positions of the trainer's views and panels.
 #ifndef SELDINGER_RENDER_PANEL_LAYOUT_H
 #define SELDINGER_RENDER_PANEL_LAYOUT_H
 
@@ -11,16 +11,16 @@ typedef enum { VIEW_FLUOROSCOPY, VIEW_3D, VIEW_ANGIOSCOPY, VIEW_COUNT, VIEW_ALL 
 
 typedef GuiRect PanelRect;   // x, y, width, height [pixel], y down from the upper left corner
 
-// Where things are. A view's rectangle of zero width is not shown. Nothing overlaps from 1024x600 on (times 0.6 for smaller windows).
+// A view whose rectangle has zero width is not shown. Nothing overlaps for windows of at least 1024x600 (0.6 times that with smaller scale).
 typedef struct PanelLayout {
-    double scale;                  // of text and widgets, from the content scale and the window's height
-    ViewPort view[VIEW_COUNT];     // framebuffer 0, y from the lower left corner as OpenGL has it
+    double scale;                  // of text and widgets, from the content scale and the height of the window
+    ViewPort view[VIEW_COUNT];     // framebuffer 0, y from the lower left corner as in OpenGL
     PanelRect view_rect[VIEW_COUNT]; // the same, y down
     PanelView main;                // the largest
     PanelRect top, left, right, bottom;
 } PanelLayout;
 
-// `has_panels` false: the views alone fill the window.
+// `has_panels` false: the views fill the window.
 PanelLayout panel_layout(int width, int height, double scale, PanelView view, bool has_panels);
 
 #endif

@@ -1,4 +1,4 @@
-// Input and output of the trainer's panels: what they show, and the user's actions. Plain data.
+// Input and output of the trainer's panels: the data that they show, and the user's actions. Plain data.
 #ifndef SELDINGER_RENDER_PANEL_STATE_H
 #define SELDINGER_RENDER_PANEL_STATE_H
 
@@ -26,7 +26,7 @@ typedef struct PanelFigure {       // one line of the score or of the exercise
 } PanelFigure;
 
 typedef struct PanelTool {         // one of the coaxial tools
-    const char *name;              // one word, where there are several
+    const char *name;              // one word, if there are several tools
     const char *what;              // "catheter 0.70 mm x 160 mm"
     Color color;                   // as in the 3D view
     double inserted_mm, turned_deg, push_mm_s, twist_deg_s;
@@ -42,11 +42,11 @@ typedef struct PanelDevice {
 } PanelDevice;
 
 typedef struct PanelLabel {        // a label in the 3D view; pixels from the view's upper left corner
-    double x, y, radius;           // its centre, and of what is drawn there
+    double x, y, radius;           // its centre, and the radius of the object drawn there
     const char *text;
 } PanelLabel;
 
-// A device on the tray: of the scene, or one that may be added to it.
+// A device on the tray: one of the scene, or one that may be added to it.
 enum { TRAY_POINTS = 160, TRAY_STEPS = 64 };
 typedef struct PanelTrayDevice {
     const char *name;
@@ -55,42 +55,42 @@ typedef struct PanelTrayDevice {
     const char *remark;            // an additional note, or NULL
     bool is_in;                    // it is inserted now
     int point_count;
-    double point[TRAY_POINTS][2];  // [mm] (x, y) of its distal part when nothing holds it, the tip last; y up
+    double point[TRAY_POINTS][2];  // [mm] (x, y) of its distal part in its unloaded shape, the tip last; y up
     int step_count;
-    double end_mm[TRAY_STEPS];     // rising: where each stretch ends, from the proximal end
+    double end_mm[TRAY_STEPS];     // ascending: the end of each stretch, from the proximal end
     double bending_n_mm2[TRAY_STEPS];   // of each stretch
-    bool can_be_shaped;            // a wire whose core keeps a bend
+    bool can_be_shaped;            // a wire whose core can be bent permanently
 } PanelTrayDevice;
 
-typedef struct PanelTray {         // the chosen tool's devices, while the tray is open
+typedef struct PanelTray {         // the devices of the selected tool, while the tray is open
     const char *tool;
     const char *note;              // what to do before a device can be inserted, or NULL
     int device_count;
     const PanelTrayDevice *device; // (device_count)
-    const PanelTrayDevice *shaped; // the chosen one with its tip as requested by PanelActions.tray, or NULL; if it cannot keep that shape, its note says why
+    const PanelTrayDevice *shaped; // the selected device with its tip shaped as in PanelActions.tray, or NULL; its note says why if it cannot keep that shape
 } PanelTray;
 
-// The data shown. Strings are borrowed for the call; NULL is an empty string. NaN in a figure shows as a dash.
+// The data shown. Strings are borrowed for the call; NULL is an empty string. NaN is shown as a dash.
 typedef struct PanelState {
     double now_s;                  // wall clock of the session, for messages and hints
     double time_s;                 // simulated
     bool is_paused;
     // exercise
     const char *title;
-    const char *instructions;      // its first line is always shown, all of it in a box at the beginning and on request
+    const char *instructions;      // its first line is always shown, the whole text in a box at the start and on request
     const char *trainee;
-    const char *target;            // name of the one to reach now
+    const char *target;            // name of the target to reach now
     double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target
     bool is_finished;              // the exercise is over; `instructions` holds the result
     int figure_count, error_count;
     const PanelFigure *figure;     // (figure_count) score so far
     const char *const *error;      // (error_count) handling errors so far, newest last
     // tools
-    int tool_count, chosen_tool;   // outermost first; the one that is shown in full
+    int tool_count, chosen_tool;   // outermost first; the one shown with all its figures
     PanelTool tool[PANEL_TOOLS];
-    bool is_pair_locked, is_let_go;  // the chosen tool and its partner; the chosen one
+    bool is_pair_locked, is_let_go;  // the selected tool and its partner; the selected tool
     const PanelTray *tray;         // NULL: closed, or not known yet
-    double wall_max_n, wall_sum_n; // of all
+    double wall_max_n, wall_sum_n; // over all tools
     // X-ray
     XrayControl xray;
     PanelMode mode;
@@ -108,16 +108,16 @@ typedef struct PanelState {
     double step_median_us, step_p999_us, real_time_factor, frame_ms;
     int64_t missed_deadlines;
     unsigned warnings;             // WARN_ bits
-    const char *warning;           // one more line of warning, or NULL
+    const char *warning;           // one more warning line, or NULL
     int device_count;
     const PanelDevice *device;
 } PanelState;
 
-// Mouse input in a view (dragging stays with the view where it began).
+// Mouse input in a view (a drag belongs to the view where it began).
 typedef struct PanelMouse {
     int view;                      // PanelView, or -1 outside all
     double x, y;                   // [0, 1] in the view, y up
-    double drag_x, drag_y;         // since the last frame, as parts of the view's height, y up
+    double drag_x, drag_y;         // since the last frame, as fractions of the view's height, y up
     unsigned buttons;              // WINDOW_MOUSE_ bits of a press that began in the view
     double scroll;
 } PanelMouse;
@@ -125,8 +125,8 @@ typedef struct PanelMouse {
 // The user's choice in the tray, while it is open.
 typedef struct PanelTrayChoice {
     bool is_open;
-    int device;                    // of PanelTray.device
-    bool is_shaped;                // with its tip shaped: from the tip back to the bend, the angle that stays, the mandrel's radius
+    int device;                    // index in PanelTray.device
+    bool is_shaped;                // with a shaped tip: distance of the bend from the tip, remaining angle, radius of the mandrel
     double length_mm, angle_deg, mandrel_mm;
     bool is_taken;                 // in this frame: insert it
 } PanelTrayChoice;
@@ -134,7 +134,7 @@ typedef struct PanelTrayChoice {
 typedef struct PanelActions {
     bool held[ACTION_COUNT];       // by key or by the mouse on a button
     int pressed[ACTION_COUNT];     // times since the last frame. RESTART and QUIT only when confirmed; SIGINT, SIGTERM: QUIT at once
-    bool xray_set;                 // a slider was moved: `xray` holds what the state showed with the new value in it
+    bool xray_set;                 // a slider was moved: `xray` is that of the state with the new value
     XrayControl xray;
     bool trainee_set;
     char trainee[64];              // UTF-8, printable, no control characters, trimmed
@@ -143,7 +143,7 @@ typedef struct PanelActions {
     int answer;                    // to panel_ask(): 1 yes, -1 no, 0 none in this frame
 } PanelActions;
 
-// Texts are the caller's and live until it is answered.
+// The texts belong to the caller and must live until the question is answered.
 typedef struct PanelQuestion {
     const char *title, *text, *yes, *no;
 } PanelQuestion;

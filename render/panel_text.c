@@ -1,4 +1,4 @@
-// Formatting of words, numbers and signs for the panel.
+// Formatting of text, numbers and signs for the panel.
 #include "render/panel_internal.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@ Color panel_mark_color(PanelMark mark) { return (const Color[]){gui_colors.text,
 
 const char *panel_text(const char *text) { return text ? text : ""; }
 
-// "12.3 mm", a dash for what is not known; never "-0.0".
+// "12.3 mm", a dash for unknown values; never "-0.0".
 const char *panel_figure(char *text, size_t capacity, double value, int decimals, const char *unit)
 {
     const char *blank = unit[0] && strncmp(unit, "\u00b0", 2) != 0 ? " " : "";   // 35 mm, but 35\u00b0
@@ -38,7 +38,7 @@ bool panel_has_more_lines(const char *text)
     return end && end[strspn(end, " \n\r\t")];
 }
 
-// Of the instructions; false if there is none.
+// First line of the instructions; false if there is none.
 bool panel_first_line(const char *text, char *line, size_t capacity)
 {
     snprintf(line, capacity, "%.*s", (int)strcspn(panel_text(text), "\n"), panel_text(text));

@@ -13,10 +13,10 @@ static void box(Gui *gui, GuiRect at, const char *title)
     gui_draw_text(gui, at.x + pad, at.y + pad / 2, GUI_SMALL, gui_colors.dim, title);
 }
 
-// The distal part at equal scale on both axes, its proximal end at the left, with a scale bar.
+// The distal part of the device at equal scale on both axes, its proximal end at the left, with a scale bar.
 static void draw_shape(Gui *gui, GuiRect at, const PanelTrayDevice *device)
 {
-    box(gui, at, "Shape of its end, when nothing holds it");
+    box(gui, at, "Unloaded shape of its distal end");
     if (device->point_count < 2)
         return;
     double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
@@ -28,7 +28,7 @@ static void draw_shape(Gui *gui, GuiRect at, const PanelTrayDevice *device)
     float s = gui_scale(gui), margin = floorf(10 * s), head = gui_line_height(gui, GUI_SMALL) + margin / 2;
     double width = at.width - 2 * margin, height = at.height - head - margin;
     double scale = fmin(width / fmax(high[0] - low[0], 1e-6), height / fmax(high[1] - low[1], 1e-6));
-    scale = fmin(scale, 24 * s);         // [pixel/mm] a short straight tip does not fill the box
+    scale = fmin(scale, 24 * s);         // [pixel/mm] upper limit, so that a short straight tip does not fill the box
     double x0 = at.x + margin + (width - scale * (high[0] - low[0])) / 2, y0 = at.y + head + (height + scale * (high[1] - low[1])) / 2;
     for (int i = 1; i < device->point_count; i++) {
         const double *a = device->point[i - 1], *b = device->point[i];
@@ -46,10 +46,10 @@ static void draw_shape(Gui *gui, GuiRect at, const PanelTrayDevice *device)
     gui_draw_text(gui, right - text_width, bottom - text_height - 2, GUI_SMALL, gui_colors.text, text);
 }
 
-// Steps over the length, the tip at the right; a stiffness spans decades, so its logarithm.
+// Stiffness as steps over the length, the tip at the right; logarithmic, because stiffness spans decades.
 static void draw_stiffness(Gui *gui, GuiRect at, const PanelTrayDevice *device)
 {
-    box(gui, at, "Bending stiffness along it [N mm\u00b2], the tip at the right");
+    box(gui, at, "Bending stiffness along the device [N mm\u00b2], the tip at the right");
     int count = device->step_count;
     if (count < 1 || !(device->end_mm[count - 1] > 0))
         return;
@@ -70,7 +70,7 @@ static void draw_stiffness(Gui *gui, GuiRect at, const PanelTrayDevice *device)
         gui_draw_fill(gui, (GuiRect){left, y, fmaxf(right - left, 1), thick}, gui_colors.accent);
         if (!isnan(before))
             gui_draw_fill(gui, (GuiRect){left, fminf(before, y), thick, fabsf(y - before) + thick}, gui_colors.accent);
-        // a figure over each stretch, once for stretches of one stiffness and where there is room
+        // one figure for adjoining stretches of the same stiffness, if there is room
         bool is_new = i == 0 || fabs(device->bending_n_mm2[i] / device->bending_n_mm2[i - 1] - 1) > 0.01;
         char text[24];
         float width, height;
@@ -108,8 +108,8 @@ static void draw_sliders(Panel *panel)
     static const struct {
         const char *id, *format, *tip;
         float least, most;
-    } slider[] = {{"tip length", "bend %.0f mm long", "from the tip back to where the bend begins", 1, 80},
-                  {"tip angle", "keeps %.0f\u00b0", "the angle that stays when the core has sprung back; keys: Left, Right", 5, 330},
+    } slider[] = {{"tip length", "bend %.0f mm long", "from the tip back to the start of the bend", 1, 80},
+                  {"tip angle", "keeps %.0f\u00b0", "the remaining angle after springback of the core; keys: Left, Right", 5, 330},
                   {"tip mandrel", "mandrel R %.1f mm", "radius of the mandrel for bending the tip: the thinner, the tighter the final bend", 0.3f, 10}};
     Gui *gui = panel->gui;
     float gap = floorf(4 * gui_scale(gui)), width = floorf((gui_width(gui) - 2 * gap) / 3);
@@ -144,7 +144,7 @@ static void draw_device(Panel *panel, const PanelTray *tray, GuiRect at)
     if (note[0])
         gui_text_wrapped(gui, GUI_NORMAL, shown->is_in ? gui_colors.dim : gui_colors.warning, note);
     float half = floorf((gui_width(gui) - gap) / 2);
-    if (gui_button(gui, "put in", panel->tray.is_shaped ? "Shape and insert" : "Put in", "Enter", half, false).pressed)
+    if (gui_button(gui, "put in", panel->tray.is_shaped ? "Shape and insert" : "Insert", "Enter", half, false).pressed)
         panel->answer = 1;
     gui_beside(gui, gap);
     if (gui_button(gui, "close tray", "Close", "Esc", half, false).pressed)

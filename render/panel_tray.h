@@ -1,9 +1,9 @@
-// The tray of the trainer's panels: which device is chosen.
+// The tray of the trainer's panels: selection of a device.
 #ifndef SELDINGER_RENDER_PANEL_TRAY_H
 #define SELDINGER_RENDER_PANEL_TRAY_H
 
 typedef struct Panel Panel;
 
-void panel_move_in_tray(Panel *panel, int devices);      // down, or up (< 0)
+void panel_move_in_tray(Panel *panel, int devices);      // moves the selection down, or up (< 0)
 
 #endif

@@ -1,4 +1,4 @@
-// Text over the views: the image's mode and angles as in an angio suite, warnings, the views' names.
+// Text over the views: mode and angles of the image as in an angio suite, warnings, names of the views.
 #include "render/panel_internal.h"
 
 #include "render/vessel_scene.h"
@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { LABELS_PLACED = 32 };   // beside one another; later ones may lie on others
+enum { LABELS_PLACED = 32 };   // labels placed without overlap; further ones may overlap
 
 // "LAO 30  CRA 10": rounded first, so that there is no "RAO 0".
 static const char *angles(char *text, size_t capacity, const XrayControl *xray)
@@ -73,7 +73,7 @@ static void draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRe
         label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.warning, "\u25b2 no mask yet: take one with the X-ray on");
 }
 
-// Text in a box, in the middle of the view's width; returns where the next one goes.
+// Text in a box, centred in the view; returns the y of the next box.
 static float banner(Panel *panel, GuiRect at, float y, Color ground, const char *text)
 {
     Gui *gui = panel->gui;
@@ -92,12 +92,12 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
     static const struct {
         unsigned bit;
         const char *text;
-    } warning[] = {{WARN_OUTSIDE, "The tool is outside the vessel: forces are not to be trusted"},
+    } warning[] = {{WARN_OUTSIDE, "The tool is outside the vessel: forces are not valid"},
                    {WARN_STALLED, "The simulation has stopped"},
-                   {WARN_DEVICE_LOST, "A device is lost: the tool stands still until it is back"},
+                   {WARN_DEVICE_LOST, "A device is lost: the tool does not move until it is connected again"},
                    {WARN_NOT_CONVERGED, "Contact forces did not converge in the last step"},
                    {WARN_SLOW, "Simulation slower than real time"},
-                   {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may come late"}};
+                   {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may be late"}};
     float y = at.y + floorf(52 * gui_scale(panel->gui));
     char text[300], line[280];
     if (state->is_finished && panel_first_line(state->instructions, line, sizeof line)) {
@@ -119,7 +119,7 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
     }
 }
 
-// A bar of colours for the wall force on the tool, least below.
+// A colour bar for the wall force on the tool, lowest value at the bottom.
 static void draw_force_legend(Panel *panel, GuiRect at, double full_scale_n)
 {
     enum { STEPS = 32 };
@@ -163,7 +163,7 @@ static void draw_3d_words(Panel *panel, const PanelState *state, GuiRect at)
         const PanelLabel *words = &state->label[i];
         float width, height, x = at.x + (float)words->x, away = (float)words->radius + gap;
         gui_text_extent(gui, GUI_SMALL, words->text, &width, &height);
-        bool is_left = words->x < (double)at.width / 2;      // outwards: the vessel lies inwards
+        bool is_left = words->x < (double)at.width / 2;      // outwards, because the vessel lies inwards
         GuiRect wanted = {is_left ? x - away - width - pad : x + away - pad, at.y + (float)words->y - height / 2 - pad / 2, width + 2 * pad, height + pad};
         GuiRect place = panel_free_place(wanted, taken, i < LABELS_PLACED ? i : LABELS_PLACED);
         if (i < LABELS_PLACED)

@@ -1,4 +1,4 @@
-// Options, and the check that every caller makes first. The pictures: picture_run.c, picture_tree.c, picture_fit.c, picture_series.c.
+// Options, and the check that every caller makes first. The pictures are drawn in picture_run.c, picture_tree.c, picture_fit.c and picture_series.c.
 #include "render/picture.h"
 
 #include "render/gl_context.h"

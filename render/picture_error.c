@@ -1,4 +1,4 @@
-// A model's surface coloured by its distance to the data, and the paper's Table 4 as a histogram.
+// The surface of a model coloured by its distance to the data, and the paper's Table 4 as a histogram.
 #include "base/base.h"
 #include "render/message.h"
 #include "render/picture_page.h"
@@ -37,7 +37,7 @@ bool picture_page_error_surface(PicturePage *page, const PictureOptions *options
     ViewPoint *point = malloc((size_t)mesh->vertex_count * sizeof *point);
     if (!panel || !point) {
         free(point);
-        return panel ? message_fail(page->message, page->capacity, "not enough memory for a picture") : false;
+        return panel ? message_fail(page->message, page->capacity, "out of memory for a picture") : false;
     }
     double edge = 0;
     for (int t = 0; t < mesh->triangle_count; t++)
@@ -55,7 +55,7 @@ bool picture_page_error_surface(PicturePage *page, const PictureOptions *options
     return true;
 }
 
-// The paper's Table 4 as a histogram: `count` values `error` [mm] in voxels, classes C1 to C4 with their borders and shares; ticks below the box.
+// The paper's Table 4 as a histogram: `count` values `error` [mm] in voxels, classes C1 to C4 with their limits and shares; ticks below the box.
 static void picture_page_class_chart(PicturePage *page, double x, double y, double width, double height, int count, const double *error, double voxel)
 {
     static const double border[5] = {0, 0.5, 1, 2, 2.5};
@@ -95,9 +95,9 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
                       char *message, size_t capacity)
 {
     if (!tree || !vessel_tree_is_model(tree) || !mesh || mesh->vertex_count < 1 || !error)
-        return message_fail(message, capacity, "no surface of a fitted model to draw");
+        return message_fail(message, capacity, "the model has no surface to draw");
     if (!(voxel_mm > 0) || !isfinite(voxel_mm))
-        return message_fail(message, capacity, "a voxel of %g mm; expected above 0", voxel_mm);
+        return message_fail(message, capacity, "the voxel size is %g mm; expected above 0", voxel_mm);
     for (int v = 0; v < mesh->vertex_count; v++)
         if (!vec3_is_finite(mesh->vertex[v]))
             return message_fail(message, capacity, "vertex %d is not a finite number: nothing is drawn", v);

@@ -1,8 +1,7 @@
-// A fitted tree: its surface coloured by the distance to the points (without a mesh the points alone), a histogram, and slices through the worst
-// local models.
+// A fitted tree: its surface coloured by the distance to the points (without a mesh only the points), a histogram, and slices through the worst local models.
 //
-// A slice through node i holds the node's centre, its axis (to the right) and its worst point. Contour: f_i = 0 by marching squares on bilinear
-// cells; its neighbours' contours, faint, show where the wall jumps from one local model to the next.
+// A slice through node i contains the centre of the node, its axis (to the right) and its worst point. Contour: f_i = 0 by marching squares on bilinear
+// cells; the contours of its neighbours, faint, show where the wall is discontinuous between local models.
 #include "base/base.h"
 #include "render/message.h"
 #include "render/picture_page.h"
@@ -17,11 +16,11 @@ typedef struct FitDrawing {
     const PictureOptions *options;
     const VesselTree *tree;
     const TriangleMesh *mesh;
-    double *distance;          // (P) [mm] > 0 inside; NaN where a node has no model
-    double *sorted;            // |distance|, ascending, of the finite ones
+    double *distance;          // (P) [mm] > 0 inside; NaN if the node has no model
+    double *sorted;            // |distance|, ascending, finite values only
     int64_t finite_count;
     double full_scale;         // [mm] ends of the colour map
-    float *field;              // (SLICE_CELLS + 1)^2 scratch
+    float *field;              // (SLICE_CELLS + 1)^2 scratch memory
 } FitDrawing;
 
 static Color map_diverging(double x) { return color_diverging(x); }
@@ -70,7 +69,7 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
         bool drawn = error && surface_point_error(drawing->mesh, tree, error, NULL) &&
                      picture_page_error_surface(page, drawing->options, drawing->mesh, error, drawing->full_scale, x, y, width, height);
         free(error);
-        return drawn || message_fail(page->message, page->capacity, "not enough memory for a picture");
+        return drawn || message_fail(page->message, page->capacity, "out of memory for a picture");
     }
     const Vec3 *shown = tree->point_count > 0 ? tree->point : tree->center;
     int shown_count = shown == tree->center ? tree->node_count : (int)tree->point_count;
@@ -83,9 +82,9 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
     ViewPoint *point = malloc(((size_t)tree->point_count + 1) * sizeof *point);
     if (!panel || !point) {
         free(point);
-        return panel ? message_fail(page->message, page->capacity, "not enough memory for a picture") : false;
+        return panel ? message_fail(page->message, page->capacity, "out of memory for a picture") : false;
     }
-    // as large as half the spacing on a vessel of the mean size, so that single points are seen and none hides its neighbours
+    // half the point spacing on a vessel of mean size, so that single points are visible and none hides its neighbours
     double size = fmin(fmax(0.22 / camera.mm_per_pixel, 1.6 * s), 9 * s);
     int count = 0;
     for (int64_t k = 0; k < tree->point_count; k++) {
@@ -123,10 +122,10 @@ static void draw_histogram(FitDrawing *drawing, double x, double y, double width
     }
     overlay_line(page->overlay, x + width / 2, y, x + width / 2, y + height, SHEET_MUTED, page->scale);
     if (beyond > 0)
-        picture_page_text(page, x + 6 * page->scale, y + 4 * page->scale, TEXT_SMALL, SHEET_MUTED, "%lld beyond the ends", (long long)beyond);
+        picture_page_text(page, x + 6 * page->scale, y + 4 * page->scale, TEXT_SMALL, SHEET_MUTED, "%lld outside this range", (long long)beyond);
 }
 
-// Where the field crosses zero on the edge between two corners.
+// The zero of the field on the edge between two corners.
 static void crossing(const double a[2], double fa, const double b[2], double fb, double out[2])
 {
     double t = fa / (fa - fb);
@@ -226,7 +225,7 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     picture_page_scale_bar(page, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
 }
 
-// The largest errors first, none beside one already chosen.
+// Chooses the largest errors first, and none next to one already chosen.
 static int choose_worst(const VesselTree *tree, int most, int chosen[WORST_MOST])
 {
     int count = 0;
@@ -265,12 +264,12 @@ static bool draw_fit(FitDrawing *drawing)
     y += 66 * s;
     picture_page_text(page, left, y, TEXT_NORMAL, SHEET_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
                       (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99), percentile(drawing, 1));
-    picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f a node", tree->node_count, (long long)tree->blob_count,
+    picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f per node", tree->node_count, (long long)tree->blob_count,
                       (double)tree->blob_count / tree->node_count);
     y += 56 * s;
     if (worst < 1)
         return true;
-    picture_page_text(page, left, y, TEXT_NORMAL, SHEET_MUTED, "nodes of the largest errors, cut through axis and worst point; neighbours' walls grey");
+    picture_page_text(page, left, y, TEXT_NORMAL, SHEET_MUTED, "nodes with the largest errors, cut through axis and worst point; walls of neighbours grey");
     y += 28 * s;
     int best_columns = 1;
     double room = page->height - gap - y, best = 0;
@@ -297,7 +296,7 @@ bool picture_of_fit(const char *path, const PictureOptions *options, const Vesse
     if (!picture_page_open(&page, options, options->height, message, capacity))
         return false;
     FitDrawing drawing = {.page = &page, .options = options, .tree = tree, .mesh = mesh};
-    bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "not enough memory for a picture");
+    bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "out of memory for a picture");
     if (drawn) {
         double wide = percentile(&drawing, 0.98);
         drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? picture_page_scale_end(wide) : 0.1;

@@ -1,7 +1,8 @@
-// Every junction of a model in small cells, the narrowest first: a section through the parent's axis and the branch's first nodes.
+// Every junction of a model in a small cell, the narrowest first: a section through the axis of the parent and the first nodes of the branch.
 //
-// The plane holds the joining line (to the right) and, as far as that allows, the parent's direction (up). The wall is the zero of the field as a tool meets
-// it: each pixel's corner is answered by the node to which a walk leads from the nearest node around.
+// The plane contains the joining line (to the right) and, as far as possible, the direction of the parent (up). The wall is the zero of the field as a tool
+// meets it:
+// each pixel corner is evaluated with the node reached by walking from the nearest node.
 #include "render/message.h"
 #include "geom/geom.h"
 #include "render/picture_page.h"
@@ -18,14 +19,14 @@ typedef struct JunctionCell {
     const VesselTree *tree;
     int near_count, near[NEAR_MOST];         // nodes whose balls may lie in the picture
     Vec3 center, along, across, normal;
-    double half;             // [mm] of the side
+    double half;             // [mm] half of the side
     double x, y, side;       // on the page
 } JunctionCell;
 
 typedef struct JunctionDrawing {
     PicturePage *page;
     const PictureJunctions *what;
-    float low, high;         // of the volume's values: black and white
+    float low, high;         // values of the volume drawn black and white
     float *field;            // (CELLS + 1)^2
     uint8_t *grey;           // GREY^2
 } JunctionDrawing;
@@ -66,7 +67,7 @@ static int nearest_node(const JunctionCell *cell, Vec3 x)
     return best;
 }
 
-// The field at (u, v) of the plane; below 0 if there is no node around.
+// The field at (u, v) of the plane; below 0 if there is no node nearby.
 static double field_in_plane(const JunctionCell *cell, double u, double v)
 {
     Vec3 x = vec3_add_scaled(vec3_add_scaled(cell->center, u, cell->along), v, cell->across);
@@ -124,7 +125,7 @@ static void draw_image(JunctionDrawing *drawing, const JunctionCell *cell)
             double value = trilinear(what, &to_voxel, vec3_add_scaled(vec3_add_scaled(cell->center, u, cell->along), v, cell->across), &inside);
             double share = (value - (double)drawing->low) / (double)(drawing->high - drawing->low);
             share = share > 0 ? share < 1 ? share : 1 : 0;
-            drawing->grey[j * GREY + i] = (uint8_t)(inside ? 225 * pow(share, 0.6) + 0.5 : 0);   // thin branches are faint
+            drawing->grey[j * GREY + i] = (uint8_t)(inside ? 225 * pow(share, 0.6) + 0.5 : 0);   // gamma below 1, because thin branches are faint
         }
     unsigned texture = picture_page_grey_texture(drawing->page, GREY, GREY, drawing->grey);
     if (texture)
@@ -222,7 +223,7 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Black: the median of the whole volume; white: the brightest part of it.
+// Black: the median of the whole volume; white: its 99.9th percentile.
 static bool choose_window(JunctionDrawing *drawing)
 {
     const PictureJunctions *what = drawing->what;
@@ -307,7 +308,7 @@ bool picture_of_junctions(const char *path, const PictureOptions *options, const
             return false;
         JunctionDrawing drawing = {.page = &page, .what = what, .field = malloc((CELLS + 1) * (CELLS + 1) * sizeof(float)), .grey = malloc(GREY * GREY)};
         page_path(path, *pages, name, sizeof name);
-        bool drawn = (drawing.field && drawing.grey && choose_window(&drawing)) || message_fail(message, capacity, "not enough memory for a picture");
+        bool drawn = (drawing.field && drawing.grey && choose_window(&drawing)) || message_fail(message, capacity, "out of memory for a picture");
         drawn = drawn && draw_page(&drawing, options, first, end, what->junction_count) && picture_page_save(&page, name);
         free(drawing.field);
         free(drawing.grey);

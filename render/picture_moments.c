@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// `radius` and `force` have room for the pose's nodes.
+// `radius` and `force` have room for the nodes of the pose.
 static PictureTool tool_of(const Pose *pose, const ToolLooks *looks, double *radius, Vec3 *force)
 {
     for (int i = 0; i < pose->node_count; i++) {
@@ -56,7 +56,7 @@ bool picture_moments(const char *path, const char *title, const Scene *scene, Op
             tool[count++] = tool_of(moments->pose[i], &looks, radius + (size_t)i * nodes, force + (size_t)i * nodes);
     bool good = draw(path, title, scene, open, count, tool, message, sizeof message);
     if (!good)
-        faults_add(faults, path, 0, 0, "no picture: %s", message[0] ? message : "not enough memory");
+        faults_add(faults, path, 0, 0, "no picture: %s", message[0] ? message : "out of memory");
     free(radius);
     free(force);
     tool_looks_free(&looks);

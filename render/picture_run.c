@@ -1,9 +1,9 @@
 // Vessel and tool: the large view, the close-up of the tip, and several moments side by side.
 //
-// Several tools share one line and are swept along the same points, so each is centred in the one around it.
+// Several tools share one centreline and are swept along the same points, so each is centred in the one around it.
 //
-// Depth: the tool's tube, arrows and target spheres are opaque and write depth; the vessel's wall, back and front faces, is blended over them from
-// far to near, so a tool inside is seen through exactly the walls that lie before it.
+// Depth: the tube of the tool, arrows and target spheres are opaque and write depth; the wall of the vessel, back and front faces, is blended over them from
+// far to near, so that a tool inside is seen through exactly the walls in front of it.
 #include "render/message.h"
 #include "render/picture_page.h"
 
@@ -14,14 +14,14 @@ typedef struct RunDrawing {
     const PictureOptions *options;
     const PictureScene *scene;
     ShellStyle style;
-    double force_scale;        // [N] top of the map
+    double force_scale;        // [N] top of the colour map
     Primitives primitives;
-    double *radius, *lumen;    // (longest tool and its tip) scratch
+    double *radius, *lumen;    // (longest tool and its tip) scratch memory
     Vec3 *point;
     Color *color;
-    double thickest;           // [mm] radius of a tool
+    double thickest;           // [mm] radius of the thickest tool
     int frame_count;
-    Vec3 *frame_point;         // what the camera must show
+    Vec3 *frame_point;         // points that the camera must show
 } RunDrawing;
 
 static const Color TARGET_COLOR = {0, 114, 178, 255}, ARROW_COLOR = {0, 120, 105, 255}, SHEATH_COLOR = {120, 124, 130, 255};
@@ -29,7 +29,7 @@ static const Color TARGET_COLOR = {0, 114, 178, 255}, ARROW_COLOR = {0, 120, 105
 static bool check_input(const PictureScene *scene, int tool_count, const PictureTool *tool, char *message, size_t capacity)
 {
     if (tool_count < 1 || tool_count > 6)
-        return message_fail(message, capacity, "a picture of %d moments; expected 1 to 6", tool_count);
+        return message_fail(message, capacity, "cannot draw %d moments; expected 1 to 6", tool_count);
     for (int k = 0; k < tool_count; k++) {
         if (tool[k].node_count < 2 || !tool[k].position || !tool[k].radius)
             return message_fail(message, capacity, "a tool of %d nodes cannot be drawn; expected at least 2", tool[k].node_count);
@@ -52,7 +52,7 @@ static int first_free(const PictureTool *tool)
     return tool->first_free_node < 0 ? 0 : tool->first_free_node > tool->node_count - 2 ? tool->node_count - 2 : tool->first_free_node;
 }
 
-// The points framed by the camera: the vessel where there is one, else the free part of the tools; targets; the sheath's mouth.
+// The points framed by the camera: the vessel or, without one, the free part of the tools; targets; the mouth of the sheath.
 static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool *tool)
 {
     const PictureScene *scene = drawing->scene;
@@ -82,7 +82,7 @@ static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool 
     return true;
 }
 
-// Everything visible, with extra depth for the tools' thickness and for arrows, since a planar tool has no depth.
+// Frames everything visible, with extra depth for the thickness of the tools and for arrows, since a planar tool has no depth.
 static void frame_all(const RunDrawing *drawing, Camera *camera, int width, int height, double border, double scale)
 {
     camera_frame(camera, width, height, border, drawing->frame_count, drawing->frame_point, 0);
@@ -106,7 +106,7 @@ static double arrow_length(const RunDrawing *drawing, const Camera *camera)
     return fmin(64 * drawing->page->scale, 0.12 * (camera->width < camera->height ? camera->width : camera->height)) * camera->mm_per_pixel;
 }
 
-// One arrow for each stretch of the tool of about 16 pixels: the sum of its nodes' forces, its head at the tool where the wall pushes.
+// One arrow for each piece of the tool of about 16 pixels: the sum of the forces on its nodes, with its head at the tool where the wall pushes.
 static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double line)
 {
     if (!tool->force || !drawing->options->arrows)
@@ -132,14 +132,16 @@ static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureT
             continue;
         place = vec3_scale(place, 1 / weight);
         Vec3 direction = vec3_scale(sum, 1 / size);
-        // square root: a tenth of the force is still seen
+        // square root, so that a tenth of the force is still visible
         double long_as = longest * sqrt(fmin(size / drawing->force_scale, 2));
         Vec3 tip = vec3_add_scaled(place, -radius, direction);
         primitives_arrow(&drawing->primitives, vec3_add_scaled(tip, -long_as, direction), tip, line, ARROW_COLOR);
     }
 }
 
-// The line's nodes up to where tool k ends, with its tip where that lies between two; what it is there. Returns how many.
+// Fills the points of tool k: the nodes of the centreline up to its end, and its tip if that lies between two nodes; with radius, lumen and colour. Returns
+// their number.
+// *open_count: number of points up to the last one with another tool inside.
 static int lay_tool(RunDrawing *drawing, const PictureTool *tool, int k, const double *end, double thin, int *open_count)
 {
     const Pose *pose = tool->pose;
@@ -173,7 +175,7 @@ static int lay_tool(RunDrawing *drawing, const PictureTool *tool, int k, const d
     return count;
 }
 
-// Nodes `first` to `last` of what was laid, cut open or whole.
+// Adds nodes `first` to `last` of the filled points, cut open or whole.
 static void add_stretch(RunDrawing *drawing, int first, int last, bool is_open, const Camera *camera)
 {
     Color inside = color_rgb(232, 234, 238);
@@ -215,7 +217,7 @@ static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureToo
         drawing->radius[i] = fmax(tool->radius[i], thin);
         drawing->color[i] = i < free_node ? SHEATH_COLOR : color_sequential(tool->force ? vec3_norm(tool->force[i]) / drawing->force_scale : 0);
     }
-    // behind the mouth only a short stub is shown
+    // only a short stub is shown behind the mouth
     int first = free_node;
     double stub = 0, most = 30 * drawing->page->scale * camera->mm_per_pixel;
     while (first > 0 && stub < most) {
@@ -254,14 +256,14 @@ static bool draw_panel(RunDrawing *drawing, const Camera *camera, const ShellSty
     if (drawing->scene->has_entry)
         primitives_sphere(&drawing->primitives, drawing->scene->entry, 4 * drawing->page->scale * camera->mm_per_pixel, SHEATH_COLOR);
     if (drawing->primitives.is_short_of_memory)
-        return message_fail(drawing->page->message, drawing->page->capacity, "not enough memory for a picture");
+        return message_fail(drawing->page->message, drawing->page->capacity, "out of memory for a picture");
     surface_view_draw_primitives(drawing->page->view, camera, &drawing->primitives, style);
     surface_view_draw_shell(drawing->page->view, camera, style);
     picture_page_end_panel(drawing->page, panel, x, y);
     return true;
 }
 
-// Names beside the target spheres and the entry, kept inside the panel.
+// Writes the names beside the target spheres and the entry, kept inside the panel.
 static void label_panel(RunDrawing *drawing, const Camera *camera, double x, double y)
 {
     PicturePage *page = drawing->page;
@@ -280,7 +282,7 @@ static void label_panel(RunDrawing *drawing, const Camera *camera, double x, dou
     }
 }
 
-// Width of the lumen at the tip: the nearest wall and the wall opposite to it. 0 if there is no vessel.
+// Width of the lumen at the tip: distance to the nearest wall plus distance to the wall opposite. 0 if there is no vessel.
 static double lumen_width_at(const TriangleMesh *mesh, Vec3 tip)
 {
     double near_wall = HUGE_VAL, far_wall = HUGE_VAL;
@@ -316,7 +318,7 @@ static Camera close_up_camera(const Camera *whole, Vec3 tip, double radius, int 
     return camera;
 }
 
-// Branches that lie before the tip do not hide it.
+// Fades branches in front of the tip so that they do not hide it.
 static ShellStyle close_up_style(const RunDrawing *drawing, double radius)
 {
     ShellStyle style = drawing->style;
@@ -325,7 +327,7 @@ static ShellStyle close_up_style(const RunDrawing *drawing, double radius)
     return style;
 }
 
-// The square of the large view that the close-up shows.
+// Outlines the square of the large view that the close-up shows.
 static void outline_close_up(RunDrawing *drawing, const Camera *whole, const Camera *close, double x, double y)
 {
     Vec3 p = camera_project(whole, close->center);
@@ -344,7 +346,7 @@ static void force_bar(RunDrawing *drawing, double x, double y, double width)
 
 static void readings_text(char *text, size_t capacity, const PictureTool *tool)
 {
-    if (has_several(tool)) {     // the legend has each one's
+    if (has_several(tool)) {     // the legend shows these figures for each tool
         snprintf(text, capacity, "t %.2f s", tool->time_s);
         return;
     }
@@ -352,7 +354,7 @@ static void readings_text(char *text, size_t capacity, const PictureTool *tool)
              tool->torque_n_mm);
 }
 
-// Each tool with its colour and what its hand feels. Returns the height.
+// Lists each tool with its colour and the forces on its hand. Returns the height.
 static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x, double y)
 {
     PicturePage *page = drawing->page;
@@ -367,7 +369,7 @@ static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x
     return 2 * line * tool->pose->tool_count + 6 * s;
 }
 
-// Returns the height of the text.
+// Writes the figures. Returns the height of the text.
 static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x, double y, double width)
 {
     PicturePage *page = drawing->page;
@@ -391,7 +393,7 @@ static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x
     return (2 + targets) * line;
 }
 
-// The same from the right hand side.
+// Draws the same scene from the right.
 static bool draw_side_view(RunDrawing *drawing, const Camera *whole, const PictureTool *tool, double x, double y, double width, double height)
 {
     PicturePage *page = drawing->page;
@@ -505,7 +507,7 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
         return true;
     Vec3 tip = tool->position[tool->node_count - 1];
     int side = (int)(0.38 * fmin(whole->width, whole->height));
-    // at least twice as large as beside it
+    // at least twice the scale of the view beside it
     double radius = inset_radius_of(drawing, tip), largest = side * whole->mm_per_pixel / 4.5;
     if (!(drawing->options->inset_radius > 0))
         radius = fmin(radius, largest);
@@ -527,7 +529,7 @@ typedef struct MomentLayout {
     double top, header, gap, height;   // [pixel]; height: of the page
 } MomentLayout;
 
-// The arrangement of rows in which the vessel is largest.
+// Chooses the number of rows for which the vessel is largest.
 static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
 {
     const PictureOptions *options = drawing->options;
@@ -544,7 +546,7 @@ static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
         if (options->focus_radius > 0)
             camera_frame_sphere(&camera, width, height, 4 * s, options->focus, options->focus_radius);
         else {
-            // no higher than what there is to see, but never flatter than 3 to 1
+            // no higher than the contents, but never flatter than 3 to 1
             double tall = camera_height_of(&camera, drawing->frame_count, drawing->frame_point) + 2 * border;
             camera.height = (int)fmin(height, fmax(tall, width / 3.0));
         }
@@ -601,7 +603,7 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
     drawing.color = malloc(points * sizeof *drawing.color);
     bool drawn = false;
     if (!drawing.radius || !drawing.lumen || !drawing.point || !drawing.color || !gather_frame(&drawing, tool_count, tool))
-        message_fail(message, capacity, "not enough memory for a picture");
+        message_fail(message, capacity, "out of memory for a picture");
     else {
         PicturePage page;
         MomentLayout layout = lay_out_moments(&drawing, tool_count);

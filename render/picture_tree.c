@@ -1,7 +1,7 @@
-// An angiogram's maximum-intensity projections with the tracked tree drawn over them.
+// Maximum-intensity projections of an angiogram with the tracked tree drawn over them.
 //
-// A point X falls on pixel ((X - O) . a / |a|^2, (X - O) . b / |b|^2) with a, b the steps across and up: right for orthogonal voxel axes, oblique or
-// not. The images are darker than the lines drawn over them.
+// A point X is drawn at pixel ((X - O) . a / |a|^2, (X - O) . b / |b|^2) with a, b the steps across and up: correct for orthogonal voxel axes, oblique or
+// not. The images are darkened so that the lines over them stand out.
 #include "render/message.h"
 #include "render/picture_page.h"
 #include "render/tick_step.h"
@@ -20,7 +20,7 @@ static bool check_projections(int count, const PictureProjection *projection, in
                               size_t capacity)
 {
     if (count < 1 || count > 6)
-        return message_fail(message, capacity, "a picture of %d projections; expected 1 to 6", count);
+        return message_fail(message, capacity, "cannot draw %d projections; expected 1 to 6", count);
     for (int k = 0; k < count; k++) {
         const PictureProjection *p = &projection[k];
         if (p->width < 1 || p->height < 1 || p->width > 16384 || p->height > 16384 || !p->value)
@@ -153,7 +153,7 @@ static bool draw_projection(PicturePage *page, const Panel *panel, float low, fl
     float(*at)[2] = malloc(2 * (size_t)longest * sizeof *at);
     if (!texture || !at) {
         free(at);
-        return message_fail(page->message, page->capacity, "not enough memory for a picture");
+        return message_fail(page->message, page->capacity, "out of memory for a picture");
     }
     double s = page->scale;
     overlay_image(page->overlay, texture, panel->x, panel->y, panel->width, panel->height, true);
@@ -199,14 +199,14 @@ static double length_of(int count, const PicturePolyline *polyline)
     return length;
 }
 
-// All panels at one scale, in the arrangement of rows that makes them largest. Returns the height they need.
+// Arranges all panels at one scale, in the number of rows that makes them largest. Returns the height that they need.
 static double lay_out(const PictureOptions *page, int count, const PictureProjection *projection, double top, Panel *panel)
 {
     double s = picture_page_scale_of(page), left = 52 * s, between = 14 * s, foot = 48 * s, head = 26 * s, best = 0;
     int best_columns = count;
     for (int columns = count; columns >= 1; columns--) {
         int rows = (count + columns - 1) / columns;
-        double widest = 0, tallest = 0;   // mm of a full row, and of the rows together
+        double widest = 0, tallest = 0;   // [mm] of a full row, and of all rows together
         for (int r = 0; r < rows; r++) {
             double width = 0, height = 0;
             for (int k = r * columns; k < count && k < (r + 1) * columns; k++) {
@@ -240,7 +240,7 @@ static double lay_out(const PictureOptions *page, int count, const PictureProjec
     return y;
 }
 
-// `low`, `high`: values drawn black and white; equal (0, 0): from the images' percentiles.
+// `low`, `high`: values drawn black and white; equal (0, 0): taken from the percentiles of the images.
 static bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
                                    float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
                                    size_t capacity)
@@ -248,7 +248,7 @@ static bool picture_of_projections(const char *path, const PictureOptions *optio
     if (!check_projections(projection_count, projection, polyline_count, polyline, message, capacity))
         return false;
     if (!(high > low) && !find_window(projection_count, projection, &low, &high))
-        return message_fail(message, capacity, "not enough memory for a picture");
+        return message_fail(message, capacity, "out of memory for a picture");
     PicturePage page;
     Panel panel[6];
     double s = picture_page_scale_of(options), needed = lay_out(options, projection_count, projection, 46 * s, panel);
@@ -269,7 +269,7 @@ static bool picture_of_projections(const char *path, const PictureOptions *optio
 
 // --- from a voxel grid and a tree ---
 
-enum { SAC_COLOR = 5 };      // a purple; orders above 5 take it too
+enum { SAC_COLOR = 5 };      // purple; orders above 5 use it too
 
 typedef struct Branches {
     int count;
@@ -285,7 +285,7 @@ static void free_branches(Branches *branches)
     free(branches->radius);
 }
 
-// Each branch (vessel_branches.h) from the node it springs from on, and each aneurysm node as a line of its own; the colour is the branch's order.
+// Each branch (vessel_branches.h) becomes a line starting at its parent node, and each aneurysm node a line of its own; the colour is the order of the branch.
 static bool cut_into_branches(const VesselTree *tree, Branches *branches)
 {
     size_t n = (size_t)tree->node_count;
@@ -340,7 +340,7 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
     bool drawn = true;
     for (int k = 0; k < 3; k++)
         if (size[k] < 1 || size[k] > 16384)
-            return message_fail(message, capacity, "a volume of %d x %d x %d voxels; expected 1 to 16384 per side", size[0], size[1], size[2]);
+            return message_fail(message, capacity, "the volume has %d x %d x %d voxels; expected 1 to 16384 per side", size[0], size[1], size[2]);
     for (int k = 0; k < 3; k++) {
         int a = plane[k][0], b = plane[k][1];
         size_t pixels = (size_t)size[a] * (size_t)size[b];
@@ -359,7 +359,7 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
     }
     drawn = drawn && (!tree || tree->node_count < 1 || cut_into_branches(tree, &branches));
     if (!drawn)
-        message_fail(message, capacity, "not enough memory for a picture");
+        message_fail(message, capacity, "out of memory for a picture");
     for (int z = 0; drawn && z < size[2]; z++)
         for (int y = 0; y < size[1]; y++) {
             const float *row = value + ((size_t)z * (size_t)size[1] + (size_t)y) * (size_t)size[0];

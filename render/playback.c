@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Contrast is simulated in strides of this many recorded steps; a checkpoint is kept every few strides.
+// Contrast is simulated in strides of this many recorded steps; a checkpoint is stored every few strides.
 enum { STRIDE = 10, KEEP_EVERY = 500, MOST_KEPT = 1024 };
 
 typedef struct Place {
@@ -17,14 +17,14 @@ struct Playback {
     const RecordedRun *run;
     const Scene *scene;
     const VesselTree *tree;
-    XrayControl unseen, control;     // control: of the step requested last
-    float *concentration;            // of the moment: at the tree's nodes, then at the tools'
+    XrayControl unseen, control;     // control: of the last requested step
+    float *concentration;            // at the current moment: at the nodes of the tree, then of the tools
     bool is_seen;
     Pose *pose;
     Place now;
-    double flow_ml_s;                // of contrast agent, at the moment
+    double flow_ml_s;                // current flow of contrast agent
     int kept_count;
-    int64_t keep_steps;          // between places
+    int64_t keep_steps;          // steps between checkpoints
     Place kept[MOST_KEPT];
 };
 
@@ -52,7 +52,7 @@ static int64_t frame_at(const RecordedRun *run, int64_t step)
     return low;
 }
 
-// The tree's node at the shared centreline's node nearest to x.
+// The tree node at the node of the shared centreline nearest to x.
 static int node_at(const RecordedFrame *frame, Vec3 x)
 {
     int nearest = frame->node_count - 1;

@@ -1,5 +1,5 @@
 // Playback of a recording: its state at any moment, forwards and backwards. Poses come from its frames, controls from its steps; contrast agent and
-// X-ray pulses are simulated again from the nearest checkpoint. Lengths mm, times simulated seconds.
+// X-ray pulses are simulated again from the nearest checkpoint. Lengths in mm, times in simulated seconds.
 #ifndef SELDINGER_RENDER_PLAYBACK_H
 #define SELDINGER_RENDER_PLAYBACK_H
 
@@ -8,24 +8,24 @@
 
 typedef struct Playback Playback;
 
-// All borrowed; `tree` NULL: contrast in the tools' lumens only. A recording without a viewer (`run --record`) is shown with `unseen` as the controls
-// of all its steps, except for the injections of its script. NULL when out of memory or there is no frame.
+// All arguments are borrowed. `tree` NULL: contrast only in the lumens of the tools. A recording without a viewer (`run --record`) is shown with the controls
+// `unseen` in all steps, except for the injections of its script. Returns NULL if out of memory or if there is no frame.
 Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen);
 void playback_close(Playback *playback);
 
-// Moves to the last step at or before a time, clamped to the recording. True for a jump: anything but a move forward by less than a second.
+// Moves to the last step at or before a time, clamped to the recording. Returns true for a jump: anything except a move forward by less than a second.
 bool playback_seek(Playback *playback, double time_s);
 double playback_time_s(const Playback *playback);
 double playback_end_s(const Playback *playback);
-// Of the moment sought: the last frame before it with the step's own controls and forces.
+// The pose at the current moment: the last frame before it with the controls and forces of the current step.
 const Pose *playback_pose(const Playback *playback);
 const float *playback_contrast(const Playback *playback);        // (N of the tree); NULL without tree
 const float *playback_filling(const Playback *playback);         // (nodes of all tools) of their lumens
 double playback_injected_ml(const Playback *playback);
-int playback_contrast_tool(const Playback *playback);            // tool for the requested contrast agent, -1: none
+int playback_contrast_tool(const Playback *playback);            // tool that injects the requested contrast agent, -1: none
 double playback_flow_ml_s(const Playback *playback);             // its actual flow
 const PulseClock *playback_pulses(const Playback *playback);
-// Times at which bookmarks were set; at most `capacity`, returns how many.
+// Times of the bookmarks, at most `capacity`; returns their number.
 int playback_bookmarks(const Playback *playback, double *time_s, int capacity);
 
 #endif

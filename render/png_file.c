@@ -1,4 +1,4 @@
-// No time stamp and a fixed compression level: the same pixels give the same bytes.
+// No time stamp and a fixed compression level, so that the same pixels give the same bytes.
 #include "render/png_file.h"
 
 #include "base/base.h"
@@ -30,7 +30,7 @@ static bool write_pixels(FILE *file, int width, int height, const uint8_t *rgb)
     if (!png)
         return false;
     png_infop info = png_create_info_struct(png);
-    if (!info || setjmp(png_jmpbuf(png))) {   // libpng reports errors, a full disk among them, by longjmp
+    if (!info || setjmp(png_jmpbuf(png))) {   // libpng reports errors, including a full disk, by longjmp
         png_destroy_write_struct(&png, info ? &info : NULL);
         return false;
     }

@@ -1,4 +1,4 @@
-// Writes RGB pixels to a PNG file by way of a temporary file, so an older file stays intact until the new one is complete.
+// Writes RGB pixels to a PNG file through a temporary file, so an older file is preserved until the new one is complete.
 #ifndef SELDINGER_RENDER_PNG_FILE_H
 #define SELDINGER_RENDER_PNG_FILE_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// `rgb` (height, width, 3), rows from the top. False with a reason in `message` (may be NULL).
+// `rgb` (height, width, 3), rows from the top. Returns false with a reason in `message` (may be NULL).
 bool png_file_write(const char *path, int width, int height, const uint8_t *rgb, char *message, size_t capacity);
 
 #endif

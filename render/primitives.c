@@ -1,5 +1,6 @@
-// Tubes are swept along a spline with a frame carried along without twist (double reflection would be exact to fourth order; a projection of the
-// last normal is enough for a picture). Round ends are rings of falling radius on the sphere of the end point.
+// Tubes are swept along a spline with a frame transported without twist. The projection of the last normal is accurate enough for a picture (double reflection
+// would be
+// fourth-order). Round ends are rings of decreasing radius on the sphere around the end point.
 #include "render/primitives.h"
 
 #include <stdlib.h>
@@ -51,8 +52,8 @@ static void add_vertex(Primitives *primitives, Vec3 p, Vec3 n, Color color)
     primitives->vertex[primitives->vertex_count++] = (PrimitiveVertex){{(float)d.x, (float)d.y, (float)d.z}, {(float)n.x, (float)n.y, (float)n.z}, color};
 }
 
-// A ring of vertices; `lean` tilts the normals along the tangent (cos and sin of the angle from the radial direction). With `join` it is
-// sewn to the ring before it.
+// Adds a ring of vertices; `lean` tilts the normals along the tangent (cos and sin of the angle from the radial direction). With `join` it is joined to the
+// previous ring.
 static void add_ring(Primitives *primitives, Vec3 center, Vec3 tangent, Vec3 normal, double radius, double lean_cos, double lean_sin, Color color, bool join)
 {
     int sides = primitives->sides > 2 ? primitives->sides : USUAL_SIDES;
@@ -120,7 +121,7 @@ void primitives_tube(Primitives *primitives, int count, const Vec3 *point, const
         return;
     Vec3 tangent = {1, 0, 0}, normal = {0, 0, 0};
     for (int i = 0; i + 1 < count; i++) {
-        // mirrored ghosts beyond the ends
+        // points mirrored beyond the ends
         Vec3 p[4] = {i > 0 ? point[i - 1] : vec3_sub(vec3_scale(point[0], 2), point[1]), point[i], point[i + 1],
                      i + 2 < count ? point[i + 2] : vec3_sub(vec3_scale(point[i + 1], 2), point[i])};
         for (int k = 0; k < SUBDIVISIONS + (i + 2 == count); k++) {
@@ -139,11 +140,11 @@ void primitives_tube(Primitives *primitives, int count, const Vec3 *point, const
 
 // --- pipes ---
 
-typedef struct PipeRing {      // where a ring's vertices begin
+typedef struct PipeRing {      // first vertices of a ring
     uint32_t outer, inner, cut;
 } PipeRing;
 
-// Two rows of `count` vertices become a strip; facing where a row runs counter-clockwise seen from the other's far side, or the other way.
+// Joins two rows of `count` vertices to a strip. Its front is the side from which row 0, row 1, next 0 run counter-clockwise; with `flip` the other side.
 static void sew(Primitives *primitives, uint32_t row, uint32_t next, uint32_t count, bool flip)
 {
     for (uint32_t k = 0; k + 1 < count; k++) {
@@ -154,7 +155,7 @@ static void sew(Primitives *primitives, uint32_t row, uint32_t next, uint32_t co
     }
 }
 
-// An arc of vertices; normals along `facing`, or where that is zero away from the axis (`side` 1) or towards it (-1).
+// Adds an arc of vertices with normals along `facing` or, if that is zero, away from the axis (`side` 1) or towards it (-1).
 static uint32_t add_arc(Primitives *primitives, Vec3 center, const Vec3 axis[2], double radius, const double angle[2], int sides, Vec3 facing, double side,
                         Color color)
 {
@@ -180,7 +181,7 @@ void primitives_pipe(Primitives *primitives, int count, const Vec3 *point, const
     for (int i = 0; i < rings; i++) {
         int from = i / SUBDIVISIONS < count - 1 ? i / SUBDIVISIONS : count - 2;
         double t = (double)(i - from * SUBDIVISIONS) / SUBDIVISIONS;
-        // mirrored ghosts beyond the ends
+        // points mirrored beyond the ends
         Vec3 p[4] = {from > 0 ? point[from - 1] : vec3_sub(vec3_scale(point[0], 2), point[1]), point[from], point[from + 1],
                      from + 2 < count ? point[from + 2] : vec3_sub(vec3_scale(point[from + 1], 2), point[from])};
         Vec3 x = spline(p, t);

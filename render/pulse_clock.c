@@ -16,7 +16,7 @@ bool pulse_clock_advance(PulseClock *clock, double time_s, const XrayControl *xr
     bool is_down = xray->pedal > 0;
     if (is_down && clock->was_down && passed > 0)
         clock->pedal_s += passed;
-    // a press, another rate and a step back each begin a row of pulses, the first of them at once
+    // a press, a new rate and a step back in time each start a series of pulses, the first of them at once
     if (is_down && (!clock->was_down || passed < 0 || rate != clock->rate)) {
         clock->rate = rate;
         clock->start_s = time_s;

@@ -1,4 +1,4 @@
-// render: window, views, pictures, films and pages of reports. Uses base, geom, recon, input and sim. What draws needs OpenGL 3.3 through EGL.
+// render: window, views, pictures, videos and pages of reports. Uses base, geom, recon, input and sim. Drawing needs OpenGL 3.3 through EGL.
 #ifndef SELDINGER_RENDER_RENDER_H
 #define SELDINGER_RENDER_RENDER_H
 

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// Real time that a frame may spend on simulating the recording again, and simulated seconds that a held arrow key goes in one.
+// Real time per frame for simulating the recording again, and simulated seconds per second for a held arrow key.
 static const double rescore_budget_s = 0.01, scrub_s_s = 4;
 
 typedef struct ReplayWindow {
@@ -48,7 +48,7 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
         if (!isnan(options->cra_deg))
             watched.cra_deg = (float)options->cra_deg;
         replay->playback = playback_open(replay->run, replay->scene, open->tree, &watched);
-        snprintf(message, sizeof message, "the recording holds no frame");
+        snprintf(message, sizeof message, "the recording contains no frame");
         good = replay->playback != NULL;
     }
     if (!good && faults->count == before)
@@ -108,7 +108,7 @@ static const ScoreFigures *score_now(ReplayWindow *replay)
     if (different >= 0 && !replay->has_told_difference) {
         replay->has_told_difference = true;
         panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING,
-                      "simulated again, the recording gives another state: the score stops there");
+                      "the repeated simulation differs from the recording: the score is not updated after that step");
     }
     return rescore_at(replay->rescore, playback_time_s(replay->playback));
 }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Shapes and tubes lie in no patient: they are taken to lie so that they are seen face on from the front.
+// Shapes and tubes have no patient orientation: the axes are chosen so that they are seen face on from the front.
 static PatientAxes patient_of(const Scene *scene, const TriangleMesh *mesh)
 {
     if (vec3_norm(scene->patient_superior) > 0)
@@ -20,8 +20,9 @@ static PatientAxes patient_of(const Scene *scene, const TriangleMesh *mesh)
     return (PatientAxes){.right = vec3_negate(camera.right), .anterior = camera.back, .superior = camera.up};
 }
 
-// Cells for a wall that is drawn live: coarse enough to be there soon, no coarser than the radius of all but the thinnest twentieth of the nodes, at which
-// a branch still has its shape.
+// Cell size for a live-drawn wall: coarse enough to be ready soon, but no coarser than the radius that all but the thinnest twentieth of the nodes exceed; at
+// that size a branch
+// still has its shape.
 static double live_cell(const VesselTree *tree)
 {
     enum { TRIANGLES = 150000 };
@@ -34,10 +35,10 @@ static double live_cell(const VesselTree *tree)
     sort_doubles(radius, (size_t)tree->node_count);
     double thin = radius[tree->node_count / 20];
     free(radius);
-    return fmax(fmin(sqrt(2.3 * area / TRIANGLES), thin), isosurface_cell_for(tree));   // 2.3 triangles a cell's face on the average
+    return fmax(fmin(sqrt(2.3 * area / TRIANGLES), thin), isosurface_cell_for(tree));   // 2.3 triangles per cell face on average
 }
 
-// By hand through a catheter 3 ml/s in a carotid artery, by the pump up to 20 in an aorta: as the vessel's section is.
+// 3 ml/s by hand through a catheter in a carotid artery, up to 20 ml/s by the pump in an aorta: proportional to the cross-section of the vessel.
 static double contrast_rate(const VesselTree *tree)
 {
     double radius = tree->node_count > 0 ? tree->radius[0] / 2.5 : 1;
@@ -61,7 +62,7 @@ static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const
     }
     Views *views = views_create(&options, note, capacity);
     if (!views) {
-        faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", note);
+        faults_add(faults, scene->path, 0, 0, "cannot show the scene: %s", note);
         return NULL;
     }
     *controls = mesh ? controls_create(views_scene(views), scene->tool_count, mesh->vertex_count, mesh->vertex)
@@ -87,7 +88,7 @@ Views *scene_views_create(Scene *scene, OpenVessel *open, OperatorControls *cont
         pose_take(pose, simulator, &(ToolCommands){0}, &xray);
         views = create(scene, open, volume, pose, controls, note, capacity, faults);
     } else if (faults->count == before) {
-        faults_add(faults, scene->path, 0, 0, "cannot be shown: out of memory");
+        faults_add(faults, scene->path, 0, 0, "cannot show the scene: out of memory");
     }
     pose_free(pose);
     simulator_destroy(simulator);

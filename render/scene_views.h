@@ -6,8 +6,9 @@
 #include "render/views.h"
 #include "sim/sim.h"
 
-// Everything visible: the wall, the volume behind it if the scene has one, the tool at the start. Needs a current GL context. NULL with faults.
-// `note` (capacity bytes): empty, or what is missing in the pictures.
+// Creates the views with everything visible: the wall, the volume behind it if the scene has one, the tool at the start. Needs a current GL context. Returns
+// NULL with
+// faults. `note` (capacity bytes): empty, or what is missing in the pictures.
 Views *scene_views_create(Scene *scene, OpenVessel *open, OperatorControls *controls, char *note, size_t capacity, Faults *faults);
 
 #endif

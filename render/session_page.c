@@ -36,13 +36,13 @@ static void figures_of(const ScoreFigures *f, double figure[PART_COUNT])
 static void item(FILE *out, const char *term, const char *text)
 {
     fprintf(out, "<dt>%s</dt><dd>", term);
-    page_text(out, *text ? text : "not said");
+    page_text(out, *text ? text : "not given");
     fprintf(out, "</dd>\n");
 }
 
 static void print_top(const SessionPage *page)
 {
-    static const char *const words[] = {"not begun", "target not held", "target held", "out of time"};
+    static const char *const words[] = {"not started", "target not held", "target held", "out of time"};
     FILE *out = page->out;
     const Session *s = page->session;
     const ScoreFigures *f = &s->figures;
@@ -77,21 +77,21 @@ static void print_parts(const SessionPage *page)
         if (e && judged)
             fprintf(out, "<td>%g</td><td>%.0f %%</td>", e->par[i], 100 * e->weight[i] / weights);
         else
-            fprintf(out, "<td>%s</td><td>–</td>", e ? "not judged" : "not known");
+            fprintf(out, "<td>%s</td><td>–</td>", e ? "not scored" : "unknown");
         if (judged)
             fprintf(out, "<td class=\"words\"><meter min=\"0\" max=\"1\" value=\"%.3f\">%.0f %%</meter> %.0f %%</td></tr>\n", f->part[i], 100 * f->part[i],
                     100 * f->part[i]);
         else
             fprintf(out, "<td class=\"words\">–</td></tr>\n");
     }
-    fprintf(out, "</tbody></table></div>\n<p>What was reached counts by weight, ");
+    fprintf(out, "</tbody></table></div>\n<p>The parts reached are weighted, ");
     if (f->state == SCORE_REACHED)
         fprintf(out, "in full since the target was held");
     else
-        fprintf(out, "times half of the share of the distance that was covered (%.0f %%), since the target was not held",
+        fprintf(out, "multiplied by half of the fraction of the distance covered (%.0f %%), since the target was not held",
                 f->way_mm > 0 ? 100 * fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0);
     if (e && f->error_total > 0)
-        fprintf(out, "; less %g points for each of %d error%s", e->error_points, f->error_total, f->error_total == 1 ? "" : "s");
+        fprintf(out, "; minus %g points for each of %d error%s", e->error_points, f->error_total, f->error_total == 1 ? "" : "s");
     fprintf(out, ".</p></section>\n");
 }
 
@@ -102,7 +102,7 @@ static void print_figures(const SessionPage *page)
     fprintf(out,
             "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Path of the tip</dt><dd>%.0f mm; straight distance to the target %.0f mm; efficiency %.0f "
             "%%</dd>\n"
-            "<dt>%s</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
+            "<dt>%s</dt><dd>pushed in %.0f mm, pulled back %.0f mm in total</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
             "N (mean over 20 ms)</dd>\n",
             f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n,
             f->wall_impulse_n_s, f->tip_force_peak_n);
@@ -110,7 +110,7 @@ static void print_figures(const SessionPage *page)
         fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
                 (long long)f->pulses, f->dose_area_cm2, f->contrast_ml);
     else
-        fprintf(out, "<dt>X-rays</dt><dd>none: a run without a screen</dd>\n");
+        fprintf(out, "<dt>X-rays</dt><dd>none: a headless run</dd>\n");
     fprintf(out, "</dl></section>\n");
 }
 
@@ -120,10 +120,9 @@ static void print_tools(const SessionPage *page)
     const ScoreFigures *f = &page->session->figures;
     if (f->tool_count < 2)
         return;
-    fprintf(out, "<section id=\"tools\"><h2>Tools</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Tool</th>"
-                 "<th scope=\"col\">Pushed in [mm]</th>"
-                 "<th scope=\"col\">Pulled back [mm]</th><th scope=\"col\">Tip force [N]</th><th scope=\"col\">Tip's speed, hand at rest [mm/s]</th>"
-                 "<th scope=\"col\">Tip behind the one around it [mm]</th></tr></thead><tbody>\n");
+    fprintf(out, "<section id=\"tools\"><h2>Tools</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Tool</th><th scope=\"col\">Pushed in "
+                 "[mm]</th><th scope=\"col\">Pulled back [mm]</th><th scope=\"col\">Tip force [N]</th><th scope=\"col\">Tip speed, hand at rest "
+                 "[mm/s]</th><th scope=\"col\">Tip behind the one around it [mm]</th></tr></thead><tbody>\n");
     for (int k = 0; k < f->tool_count; k++) {
         const ScoreToolFigures *tool = &f->tool[k];
         fprintf(out, "<tr><th scope=\"row\">");
@@ -135,7 +134,7 @@ static void print_tools(const SessionPage *page)
         else
             fprintf(out, "<td>–</td></tr>\n");
     }
-    fprintf(out, "</tbody></table></div><p>Forces and speeds are the largest of the session; where the tip is, is at its end.</p></section>\n");
+    fprintf(out, "</tbody></table></div><p>Forces and speeds are the maxima of the session; the position of the tip is that at its end.</p></section>\n");
 }
 
 static void print_errors(const SessionPage *page)
@@ -148,7 +147,7 @@ static void print_errors(const SessionPage *page)
         return;
     }
     fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Mark</th><th scope=\"col\" class=\"words\">Error</th><th "
-                 "scope=\"col\">Times</th><th scope=\"col\" class=\"words\">Begun at [s]</th></tr></thead><tbody>\n");
+                 "scope=\"col\">Times</th><th scope=\"col\" class=\"words\">Started at [s]</th></tr></thead><tbody>\n");
     for (int kind = 0; kind < ERROR_COUNT; kind++) {
         if (s->figures.error[kind].count == 0)
             continue;
@@ -178,7 +177,7 @@ static void print_earlier(const SessionPage *page)
         fprintf(out, "<p>%d session file%s in the folder could not be read and %s left out.</p>\n", page->broken, page->broken == 1 ? "" : "s",
                 page->broken == 1 ? "is" : "are");
     if (page->earlier_count < 2) {
-        fprintf(out, "<p>This is the only one that was found.</p></section>\n");
+        fprintf(out, "<p>No other session was found.</p></section>\n");
         return;
     }
     session_trend_figure(page);
@@ -206,14 +205,14 @@ static void print_origin(const SessionPage *page)
     const Session *s = page->session;
     char steps[96];
     snprintf(steps, sizeof steps, "%lld steps of %g ms, last state %016llx", (long long)s->steps, s->step_ms, (unsigned long long)s->state_hash);
-    fprintf(out, "<footer><section id=\"origin\"><h2>Where it comes from</h2>\n<dl>\n");
+    fprintf(out, "<footer><section id=\"origin\"><h2>Origin</h2>\n<dl>\n");
     item(out, "Session", page->path);
     item(out, "Scene", s->scene_path);
     item(out, "Recording", s->recording_path);
     item(out, "Recorded", steps);
-    fprintf(out, "<dt>Recording is this session's</dt><dd>%s</dd>\n",
-            !page->run         ? "not there: no plots"
-            : page->run_is_its ? "yes, its series have the session's sum"
+    fprintf(out, "<dt>Recording belongs to this session</dt><dd>%s</dd>\n",
+            !page->run         ? "missing: no plots"
+            : page->run_is_its ? "yes, the checksum of its series matches"
                                : "no");
     item(out, "Made by", s->version);
     fprintf(out, "</dl>\n<p>Written by seldinger " SELDINGER_VERSION ".</p></section></footer>");
@@ -232,7 +231,8 @@ void session_page(const SessionPage *page)
     fprintf(out, "</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not a medical device:</strong> points compare sessions at this "
                  "simulator; they say nothing about the treatment of patients.</p>\n");
     if (page->run && !page->run_is_its)
-        fprintf(out, "<p class=\"notice\" role=\"alert\">The recording beside this session is another one: plots and path below are not this session's.</p>\n");
+        fprintf(out, "<p class=\"notice\" role=\"alert\">The recording in the folder belongs to another session: plots and path below are not those of this "
+                     "session.</p>\n");
     fprintf(out, "</header>\n<main>\n");
     print_top(page);
     print_parts(page);
@@ -243,7 +243,7 @@ void session_page(const SessionPage *page)
     session_path_figure(page);
     fprintf(out, "%s</section>\n",
             !page->run                   ? "<p>The recording was not found.</p>"
-            : page->run->frame_count < 1 ? "<p>The recording is too long for it, or holds no pictures.</p>"
+            : page->run->frame_count < 1 ? "<p>The recording is too long for this figure, or contains no frames.</p>"
                                          : "");
     print_figures(page);
     print_tools(page);

@@ -1,5 +1,6 @@
-// The page of a trainee's session: one HTML5 page that stands alone: points and their parts, errors, plots over time, the tip's path over the vessel,
-// earlier sessions. Missing parts (recording, vessel, scene) are left out with a note.
+// The page of a trainee's session: one self-contained HTML5 page with the points and their parts, errors, plots over time, the tip's path through the vessel,
+// and
+// earlier sessions. Missing parts (recording, vessel, scene) are omitted with a note.
 #ifndef SELDINGER_RENDER_SESSION_PAGE_H
 #define SELDINGER_RENDER_SESSION_PAGE_H
 

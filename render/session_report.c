@@ -9,14 +9,14 @@
 #include <string.h>
 #include <sys/stat.h>
 
-// Scene and tree as recorded; what cannot be had stays NULL. Any fault is only said: the page is then shorter.
+// Opens scene and tree as recorded; missing parts stay NULL. Faults are only reported: the page is then shorter.
 static Scene *open_scene(const RecordedRun *run, NoteFunction note, OpenVessel *open, VesselTree **tree, Faults *faults)
 {
     Scene *scene = run && run->scene_text ? scene_parse(run->scene_text, strlen(run->scene_text), run->scene_path ? run->scene_path : "scene", faults) : NULL;
     if (!scene)
         return NULL;
     if (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE)
-        scene->contact = CONTACT_LIM;            // the tree is wanted, not the wall
+        scene->contact = CONTACT_LIM;            // only the tree is needed, not the wall
     if (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE || scene->source == SOURCE_TUBE)
         open_vessel(scene, &(OpenVesselOptions){.note = note}, open, faults);
     *tree = open->tree;
@@ -31,7 +31,7 @@ static void say(const Faults *faults)
         fprintf(stderr, "seldinger report: %s\n", faults->text[i]);
 }
 
-// An hour's frames would fill the memory of a small machine: of such a recording only what every step has, and the path is left out.
+// The frames of an hour would fill the memory of a small machine: from such a recording only the data of every step are read, and the path is omitted.
 static RecordedRun *load_run(const char *path, Faults *faults)
 {
     static const off_t most_bytes = 1500 * 1000 * (off_t)1000;
@@ -73,7 +73,7 @@ char *session_report(const char *path, const Session *session, const char *with,
     free(gone);
     free(recording);
     if (!good) {
-        faults_add(faults, path, 0, 0, "no memory for the page");
+        faults_add(faults, path, 0, 0, "out of memory for the page");
         free(bytes);
         return NULL;
     }

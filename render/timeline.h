@@ -1,4 +1,4 @@
-// The strip below the views for playing, stopping, seeking and resuming a recording. Draws with a Gui of its own over the panels' lower edge.
+// The strip below the views for playing, pausing, seeking and resuming a recording. Draws with its own Gui over the lower edge of the panels.
 #ifndef SELDINGER_RENDER_TIMELINE_H
 #define SELDINGER_RENDER_TIMELINE_H
 
@@ -7,12 +7,12 @@
 enum { TIMELINE_MARKS = 64 };
 
 typedef struct TimelineState {
-    double time_s, end_s;            // shown now, whole length; simulated time
+    double time_s, end_s;            // time shown, total length; simulated time
     bool is_playing;
     float speed;                     // simulated over real time, 0.1 to 8
     int mark_count;
     double mark_s[TIMELINE_MARKS];   // bookmarks
-    const char *note;                // one line: what recording this is
+    const char *note;                // one line: the name of the recording
 } TimelineState;
 
 typedef struct TimelineActions {
@@ -25,7 +25,7 @@ typedef struct Timeline Timeline;
 
 Timeline *timeline_create(char *message, size_t capacity);   // needs a current GL context; NULL with a reason
 void timeline_destroy(Timeline *timeline);
-// A frame; `at` is the layout's bottom strip.
+// Draws a frame; `at` is the bottom strip of the layout.
 TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, const TimelineState *state, double scale, PanelRect at, unsigned framebuffer);
 
 #endif

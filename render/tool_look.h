@@ -1,19 +1,19 @@
-// Appearance of a scene's tools: names, colours, and the stretches of constant width, lumen and attenuation.
+// Appearance of the tools of a scene: names, colours, and stretches of constant width, lumen and attenuation.
 #ifndef SELDINGER_RENDER_TOOL_LOOK_H
 #define SELDINGER_RENDER_TOOL_LOOK_H
 
 #include "render/color_map.h"
 #include "sim/sim.h"
 
-typedef struct TubeStretch {     // of a tool, from the border before it to `end`
-    double end;                  // [mm] from the proximal end; the last one counts to the tip wherever it is
-    double radius, lumen;        // [mm] of its outer surface, > 0; of its inner one, 0 if it is solid
+typedef struct TubeStretch {     // part of a tool, from the end of the previous stretch to `end`
+    double end;                  // [mm] from the proximal end; the last stretch extends to the tip wherever it is
+    double radius, lumen;        // [mm] of its outer surface, > 0; of its inner surface, 0 if it is solid
     double attenuation;          // [1/mm] of the wall, >= 0
 } TubeStretch;
 
 typedef struct ToolLook {
     const char *name;            // borrowed
-    Color color, on_paper;       // on a dark ground and on white
+    Color color, on_paper;       // on a dark background and on white
     int stretch_count;           // >= 1
     TubeStretch *stretch;
 } ToolLook;
@@ -24,14 +24,14 @@ typedef struct ToolLooks {       // zeroed: none
     ToolLook spare[TOOLS_MOST][EXCHANGES_MOST];  // their replacements, with the same name and colours; stretch_count 0: none
 } ToolLooks;
 
-// Of `scene`, which must outlive them. False if out of memory; free them all the same.
+// For `scene`, which must outlive them. Returns false if out of memory; free them even then.
 bool tool_looks_make(ToolLooks *looks, const Scene *scene);
 void tool_looks_free(ToolLooks *looks);
-// Of the inserted device (PoseTool.fitted).
+// Look of the inserted device (PoseTool.fitted).
 const ToolLook *tool_looks_of(const ToolLooks *looks, int tool, int fitted);
-// Where the arc length `s` lies; at a border what lies before it.
+// The stretch at the arc length `s`; at a border the one before it.
 const TubeStretch *tool_look_at(const ToolLook *look, double s);
-// Colours for tools of these kinds, distinguishable for the colour-blind, on a dark ground or on paper: one per kind, and an unused colour for a
+// Colours for tools of these kinds, distinguishable with colour-vision deficiency, on a dark background or on paper: one per kind, and an unused colour for a
 // repeated kind.
 void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color);
 

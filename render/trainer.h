@@ -10,7 +10,7 @@
 enum { TRAINER_MAPS = 8 };
 
 typedef struct TrainerOptions {
-    const char *folder;              // where recordings, session files, films and screenshots go; created if it does not exist
+    const char *folder;              // folder of recordings, session files, videos and screenshots; created if it does not exist
     bool is_recorded;
     const char *trainee;             // "" if not known yet
     int map_count;
@@ -18,12 +18,12 @@ typedef struct TrainerOptions {
     bool has_built_in_maps;
     const RecordedRun *resume;       // NULL, or a recording to resume …
     double resume_s;
-    const char *library;             // folder of devices for the tray; NULL: scenes/tools beside the program's build folder
-    const char *cine;                // NULL, or a cine loop to begin with
+    const char *library;             // folder of devices for the tray; NULL: scenes/tools in the source folder of the program
+    const char *cine;                // a cine loop to begin with, or NULL
     int width, height;
     PanelView view;
     bool is_full_screen;
-    double duration_s;               // ends by itself after this much real time; 0: never
+    double duration_s;               // ends after this much real time; 0: never
     int threads;
     NoteFunction note;               // receives remarks on the vessel of a recovered session; may be NULL
 } TrainerOptions;
@@ -37,13 +37,13 @@ typedef struct TrainerFigures {
     int64_t deadline_misses;
     double slowed_s;
     bool real_time_priority;
-    double resident_mb[2];           // of the process, after the first minute (or the first frame of a shorter session) and at the end
-    int64_t reports;                 // of devices
-    char hash[17];                   // of the last state
+    double resident_mb[2];           // memory of the process, after the first minute (or the first frame of a shorter session) and at the end
+    int64_t reports;                 // number of reports from devices
+    char hash[17];                   // hash of the last state
     char recording[4096];
 } TrainerFigures;
 
-// An exit code; faults are added. `scene` and `open` are the caller's.
+// Returns an exit code; adds faults. `scene` and `open` belong to the caller.
 int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, TrainerFigures *figures, Faults *faults);
 
 #endif

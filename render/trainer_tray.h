@@ -1,4 +1,4 @@
-// The tray in the trainer's window: the chosen tool's devices as the panel shows them, and what prevents inserting one.
+// The tray in the trainer's window: the devices of the selected tool as the panel shows them, and what prevents inserting one.
 #ifndef SELDINGER_RENDER_TRAINER_TRAY_H
 #define SELDINGER_RENDER_TRAINER_TRAY_H
 
@@ -8,23 +8,23 @@
 enum { TRAY_WORDS = 320 };
 
 typedef struct TrainerTray {
-    PanelTray shown;             // what panel_draw takes; its strings lie below
+    PanelTray shown;             // the input of panel_draw; its strings are stored below
     TrayDevices devices;
-    TrayDevice shaped;           // the chosen one as set by the sliders; without sections: none
+    TrayDevice shaped;           // the selected device as set by the sliders; without sections: none
     PanelTrayDevice device[TRAY_DEVICES], shaped_shown;
     char what[TRAY_DEVICES + 1][160], note[TRAY_DEVICES + 2][TRAY_WORDS];
     char remark[160];
-    PanelTrayChoice choice;      // of the last frame
+    PanelTrayChoice choice;      // choice of the last frame
 } TrainerTray;
 
-// Fills the tray for a tool and marks the inserted device. `library` as in tray_devices_find. False when out of memory.
+// Fills the tray for a tool and marks the inserted device. `library`: as in tray_devices_find. Returns false if out of memory.
 bool trainer_tray_open(TrainerTray *tray, const Scene *scene, int tool, const char *library, const Pose *pose, int *in);
 void trainer_tray_close(TrainerTray *tray);
-// To be called in each frame while it is open, with the user's choice and the present pose.
+// Call in each frame while it is open, with the user's choice and the present pose.
 void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, const PanelTrayChoice *choice);
-// Why the chosen device cannot be inserted now, or NULL.
+// Why the selected device cannot be inserted now, or NULL.
 const char *trainer_tray_obstacle(const TrainerTray *tray);
-// The tip as the user wants it, length 0 if it is left as it is.
+// The requested shape of the tip; length 0 if it is left unchanged.
 TipShaping trainer_tray_tip(const TrainerTray *tray);
 
 #endif

@@ -1,5 +1,5 @@
-// The three views of the trainer together: fluoroscopy, 3D, angioscopy, drawn where a layout says. For the window, and off screen for pictures and movies.
-// Needs a current OpenGL 3.3 context, the same in every call; one thread. Lengths mm.
+// The three views of the trainer, fluoroscopy, 3D and angioscopy, drawn where a layout says: for the window, and off screen for pictures and videos.
+// Needs a current OpenGL 3.3 context, the same in every call; one thread. Lengths in mm.
 #ifndef SELDINGER_RENDER_VIEWS_H
 #define SELDINGER_RENDER_VIEWS_H
 
@@ -10,10 +10,10 @@
 
 typedef struct Views Views;
 
-typedef struct ViewsOptions {        // borrowed during create, but for scene, vessel and tree, which must outlive the views
+typedef struct ViewsOptions {        // borrowed during create, except scene, vessel and tree, which must outlive the views
     const Scene *scene;
     const Vessel *vessel;            // NULL: none
-    const VesselTree *tree;          // NULL: the vessel is not a tree
+    const VesselTree *tree;          // NULL: the vessel has no tree
     const TriangleMesh *mesh;        // the wall, NULL: none
     const Pose *pose;                // any pose of the scene's tools, for numbers of nodes and arc lengths
     int anatomy_size[3];             // a volume behind the vessel, see FluoroscopeOptions; value NULL: none
@@ -22,7 +22,7 @@ typedef struct ViewsOptions {        // borrowed during create, but for scene, v
     PatientAxes patient;
 } ViewsOptions;
 
-// NULL with a reason. Otherwise `message` is empty or says what is missing in the pictures.
+// Returns NULL with a reason. Otherwise `message` is empty or says what is missing in the pictures.
 Views *views_create(const ViewsOptions *options, char *message, size_t capacity);
 void views_destroy(Views *views);
 
@@ -30,14 +30,14 @@ typedef struct ViewsFrame {
     const Pose *pose;
     const XrayControl *xray;
     const float *contrast;           // (N of the tree), NULL: none
-    const float *filling;            // (nodes of all tools) of their lumens by contrast agent, NULL: none
+    const float *filling;            // (nodes of all tools) filling of their lumens with contrast agent, NULL: none
     uint32_t pulse;                  // number of X-ray pulses so far
     const VesselSceneLook *look;
-    int scope_tool;                  // from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
+    int scope_tool;                  // tool from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
     bool is_still;                   // an independent picture: nothing is reused from the previous frame
 } ViewsFrame;
 
-// Draws each view of the layout (secondary views in turn) into `framebuffer`, and a dark background between them.
+// Draws each view of the layout (secondary views in turn) into `framebuffer`, with a dark background between them.
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
 const VesselScene *views_scene(const Views *views);
 Fluoroscope *views_fluoroscope(Views *views);

@@ -1,5 +1,5 @@
-// The trainer's window: GLFW 3.3 with an OpenGL 3.3 core context, behind plain C. One thread (the one that created it) calls everything here.
-// Positions and sizes are framebuffer pixels, y down from the upper left corner, whatever the display's density.
+// The trainer's window: GLFW 3.3 with an OpenGL 3.3 core context, behind plain C. All calls must come from the thread that created it.
+// Positions and sizes are framebuffer pixels, y down from the upper left corner, for any display density.
 #ifndef SELDINGER_RENDER_WINDOW_H
 #define SELDINGER_RENDER_WINDOW_H
 
@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Letters ('A' to 'Z') are those of the user's keyboard layout; digits and signs are named by their place on a US keyboard.
+// Letters ('A' to 'Z') follow the user's keyboard layout; digits and signs are named by their position on a US keyboard.
 typedef enum WindowKey {
     WINDOW_KEY_NONE = 0,
     WINDOW_KEY_SPACE = ' ', // printable keys: their ASCII capital
@@ -39,12 +39,12 @@ enum { WINDOW_SHIFT = 1, WINDOW_CTRL = 2, WINDOW_ALT = 4, WINDOW_SUPER = 8 };   
 enum { WINDOW_MOUSE_LEFT = 1, WINDOW_MOUSE_RIGHT = 2, WINDOW_MOUSE_MIDDLE = 4 };   // bits of mouse buttons
 
 typedef enum WindowEventKind {
-    WINDOW_KEY_DOWN_EVENT,   // `key`, `modifiers`; `is_repeat` where the keyboard repeats it
+    WINDOW_KEY_DOWN_EVENT,   // `key`, `modifiers`; `is_repeat` if the keyboard repeats it
     WINDOW_KEY_UP_EVENT,
-    WINDOW_TEXT_EVENT,       // `character`, for text fields and for signs that lie elsewhere on other keyboards; `is_repeat`
+    WINDOW_TEXT_EVENT,       // `character`, for text fields and for signs at other positions on other keyboards; `is_repeat`
     WINDOW_SCROLL_EVENT,     // `scroll_x`, `scroll_y`: notches, y > 0 away from the user
-    WINDOW_FOCUS_LOST_EVENT, // keys and mouse buttons count as released
-    WINDOW_DEVICE_EVENT      // `device`, `is_present`: a joystick has come or gone; its name by window_gamepad or window_gamepad_name
+    WINDOW_FOCUS_LOST_EVENT, // counts as a release of all keys and mouse buttons
+    WINDOW_DEVICE_EVENT      // `device`, `is_present`: a joystick was connected or removed; its name by window_gamepad or window_gamepad_name
 } WindowEventKind;
 
 typedef struct WindowEvent {
@@ -61,17 +61,17 @@ typedef enum { WINDOW_OPEN, WINDOW_CLOSE_ASKED, WINDOW_ENDED } WindowClose;   //
 
 enum { WINDOW_EVENTS = 256, WINDOW_GAMEPADS = 16, WINDOW_AXES = 16, WINDOW_BUTTONS = 64 };
 
-// Input since the last poll. It can also be filled by hand to drive the panel off screen: zeros with width, height and scale give a still frame.
+// Input since the last poll. It can also be filled by code to drive the panel off screen: zeros with width, height and scale give a still frame.
 typedef struct WindowInput {
     int width, height;       // of the framebuffer [pixel]
     double scale;            // content scale: 1, 2 on a high-density display
-    double mouse_x, mouse_y; // [pixel], y down; negative where there is no mouse
-    unsigned mouse_buttons;  // held now; a click between two polls shows for one poll at least
+    double mouse_x, mouse_y; // [pixel], y down; negative if there is no mouse
+    unsigned mouse_buttons;  // pressed now; a click between two polls is visible for at least one poll
     bool has_focus, is_iconified;
-    WindowClose close;       // CLOSE_ASKED for one poll, ENDED for good
+    WindowClose close;       // CLOSE_ASKED for one poll, ENDED permanently
     int event_count;
     WindowEvent event[WINDOW_EVENTS];
-    int events_lost;         // beyond WINDOW_EVENTS in one poll; releases and loss of focus are never among them
+    int events_lost;         // number of events beyond WINDOW_EVENTS in one poll; releases and loss of focus are never lost
 } WindowInput;
 
 typedef struct WindowGamepad {
@@ -79,28 +79,28 @@ typedef struct WindowGamepad {
     bool is_mapped;          // axes and buttons in the standard order: left x, left y, right x, right y, left and right trigger; A B X Y …
     int axis_count, button_count;
     float axis[WINDOW_AXES];          // [-1, 1]; y down
-    uint8_t button[WINDOW_BUTTONS];   // 0 or 1; of a joystick its hats follow its buttons: up, right, down, left
+    uint8_t button[WINDOW_BUTTONS];   // 0 or 1; the hats of a joystick follow its buttons: up, right, down, left
 } WindowGamepad;
 
 typedef struct Window Window;
 
-// A window with a current context and signal handlers, at most as large as the screen. `hz` frames a second (0: 30). One window a process.
-// NULL with a reason: "no display; seldinger run works without one, or start under Xvfb" where there is none.
+// Creates a window with a current context and signal handlers, at most as large as the screen. `hz`: frames per second (0: 30). One window per process.
+// Returns NULL with a reason, such as "no display; seldinger run works without one, or start under Xvfb".
 Window *window_create(const char *title, int width, int height, double hz, char *message, size_t capacity);
-void window_destroy(Window *window);   // signals and what was current are put back
+void window_destroy(Window *window);   // restores signal handlers and the previous context
 
-// Sleeps until the next frame's deadline (absolute: a late frame does not shift later ones; whole periods are skipped if needed), then polls. False
-// if nothing should be drawn: iconified or of zero size. *input is valid until the next call.
+// Sleeps until the deadline of the next frame (absolute: a late frame does not shift later ones; whole periods are skipped if needed), then polls. Returns
+// false if nothing should be drawn: iconified or of zero size. *input is valid until the next call.
 bool window_next_frame(Window *window, const WindowInput **input);
-void window_swap(Window *window);   // the first time it also shows the window, which is hidden until then
-int64_t window_frames_skipped(const Window *window);   // periods left out because a frame took longer
+void window_swap(Window *window);   // the first call also shows the window, which is hidden until then
+int64_t window_frames_skipped(const Window *window);   // periods skipped because a frame took longer
 
-// A joystick as it is now, `index` 0 to 15. False if there is none.
+// The present state of a joystick, `index` 0 to 15. Returns false if there is none.
 bool window_gamepad(Window *window, int index, WindowGamepad *out);
 const char *window_gamepad_name(const Window *window, int index);   // also of one just removed; "" if there never was one
 
 void window_set_full_screen(Window *window, bool is_full);
 bool window_is_full_screen(const Window *window);
-const char *window_renderer(const Window *window);     // OpenGL's name of what draws
+const char *window_renderer(const Window *window);     // name of the OpenGL renderer
 
 #endif

@@ -134,15 +134,15 @@ static void the_wrong_kind_of_file(void **state)
     put("noise.bin", "no file of any kind");
     refused("query tree.h5 --points ok.csv -o out.csv", "tree.h5: is a tree without a model; make one with `seldinger fit`");
     refused("query noise.bin --points ok.csv -o out.csv", "noise.bin:byte 0: is not a readable HDF5 file");
-    refused("query model.h5 --points nan.csv -o out.csv", "nan.csv:3:3: 'nan' is no coordinate; valid: a finite number of mm");
-    refused("query model.h5 --points cell.csv -o out.csv", "cell.csv:2: 2 cells; valid: 3");
+    refused("query model.h5 --points nan.csv -o out.csv", "nan.csv:3:3: 'nan' is not a coordinate; expected a finite number of mm");
+    refused("query model.h5 --points cell.csv -o out.csv", "cell.csv:2: has 2 cells; expected 3");
     refused("query model.h5 --points unit.csv -o out.csv", "unit.csv:1: the header has no column x_mm");
     refused("query model.h5 --points model.h5 -o out.csv", "model.h5:byte");
     refused("fit noise.bin -o out.h5", "noise.bin:byte 0: is not a readable HDF5 file");
     refused("fit cut.h5 -o out.h5", "cut.h5:byte 0: is not a readable HDF5 file");
     refused("export tree.h5 -o out.stl", "tree.h5: is a tree without a model");
     refused("export noise.bin -o out.stl", "noise.bin: is no tree, model or recording");
-    refused("export model.h5 -o out.xyz", "extension '.xyz' is no format");
+    refused("export model.h5 -o out.xyz", "unknown extension '.xyz'");
     refused("info noise.bin", "noise.bin");
     refused("info cut.h5", "cut.h5:byte 0: is not a readable HDF5 file");
     refused("export cut.h5 -o out.swc", "cut.h5:byte 0: is not a readable HDF5 file");
@@ -186,8 +186,8 @@ static void words_of_the_command_line(void **state)
         {"synth capsule --radius-mm 0 -o out.h5", "radius_mm is '0'; expected a number from"},
         {"synth capsule --noise-grey 11 -o out.nrrd", "need --contrast-grey"},
         {"synth capsule --contrast-grey 0 -o out.nrrd", "--contrast-grey: '0' is not valid"},
-        {"synth capsule -o out.xyz", "expected .h5, .stl, .ply or .nrrd"},
-        {"export", "are needed"},
+        {"synth capsule -o out.xyz", "valid: .h5, .stl, .ply, .nrrd"},
+        {"export", "expected one file"},
         {"info", "one file is needed"}};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         refused(lines[i][0], lines[i][1]);
@@ -229,13 +229,13 @@ static void verbs_of_the_trainer(void **state)
         {"replay cut.h5 --scene out", "cut.h5:byte 0: is not a readable HDF5 file"},
         {"replay free.h5 --scene nowhere/out", "nowhere/out: cannot be created: No such file or directory"},
         {"replay free.h5 --at -1 --picture out.png", "--at: '-1' is not valid"},
-        {"report", "takes one session file"},
-        {"report empty.json empty.json", "takes one session file"},
+        {"report", "expected one session file"},
+        {"report empty.json empty.json", "expected one session file"},
         {"report nowhere.json", "nowhere.json: cannot be opened"},
         {"report noise.bin --html out.html", "noise.bin:byte 0: is not JSON"},
         {"report empty.json --html out.html", "empty.json: 'score' is missing or not an object"},
         {"report empty.json --banana", "see `seldinger report --help`"},
-        {"devices noise.bin", "takes no file but by --map"},
+        {"devices noise.bin", "takes files only with --map"},
         {"devices --banana", "see `seldinger devices --help`"},
         {"devices --map nowhere.yaml", "nowhere.yaml: cannot be opened"},
         {"devices --map open.yaml --json out.json", "open.yaml:2:1: is not YAML"},

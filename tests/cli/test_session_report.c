@@ -143,7 +143,7 @@ static void the_page_holds_the_session(void **state)
     assert_non_null(strstr(text, "Ada &lt;script&gt;"));
     assert_non_null(strstr(text, "class=\"vessel\""));
     assert_non_null(strstr(text, "target held"));
-    assert_non_null(strstr(text, "yes, its series have the session's sum"));
+    assert_non_null(strstr(text, "yes, the checksum of its series matches"));
     assert_null(strstr(text, "Bob"));
     char points[64];
     snprintf(points, sizeof points, "<div class=\"points\">%.0f <small>", session.figures.points);
@@ -175,13 +175,13 @@ static void what_lacks_is_said(void **state)
     Seen seen = look_at(in_folder("other.html"), &text);
     assert_int_equal(seen.pictures, 0);
     assert_non_null(strstr(text, "recording was not found"));
-    assert_non_null(strstr(text, "only one that was found"));
+    assert_non_null(strstr(text, "No other session was found"));
     free(text);
     // another session's recording under its name
     assert_int_equal(link(in_folder("first.h5"), in_folder("other.h5")), 0);
     assert_int_equal(report(arguments), 0);
     look_at(in_folder("other.html"), &text);
-    assert_non_null(strstr(text, "is another one"));
+    assert_non_null(strstr(text, "belongs to another session"));
     free(text);
     assert_int_equal(unlink(in_folder("other.h5")), 0);
     assert_int_equal(rename(in_folder("kept.h5"), in_folder("other.h5")), 0);

@@ -92,7 +92,7 @@ static void a_run_without_its_device_leaves_no_recording(void **state)
     (void)state;
     int code = run_in("timeout 100",
                       "run tube.yaml --device absent.yaml --duration-s 1 --record run.h5 --summary run.json --score run-score.json --final run.csv --quiet");
-    if (code != 2 || !strstr(output, "no device that fits came"))
+    if (code != 2 || !strstr(output, "no matching device was connected"))
         fail_msg("ended with %d: %s", code, output);
     assert_false(is_there("run.*") || is_there("run-*") || is_there("*.part*"));
 }

@@ -82,12 +82,12 @@ static void what_does_not_fit_together_is_said(void **state)
     (void)state;
     expect_fault("", "empty");
     expect_fault("[1, 2]", "not a device map");
-    expect_fault(TOP "device: {}\npush: {source: X, mm_s: 1}\n", "selects no device");
+    expect_fault(TOP "device: {}\npush: {source: X, mm_s: 1}\n", "selects nothing");
     expect_fault(HID, "at least one of these");
     expect_fault(HID "push: {source: X}\n", "one of mm_s and mm_per_count");
     expect_fault(HID "push: {source: X, mm_s: 1, mm_per_count: 1}\n", "one of mm_s and mm_per_count");
-    expect_fault(HID "push: {source: X, mm_per_count: 1, dead_zone: 0.1}\n", "goes with a deflection");
-    expect_fault(HID "push: {source: X, mm_s: 1, counts_per_wrap: 16}\n", "goes with counts");
+    expect_fault(HID "push: {source: X, mm_per_count: 1, dead_zone: 0.1}\n", "is only valid with a deflection");
+    expect_fault(HID "push: {source: X, mm_s: 1, counts_per_wrap: 16}\n", "is only valid with counts");
     expect_fault(HID "push: {source: X, mm_s: 1, kind: counter}\n", "kind: deflection");
     expect_fault(HID "push: {source: X, mm_s: 1, kind: circular}\n", "one of");
     expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 5, logical_max: 5}\n", "do not increase");
@@ -101,7 +101,7 @@ static void what_does_not_fit_together_is_said(void **state)
     expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_s: 2}\nforce: {full_scale_n: 1}\n", "needs a HID device");
     expect_fault(TOP "device: {usb: ftdi}\npush: {source: B, mm_per_count: 2}\n", "not among");
     expect_fault(TOP "device: {usb: ftdi}\npush: {source: A, mm_s: 2}\n", "gives counts");
-    expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A1, A1]}\npush: {source: A1, mm_per_count: 2}\n", "letters without digits");
+    expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A1, A1]}\npush: {source: A1, mm_per_count: 2}\n", "a name without digits");
     expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A, A]}\npush: {source: A, mm_per_count: 2}\n", "twice");
     expect_fault(TOP "device: {usb: ftdi}\npedal: {source: A}\n", "no buttons");
     expect_fault(TOP "device: {vendor_id: 046d}\npush: {source: X, mm_s: 2}\n", "0x");
@@ -116,7 +116,7 @@ static void what_does_not_fit_together_is_said(void **state)
     expect_fault(HID "pedal: {source: button_1, tool: wire}\n", "tool");
     expect_fault(HID "push: [{source: X, mm_s: 2, tool: 1}, {source: Y, mm_s: 2, tool: 2}, {source: Z, mm_s: 2, tool: 3}, {source: Rx, mm_s: 2, tool: 4},"
                      " {source: Ry, mm_s: 2, tool: wire}]\n",
-                 "one tool too many");
+                 "one tool more than the limit");
 }
 
 static const ToolNames three = {.count = 3, .name = {"guide", "micro", "thread"}, .kind = {"catheter", "catheter", "wire"}};

@@ -108,7 +108,7 @@ static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **stat
     close(kept);
     unlink(path);
     assert_true(watched && !none);
-    static const char *const words[] = {"2 reports, 1 that the descriptor does not describe", "logical_min -512, logical_max 496 so far", "twist 240.0 deg/s",
+    static const char *const words[] = {"2 reports, 1 not described by the descriptor", "logical_min -512, logical_max 496 so far", "twist 240.0 deg/s",
                                         "push 40.00 mm/s", ", pedal"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (!strstr(said, words[i]))

@@ -398,7 +398,7 @@ static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told(void **s
     HandInfo info;
     wait_for((hands_info(hands, 0, &info), info.state == HAND_READY));
     assert_string_equal(info.map, "haptic joystick");
-    assert_non_null(strstr(info.force, "did not take"));
+    assert_non_null(strstr(info.force, "did not accept"));
     hands_close(hands);
     free(hid);
 }
@@ -453,7 +453,7 @@ static void torque_is_a_second_effect(void **state)
         force_tick(&force, &port, now, now, false, &transport, device);
     }
     assert_int_equal(force.block[0], 0);    // given up
-    assert_non_null(strstr(force.text, "takes no forces"));
+    assert_non_null(strstr(force.text, "accepts no forces"));
     free(stick);
     free(map);
     free(hid);

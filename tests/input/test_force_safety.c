@@ -238,7 +238,7 @@ static void a_device_that_is_given_up_is_stopped_first(void **state)
     for (int i = 0; i < 100 && bench->force.block[0]; i++)
         tick(bench, 2, true);
     assert_int_equal(bench->force.block[0], 0);
-    assert_non_null(strstr(bench->force.text, "takes no forces"));
+    assert_non_null(strstr(bench->force.text, "accepts no forces"));
     // its last words: zero and stop of each effect, then stop all
     const LyingReport *last = &bench->device.log[bench->device.log_count - 1];
     assert_true(last->bytes[0] == REPORT_CONTROL && last->bytes[1] == CONTROL_STOP_ALL);
@@ -292,13 +292,13 @@ static void an_effect_that_would_not_end_is_refused(void **state)
          "26ff7f350046ff7f57fdffffff",
          "0950095409511500"
          "26ff7f350046ff7f5701000000",
-         "end by themselves"},
+         "limited to a duration"},
         {"a millisecond at most",
          "0950095409511500"
          "26ff7f350046ff7f57fdffffff",
          "0950095409511500"
          "26ffff350046ff7f57f8ffffff",
-         "end by themselves"},
+         "limited to a duration"},
         {"forces from 1 on", "09701601ff26ff00", "097016010026ff00", "no zero"},
         {"forces to 32767 in 8 bits", "09701601ff26ff0036f0d84610277510", "097016018026ff7f36f0d84610277508", "does not fit"},
     };

@@ -156,7 +156,7 @@ static void what_cannot_be_is_said(void **state)
         double fps;
         const char *path, *says;
     } bad[] = {{1, 20, 30, place("x"), "sides of 2 to 8192"},      {20, 9000, 30, "/tmp/x", "sides of 2 to 8192"},
-               {20, 20, 0, "/tmp/x", "frames a second"},           {20, 20, NAN, "/tmp/x", "frames a second"},
+               {20, 20, 0, "/tmp/x", "frames per second"},         {20, 20, NAN, "/tmp/x", "frames per second"},
                {20, 20, 30, "/tmp", "not a regular file"},         {20, 20, 30, "/dev/null", "not a regular file"},
                {20, 20, 30, "/nowhere/x.mp4", "cannot be written"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -241,7 +241,7 @@ static void an_encoder_that_dies_is_a_message(void **state)
                  "ffmpeg failed: the disk is full"},
                 {"cat >/dev/null; echo 'something went wrong' >&2", "something went wrong"},
                 {"cat >/dev/null", "wrote nothing"},
-                {"exit 3", "says nothing"}};
+                {"exit 3", "without a message"}};
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
         MovieFile *movie = movie_by(ends[i].script);
         for (int k = 0; k < 30 && movie_file_add(movie, rgb); k++)

@@ -202,7 +202,7 @@ static const struct {
     {"t_s,micro.push_mm_s,micro.twist_deg_s,wire.twist_deg_s\n0,1,0,0\n", "1:39", "'wire.twist_deg_s' needs the column 'wire.push_mm_s' too"},
     {"t_s,wire.push_mm_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,0\n", "1:20", "duplicate"},
     {"t_s,wire.push_cm_s,wire.twist_deg_s\n0,1,0\n", "1:5", "such as 'wire.push_mm_s'"},
-    {"t_s,push_mm_s,twist_deg_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,1,0\n", "1:5", "beside named tools"},
+    {"t_s,push_mm_s,twist_deg_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,1,0\n", "1:5", "with named tools"},
     {"t,wire.push_mm_s,wire.twist_deg_s\n0,1,0\n", "1:1", "expected 't_s'"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n0,1\n", "2:1", "2 fields"},
     {"t_s,wire.released\n0,2\n", "2:1", "released is 2; expected 0 (the tool is held)"},
