@@ -223,7 +223,7 @@ typedef struct Run {
     double radius, advance, twist;       // [mm], [mm] and [rad] a step
     double size;                         // [mm] of an element
     int in, out;                         // steps
-    double share;                        // largest fraction of queries that remain: at 200 mm/s no point sleeps for long, and a point that wakes within a step queries twice
+    double share;                        // largest fraction of queries left: at 200 mm/s no point sleeps long, and a point that wakes in a step queries twice
 } Run;
 
 // A J-tip in a wide tube with bends, run twice: once with sleepers, once querying every point in every step; sometimes the first run is restored from a
@@ -267,7 +267,7 @@ static void sleepers_miss_nothing(void **state)
             memset(s[1]->clearance, 0, (size_t)s[1]->point_count * sizeof *s[1]->clearance);
             for (int j = 0; j < 2; j++)
                 step_once(s[j], advance, run[k].twist);
-            // both start from the same state, so that single steps are compared and not the growth of small differences
+                    // both start from the same state, so that single steps are compared and not the growth of small differences
             for (int n = 0; n < s[0]->state.node_count; n++)
                 apart = fmax(apart, vec3_distance(s[0]->state.position[n], s[1]->state.position[n]));
             for (int p = 0; p < s[0]->point_count; p++) {
