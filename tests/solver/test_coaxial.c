@@ -453,7 +453,7 @@ typedef struct Chain {
     struct {
         int count, tool[TOOLS];                // the carrier first
         bool has_tip;                          // of the last tool
-double spread;                                 // of all tools
+        double spread;          // of all tools
     } element[NODES_MAX];
     Vec3 end_force;                            // [N] on the last node
     double gradient[FREE_MAX];

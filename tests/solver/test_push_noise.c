@@ -57,7 +57,8 @@ static Push push_in(const Vessel *wall, double friction, double dt)
     return p;
 }
 
-// With contact points that did not follow the place of contact, the change was 2.6 (mu 0) and 1.4 % (0.04) per step, and the work was 5.6 % larger at 2 ms than at 1 ms.
+// With contact points that did not follow the place of contact, the change was 2.6 (mu 0) and 1.4 % (0.04) per step, and the
+// work was 5.6 % larger at 2 ms than at 1 ms.
 static void push_does_not_go_to_and_fro(void **state)
 {
     (void)state;
