@@ -1,4 +1,4 @@
-// Shared by the timing tables: a scene run to the end of its script, and its figures.
+// Shared by all benchmarks: runs of scenes to the end of their script, and the figures of a run.
 #ifndef SELDINGER_BENCH_BENCH_H
 #define SELDINGER_BENCH_BENCH_H
 
@@ -23,29 +23,29 @@ typedef struct StepFigures { // of all steps of a run; times are the thread's CP
     unsigned flags;
     int64_t crowded_step;    // the first with 80 candidates, or else the most
     StepReport last;
-    double inserted_mm, stalled_mm;      // at the end; fed by the hand but not taken by the tool
+    double inserted_mm, stalled_mm;      // at the end; length fed by the hand by which the tool did not advance
     uint64_t hash;
 } StepFigures;
 
 int64_t bench_cpu_ns(void);
-// Figures at the end of a run, all but `crowded_step` and `stalled_mm`. cpu_s: CPU time of the run.
+// Figures at the end of a run, except `crowded_step` and `stalled_mm`. cpu_s: CPU time of the run.
 void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures);
 Spread bench_spread(const TimeHistogram *histogram, double unit);
 cJSON *bench_figures_json(const StepFigures *figures);
 // The command of step i, from the scene's script.
 Command bench_command(const Scene *scene, int64_t step, int *cursor);
-int64_t bench_steps(const Scene *scene, int64_t most);   // of the script, but not more than `most`
+int64_t bench_steps(const Scene *scene, int64_t most);   // number of steps of the script, at most `most`
 typedef struct StepTrace {   // of each step; arrays of the caller with room for bench_steps()
     double *us;
     int *contacts;
 } StepTrace;
-// Runs the script, at most `most` steps of it; stops where a step diverges. `trace` may be NULL. False with a fault.
+// Runs at most `most` steps of the script; stops if a step diverges. `trace` may be NULL. False with a fault.
 bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults);
 
-// Detection of up to 80 points nearest to the wall at that step of the script [us], and how many they were.
+// Time of detection for the up to 80 points nearest to the wall at that step of the script [us], and the number of points.
 void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection_us, int *points, Faults *faults);
 
-// A scene with its vessel, opened; false with faults.
+// Opens a scene with its vessel; false with faults.
 typedef struct BenchScene {
     Scene *scene;
     OpenVessel open;
@@ -56,17 +56,18 @@ void bench_close(BenchScene *scene);
 // The processor's name for the head of a table.
 const char *bench_processor(void);
 
-// What all tables take.
+// Options of all benchmarks.
 typedef struct BenchOptions {
     bool quick;
     int threads;
     const char *json;
 } BenchOptions;
-// Their rows of an option table; `member`: the BenchOptions in the structure. `quick_text`: what --quick changes.
+// Their rows in an option table. `member`: the BenchOptions in the structure; `quick_text`: the effect of --quick.
 #define BENCH_OPTIONS(structure, member, quick_text)                                                                                                           \
     {"quick", NULL, OPTION_FLAG, OPTION_AT(structure, member.quick), quick_text}, CLI_THREADS(structure, member.threads),                                      \
     {                                                                                                                                                          \
-        "json", "F.json", OPTION_FILE, OPTION_AT(structure, member.json), "the figures too; - is standard output, the tables then go to standard error"        \
+        "json", "F.json", OPTION_FILE, OPTION_AT(structure, member.json),                                                                                      \
+            "also writes the figures; - is standard output, the tables then go to standard error"                                                              \
     }
 // The stream for text: standard error if the JSON goes to standard output.
 FILE *bench_text(const BenchOptions *options);

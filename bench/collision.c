@@ -1,10 +1,9 @@
-// seldinger bench collision: implicit models against triangles, the exact wall and a sampled distance, in one run (Kerrien 2017, sections 6.3 to 6.5).
+// seldinger bench collision: implicit models compared with triangles, the exact wall and a sampled distance, in one run (Kerrien 2017, sections 6.3 to 6.5).
 //
-//   same motion positions of all free nodes in a run on the exact wall, queried from each representation: the cost of detection, and its errors
-//                  from the truth
-//   closed loop the same push on each representation, with the solver; the wire's course is compared with the truth
-//   no friction the same with mu = 0: the push is then due to the wall's roughness
-//   clamps         the contact solve stopped after 50, 100, 200, 1000 iterations (section 6.5)
+//   same motion    positions of all free nodes in a run on the exact wall, queried from each representation: time and error of detection
+//   closed loop    the same push simulated on each representation; the path of the wire is compared with that on the exact wall
+//   no friction    the same with mu = 0: the push is then due to the wall's roughness
+//   clamps         the contact solver stopped after 50, 100, 200, 1000 iterations (section 6.5)
 #include "bench/bench.h"
 
 #include "bench/collision_chart.h"
@@ -59,10 +58,11 @@ static const struct {
               {"peer b", "scenes/peer/tube-b-centreline.csv", "scenes/peer/prepare brings it"},
               {"peer c", "scenes/peer/tube-c-centreline.csv", "scenes/peer/prepare brings it"}};
 static const char legend[] =
-    "exact: the true wall, where it can be asked; lim: one field of shared blobs; lim fine: the same fitted ten times closer; lim-blend: local models,\n"
-    "neighbours blended; lim-switch: the paper's, a point's own model alone; mesh full, warm, cached: a wall of planes, searched by Embree from nothing, "
-    "within the last distance, and only where what is\n"
-    "remembered of each triangle's surroundings does not do; mesh curved: its planes with the bend of the wall as Hessian; mesh smooth: interpolated\n"
+    "exact: the true wall, if it can be queried; lim: one field of shared blobs; lim fine: the same fitted ten times closer; lim-blend: local models,\n"
+    "neighbours blended; lim-switch: the paper's method, only a point's own model; mesh full, warm, cached: flat triangles, searched by Embree without "
+    "a start value,\n"
+    "within the last distance, and only if the cached neighbourhood is not enough; mesh curved: triangles with the curvature of the wall as Hessian; mesh "
+    "smooth: interpolated\n"
     "normals; grid: a sampled distance, trilinear, with the mesh's edge as its cell\n";
 static const char *const in_quick[] = {"capsule", "spiral"}, *const clamped[] = {"capsule", "spiral", "phantom", "peer b"},
                          *const clamped_quick[] = {"capsule"};
@@ -71,11 +71,11 @@ static const char *const form_name[FORMS] = {"block", "pointwise"};
 
 typedef struct Row {
     const CollisionCase *of;
-    CollisionWall wall;                  // its vessel is gone
+    CollisionWall wall;                  // its vessel is already destroyed
     int64_t primitives;
     double bytes, bytes_per_mm;
     bool truth_is_model, has_loop;
-    const char *reference;               // on which the motion was recorded and with whose push the others' are compared
+    const char *reference;               // the wall on which the motion was recorded, and whose push is the reference
     CollisionReplay motion;
     CollisionLoop loop, smooth;          // `smooth`: mu = 0
     PushFigures push;
@@ -87,7 +87,7 @@ typedef struct Clamp {
     CollisionLoop loop;
 } Clamp;
 
-typedef struct EqualError {              // a mesh as wrong as the model
+typedef struct EqualError {              // a mesh with the same error as the model
     const char *surface;
     double lim_um, mesh_um, lim_us, warm_us, cached_us;
     int triangles;
@@ -96,7 +96,7 @@ typedef struct EqualError {              // a mesh as wrong as the model
 typedef struct Verdict {
     char item[192];
     double must, measured;
-    bool at_most, good;      // `must` is the most, not the least, that it may be
+    bool at_most, good;      // at_most: `must` is an upper limit, else a lower limit
 } Verdict;
 
 typedef struct CollisionBench {
@@ -123,7 +123,7 @@ static bool is_listed(const char *name, const char *const *list, size_t count)
     return false;
 }
 
-// A further element of a growing array, zeroed; NULL with a fault.
+// Appends a zeroed element to a growing array; NULL with a fault.
 static void *further(void **array, int *count, size_t size, Faults *faults)
 {
     char *bigger = realloc(*array, ((size_t)*count + 1) * size);
@@ -149,7 +149,7 @@ typedef struct Run {         // of one surface
 
 static bool is_mesh_search(const char *name) { return !strcmp(name, "mesh full") || !strcmp(name, "mesh warm") || !strcmp(name, "mesh cached"); }
 
-// The fastest search represents the mesh in closed loop: all give the same answers.
+// In closed loop the mesh uses the fastest search: all searches give the same result.
 static bool is_fastest_search(const CollisionBench *bench, const Run *run, const Row *row)
 {
     for (int i = run->first_row; i < bench->row_count; i++) {
@@ -176,7 +176,7 @@ static bool run_loops(CollisionBench *bench, Run *run, int index, Faults *faults
         return false;
     if (is_reference)
         run->reference_steps = row->smooth.steps;
-    // the push on a wall in which the wire is caught, or which it has left, is not friction
+    // if the wire is stuck in the wall, or has left it, the push is not friction
     row->push = collision_push(options.push_n, row->smooth.survived ? row->smooth.steps : row->smooth.failed_step, run->reference_push, run->reference_steps);
     return true;
 }
@@ -247,7 +247,7 @@ static const Row *row_of(const CollisionBench *bench, const CollisionCase *of, c
     return NULL;
 }
 
-// The row in closed loop of the finest mesh; NULL without meshes.
+// The closed-loop row of the finest mesh; NULL without meshes.
 static const Row *mesh_in_loop(const CollisionBench *bench, const CollisionCase *of)
 {
     for (int i = 0; i < bench->row_count; i++) {
@@ -391,7 +391,7 @@ static void print_motion(FILE *out, const CollisionBench *bench, int first)
     }
 }
 
-// The excess of the push without friction over the reference; undefined for a wall in which the wire was caught or which it left.
+// The excess of the push without friction over the reference; undefined if the wire was stuck in the wall or left it.
 static double artificial_friction(const Row *row) { return row->smooth.survived ? row->push.mean_n - row->push.reference_n : NAN; }
 
 static void print_loops(FILE *out, const CollisionBench *bench, int first)
@@ -505,8 +505,8 @@ enum { NEAR_POINTS, ALL_POINTS, TIMES };
 
 static double time_of(const Row *row, int what) { return what == NEAR_POINTS ? row->motion.us_per_80_points : row->motion.us_per_step; }
 
-// The near points of the same motion, which matter for contact, and all points, of which the solver skips most far ones. The field is compared with
-// Embree; cached triangles (geom/triangle_groups.h) must be at least as fast.
+// Time for the near points of the same motion, which matter for contact, and for all points (the solver skips most of those far away). The field is compared
+// with Embree; cached triangles (geom/triangle_groups.h) must be at least as fast as Embree.
 static bool judge_surface(CollisionBench *bench, const CollisionCase *of, Faults *faults)
 {
     static const char *const what[TIMES] = {"80 near points", "all points"};
@@ -527,7 +527,7 @@ static bool judge_surface(CollisionBench *bench, const CollisionCase *of, Faults
     return true;
 }
 
-// Detection in local models against the size of the tree: the slowest of all sizes over the fastest, by collision_growth's figures.
+// Detection in local models for trees of different size: the slowest time over the fastest, from the figures of collision_growth.
 static bool judge_growth(CollisionBench *bench, const cJSON *sizes, Faults *faults)
 {
     static const char *const times[] = {"ns_warm", "ns_cold"}, *const what[] = {"one wire", "wires all over the tree"};
@@ -564,7 +564,7 @@ static void print_verdicts(FILE *out, const CollisionBench *bench)
     for (int i = 0; i < bench->equal_count; i++) {
         const EqualError *e = &bench->equal[i];
         fprintf(out,
-                "\nequal error, %s: the model is wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um).\n  80 near points: lim %.2f us, "
+                "\nequal error, %s: the rms error of the model is %.3g um, that of a mesh of %d triangles %.3g um.\n  80 near points: lim %.2f us, "
                 "Embree in each step %.2f us (%.1f times), cached triangles %.2f us (%.1f times)\n",
                 e->surface, e->lim_um, e->triangles, e->mesh_um, e->lim_us, e->warm_us, e->warm_us / e->lim_us, e->cached_us, e->cached_us / e->lim_us);
     }

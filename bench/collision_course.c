@@ -7,13 +7,13 @@
 
 static const double STEP = 0.05, GAP = 0.1, GAP_SWING = 0.05, SWING_LENGTH = 7;    // [mm]
 static const double NEAR_ENOUGH = 1e-3;   // [mm]
-static const double REACH = 0.5;         // [mm] all points are nearer to the wall
+static const double REACH = 0.5;         // [mm] all points are nearer to the wall than this
 enum { STEPS_APART = 10 };               // a wire's points, half a millimetre
 
 typedef struct Walker {
     Vec3 x, heading;         // unit, along the wall; 0 before the first step
     double sense;            // with or against the nodes' directions
-    double way;              // [mm] since the start
+    double way;              // [mm] travelled since the start
     int node;                // of the tree of directions
     VesselMemory memory;
     VesselHit hit;
@@ -44,7 +44,7 @@ static bool begin_walk(const Vessel *exact, const VesselTree *nodes, Vec3 x, int
     return pull(exact, w);
 }
 
-// A step along the node's direction, or straight on over a blind end; never back, except where the wall ends.
+// A step along the node's direction, or straight on past a blind end; never back, except where the wall ends.
 static void walk(const Vessel *exact, const VesselTree *nodes, Walker *w)
 {
     Walker before = *w;
@@ -112,7 +112,7 @@ bool course_all_over(const Vessel *exact, const VesselTree *nodes, const Triangl
     int found = 0, count = mesh->vertex_count;
     for (int tried = 0; tried < 4 * points && found < points; tried++) {
         Walker w;
-        int v = (int)(((int64_t)tried * count / points + tried / points * 7) % count);   // round and round, other vertices each time
+        int v = (int)(((int64_t)tried * count / points + tried / points * 7) % count);   // several passes over the mesh, with other vertices each time
         if (!begin_walk(exact, nodes, mesh->vertex[v], -1, 0.37 * tried, &w))
             continue;
         for (int s = 0; s < steps; s++) {
@@ -124,7 +124,7 @@ bool course_all_over(const Vessel *exact, const VesselTree *nodes, const Triangl
     return found == points;
 }
 
-// --- asking ---
+// --- queries ---
 
 typedef struct Asker {
     int count;

@@ -1,4 +1,4 @@
-// Points that creep along a wall like a wire's: recorded once on an exact vessel, then queried from any representation, for time and error.
+// Points that move slowly along a wall like those of a wire: recorded once on an exact vessel, then queried from any representation, for time and error.
 #ifndef SELDINGER_BENCH_COLLISION_COURSE_H
 #define SELDINGER_BENCH_COLLISION_COURSE_H
 
@@ -9,7 +9,7 @@ typedef struct Course {
     int points, steps;
     bool in_line;            // each point is near its predecessor, which is the start of its search
     Vec3 *place;             // (steps, points) [mm]
-    VesselHit *truth;        // (steps, points) the exact vessel's answers there
+    VesselHit *truth;        // (steps, points) the exact vessel's results there
 } Course;
 
 // A track along the wall of `exact` from `start` (moved to the wall; where `exact` is a LIM of `nodes`, near its node `from`; -1: anywhere), in the
@@ -20,15 +20,15 @@ bool course_wire(const Vessel *exact, const VesselTree *nodes, Vec3 start, int f
 bool course_all_over(const Vessel *exact, const VesselTree *nodes, const TriangleMesh *mesh, int points, int steps, Course *out);
 void course_free(Course *course);
 
-// CPU time [ns] of a query: the least of `runs` passes over the steps, forth and back, so that the points' memory always fits; a pass before warms
-// up. Several courses are so many tools: one step of each after the other, so that caches are cold. NAN if out of memory.
+// CPU time [ns] of a query: the smallest of `runs` passes over the steps, forwards and backwards, so that the points' memory is always valid, after one pass to
+// warm up. Several courses act as several tools: one step of each in turn, so that caches are cold. NAN if out of memory.
 double course_ns(const Vessel *vessel, int count, const Course *course, int runs);
 
-typedef struct CourseError { // against the truth, over all answers without flags
+typedef struct CourseError { // compared with the truth, over all results without flags
     double gap_rms_um, gap_max_um, normal_rms_deg, normal_max_deg;
-    int flagged;             // answers left out
+    int flagged;             // results left out
 } CourseError;
-// False if out of memory or no answer is left.
+// False if out of memory or no result is left.
 bool course_error(const Vessel *vessel, const Course *course, CourseError *out);
 
 #endif

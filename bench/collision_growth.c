@@ -1,4 +1,4 @@
-// All queries are of points 0.05 to 0.15 mm from the wall that creep along it (collision_course.h).
+// All queries are of points that move slowly along the wall, 0.05 to 0.15 mm from it (collision_course.h).
 #include "bench/collision_growth.h"
 
 #include "bench/bench.h"
@@ -23,7 +23,7 @@ static const MeshSearch search_kind[SEARCHES] = {MESH_SEARCH_FULL, MESH_SEARCH_W
 typedef struct Growth {
     FILE *out;
     bool quick;
-    int threads, runs;       // runs: of which the least counts
+    int threads, runs;       // runs: the smallest time of these counts
     cJSON *growth, *sizes, *match, *memory;
     Faults *faults;
 } Growth;
@@ -57,7 +57,7 @@ typedef struct Wall {
     const VesselTree *nodes;
     double area;             // [mm2] cell^2 times triangles of its meshes
     const Vessel *near_exact;        // source for meshing if `exact` is too slow; NULL: `exact` …
-    const Shape *shape;      // … and whose surface the vertices then continue to
+    const Shape *shape;      // … the vertices are then moved to the surface of this shape
     Course wire, spread;
 } Wall;
 
@@ -66,7 +66,7 @@ typedef struct Figures {
     CourseError error;
 } Figures;
 
-// With about so many triangles: the first mesh of a wall shows how many cells of what size make them.
+// A mesh with about this number of triangles: the first mesh of a wall gives the cell size.
 static TriangleMesh *mesh_wall(Wall *wall, double triangles, Faults *faults)
 {
     double cell = wall->area > 0 ? sqrt(wall->area / triangles) : contact_surface_cell(wall->nodes, triangles);
@@ -79,7 +79,7 @@ static TriangleMesh *mesh_wall(Wall *wall, double triangles, Faults *faults)
     return mesh;
 }
 
-// The wire starts beside the tree's axis, two radii from its root; the other points at the mesh's vertices.
+// The wire starts beside the tree's axis, two radii from its root; the other points start at the mesh's vertices.
 static bool open_wall(Growth *g, Wall *wall, const TriangleMesh *mesh)
 {
     const VesselTree *tree = wall->nodes;
@@ -167,7 +167,7 @@ static Vessel *mesh_vessel_of(const Wall *wall, const TriangleMesh *mesh, MeshSe
 
 static bool measure_mesh(Growth *g, const Wall *wall, const TriangleMesh *mesh, double surface_s)
 {
-    enum { LARGEST_CACHED = 2000000 };   // beyond, what that search needs takes some half a minute to make
+    enum { LARGEST_CACHED = 2000000 };   // for larger meshes it takes about half a minute to prepare that search
     Figures f[SEARCHES] = {0};
     double bytes = 0, build_s = 0;
     for (int k = 0; k < SEARCHES && (search_kind[k] != MESH_SEARCH_CACHED || mesh->triangle_count <= LARGEST_CACHED); k++) {
@@ -212,7 +212,7 @@ static bool measure_grid(Growth *g, const Wall *wall, const TriangleMesh *mesh)
 
 static bool grow_mesh(Growth *g, Wall *wall, int largest, int largest_grid)
 {
-    enum { LARGEST_MARCHED = 16000 };    // from there on each triangle in four
+    enum { LARGEST_MARCHED = 16000 };    // larger meshes are made by splitting each triangle into four
     TriangleMesh *mesh = NULL;
     bool good = true;
     for (int size = 1000; good && size <= largest; size *= 4) {
@@ -286,7 +286,7 @@ static void close_phantom(Phantom *p)
     shape_free(p->shape);
 }
 
-// The fitted phantom is its own truth here; the exact tube's local models have their error.
+// For the fitted phantom the model itself is the truth here; the local models of the exact tube have an error.
 static bool grow_phantom(Growth *g, const Phantom *p)
 {
     Wall wall = {.name = "phantom, as fitted", .exact = p->lim, .nodes = p->model};
@@ -317,10 +317,10 @@ static bool grow_tube(Growth *g)
 
 // --- growth of the model ---
 
-// A strand of a helix, winding on: the middle of a fitted one, screwed on along itself, so that there is no seam. Strands stand side by side, 1000 nodes each,
-// their first nodes children of the first one's.
+// A strand of a long helix: the middle of a fitted helix is repeated by a screw motion along itself, so that there is no seam. Strands of 1000 nodes each stand
+// side by side; their first nodes are children of the first strand's first node.
 enum { STRAND = 1000, FIRST = 30, PERIOD = 90, SPAN = 20 };
-static const double STRAND_APART = 12;   // [mm] of axes; a helix is 10 mm wide
+static const double STRAND_APART = 12;   // [mm] between axes; a helix is 10 mm wide
 
 typedef struct Motion {      // x -> turn x + shift
     Mat3 turn;
@@ -391,13 +391,13 @@ static VesselTree *strands(const VesselTree *helix, int nodes)
 }
 
 enum { FIELDS = LIM_BLEND + 1, TOOLS = 250, TOOL_STEPS = 4, LOCATIONS = 20 };
-enum { STRETCH = 92, INLET = 4 };        // nodes that the 42 mm of a tool may take, and that the wall beyond the root's end is near
+enum { STRETCH = 92, INLET = 4 };        // nodes that the 42 mm of a tool may cover; the first nodes, whose walls are too near to that beyond the root's end
 typedef struct SizeFigures {
     double warm_ns, cold_ns, strand_ns, first_us, next_us, build_s;
     size_t bytes;
 } SizeFigures;
 
-// CPU time of locating a point in the whole tree, and its neighbour from there; the least of some all over.
+// CPU time to locate a point in the whole tree, and then its neighbour from there; the smallest of several points all over the tree.
 static void time_locations(const Vessel *vessel, int tools, const Course *tool, SizeFigures *f)
 {
     f->first_us = f->next_us = HUGE_VAL;
@@ -412,7 +412,7 @@ static void time_locations(const Vessel *vessel, int tools, const Course *tool, 
     }
 }
 
-// A tool starts on the wall of some node from which its stretch still continues.
+// A tool starts on the wall of a node from which the strand is still long enough for it.
 static bool place_tool(const Vessel *vessel, const VesselTree *tree, int node, int steps, Course *tool)
 {
     Vec3 x = vec3_add_scaled(tree->center[node], 0.8 * tree->radius[node], vec3_normal_to(tree->direction[node]));
@@ -426,7 +426,7 @@ static bool place_wire(const Vessel *vessel, const VesselTree *tree, Course *wir
     return place_tool(vessel, tree, tree->node_count / STRAND / 2 * STRAND + (strand - STRETCH) / 2, WIRE_STEPS, wire);
 }
 
-// Among `nodes` nodes from `first` on, all over them in no order: a golden ratio's steps round.
+// A scattered sequence over `nodes` nodes from `first` on, by steps of the golden ratio.
 static bool place_tools(const Vessel *vessel, const VesselTree *tree, int first, int nodes, int tools, Course *tool)
 {
     int strand = nodes < STRAND ? nodes : STRAND;
@@ -442,7 +442,7 @@ static bool place_tools(const Vessel *vessel, const VesselTree *tree, int first,
 typedef struct Size {
     VesselTree *tree;
     Vessel *vessel[FIELDS];
-    Course wire;             // both fields are asked at the same places
+    Course wire;             // both fields are queried at the same places
     int tools;
     Course *tool, *close;    // (tools) all over the tree, and within its middle strand
     SizeFigures figures[FIELDS];
@@ -525,8 +525,8 @@ static void print_sizes(Growth *g, int count, const Size *size)
 {
     static const char *const field_name[FIELDS] = {[LIM_SWITCH] = "switch", [LIM_BLEND] = "blend"};
     fprintf(g->out,
-            "\nLocal models of a helix that winds on, 1000 nodes a strand: nanoseconds a query, for one wire of %d points, for %d wires all over the "
-            "tree in turn\n(far apart: what they touch outgrows the caches), and for as many in one strand\n",
+            "\nLocal models of a long helix, 1000 nodes per strand: nanoseconds per query, for one wire of %d points, for %d wires all over the "
+            "tree in turn\n(far apart: their data is larger than the caches), and for as many in one strand\n",
             WIRE_POINTS, size[0].tools);
     fputs("  field    nodes    blobs |   wire far apart   one strand | us: first location, next from there | MB, s to build\n", g->out);
     for (int field = 0; field < FIELDS; field++) {
@@ -549,7 +549,7 @@ static bool grow_model(Growth *g)
     VesselTree *helix = samples ? fit(g, samples, 0, shape_options_voxel_mm(0, NULL)) : NULL;
     Size size[SIZES] = {0};
     int count = g->quick ? SIZES - 1 : SIZES;
-    bool good = helix && (helix->node_count > FIRST + PERIOD + SPAN || fault(g, "the helix is too short to be wound on"));
+    bool good = helix && (helix->node_count > FIRST + PERIOD + SPAN || fault(g, "the helix is too short to be continued"));
     for (int k = 0; good && k < count; k++)
         good = open_size(g, helix, nodes[k], &size[k]);
     good = good && measure_sizes(g, count, size);
@@ -582,7 +582,8 @@ static bool measure_true_mesh(Growth *g, const Wall *wall, const TriangleMesh *m
     return good;
 }
 
-// The mesh whose gap is as wrong as `error_um` to a tenth, from one of other size: the error goes with one over the triangles, less so where they are few.
+// A mesh whose gap error is `error_um` within a tenth, found from a mesh of another size: the error is proportional to one over the number of triangles, for
+// coarse meshes only roughly.
 static bool match_mesh(Growth *g, Wall *wall, double error_um, MeshPoint *point)
 {
     enum { ROUNDS = 3, MOST = 400000 };
@@ -675,7 +676,7 @@ static double dense_grid_bytes(const TriangleMesh *mesh, double cell)
 
 typedef struct MemoryRow {
     const char *name;
-    const Vessel *vessel;    // NULL: none, its bytes alone are known
+    const Vessel *vessel;    // NULL: none, only its number of bytes is known
     double edge, bytes, primitives, build_s;
 } MemoryRow;
 

@@ -9,7 +9,7 @@
 // The margin of solver/step_detect.c beyond the speed of the nodes, and its maximum [mm]; it queries twice as much.
 static const double LOOK = 0.2, LOOK_MAX = 5;
 static const double CONTAINED = 0.05, STALLED = 0.1; // [mm]
-static const double GONE = 1;                // [mm] a node further outside: the run is over
+static const double GONE = 1;                // [mm] the run ends if a node is further outside
 enum { JUDGE_EVERY = 5 };                    // steps
 
 // --- a follower: every free node with its own query state ---
@@ -80,7 +80,7 @@ void collision_motion_free(CollisionMotion *motion)
     *motion = (CollisionMotion){0};
 }
 
-// Asks for all points of a step; the answers stand in hit from 0 on.
+// Queries all points of a step; the results are in hit from index 0 on.
 static void ask_step(const Vessel *wall, const CollisionMotion *motion, int step, VesselMemory *memory, VesselHit *hit)
 {
     int first = motion->first_node[step];
@@ -140,7 +140,7 @@ static double time_all(const Vessel *wall, const CollisionMotion *motion, Vessel
     return (double)(bench_cpu_ns() - begin) / 1000;
 }
 
-// Only the near points. With `ask` false, only the loop around the queries, to be subtracted.
+// Only the near points. With `ask` false it runs only the loop around the queries, whose time is subtracted.
 static double time_near(const Vessel *wall, const CollisionMotion *motion, bool ask, VesselMemory *memory, const Gathered *near)
 {
     follow_start(memory, motion->node_count);
@@ -208,7 +208,7 @@ bool collision_replay(const Vessel *wall, const CollisionMotion *motion, int rep
     bool good = near.node && near.point && near.memory && near.hit && memory;
     *out = (CollisionReplay){.steps = motion->steps, .points_per_step = motion->steps > 0 ? (double)motion->offset[motion->steps] / motion->steps : 0};
     if (good) {
-        measure_errors(wall, motion, memory, near.hit, out);    // which also warms up
+        measure_errors(wall, motion, memory, near.hit, out);    // also warms up the caches
         double all = HUGE_VAL, asked = HUGE_VAL, copied = HUGE_VAL;
         for (int k = 0; k < repeats; k++) {
             all = fmin(all, time_all(wall, motion, memory, near.hit));
@@ -266,8 +266,8 @@ static double judge_depth(Judge *judge, const WireState *state, int first)
     return deepest;
 }
 
-// The wall's force in the step that ended. The solver's is along the normal where the step began, save where it looked ahead; what the normal turned by in
-// the step where the wall is hollow was in its stiffness, and is added here.
+// The wall's force in the last step. The solver's force is along the normal at the start of the step (unless it looked ahead). In a concave wall its stiffness
+// matrix contains the rotation of the normal during the step; this part of the force is added here.
 static Vec3 force_in_step(const Judge *judge, int i, Vec3 d, VesselMemory *memory)
 {
     Vec3 force = judge->node[i].force;
@@ -280,8 +280,8 @@ static Vec3 force_in_step(const Judge *judge, int i, Vec3 d, VesselMemory *memor
     return vec3_add_scaled(force, fmax(0, vec3_dot(force, hit.normal)), sym3_mul_vec(&hit.hessian, d));
 }
 
-// W = sum of -F . (dx - (dx.n) n): what the wall's forces take from the wire as it slides along the true wall, which a smooth wall without friction does
-// not. n is the true normal at the end of the step.
+// W = sum of -F . (dx - (dx.n) n): the work that the wall's forces take from the wire as it slides along the true wall; 0 for a smooth wall without friction.
+// n is the true normal at the end of the step.
 static void judge_work(Judge *judge, const WireState *state, int first)
 {
     follow_forget(judge->wall_memory, first);
@@ -359,7 +359,7 @@ static double reach_at(const Scene *scene, const WireState *state, Command comma
 }
 
 typedef struct Hand {
-    double length, fed, travel;      // [mm] of the wire; in, as the hand has it; pushed and pulled in all
+    double length, fed, travel;      // [mm] of the wire; net length fed by the hand; total length pushed and pulled
 } Hand;
 
 // One step and its measurements; false if the run is over.
@@ -417,7 +417,7 @@ static void read_profile(const Simulator *simulator, CollisionLoop *out)
     out->not_converged = simulator_totals(simulator)->not_converged_steps;
 }
 
-// The scene's run with other options for friction and contact; sections of the caller's.
+// The scene with other options for friction and contact; the caller provides the sections.
 static Scene scene_for(const Scene *scene, const LoopOptions *o, WireSection *section)
 {
     Scene own = *scene;

@@ -1,4 +1,4 @@
-// What `bench collision` measures: a recorded motion queried from any wall, and runs in closed loop compared with the true wall.
+// Measurements of `bench collision`: a recorded motion queried from any wall, and closed-loop runs compared with the true wall.
 #ifndef SELDINGER_BENCH_COLLISION_RUN_H
 #define SELDINGER_BENCH_COLLISION_RUN_H
 
@@ -11,7 +11,7 @@ typedef struct CollisionMotion {
     int steps, step_capacity;
     int *first_node;         // (S) the first free node; all from there to the tip are free
     size_t *offset;          // (S+1) into the points
-    double *reach;           // (S) [mm] what the solver asks for at that step
+    double *reach;           // (S) [mm] range of the solver's queries at that step
     size_t point_capacity;
     Vec3 *point;             // (P)
     double *gap;             // (P) the truth [mm]; +HUGE_VAL if it is beyond reach or there is no wall
@@ -27,20 +27,20 @@ typedef struct ErrorFigures {
 } ErrorFigures;
 
 typedef struct CollisionReplay {
-    int64_t steps, near_points;      // near: gap less the tool's radius below the reach of half a question, as of the solver's candidates
+    int64_t steps, near_points;      // near: gap less the tool's radius is below half the query range, as for the solver's candidates
     double points_per_step, us_per_step, us_per_80_points;
-    int64_t judged, lost;            // near points compared; those without an answer
-    ErrorFigures gap_um, normal_deg; // over judged points; the normal where the wall is nearer than half of the tool's room
+    int64_t judged, lost;            // near points compared; near points without a result
+    ErrorFigures gap_um, normal_deg; // over judged points; the normal only where the wall is nearer than half of the tool's clearance
 } CollisionReplay;
 
-// Each node has its own state, as in the solver. Times are CPU times of the queries, the least of `repeats` replays. False if out of memory.
+// Each node has its own state, as in the solver. Times are CPU times of the queries, the smallest of `repeats` replays. False if out of memory.
 bool collision_replay(const Vessel *wall, const CollisionMotion *motion, int repeats, CollisionReplay *out);
 
 typedef struct CollisionLoop {
     int64_t steps, wanted;
     Spread step_us;
     double detect_us, contact_us;    // medians
-    double candidates, candidates_max, contacts, contacts_max;   // near enough to touch, and with force; medians and largest
+    double candidates, candidates_max, contacts, contacts_max;   // points near enough to touch, and points with force; median and largest number
     double iterations;               // factorisations or sweeps, median
     int64_t not_converged;
     double penetration_um;           // deepest node outside the true wall
@@ -48,9 +48,9 @@ typedef struct CollisionLoop {
     bool survived;
     int64_t failed_step;             // -1
     char why[96];                    // first failure
-    // measured where asked for
+    // measured only with without_friction
     double work_n;                   // [mJ/mm] lost along the true wall for each millimetre fed
-    double work_mu;                  // the same over the work of the wall's forces taken as normal ones: a coefficient of friction
+    double work_mu;                  // the same as a coefficient of friction: over the work of the wall's forces if they were normal forces
 } CollisionLoop;
 
 typedef struct LoopOptions {

@@ -17,11 +17,13 @@
 
 static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25,
                     CAPSULE_WIDTH = 0.401485;               // [mm]; the width gives the radius half way (docs/references.md, "Blobs")
-enum { FINE = 10 };                          // by how much the fine fit is closer
-enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
+enum { FINE = 10 };                          // the fine fit has tolerances smaller by this factor
+enum { CAPSULE_NODES = 10, TRIAL = 6 };      // the first mesh has 1 / TRIAL of the triangles and gives the cell size for the final mesh
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
-static const double BAND_CELLS = 2, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
-static const double ASKED_BEYOND_TOOL = 0.6; // [mm] of a shape's lattice: answers further from the wall are not judged
+static const double BAND_CELLS = 2,
+                    BAND_BEYOND_TOOL =
+                        0.2; // half width of the grid's band: at least both (cells; mm beyond the tool's radius), the range of the solver's queries
+static const double ASKED_BEYOND_TOOL = 0.6; // [mm] extent of a shape's lattice: results further from the wall are not judged
 
 double collision_build_clock_s(void)
 {
@@ -58,7 +60,7 @@ static void capsule_points(VesselTree *tree, const TriangleMesh *samples)
     }
 }
 
-// With the samples and with or without the blobs; NULL if out of memory.
+// The tree with the samples, with or without the blobs; NULL if out of memory.
 static VesselTree *capsule_tree(const TriangleMesh *samples, bool is_model)
 {
     VesselTree *tree = vessel_tree_create(CAPSULE_NODES, samples ? samples->vertex_count : 0, is_model ? CAPSULE_NODES * CAPSULE_NODES : 0);
@@ -111,11 +113,11 @@ static bool open_capsule(CollisionSurface *s, Faults *faults)
 
 // --- vessels of scenes ---
 
-// `closer`: what the usual tolerances are divided by.
+// `closer`: divisor of the usual tolerances.
 static VesselTree *fit(const VesselTree *nodes, double voxel_mm, double closer, int threads, double *cpu_s, Faults *faults)
 {
     FieldFitOptions options = field_fit_default_options();
-    options.voxel_mm = voxel_mm / closer;    // of which tolerance and least reach are multiples
+    options.voxel_mm = voxel_mm / closer;    // tolerance and smallest reach are multiples of this
     options.tolerance /= closer;
     options.threads = threads;
     double begin = collision_build_clock_s();
@@ -135,12 +137,12 @@ static VesselTree *fit_local(const VesselTree *nodes, double voxel_mm, int threa
     return model;
 }
 
-// A shape's wall without curvature: half the time.
+// The wall of a shape without curvature, which takes half the time.
 typedef struct GapVessel {
     Vessel vessel;           // first: a Vessel * to us is a GapVessel *
     const Shape *shape;
-    const Vessel *whole;     // answers beyond open ends
-    double limit;            // [mm] further from the wall the shape's field suffices, which never exceeds the distance
+    const Vessel *whole;     // gives the result beyond open ends
+    double limit;            // [mm] further from the wall the shape's field is used, which never exceeds the distance
 } GapVessel;
 
 static void gap_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -246,7 +248,7 @@ bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurfa
         out->truth = out->lim;
     if (!out->truth_gap)
         out->truth_gap = out->truth;
-    // the tool's entry is the same for all
+    // the tool enters at the same place in all representations
     return open_vessel_inlet(out->scene, &(OpenVessel){.vessel = out->scene->source == SOURCE_TUBE ? out->exact : out->lim}, faults);
 }
 
@@ -276,7 +278,7 @@ static TriangleMesh *mesh_of(const CollisionSurface *s, const Vessel *wall, doub
     return contact_surface_mesh(wall, s->nodes, open_end, cell_mm, s->of->name, cli_note, faults);
 }
 
-// Moves all vertices onto the wall, to 1e-9 mm. False if one would go further than half a cell, or does not get there.
+// Moves all vertices onto the wall, to 1e-9 mm. False if a vertex would move by more than half a cell, or the iteration does not converge.
 static bool project(TriangleMesh *mesh, const Vessel *wall, double cell_mm)
 {
     enum { ROUNDS = 20 };

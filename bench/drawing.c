@@ -1,4 +1,4 @@
-// seldinger bench drawing: the cost of a picture of the trainer, and whether drawing disturbs the 1 kHz thread.
+// seldinger bench drawing: CPU time of an image of the trainer, and the effect of rendering on the 1 kHz thread.
 #include "bench/bench.h"
 
 #include "render/gl_canvas.h"
@@ -30,7 +30,7 @@ typedef struct Studio {
 
 static TrackerView *tracked_at(const Studio *studio, int moment) { return (TrackerView *)(void *)((char *)studio->tracked + (size_t)moment * studio->stride); }
 
-// Moments 33 ms apart, the last ones of the script where it is that long; contrast flows all the while.
+// Moments 33 ms apart at the end of the script, or from its start if it is shorter; contrast agent flows all the time.
 static bool take_moments(Studio *studio, Faults *faults)
 {
     const Scene *scene = studio->scene.scene;
@@ -172,7 +172,7 @@ typedef struct Turn {
     double seconds;
 } Turn;
 
-// A session driven by the scene's script, `seconds` long, with or without concurrent drawing.
+// A session of `seconds` that is driven by the scene's script, with or without concurrent rendering.
 static bool take_turn(Studio *studio, double seconds, bool draws, Turn *turn, Faults *faults)
 {
     static HandPort hand[TOOLS_MOST];

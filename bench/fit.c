@@ -1,4 +1,4 @@
-// seldinger bench fit: tables 3, 4 and 5 of Kerrien et al. 2017 beside the paper's figures, and the cost of a local model.
+// seldinger bench fit: tables 3, 4 and 5 of Kerrien et al. 2017 with the paper's figures, and the time of a local model.
 #include "bench/bench.h"
 
 #include "base/simd.h"
@@ -174,9 +174,8 @@ static double process_cpu_s(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-// Triangles a blob. As the paper counts: marching cubes of the tree's surface on the volume's grid. Of equal error: equilateral triangles on each
-// node's piece of tube whose sag in the middle of an edge, h^2 / (8 r), is the model's own d_a: i.e. a mesh as accurate as the model, if it had no
-// other error.
+// Triangles per blob. As in the paper: marching cubes of the tree's surface on the volume's grid. At equal error: equilateral triangles on each node's piece of
+// tube whose sag in the middle of an edge, h^2 / (8 r), equals the model's d_a, i.e. a mesh as accurate as the model if it had no other error.
 static bool count_triangles(const VesselTree *model, double voxel, double *on_grid, double *equal)
 {
     TriangleMesh *mesh = isosurface_of_tree(model, voxel);
@@ -249,7 +248,7 @@ static bool report_tree(const FitBench *bench, const VesselTree *tree, const cha
     return true;
 }
 
-// The tree of the scene's angiogram; NULL without a fault if that is missing.
+// The tree of the scene's angiogram; NULL without a fault if the angiogram is missing.
 static VesselTree *segment_aneurism(int threads, Faults *faults)
 {
     static const char volume_path[] = "../shared/data/aneurism.nrrd", trace_path[] = "scenes/aneurism/trace.yaml";
@@ -266,7 +265,7 @@ static VesselTree *segment_aneurism(int threads, Faults *faults)
     return tree;
 }
 
-// The paper's average patient: models of 540 points and 10 blobs. Five nodes of a noisy arc, fitted until there are 10 blobs; the least of some runs.
+// The paper's average patient: models of 540 points and 10 blobs. Five nodes of a noisy arc, fitted until there are 10 blobs; the smallest time of some runs.
 static bool time_model(const FitBench *bench, FILE *text, cJSON *root, Faults *faults)
 {
     enum { MIDDLE = 8, RUNS = 15, BLOBS = 10 };
@@ -364,7 +363,7 @@ static const Option options[] = {
     {"table3", NULL, OPTION_FLAG, OPTION_AT(FitBench, table3),
      "one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with what least squares could reach; exit code 1 "
      "where a "
-     "median of blobs, the share that meets t_g or d against the noise misses its limit"},
+     "median of blobs, the share that meets t_g, or d compared with the noise misses its limit"},
     {"tables45", NULL, OPTION_FLAG, OPTION_AT(FitBench, tables45),
      "whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs a node, triangles a blob, time; the angiogram of "
      "scenes/aneurism, "
@@ -384,8 +383,8 @@ static const char *check(void *structure)
 
 static const OptionTable table = {
     .program = "seldinger bench fit",
-    .does = "local models: the paper's tables 3, 4 and 5 beside its figures",
-    .intro = "Tables 3, 4 and 5 of Kerrien et al. 2017 beside the paper's figures.",
+    .does = "local models: the paper's tables 3, 4 and 5 with its figures",
+    .intro = "Tables 3, 4 and 5 of Kerrien et al. 2017 with the paper's figures.",
     .usage = "--table3 [options]\n--tables45 [--tree TREE.h5]... [options]",
     .exits = "0 done; 1 a limit is missed; 2 wrong usage or bad input",
     CLI_OPTIONS(options, FitBench),

@@ -29,7 +29,7 @@ struct LimTrialShape {
 
 static const double ISO_LEVEL = 0.1;
 
-// Skeleton at s in [0, 1]; `size`: the width of all primitives, then the skeleton's own measures.
+// Skeleton at s in [0, 1]; `size`: the width of all primitives, then the dimensions of the skeleton.
 static Vec3 skeleton(int which, int branch, double s, const double *size)
 {
     if (which < 2)
@@ -45,7 +45,7 @@ static int build(int which, const double *size, Vec3 *center, double *width)
 {
     int steps = which < 2 ? 4 : which == 2 ? 13 : 6, count = 0;
     for (int branch = 0; branch < (which == 3 ? 2 : 1); branch++)
-        for (int i = branch; i <= steps; i++) {   // the bifurcation's first primitive once
+        for (int i = branch; i <= steps; i++) {   // the bifurcation's first primitive only once
             center[count] = skeleton(which, branch, (double)i / steps, size);
             width[count++] = size[0];
         }
@@ -62,7 +62,7 @@ static void sizes_of(int which, double *size)
     size[1] = 4;
     size[2] = which == 2 ? PI : 4;
     size[3] = 0;
-    double low = 0.05, high = 1;   // radius 1 mm half way along (of the first branch)
+    double low = 0.05, high = 1;   // radius 1 mm at the midpoint (of the first branch)
     for (int i = 0; i < 60; i++) {
         Vec3 center[MOST_BLOBS];
         double width[MOST_BLOBS];
@@ -150,7 +150,7 @@ static double p90(double *value, int count)
     return value[(int)(0.9 * (count - 1) + 0.5)];
 }
 
-// p90 |H e|; `column` is (parameters, LIM_TRIAL_POINTS), orthogonalised here (modified Gram-Schmidt); columns without anything new are left out.
+// p90 |H e|; `column` is (parameters, LIM_TRIAL_POINTS), orthogonalised here (modified Gram-Schmidt); linearly dependent columns are left out.
 static double projected_noise(double (*column)[LIM_TRIAL_POINTS], int parameters, const double *noise)
 {
     double moved[LIM_TRIAL_POINTS] = {0};
@@ -201,7 +201,7 @@ static bool bounds(const LimTrialShape *shape, const Vec3 *point, const double *
     double width[MOST_BLOBS];
     int parameters = 0;
     sizes_of(shape->which, size);
-    // size, then turns and shifts of the whole
+    // size, then rotations and translations of the whole
     for (int k = 0; k < SIZES - 1 + 6; k++) {
         for (int side = 0; side < 2; side++) {
             double changed[SIZES], by = side ? step : -step;

@@ -1,4 +1,4 @@
-// seldinger-bench: the table of benchmarks. `seldinger bench` calls it.
+// seldinger-bench: the list of benchmarks. `seldinger bench` starts this program.
 #include "bench/bench.h"
 
 #include "base/process.h"

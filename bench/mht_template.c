@@ -1,10 +1,10 @@
 // With q = x - c in units of r, (p1, p2, pa) its parts along e1, e2 and the axis v, s = p1^2 + p2^2 = (d/r)^2:
 //   T = 1 / (1 + s^4),  dT/ds = -4 s^3 T^2 = -h/2,  and from ds: dT = h (s dlog r + p1 dc1 + p2 dc2 + pa p1 da1 + pa p2 da2).
-// All that least squares need are the weighted moments of (1, T, h s, h p1, h p2, h pa p1, h pa p2, I). The weights w stand before the residuals, so sums
-// carry w^2. Lanes are voxels; floats are summed over 64 of a lane, then in double.
+// Least squares needs only the weighted moments of (1, T, h s, h p1, h p2, h pa p1, h pa p2, I). The weights w multiply the residuals, so that sums contain
+// w^2. Lanes are voxels; floats are summed over 64 voxels of a lane, then in double.
 //
-// Friman's own iteration takes turns: the five of the shape with k and m held, then k and m. Here the step is that of all seven at once and k and m are
-// solved for at every trial: the same minimum in a third of the iterations.
+// Friman alternates between the five parameters of the shape, with k and m fixed, and k and m. Here a step changes all seven at once, and k and m are solved
+// for at every trial: the same minimum in a third of the iterations.
 #include "bench/mht_template.h"
 
 #include "base/same_math.h"
@@ -15,14 +15,14 @@
 
 enum { LANES = 4, CHUNK = 64 * LANES, MAX_VOXELS = 12000, LEAST_VOXELS = 32, BASIS = 8, MOMENTS = BASIS * (BASIS + 1) / 2, SHAPE = 7 };
 
-static const double CUT = 0.1;   // least weight
-static const double ALONG = 0.5; // window's length to its breadth
+static const double CUT = 0.1;   // smallest weight
+static const double ALONG = 0.5; // ratio of the window's length to its width
 
 typedef float Lanes __attribute__((vector_size(4 * LANES)));
 
 struct MhtWindow {
-    int count, capacity;     // count is padded to whole lanes with voxels of no weight
-    float *x, *y, *z, *intensity, *weight;   // positions from `middle` [mm]; intensities from `level`
+    int count, capacity;     // count is padded to whole lanes with voxels of weight 0
+    float *x, *y, *z, *intensity, *weight;   // positions relative to `middle` [mm]; intensities relative to `level`
     Vec3 middle;
     double level;
 };
@@ -70,7 +70,7 @@ int mht_window_open(MhtWindow *window, const Volume *volume, const MhtTemplate *
         if (!(middle[i] > -1e6 && middle[i] < 1e6 && half < 1e6))
             return 0;
         stride[i] = (int)fmin(1e6, fmax(1, ceil(spacing / vec3_norm(volume->axis[i]) - 1e-9)));
-        // the lattice of the strides goes through the voxel in the middle
+        // the subsampled lattice contains the voxel in the middle
         int here = (int)floor(middle[i] + 0.5), before = (int)floor(half / stride[i]) + 1, after = before;
         while (before > 0 && here - before * stride[i] < 0)
             before--;
@@ -106,7 +106,7 @@ int mht_window_open(MhtWindow *window, const Volume *volume, const MhtTemplate *
                 total += (double)w;
             }
         }
-    // about a mean of zero the sums of floats do not cancel
+    // with a mean of zero the sums of floats lose no digits by cancellation
     window->level = total > 0 ? sum / total : 0;
     for (int i = 0; i < n; i++)
         window->intensity[i] -= (float)window->level;
@@ -119,7 +119,7 @@ int mht_window_open(MhtWindow *window, const Volume *volume, const MhtTemplate *
 
 // --- sums over the window ---
 
-typedef struct Frame {       // of a template, in lanes' precision
+typedef struct Frame {       // of a template, in single precision
     float e1[3], e2[3], v[3], c1, c2, cv;   // in units of the radius
 } Frame;
 
@@ -175,7 +175,7 @@ static double moment(const double m[MOMENTS], int i, int j)
     return m[a * BASIS - a * (a - 1) / 2 + b - a];
 }
 
-// Contrast and background of least squares, and the weighted sum of squares that they leave. False if they are not defined.
+// Contrast and background by least squares, and the weighted sum of squared residuals. False if they are not defined.
 static bool solve_linear(double ww, double wt, double wtt, double wi, double wti, double wii, double *contrast, double *background, double *cost)
 {
     double det = ww * wtt - wt * wt;
@@ -187,7 +187,7 @@ static bool solve_linear(double ww, double wt, double wtt, double wi, double wti
     return true;
 }
 
-// The same for a template on trial.
+// The same for a trial template.
 static bool linear_fit(const MhtWindow *window, MhtTemplate *template, double *cost)
 {
     Frame f = frame_of(window, template);
@@ -237,7 +237,7 @@ static void finish_score(const MhtWindow *window, MhtTemplate *template)
     }
     double det = total[2] * total[4] - total[3] * total[3], variance = total[1] / total[0];
     double spread = (total[3] * total[3] * total[5] - 2 * total[2] * total[3] * total[6] + total[2] * total[2] * total[7]) / (det * det);
-    // a picture without noise would score without bound
+    // without noise the score would be unbounded
     variance = fmax(variance, 1e-8 * template->contrast * template->contrast);
     double score = template->contrast / sqrt(variance * spread);
     template->score = isfinite(score) ? score : 0;
@@ -330,7 +330,7 @@ void mht_template_fit(const MhtWindow *window, MhtTemplate *template, const MhtL
                 continue;
             for (int k = 2; k < SHAPE; k++)
                 largest = fmax(largest, fabs(step[k]));
-            if (largest > 0.5)   // beyond that the derivatives mean nothing
+            if (largest > 0.5)   // for larger steps the derivatives are not valid
                 continue;
             MhtTemplate tried = moved(template, step, limits);
             if (linear_fit(window, &tried, &t_cost) && t_cost < cost) {

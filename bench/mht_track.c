@@ -63,7 +63,7 @@ typedef struct Tracker {
     MhtWindow *window;
     Chain tree;
     bool out_of_memory;
-    const char *why;         // the last hypothesis was refused
+    const char *why;         // reason for which the last hypothesis was rejected
 } Tracker;
 
 static bool chain_append(Chain *chain, const MhtTemplate *template, int parent, int branch)
@@ -103,11 +103,11 @@ static bool is_in_tree(const Tracker *t, Vec3 x, double share)
 // --- hypotheses ---
 
 typedef struct Branch {
-    Chain way;               // the nodes that are taken
+    Chain way;               // the accepted nodes
     Chain tried;             // hypotheses, each with its parent; the root is one of them
     int root, leaf[MAX_LEAVES], leaf_count, depth;   // depth: steps from the root to the leaves
     MhtLimits limits;        // of the radius
-    bool may_overlap;        // it has not yet left its parent's tube
+    bool may_overlap;        // the branch has not yet left its parent's tube
 } Branch;
 
 // Sum of the scores from below the root to a hypothesis.
@@ -135,7 +135,7 @@ static bool fit(Tracker *t, MhtTemplate *template, const MhtTemplate *previous, 
     return vec3_is_finite(template->center) && template->contrast > 0;
 }
 
-// Is a fitted template a step on from hypothesis `from`?
+// Is a fitted template a valid next step after hypothesis `from`?
 static bool is_progress(Tracker *t, const Branch *branch, int from, const MhtTemplate *next)
 {
     const MhtParameters *p = t->parameters;
@@ -228,7 +228,7 @@ static bool extend(Tracker *t, Branch *branch)
             t->why = "no template fits";
             bool good = fit(t, &guess[k], &from, &branch->limits) && is_progress(t, branch, branch->leaf[i], &guess[k]);
             why = good ? why : t->why;
-            // fits often coincide
+            // several fits often converge to the same template
             for (int other = 0; other < kept && good; other++)
                 if (vec3_distance(guess[other].center, guess[k].center) < t->voxel && vec3_dot(guess[other].axis, guess[k].axis) > 0.9) {
                     good = false;
@@ -290,8 +290,8 @@ static bool take(Tracker *t, Branch *branch, int next)
     return !t->out_of_memory;
 }
 
-// The nodes of a branch from its fitted first one until it ends, t->why says how. `until_tree`: it is on its return path to its parent and ends
-// inside another branch's tube.
+// Tracks a branch from its fitted first node to its end; t->why gives the reason for the end. `until_tree`: the branch is on its return path to its parent and
+// ends inside another branch's tube.
 static void follow(Tracker *t, Branch *branch, const MhtTemplate *first, bool until_tree)
 {
     const MhtParameters *p = t->parameters;
@@ -332,7 +332,7 @@ static void branch_free(Branch *branch)
     chain_free(&branch->tried);
 }
 
-// Fits the first template at the requested place and follows it. False if it does not score.
+// Fits the first template at the requested place and tracks from it. False if its score is too low.
 static bool track_branch(Tracker *t, const MhtTemplate *start, const MhtLimits *limits, Branch *out, bool until_tree)
 {
     const MhtParameters *p = t->parameters;
@@ -358,7 +358,7 @@ static bool track_branch(Tracker *t, const MhtTemplate *start, const MhtLimits *
 
 // --- the tree ---
 
-// Least brightness on the line between two points over that at its darker end, above the volume's minimum.
+// Lowest brightness on the line between two points, divided by the brightness at the darker end; both above the volume's minimum.
 static double link_brightness(const Tracker *t, Vec3 a, Vec3 b)
 {
     double base = (double)t->volume->minimum, least = HUGE_VAL, ends = HUGE_VAL;
@@ -414,8 +414,8 @@ static double gap_to_tree(const Tracker *t, const MhtTemplate *template)
     return least - template->radius;
 }
 
-// Appends a branch's nodes: those of the return path reversed, then those of the outgoing path. A return path that missed its parent is joined where
-// it came nearest, and what lies beyond is a limb of its own there: by a link from its far end it would cross the background.
+// Appends a branch's nodes: those of the return path reversed, then those of the outgoing path. A return path that missed its parent is joined where it was
+// nearest, and the rest becomes a separate limb there: a link from its far end would cross the background.
 static bool adopt(Tracker *t, const Chain *out, const Chain *back, int number)
 {
     bool is_first = t->tree.count == 0, good = true;
@@ -464,7 +464,7 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
             MhtLimits limits = limits_of(t, start.radius);
             start.axis = away;
             found = track_branch(t, &beside, &limits, &out, false);
-            // as long as an attempt can be that leads to where the point was set
+            // the maximum length of an attempt that leads to the given point
             double length = 0;
             for (int i = 1; i < out.way.count; i++)
                 length += vec3_distance(out.way.node[i].template.center, out.way.node[i - 1].template.center);
@@ -484,7 +484,7 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
         behind = (Branch){.limits = limits};
         follow(t, &behind, &first, true);
     }
-    // its first node is the branch's own first one, in the opposite direction
+    // its first node is that of the branch, in the opposite direction
     Chain back = behind.way.count > 1 ? (Chain){behind.way.node + 1, behind.way.count - 1, 0} : none;
     if (found && !t->out_of_memory)
         t->out_of_memory = !adopt(t, &out.way, &back, number);

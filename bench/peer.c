@@ -1,6 +1,6 @@
-// seldinger bench peer: the scenes on which SOFA v26.06 with BeamAdapter v26.06 was measured (docs/benchmarks.md, "Against SOFA"), each at
-// 100 and 20 GPa, on the exact tube, on local blobby models fitted to it and on a mesh of it, beside the peer's figures. The peer was measured on its
-// machine and on meshes of the same tubes: its times are printed to give the order of magnitude.
+// seldinger bench peer: the scenes with which SOFA v26.06 and BeamAdapter v26.06 were measured (docs/benchmarks.md, "Against SOFA"), each at 100 and
+// 20 GPa, with the exact tube, local blobby models fitted to it and a mesh of it as the wall, together with the peer's figures. The peer was measured on
+// another machine and with meshes of the same tubes: its times give only the order of magnitude.
 #include "bench/bench.h"
 
 #include "base/output.h"
@@ -12,7 +12,7 @@
 
 enum { TUBES = 3, STIFFNESSES = 2, SURFACES = 3, WINDOWS = 2 };
 
-typedef struct Window {      // of steps: the first `most_steps`, or those with so many contacts with force
+typedef struct Window {      // of steps: the first `most_steps`, or those with this number of contacts with force
     const char *name;
     int most_steps, least_contacts, most_contacts;
     const char *peer[STIFFNESSES];       // CPU ms median (p99), contacts
@@ -98,7 +98,7 @@ static bool run_row(Row *row, int64_t most_steps, int threads, Faults *faults)
 
 static bool is_contained(const Row *row) { return !(row->run.flags & (STEP_DIVERGED | STEP_OUT_OF_VESSEL)) && row->run.penetration_um.max <= contained_um; }
 
-// All steps, and all that the hand fed is in.
+// All steps were made, and the whole length fed by the hand is inserted.
 static bool is_whole(const Row *row) { return row->run.steps == row->wanted_steps && fabs(row->run.stalled_mm) <= stalled_mm; }
 
 static void print_row(FILE *out, const Row *row)
@@ -176,7 +176,7 @@ static bool run_all(FILE *out, int64_t most_steps, int threads, cJSON *list, boo
                 return false;
             print_row(out, &row);
             fflush(out);
-            *contained &= surfaces[row.surface] == CONTACT_MESH || (is_contained(&row) && is_whole(&row));   // the mesh is what we compare with
+            *contained &= surfaces[row.surface] == CONTACT_MESH || (is_contained(&row) && is_whole(&row));   // the mesh is only for comparison
             cJSON_AddItemToArray(list, row_json(&row));
         }
     }
@@ -202,7 +202,8 @@ static int call(void *taken, Faults *faults)
     if (!good)
         return EXIT_BAD_INPUT;
     if (!contained)
-        fprintf(stderr, "seldinger bench peer: a run on tube or models left the wall by more than %.0f um, or did not finish\n", contained_um);
+        fprintf(stderr, "seldinger bench peer: in a run with the tube or models a node was more than %.0f um outside the wall, or the run did not finish\n",
+                contained_um);
     return contained ? EXIT_DONE : EXIT_DIFFERENT;
 }
 
@@ -210,7 +211,7 @@ static const Option rows[] = {BENCH_OPTIONS(PeerBench, options, "the first 400 o
 
 static const OptionTable table = {
     .program = "seldinger bench peer",
-    .does = "the scenes on which SOFA with BeamAdapter was measured, beside its figures",
+    .does = "the scenes with which SOFA and BeamAdapter were measured, with their figures",
     .usage = "[options]",
     .intro = "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube, on "
              "local models "

@@ -1,5 +1,5 @@
-// See shape_vessel.h. A shape's straight pieces beyond its open ends are six radii long and closed by a cap, so a point further upstream than LENGTH radii
-// is asked as if it stood LENGTH radii upstream.
+// See shape_vessel.h. A shape's straight pieces beyond its open ends are six radii long and closed by a cap, so a point further upstream than LENGTH radii is
+// moved to LENGTH radii upstream before the query.
 #include "bench/shape_vessel.h"
 
 #include "recon/phantom/phantom_parts.h"
@@ -16,7 +16,7 @@ typedef struct ShapeVessel {
     const Shape *shape;
 } ShapeVessel;
 
-// How far beyond an open end the section stands that answers at x, in radii; 0: not beyond one. `is_inlet`: that of the root.
+// Distance beyond an open end of the section that is used at x, in radii; 0: x is not beyond an open end. `is_inlet`: the end is that of the root.
 static double beyond_end(const Shape *shape, Vec3 x, bool *is_inlet, Station *section)
 {
     int which;
@@ -57,8 +57,8 @@ static Sym3 hessian_at(const Shape *shape, Vec3 foot, Vec3 n, double gap, double
                   e[0].y * u.y + e[1].y * v.y, e[0].y * u.z + e[1].y * v.z, e[0].z * u.z + e[1].z * v.z};
 }
 
-// The foot of x, and the side of the wall that x is on. On a part's centreline, and between two, the field has no slope to fall along, or one to a foot that is
-// not the nearest: where the way to the foot is much more than the field (which is never more than the distance), starts beside x are tried too.
+// The closest point of x on the wall, and the side of x. On a part's centreline, and between two, the gradient of the field vanishes or leads to a point that is
+// not the nearest. If the distance to the point found is much larger than the field (which never exceeds the distance), starts beside x are tried too.
 static double closest_foot(const Shape *shape, Vec3 x, const Station *section, Vec3 *foot)
 {
     Vec3 along = vec3_unit(section->tangent), u = vec3_normal_to(along), v = vec3_cross(along, u);
@@ -106,7 +106,7 @@ static VesselHit hit_at(const Shape *shape, Vec3 x, double reach, VesselMemory *
     }
     double field = shape_field(shape, x, NULL);
     hit.flags = beyond > 0 ? VESSEL_BEYOND : 0;
-    if (field > reach) {                     // never more than the distance
+    if (field > reach) {                     // the field never exceeds the distance
         hit.gap = field;
         hit.flags |= VESSEL_FAR;
         return hit;

@@ -1,6 +1,6 @@
-// A trial is a random tree with its own band, noise and click. Three kinds of result are correct: in a volume whose trunk can be seen a start in it,
-// with its radius and four fifths of its length; where noise hides the trunk, or the click is beside all vessels, a refusal; and where a result is
-// wrong, a warning with it.
+// A trial is a random tree with its own band, noise and click. If the trunk is visible, the correct result is a start in it with its radius, and a tree that
+// covers four fifths of its length. If noise hides the trunk, or the click is outside all vessels, the correct result is a rejection. A wrong result must come
+// with a warning.
 #include "bench/starts.h"
 
 #include "base/parallel.h"
@@ -15,7 +15,7 @@ typedef struct Kind {
     const char *name;
     double contrast, noise, band;            // [grey values]
     double band_radii, radius;               // thickness of the band, radius of the trunk [voxel]
-    bool is_hidden;          // a refusal is right
+    bool is_hidden;          // a rejection is correct
     bool is_beside;          // the click lies on background
 } Kind;
 
@@ -37,12 +37,12 @@ enum { KINDS = sizeof kinds / sizeof kinds[0], ENOUGH = 8 };
 
 typedef struct Trial {
     bool is_refused, is_right, failed;
-    int warnings;            // other warnings than that a smoothed copy was tracked
+    int warnings;            // except the warning that a smoothed copy was tracked
     bool is_smoothed;
-    double drift, offset;    // [true radii] from the click to the axis that was found; of that from the true axis
-    double radius;           // found over true
-    double trunk;            // share of its length that was tracked, whichever end became the root
-    bool is_turned;          // the root lies elsewhere than on the trunk: labels, which follow the tree downstream, are not counted
+    double drift, offset;    // [true radii] distance of the axis found from the click and from the true axis
+    double radius;           // found radius over true radius
+    double trunk;            // tracked fraction of the trunk's length, whichever end became the root
+    bool is_turned;          // the root is not on the trunk: labels are not counted, as they follow the tree downstream
     int branches, correct, too_short, missed, leaks;
     double cpu_s;
 } Trial;
@@ -66,7 +66,7 @@ static double centreline_distance(const VesselTree *tree, Vec3 x, double *radius
     return least;
 }
 
-// In the trunk, between three and seven tenths of its length, up to 0.4 radii off its axis; or a place seven radii and more from every vessel's axis.
+// A point in the trunk, between three and seven tenths of its length and up to 0.4 radii off its axis, or a point at least seven radii from all vessel axes.
 static bool click_of(const Kind *kind, const VesselTree *truth, const TrackBranch *trunk, const Volume *volume, Random *random, Vec3 *click)
 {
     if (kind->is_beside) {
@@ -89,8 +89,7 @@ static bool click_of(const Kind *kind, const VesselTree *truth, const TrackBranc
     return true;
 }
 
-// Share of the trunk's centreline that lies within one true radius of the tracked one, sampled at the true nodes; those of the first two radii are
-// not scored.
+// Fraction of the trunk's centreline within one true radius of the tracked centreline, sampled at the true nodes; the first two radii are not scored.
 static double trunk_share(const TrackBranch *trunk, const VesselTree *truth, const VesselTree *tracked)
 {
     int asked = 0, met = 0;
@@ -166,7 +165,7 @@ static void run_trial(void *context, long index)
     o.noise = kind->noise / kind->contrast;
     o.band = kind->band / kind->contrast;
     o.band_mm = fmax(1, kind->band_radii * kind->radius);
-    o.seed = 1 + (uint64_t)seed;   // as `synth --seed` has it
+    o.seed = 1 + (uint64_t)seed;   // the same as `synth --seed`
     o.threads = 1;
     VesselTree *truth = shape ? shape_sample(shape, faults) : NULL, *tracked = NULL;
     Volume *volume = truth ? shape_volume_with(shape, &o, faults) : NULL;
@@ -275,7 +274,7 @@ static void json_row(cJSON *list, const Kind *kind, const Row *r)
     cJSON_AddItemToArray(list, item);
 }
 
-// `kept` is NULL for an aim.
+// `kept` is NULL for a desired value.
 static void print_verdict(FILE *out, const char *what, double found, double limit, bool at_least, bool *kept)
 {
     bool reached = at_least ? found >= limit : found <= limit;

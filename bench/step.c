@@ -1,8 +1,8 @@
 // seldinger bench step: the cost of a simulation step, by stage, and its accuracy.
 //
-//   scenes       the whole script of spiral, phantom and aneurism on the widest SIMD level: CPU time of the step and its stages, contacts, depth
-//   force error  every so many steps, and each that did not converge, is taken again from its checkpoint with tolerance 1e-10; the error is the
-//                largest difference of a node's wall force, over the step's largest. Some are taken a third time by the pointwise form, to 1e-8
+//   scenes       the whole script of spiral, phantom and aneurism with the widest SIMD level: CPU time of the step and its stages, contacts, depth
+//   force error  steps at regular intervals, and all that did not converge, are repeated from a checkpoint with tolerance 1e-10; the error is the largest
+//                difference of a node's wall force, divided by the largest force of the step. Some are repeated with the pointwise form, to 1e-8
 //   growth       the spiral's wire in 50 to 800 elements
 //   levels       the same runs with each SIMD level forced: the state hash must not change
 //   kernels      assembly, factor and solve, detection alone, against the budgets (list_budgets)
@@ -21,7 +21,7 @@
 enum { CASES = 3, GROWTHS = 5 };
 
 typedef struct Case {
-    const char *name, *path, *needs;     // `needs`: a file without which the case is skipped
+    const char *name, *path, *needs;     // `needs`: without this file the case is skipped
 } Case;
 static const Case cases[CASES] = {{"spiral", "scenes/spiral/scene.yaml", NULL},
                                   {"phantom", "scenes/phantom/scene.yaml", NULL},
@@ -155,7 +155,7 @@ static bool force_error(const Scene *scene, const Vessel *vessel, int64_t steps,
 
 enum { BATCH = 8, BATCHES = 201 };
 
-// Median time of a call [us], over batches, after one to warm up.
+// Median time of a call [us] over batches, after one batch to warm up.
 static double time_of(void (*call)(void *context), void *context)
 {
     double time[BATCHES];
@@ -233,7 +233,7 @@ typedef struct Detection {
     const Vessel *vessel;
     int count;
     double reach;
-    Vec3 point[2][POINTS];               // at two successive steps, taken in turn
+    Vec3 point[2][POINTS];               // at two successive steps, used alternately
     VesselMemory memory[POINTS];
     VesselHit hit[POINTS];
     int turn;
@@ -246,7 +246,7 @@ static void call_query(void *context)
     vessel_query(d->vessel, d->count, d->point[d->turn], d->reach, d->memory, d->hit);
 }
 
-// The free nodes nearest to the wall at a crowded step, along the wire; moved to and fro by that step's motion.
+// The free nodes nearest to the wall at a step with many contacts, in order along the wire; they alternate between the positions before and after that step.
 void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection, int *points, Faults *faults)
 {
     Simulator *simulator = simulator_create(scene, vessel, faults);
@@ -338,11 +338,11 @@ static void print_scene(FILE *out, const char *name, const StepFigures *run, con
             run->hash);
 }
 
-// A tool at rest is fast and uninformative.
+// The steps of a tool that does not advance are fast, so that their times mean nothing.
 static void print_stall(FILE *out, const StepFigures *run)
 {
     if (fabs(run->stalled_mm) > 0.01)
-        fprintf(out, "  STALLED: %.2f mm of what the hand fed are not in the vessel at the end\n", run->stalled_mm);
+        fprintf(out, "  STALLED: %.2f mm of the length fed by the hand are not in the vessel at the end\n", run->stalled_mm);
 }
 
 static void print_growth(FILE *out, const StepBench *bench)
@@ -565,7 +565,7 @@ static const OptionTable table = {
     .program = "seldinger bench step",
     .does = "a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets; --tools: coaxial tools",
     .usage = "[options]",
-    .intro = "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level. Run it "
+    .intro = "Time of a simulation step by stage, and its error: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level. Run it "
              "from the "
              "project's folder. Times are CPU times of the simulation's thread.",
     .exits = "0 done; 1 state hashes differ between SIMD levels or repetitions; 2 wrong usage or bad input",

@@ -1,8 +1,9 @@
 // seldinger bench step --tools: the cost of a step of coaxial tools, by number of tools and nodes.
 //
-// Stacks of four library tools in the phantom, the arch and the angiogram; with three the intermediate catheter is taken out, with two the guide too, with one
-// the microcatheter. Nodes are spread evenly from the outermost hub to the depth to which the wire goes, and tool j of K goes to (j + 1) / K of it: each layer has the same share.
-// First all hands push until the tips are there, each at its own speed; then all move against each other, along and about; then they rest.
+// Four tools of the device library in the phantom, the arch and the angiogram. With three tools the intermediate catheter is left out, with two also the guide,
+// with one also the microcatheter. Nodes are spread evenly from the outermost hub to the depth of the wire, and tool j of K reaches (j + 1) / K of it:
+// each layer has the same share. First all hands push until the tips are there, each at its own speed; then the tools slide and rotate against each other;
+// then they rest.
 #include "bench/tools.h"
 
 #include <inttypes.h>
@@ -12,18 +13,18 @@
 
 static const char *const vessel_name[TOOLS_VESSELS] = {"phantom", "arch", "angiogram"};
 static const struct {
-    const char *path, *needs;            // `needs`: a file without which it is skipped
+    const char *path, *needs;            // `needs`: without this file the row is skipped
     double depth_mm, speed_mm_s;         // of the wire
 } stack[TOOLS_VESSELS] = {{"scenes/coaxial/siphon.yaml", NULL, 90, 20},
                           {"scenes/coaxial/arch.yaml", "scenes/arch/arch.h5", 300, 48},
                           {"scenes/coaxial/angiogram.yaml", "scenes/aneurism/aneurism.h5", 100, 20}};
 static const int tools_bench_nodes[TOOLS_NODES] = {50, 100, 200, 400};
-static const double margin_mm = 15, hub_mm = 25;     // of the outermost tool, in the sheath at the end; by which the hub of each inner one is further back
+static const double margin_mm = 15, hub_mm = 25;     // length of the outermost tool that stays in the sheath; distance between successive hubs
 // Limits for the cost by number of tools and nodes: median and p99.9.
 static const double must_us[2] = {300, 1000};
 enum { MUST_TOOLS = 3, MUST_NODES = 200, SECTIONS_MOST = 64 };
 
-// Keeps the distal `length` of a tool. `section` has room for all of them.
+// Keeps the distal `length` of a tool. `section` has room for all its sections.
 static void cut(WireOptions *wire, double length, WireSection *section)
 {
     int first = wire->section_count;
@@ -37,7 +38,7 @@ static void cut(WireOptions *wire, double length, WireSection *section)
     wire->section_count = count;
 }
 
-// The scene with `tools` of its four. `section`: room for theirs.
+// The scene with `tools` of its four tools. `section`: room for their sections.
 static Scene with_tools(const Scene *scene, int tools, int nodes, double depth, WireSection *section)
 {
     static const int kept[4][4] = {{3}, {2, 3}, {0, 2, 3}, {0, 1, 2, 3}};
@@ -61,7 +62,7 @@ static Scene with_tools(const Scene *scene, int tools, int nodes, double depth, 
 static ToolCommands commands_at(int tools, double t_s, double feed_s, double speed)
 {
     ToolCommands c = {0};
-    // push and twist of each hand, in shares of the speed and of 90 degrees a second: half a second each
+    // push and twist of each hand, as fractions of the speed and of 90 degrees a second; each row lasts half a second
     static const double play[6][4][2] = {{{0, 0}, {-0.5, 0.5}, {0.5, 1}, {-0.5, 1}}, {{0.2, 0}, {0.5, 0.5}, {-0.5, 0}, {0.5, 0}},
                                          {{0, 0.3}, {0, 0}, {0.5, -1}, {0.5, -1}},   {{-0.2, 0}, {0, -0.5}, {-0.5, 0}, {-0.5, 0}},
                                          {{0, -0.3}, {0, 0}, {0, 0}, {0, 0}},        {{0, 0}, {0, -0.5}, {0, 0}, {0, 0}}};

@@ -1,4 +1,4 @@
-// The table of `bench step --tools`: steps of one to four coaxial tools in three vessels, with 50 to 400 nodes.
+// The table of `bench step --tools`: steps with one to four coaxial tools in three vessels, with 50 to 400 nodes.
 #ifndef SELDINGER_BENCH_TOOLS_H
 #define SELDINGER_BENCH_TOOLS_H
 

@@ -16,9 +16,9 @@
 #include <unistd.h>
 
 enum { MODELS_MOST = 8, TRUTH_EVERY = 5, FAULT_TEXT = 240 };
-static const double outside_mm = 0.2;     // deeper in the true wall than this: failed
-static const double unreported_mm = 0.05; // or by this much deeper than the program says
-static const double kink_rad = 1;         // an element that turns by more is outside beam theory: such runs are counted, and their energy is not judged
+static const double outside_mm = 0.2;     // a run fails if a node is deeper in the true wall than this …
+static const double unreported_mm = 0.05; // … or deeper than reported by this
+static const double kink_rad = 1;         // an element with a larger rotation is outside beam theory: such runs are counted, and their energy is not judged
 static const double stuck_mm = 10;        // [mm] fed but not inserted, though inserted with steps and elements half as long
 
 typedef enum { FAILED_DEEP = 1, FAILED_UNREPORTED = 2, FAILED_NUMBER = 4, FAILED_ENERGY = 8, FAILED_STUCK = 16, FAILED_REFUSED = 32 } Failure;
@@ -30,8 +30,8 @@ typedef struct Outcome {
     TortureTool tool;
     unsigned failed;
     int64_t steps, cut, not_converged;
-    double deepest, unreported;      // [mm] in the true wall; by how much more than reported
-    double deepest_s, gained, gained_end, gained_mean, work;  // when; [mJ]
+    double deepest, unreported;      // [mm] depth in the true wall; unreported part of the depth
+    double deepest_s, gained, gained_end, gained_mean, work;  // time of `deepest`; energies [mJ]
     double not_taken;                // [mm] fed by the hands but not inserted
     bool was_compared, kinks;
     char reason[FAULT_TEXT];         // FAILED_REFUSED
@@ -55,12 +55,12 @@ typedef struct Witness {
     const Vessel *contact, *truth;
     Stepper *stepper;
     NodeReport *node;
-    double outside_before;   // [mm] true depth of the state that the next step reports
+    double outside_before;   // [mm] true depth of the state to which the next report applies
     int64_t step;
     double fed[STEP_TOOLS_MAX];
 } Witness;
 
-// Without the previous position on the wall.
+// Queries without the previous position on the wall.
 static double true_gap(const Vessel *vessel, Vec3 place, double reach)
 {
     VesselHit hit;
@@ -90,7 +90,7 @@ static bool is_kinked(const WireState *state)
 {
     for (int i = 0; i + 1 < state->node_count; i++) {
         const Quat *p = &state->orientation[i], *q = p + 1;
-        // about the axes across; the twist does not count
+        // only about the transverse axes; the twist does not count
         Quat turn = quat_mul(quat_conjugate(*p), *q);
         if (2 * asin(fmin(1, hypot(turn.y, turn.z))) > kink_rad)
             return true;
@@ -112,7 +112,7 @@ static bool watch_step(void *context, Simulator *simulator, const ToolCommands *
     const StepReport *report = simulator_last(simulator);
     for (int k = 0; k < stepper_tool_count(w->stepper); k++)
         w->fed[k] += commands->tool[k].push_mm_s * simulator_scene(simulator)->dt / 1000;
-    // the report is of the state at the step's start, which was looked at after the step before
+    // the report is for the state at the start of the step, which was measured after the previous step
     if (w->outside_before - report->penetration > w->outcome->unreported)
         w->outcome->unreported = w->outside_before - report->penetration;
     w->outside_before = 0;
@@ -165,7 +165,7 @@ static void drive(const Scene *scene, const Vessel *contact, const Vessel *truth
     simulator_destroy(simulator);
 }
 
-// A scene's text completely; `name` for messages.
+// Writes the whole text of a scene; `name` is for messages.
 static void run_text(Torture *torture, const char *text, const char *name, Outcome *outcome)
 {
     Faults *faults = calloc(1, sizeof *faults);
@@ -243,7 +243,7 @@ static void run_seed(void *context, long index)
 
 typedef struct Row {
     int64_t runs, steps, cut, not_converged, compared, kinked;
-    int64_t failed[FAILURES], by_end, by_mean;     // by_: runs that gain energy by one count alone (simulator.h)
+    int64_t failed[FAILURES], by_end, by_mean;     // by_end, by_mean: runs that gain energy by one criterion alone (simulator.h)
     double deepest, unreported, gained_share;
 } Row;
 
@@ -406,7 +406,7 @@ static const char *check(void *structure)
 
 static const OptionTable table = {
     .program = "seldinger bench torture",
-    .does = "random hands, tools and vessels, judged by the true wall",
+    .does = "random hands, tools and vessels, compared with the true wall",
     .usage = "[options]",
     .intro = "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four "
              "in each other), "

@@ -69,7 +69,7 @@ static void write_vessel(Draws *draws, TortureVessel kind, int model_count, cons
 
 // --- the tools ---
 
-// A bend that the catheter around it, or the vessel, can bear: a kick of 1 N.
+// A bend that the catheter around it, or the vessel, can hold with a force of 1 N.
 static double bend_radius(double radius, double diameter, double inner, double modulus_gpa)
 {
     double bending = 1000 * modulus_gpa * 3.141592653589793 / 64 * (pow(diameter, 4) - pow(inner, 4));
@@ -104,7 +104,7 @@ static void write_tool(Draws *draws, TortureTool tip, double diameter, double in
     soft += rest;
     fprintf(draws->out, "%selements: %.0f\n%ssections:\n", indent, elements * draws->finer, indent);
     fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n",
-            indent, fmax(length - soft, 20), diameter, inner, modulus); // a wide stiff tool has a wide curve
+            indent, fmax(length - soft, 20), diameter, inner, modulus); // a wide stiff tool has a large radius of curvature
     fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n",
             indent, soft, diameter, inner, tip_modulus);
     if (*curve)
@@ -148,12 +148,12 @@ static double draw_speed(Draws *draws, double most)
     return most * part * draw(draws, -0.8, 1);
 }
 
-// Each keeps a speed for a while; up to 100 mm/s and 1000 degrees a second, there and back.
+// Each hand keeps a speed for a while; up to 100 mm/s and 1000 degrees a second in both directions.
 static void write_script(Draws *draws, int tools, double seconds)
 {
     static const char *const name[4] = {"a", "b", "c", "d"};
     fprintf(draws->out, "script:\n");
-    for (double t = 0; t < seconds - 1e-3; t += draw(draws, 0.05, 0.5)) {    // times differ as they are written, too
+    for (double t = 0; t < seconds - 1e-3; t += draw(draws, 0.05, 0.5)) {    // the times also differ after rounding in the file
         fprintf(draws->out, "  - {t_s: %.4f", t);
         for (int k = 0; k < tools; k++) {
             double push = draw_speed(draws, 100), twist = draw_speed(draws, 1000);

@@ -17,10 +17,10 @@ typedef struct TortureScene {
     char *text;              // the caller frees
 } TortureScene;
 
-// The scene of a seed: the same text for the same arguments. `model`: files for TORTURE_MODEL (none: that kind is not drawn), `lumen_mm` the radius
-// at the inlet of each. Text NULL if there is no memory.
+// The scene of a seed: the same text for the same arguments. `model`: files for TORTURE_MODEL (none: that kind is not used), `lumen_mm` the radius
+// at the inlet of each. `text` is NULL if out of memory.
 TortureScene torture_scene(uint64_t seed, int64_t steps, int model_count, const char *const *model, const double *lumen_mm);
-// The same scene, but with steps and elements half as long: a run that ends elsewhere there was not converged.
+// The same scene, but with steps and elements half as long: if this run ends elsewhere, the first one was not converged.
 char *torture_scene_finer(uint64_t seed, int64_t steps, int model_count, const char *const *model, const double *lumen_mm);
 
 #endif

@@ -1,8 +1,8 @@
 // seldinger bench track: trackers on synthetic angiograms with truth, labelled as in Kerrien et al. 2017, Table 2.
 //
-// Per row all trees of a kind: random trees at four noise levels, and the difficulties named in the paper: vessels in contact, bone, aneurysms,
-// anisotropic voxels, contrast that fades, clipped brightness. "from one click" tracks the whole tree from the root's start. The others are run as
-// the authors ran them (5.2.1): one run a branch, started in it with the true point, direction and radius, and judged on that branch alone.
+// Each row is for all trees of a kind: random trees at four noise levels, and the difficulties listed in the paper: vessels in contact, bone, aneurysms,
+// anisotropic voxels, fading contrast, clipped brightness. "from one click" tracks the whole tree from the root's start. The other methods are used as in the
+// paper (5.2.1): one run per branch, started in it with the true point, direction and radius, and judged on that branch alone.
 #include "base/output.h"
 #include "bench/bench.h"
 #include "bench/starts.h"
@@ -50,8 +50,8 @@ typedef struct Figures {         // of a group and a method
 
 typedef struct Group {
     char name[48];
-    double noise;                // of the random trees whose figures must be reached; < 0: none
-    bool is_size;                // not of the table: what a tree of this size costs
+    double noise;                // of the random trees with required figures; < 0: none
+    bool is_size;                // not in the table: only for the time of a tree of this size
     Figures figures[METHODS];
 } Group;
 
@@ -147,7 +147,7 @@ static int make_cases(bool quick, int trees, Case *cases, Group *groups, int *gr
 
 // --- Runs ---
 
-typedef struct Angiogram {           // a case, made
+typedef struct Angiogram {           // a synthetic case
     const Case *about;
     Shape *shape;
     VesselTree *truth;
@@ -169,7 +169,7 @@ typedef struct Trials {
     Trial *trial;                // 1 + (METHODS - 1) branches
 } Trials;
 
-// A node of the branch `way` mm from where it begins, and one further on.
+// A node of the branch `way` mm from its start, and the next one.
 static RbtSeed seed_at(const Angiogram *image, const TrackBranch *branch, double way)
 {
     const VesselTree *truth = image->truth;
@@ -186,7 +186,7 @@ static RbtSeed seed_at(const Angiogram *image, const TrackBranch *branch, double
     return (RbtSeed){.start = truth->center[at], .toward = truth->center[next], .has_toward = true, .radius = truth->radius[at], .name = "start"};
 }
 
-// b of the total blur of the image.
+// b, the standard deviation of the total blur of the image.
 static double blur_of(const Angiogram *image, const RbtParameters *parameters)
 {
     double v2 = 0;
@@ -210,7 +210,7 @@ static void run_trial(void *context, long index)
     if (method == MHT || method == MHT_PAPER) {
         MhtParameters parameters = method == MHT ? mht_default_parameters() : mht_paper_parameters();
         parameters.max_length_mm = 1.3 * branch->length + 4 * branch->radius;
-        known.blur_mm = 0;       // the template's radius has no closed form of its bias
+        known.blur_mm = 0;       // there is no closed form for the bias of the template's radius
         tracked = faults ? mht_track(image->volume, &parameters, &seed, 1, 1, NULL, NULL, "bench", faults) : NULL;
     } else {
         RbtParameters parameters = method == PAPER ? rbt_paper_parameters() : rbt_default_parameters();
@@ -396,7 +396,7 @@ static void print_groups(FILE *out, const Group *groups, int count)
             "links that leave the lumen. Only for whole trees: a run a branch is judged on its branch alone. s/tree: CPU seconds.\n");
 }
 
-// Time against tracked length and nodes: narrow vessels have more nodes on a millimetre, and larger trees have more of them.
+// Time per tracked length and per node: narrow vessels have more nodes per millimetre, and larger trees have more narrow vessels.
 static void print_sizes(FILE *out, const Group *groups, int count)
 {
     fprintf(out, "\ncost of whole trees from one click, 5 %% noise\n");
@@ -485,8 +485,8 @@ static cJSON *json_of(const Group *groups, int count)
 typedef struct TrackBench {
     BenchOptions common;
     bool click_only, only_starts;
-    int starts;                  // of a kind
-    int trees;                   // random ones at a level of noise
+    int starts;                  // per kind
+    int trees;                   // random trees per noise level
 } TrackBench;
 
 static int call(void *structure, Faults *faults)
@@ -534,8 +534,8 @@ static const Option options[] = {
      .otherwise = "5"},
     {"click", NULL, OPTION_FLAG, OPTION_AT(TrackBench, click_only), "whole trees from one click alone, without the other trackers"},
     {"starts", "N", OPTION_INT, OPTION_AT(TrackBench, starts), "clicks in noisy volumes of each kind", .least = 1, .most = 100, .otherwise = "8"},
-    {"only-starts", NULL, OPTION_FLAG, OPTION_AT(TrackBench, only_starts), "these alone"},
-    BENCH_OPTIONS(TrackBench, common, "one small tree at 5 % noise and one of each trouble"),
+    {"only-starts", NULL, OPTION_FLAG, OPTION_AT(TrackBench, only_starts), "only these clicks"},
+    BENCH_OPTIONS(TrackBench, common, "one small tree at 5 % noise and one tree of each difficulty"),
 };
 
 static const char *check(void *structure)
@@ -559,7 +559,7 @@ static const OptionTable table = {
              "clipped volumes. Then what a millimetre of vessel costs in trees of two sizes, and clicks in volumes as noisy as VascuSynth's (contrast 12 to 15 "
              "of 255, "
              "noise 11 to 21, a bright band), refusals and warnings counted.",
-    .exits = "0 done; 1 a figure that must be reached is not; 2 wrong usage or bad input",
+    .exits = "0 done; 1 a required figure was missed; 2 wrong usage or bad input",
     CLI_OPTIONS(options, TrackBench),
     .check = check,
     .too_many = "unexpected argument ",

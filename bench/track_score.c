@@ -1,5 +1,5 @@
-// Every tracked node is located on the true tree. From the root outwards a node is good while it lies in the lumen where its parent leads to; where
-// it leaves, a run begins that continues to the run's last node. A short run that comes back to where it left is an excursion, no leak.
+// Every tracked node is located on the true tree. From the root outwards, a node is good while it lies in the lumen to which its parent leads. Where the
+// tracking leaves the lumen, a run of bad nodes begins. A short run that returns to the place where it left is an excursion, not a leak.
 #include "bench/track_score.h"
 
 #include "recon/volume/blurred_edge.h"
@@ -15,7 +15,7 @@ typedef struct Place {           // on a true tree
     int node;                    // the nearest
     int link;                    // the child of the nearest link
     double arc, radius, away;    // path length from the root, radius there, distance from the centreline
-    bool beyond;                 // off a tip's or the root's end
+    bool beyond;                 // beyond the end of a tip or of the root
 } Place;
 
 typedef struct Ball {
@@ -32,8 +32,8 @@ typedef struct Map {             // of a true tree
     Ball *ball;                  // around each GROUP of links
 } Map;
 
-typedef struct Run {             // of nodes that are not in the truth
-    int source;                  // branch that it left
+typedef struct Run {             // of successive nodes outside the true tree
+    int source;                  // the branch that the run left
     Place from;
     double length, limit, kind_mm[TRACK_LABELS];
     bool is_back, is_excursion;
@@ -43,7 +43,7 @@ typedef struct Step {            // of a tracked node
     Place place;
     Zone zone;
     int run;                     // -1: good
-    int furthest;                // true node furthest along on the path to here
+    int furthest;                // the most distal true node on the path to this node
     double since;                // path length since the run began
     bool jumped;
 } Step;
@@ -89,7 +89,7 @@ static bool map_make(const VesselTree *tree, Map *map)
     return true;
 }
 
-// The place that is nearest in radii.
+// The nearest place, with distances in radii.
 static Place locate(const Map *map, Vec3 x)
 {
     const VesselTree *tree = map->tree;
@@ -215,7 +215,7 @@ static bool leads_to(const Judge *j, const Place *from, const Place *to, double 
     return way_between(&j->map, from, to) <= 1.2 * straight + 4 * fmax(from->radius, to->radius);
 }
 
-// Node i after its nearest ancestor that is a vessel.
+// Judges node i after its nearest ancestor that is a vessel.
 static void judge_node(Judge *j, int i)
 {
     const VesselTree *tracked = j->tracked;
@@ -262,7 +262,7 @@ static void judge_node(Judge *j, int i)
     }
 }
 
-// What of the truth the link from node i's parent covers, and whether it stays inside.
+// Marks the part of the true tree that the link from node i's parent covers, and checks whether the link stays inside.
 static void follow_link(Judge *j, int i)
 {
     const VesselTree *tracked = j->tracked;
@@ -314,7 +314,7 @@ static TrackLabel run_kind(const Run *run)
     return TRACK_LB;
 }
 
-// Labels, once nodes and links are judged. `lost`: kind of the longest run that left each branch, or TRACK_ST; `hung`: reached by a jump.
+// Labels the branches after nodes and links are judged. `lost`: kind of the longest run that left each branch, or TRACK_ST; `hung`: reached by a jump.
 static void label_branches(Judge *j, const TrackLabel *lost, const bool *hung)
 {
     const VesselTree *tree = j->truth->tree;
@@ -371,7 +371,7 @@ static void judge(Judge *j, TrackLabel *lost, double *lost_mm, bool *hung)
         const Step *step = &j->step[i];
         if (tracked->kind[i] != NODE_VESSEL || !step->jumped)
             continue;
-        // the branch that the tracking left, should it not have been followed otherwise, was lost into a vessel in contact
+        // a branch that the tracking left, and that was not tracked otherwise, was lost into a vessel in contact
         int p = tracked->parent[i];
         while (tracked->kind[p] != NODE_VESSEL)
             p = tracked->parent[p];

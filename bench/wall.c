@@ -1,6 +1,6 @@
-// seldinger bench wall: the wall of fitted trees in one table, each line with its required and desired value.
+// seldinger bench wall: measurements of the wall of fitted trees in one table, each line with its required and desired value.
 //
-// Trees and models are made by the commands of `seldinger`, which lies beside this program, as a user makes them (their command is printed), or named on the command line.
+// Trees and models are given on the command line, or made by the program `seldinger` in this program's folder, with the commands of a user (which are printed).
 #include "bench/wall_measures.h"
 
 #include "base/heap.h"
@@ -28,7 +28,7 @@ typedef struct WallLimits {
 
 typedef struct WallLine {
     char row[24], on[32], what[64], unit[16], note[160];
-    double value;            // NAN: could not be measured, the note says why
+    double value;            // NAN: could not be measured; the note gives the reason
     WallLimits limits;
 } WallLine;
 
@@ -42,7 +42,7 @@ typedef struct WallTable {
 typedef struct WallModel {
     char name[32], tree[PATH], path[PATH];   // "" where there is none
     VesselTree *model;
-    WallCost cost;           // of the fit; cpu_s 0: it came as a model
+    WallCost cost;           // of the fit; cpu_s 0: the model was given
     double point_must, point_aim;            // NAN
     double wire_mm;          // diameter of the stiff wire
 } WallModel;
@@ -165,7 +165,7 @@ static bool open_model(WallBench *bench, WallModel *m, Faults *faults)
     return m->model != NULL;
 }
 
-// The trees that the table names, where their data are here and nothing else was given.
+// The default trees of the table, if their data is available and no files were given.
 static bool make_tree(WallBench *bench, int which, Faults *faults)
 {
     static const char volume[] = "../shared/data/aneurism.nrrd", trace[] = "scenes/aneurism/trace.yaml", arch[] = "out/arch-tree.h5";
@@ -405,7 +405,7 @@ static void judge_synth(WallBench *bench, const VesselTree *model, const Shape *
     reach_free(reach);
 }
 
-// Trees with truth: from exact samples, and from a click on their angiograms.
+// Trees with known truth: from exact samples, and from a click on their angiograms.
 static bool row_synth_junctions(WallBench *bench, Faults *faults)
 {
     bool good = true;
@@ -478,7 +478,7 @@ static bool row_spread(WallBench *bench, const WallModel *m, Faults *faults)
             good = wall_write_jittered(m->tree, 0.02, (uint64_t)seed + 1, tree, faults) && fit(bench, tree, path, NULL, faults);
             model = good ? tree_file_load(path, NULL, faults) : NULL;
         } else {
-            // the samples' positions must stay: the noise is added here
+            // the positions of the samples must not change, so the noise is added here
             char exact[PATH];
             work_path(bench, "spread", "-exact.h5", exact);
             work_path(bench, "spread", "-tree.h5", tree);
@@ -502,7 +502,7 @@ static bool row_spread(WallBench *bench, const WallModel *m, Faults *faults)
     return good;
 }
 
-// --- Forces at the hand, and the cost of a step ---
+// --- Forces at the hand, and the time of a step ---
 
 static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
 {
@@ -764,20 +764,20 @@ static const Option rows[] = {
     {"rows", "A,B", OPTION_TEXT, OPTION_AT(WallBench, wanted), "of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step",
      .take = take_rows, .otherwise = "all"},
     {"seeds", "N", OPTION_INT, OPTION_AT(WallBench, seeds), "fits of `spread`", .least = 2, .most = 20},
-    {"work", "DIR", OPTION_FOLDER, OPTION_AT(WallBench, folder), "where trees and models are put and kept", .otherwise = "a folder that is removed afterwards"},
+    {"work", "DIR", OPTION_FOLDER, OPTION_AT(WallBench, folder), "folder in which trees and models are written and kept", .otherwise = "a temporary folder"},
     BENCH_OPTIONS(WallBench, common, "only what is given, no synthetic angiograms, stiff wires for 1 s"),
 };
 
 static const OptionTable table = {
     .program = "seldinger bench wall",
-    .does = "one table of what the wall of fitted trees is worth: agreement, accuracy, ostia, reach, tools in it",
+    .does = "one table about the wall of fitted trees: agreement, accuracy, ostia, reach, tools in it",
     .usage = "[options] [TREE.h5|MODEL.h5 ...]",
     .intro = "The wall of fitted trees in one table: value, what it must be, what is aimed at, met or missed. Trees are fitted by `seldinger fit` first, "
              "models are taken as "
              "they are. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch, each skipped where it is "
              "not here. "
              "Run it from the project's folder. Figures of the first table row by row; CPU times are the commands' own.",
-    .exits = "0 done; 1 a line missed what it must be; 2 wrong usage or bad input",
+    .exits = "0 done; 1 a required value was missed; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, WallBench),
     .set_defaults = set_defaults,
     .check = check,

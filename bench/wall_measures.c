@@ -25,7 +25,7 @@ static double seconds_now(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-// Of all children that have ended.
+// CPU time of all child processes that have ended.
 static double children_cpu_s(void)
 {
     struct rusage used = {0};
@@ -42,7 +42,7 @@ bool wall_command(const char *const *argv, WallCost *cost, Faults *faults)
         list[count] = (char *)(size_t)argv[count - 1];
     char program[PATH_MAX];
     if (!process_beside("seldinger", program, sizeof program)) {
-        faults_add(faults, argv[0], 0, 0, "cannot be called: where this program lies is not known");
+        faults_add(faults, argv[0], 0, 0, "cannot be started: the folder of this program is not known");
         return false;
     }
     double begin = seconds_now(), cpu = children_cpu_s();
@@ -58,7 +58,7 @@ bool wall_command(const char *const *argv, WallCost *cost, Faults *faults)
         ended = child > 0 ? waitpid(child, &status, 0) : -1;
     while (ended < 0 && errno == EINTR);
     if (ended < 0 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-        faults_add(faults, argv[0], 0, 0, "ended with %d; what it printed says why", ended > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : -1);
+        faults_add(faults, argv[0], 0, 0, "ended with exit code %d; see its output above", ended > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : -1);
         return false;
     }
     if (cost)
@@ -98,7 +98,7 @@ bool wall_points(const VesselTree *model, PointFigures *out)
     return good;
 }
 
-// The parent's axis may be a little off the true one: only the line outside the parent's own ball is judged.
+// The parent's axis may differ slightly from the true one: only the line outside the parent's ball is judged.
 static bool is_false_link(const VesselTree *tree, const ReachJunction *junction, const Shape *truth, double slack)
 {
     enum { PLACES = 40 };

@@ -9,13 +9,13 @@
 typedef struct WallCost {
     double cpu_s, wall_s;    // of all its threads
 } WallCost;
-// argv[0] is the verb; NULL at the end. False with a fault that says how it ended. `cost` may be NULL.
+// argv[0] is the verb; NULL at the end. False with a fault that gives the exit code. `cost` may be NULL.
 bool wall_command(const char *const *argv, WallCost *cost, Faults *faults);
 
 // --- Models ---
 typedef struct PointFigures {
-    int count, unsure;       // points asked, at most 60,000, evenly by their order; answers that are not sure
-    double mean, p99, most;  // [mm] of their distance to the wall as met
+    int count, unsure;       // number of points queried, at most 60,000, evenly by their order; number of unsure results
+    double mean, p99, most;  // [mm] of their distance to the wall as in contact
 } PointFigures;
 bool wall_points(const VesselTree *model, PointFigures *out);
 
@@ -26,7 +26,7 @@ typedef struct TruthFigures {
 } TruthFigures;
 TruthFigures wall_judge_junctions(const VesselTree *model, const Reach *reach, const Shape *truth, double slack_mm);
 
-// The points moved by `sigma_mm` in each direction (standard deviation), for fits whose input's noise differs. False with a fault.
+// Moves the points randomly by `sigma_mm` in each direction (standard deviation), for fits with different noise. False with a fault.
 bool wall_write_jittered(const char *tree_path, double sigma_mm, uint64_t seed, const char *out_path, Faults *faults);
 
 #endif

@@ -28,7 +28,7 @@ bool wall_stiff_run(const Vessel *vessel, double diameter_mm, double length_mm, 
     Scene *scene = stiff_scene(diameter_mm, length_mm, seconds, run, faults);
     if (!scene)
         return false;
-    OpenVessel open = {.vessel = (Vessel *)(size_t)vessel};      // to read the inlet alone
+    OpenVessel open = {.vessel = (Vessel *)(size_t)vessel};      // only to read the inlet
     Simulator *simulator = open_vessel_inlet(scene, &open, faults) ? simulator_create(scene, vessel, faults) : NULL;
     if (simulator) {
         int64_t steps = bench_steps(scene, INT64_MAX);

@@ -1,12 +1,12 @@
-// Trees with blobby models along a given centreline, for tests: node i at the centreline's point i, its model a row of equal blobs along the
-// centreline over `overlap` nodes to each side, whose width makes the mid radius right on a straight line.
+// Trees with blobby models along a given centreline, for tests: node i is at point i of the centreline, and its model is a row of equal blobs along the
+// centreline over `overlap` nodes to each side. The width of the blobs gives the right radius in the middle of a straight line.
 #ifndef SELDINGER_TESTS_BLOB_TUBE_H
 #define SELDINGER_TESTS_BLOB_TUBE_H
 
 #include "geom/blobby.h"
 #include "geom/vessel_tree.h"
 
-// Width of blobs `spacing` apart, `count` in a row, whose surface is `radius` from the row's middle.
+// Width of `count` blobs in a row, `spacing` apart, whose surface is `radius` from the middle of the row.
 static inline double blob_row_width(int count, double spacing, double radius)
 {
     double low = 1e-6, high = 10 * radius;

@@ -1,5 +1,5 @@
-// Small trees with a field of shared blobs, made branch by branch, for tests: nodes half a radius apart, a blob at each, whose amplitude makes the radius
-// right on a straight line. Include after the headers of cmocka.
+// Small trees with a field of shared blobs, made branch by branch, for tests: nodes half a radius apart with a blob at each, whose amplitude gives the right
+// radius on a straight line. Include after the headers of cmocka.
 #ifndef SELDINGER_TESTS_FIELD_TREE_H
 #define SELDINGER_TESTS_FIELD_TREE_H
 
@@ -63,14 +63,14 @@ static inline int field_tree_branch(FieldTree *t, int parent, Vec3 from, Vec3 to
     return t->nodes - 1;
 }
 
-// Blobs upstream of the root, so that the tube is whole there.
+// Blobs upstream of the root, so that the tube continues there.
 static inline void field_tree_extend_root(FieldTree *t)
 {
     for (int k = 1; k <= 4; k++)
         field_tree_blob(t, 0, vec3_add_scaled(t->center[0], -0.5 * k * t->radius[0], t->direction[0]), 2 * t->radius[0], field_tree_amplitude());
 }
 
-// x -> turn x, where the rows of `turn` may mirror too.
+// x -> turn x; the matrix `turn` may also mirror.
 static inline VesselTree *field_tree_make(const FieldTree *t, const Mat3 *turn)
 {
     VesselTree *tree = vessel_tree_create_shared(t->nodes, 0, t->blobs);

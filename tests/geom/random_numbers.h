@@ -1,4 +1,4 @@
-// Random numbers of the tests: splitmix64, so that every machine draws the same.
+// Random numbers for the tests: splitmix64, which gives the same numbers on every machine.
 #ifndef SELDINGER_TESTS_RANDOM_NUMBERS_H
 #define SELDINGER_TESTS_RANDOM_NUMBERS_H
 

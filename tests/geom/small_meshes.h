@@ -1,4 +1,4 @@
-// Triangle meshes of the tests: spheres, tori, boxes, swept tubes, and what moves them.
+// Triangle meshes for the tests: spheres, tori, boxes, swept tubes, and transformations.
 #ifndef SELDINGER_TESTS_SMALL_MESHES_H
 #define SELDINGER_TESTS_SMALL_MESHES_H
 
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Grown without bounds' checks: room for what the tests make.
+// Appends without bounds checks: the capacity is enough for the tests.
 static inline TriangleMesh mesh_room(int vertices, int triangles)
 {
     TriangleMesh m = {.vertex = calloc((size_t)vertices, sizeof(Vec3)),
@@ -38,7 +38,7 @@ static inline void mesh_triangle(TriangleMesh *m, int a, int b, int c)
     t[0] = a, t[1] = b, t[2] = c;
 }
 
-// Unit sphere: an octahedron's faces cut in n^2 each, by vertices on a lattice.
+// Unit sphere: each face of an octahedron is divided into n^2 triangles by vertices on a lattice.
 static inline TriangleMesh sphere_mesh(int n)
 {
     TriangleMesh m = mesh_room(8 * (n + 1) * (n + 2) / 2, 8 * n * n);
@@ -69,7 +69,7 @@ static inline TriangleMesh sphere_mesh(int n)
     return m;
 }
 
-// `more` after it, moved by `by`; inside out where asked.
+// Appends `more`, moved by `by`, optionally inside out.
 static inline TriangleMesh mesh_and(TriangleMesh m, TriangleMesh more, Vec3 by, bool inside_out)
 {
     TriangleMesh all = mesh_room(m.vertex_count + more.vertex_count, m.triangle_count + more.triangle_count);
@@ -88,7 +88,7 @@ static inline TriangleMesh mesh_and(TriangleMesh m, TriangleMesh more, Vec3 by, 
     return all;
 }
 
-// A strip of rings: ring j holds `around` vertices from first + j * around, counter-clockwise seen against the way from ring to ring.
+// A strip of rings: ring j holds `around` vertices from first + j * around, counter-clockwise seen against the direction from ring to ring.
 static inline void mesh_join_rings(TriangleMesh *m, int first, int second, int around)
 {
     for (int i = 0; i < around; i++) {
@@ -110,7 +110,7 @@ static inline TriangleMesh torus_mesh(double radius, double tube, int rings, int
         }
     for (int j = 0; j < rings; j++)
         mesh_join_rings(&m, j * around, (j + 1) % rings * around, around);
-    for (int t = 0; t < m.triangle_count; t++) {     // rings run the other way round here
+    for (int t = 0; t < m.triangle_count; t++) {     // these rings have the opposite orientation
         int b = m.triangle[t][1];
         m.triangle[t][1] = m.triangle[t][2], m.triangle[t][2] = b;
     }
@@ -159,7 +159,7 @@ static inline TriangleMesh prism_mesh(const Vec3 *corner, int count, double heig
     return m;
 }
 
-// A pyramid over a square of 0.2 x 0.2, 1 high, one of whose sides is cut into `fan` triangles about the tip.
+// A pyramid over a square of 0.2 x 0.2, 1 high; one of its sides is divided into `fan` triangles at the tip.
 static inline TriangleMesh spike_mesh(int fan)
 {
     TriangleMesh m = mesh_room(fan + 5, fan + 3 + fan + 1);
@@ -180,7 +180,7 @@ static inline TriangleMesh spike_mesh(int fan)
     return m;
 }
 
-// Rotated by q, moved; mirrored in x before where asked, triangles turned so that they face outwards still.
+// Rotates by q and moves; optionally first mirrors in x and reverses the triangles so that they still face outwards.
 static inline void mesh_move(TriangleMesh *m, Quat q, Vec3 by, bool mirrored)
 {
     for (int v = 0; v < m->vertex_count; v++) {
@@ -196,7 +196,7 @@ static inline void mesh_move(TriangleMesh *m, Quat q, Vec3 by, bool mirrored)
     }
 }
 
-// Vertices of a star-shaped mesh in and out along their rays, by up to `part` of their distance: edges and corners of all kinds.
+// Moves the vertices of a star-shaped mesh in and out along their rays by up to `part` of their distance, which gives edges and corners of all kinds.
 static inline void mesh_crumple(TriangleMesh *m, double part, uint64_t seed)
 {
     for (int v = 0; v < m->vertex_count; v++)

@@ -1,5 +1,5 @@
-// Blobby models: the table of docs/references.md, derivatives against central differences with their order, the closest surface point
-// against spheres (exact) and against sampling.
+// Blobby models: the table of docs/references.md, derivatives compared with central differences and their order, the closest surface point compared with
+// spheres (exact) and with sampling.
 #include "geom/blobby.h"
 #include "random_numbers.h"
 
@@ -25,7 +25,7 @@ static void radius_table(void **state)
     assert_true(blob_radius(0.1, 0.1) == 0 && blob_radius(0.05, 0.1) == 0);
 }
 
-// Two co-centred blobs of the split's width have the same iso-surface as the one before.
+// Two concentric blobs with the width after splitting have the same iso-surface as the blob before.
 static void split_table(void **state)
 {
     (void)state;
@@ -130,7 +130,7 @@ static void sphere_is_exact(void **state)
         double r = random_in(&seed, 0.2, 3), rho = blob_width_for_radius(r, 0.1), d = random_in(&seed, 0.001, 40) * (trial % 2 ? 1 : 0.02 * r);
         Blobby one = {.count = 1, .center = &c, .width = &rho, .iso_level = 0.1};
         Vec3 x = vec3_add_scaled(c, d, u);
-        // from nowhere, and from a last contact somewhere else on the sphere
+        // without a start, and from a last contact elsewhere on the sphere
         for (int warm = 0; warm < 2; warm++) {
             SurfacePoint s = blobby_project(&one, x, warm ? vec3_add_scaled(c, r, random_unit_vector(&seed)) : x);
             assert_true(s.converged);
@@ -164,7 +164,7 @@ static void centre_and_far_away(void **state)
     for (int i = 0; i < 3; i++) {
         SurfacePoint s = blobby_project(&one, vec3(bad[i], 0, 0), vec3(bad[i], 0, 0));
         assert_true(!s.converged && vec3_is_finite(s.foot) && vec3_is_finite(s.normal) && isfinite(s.distance));
-        s = blobby_project(&one, vec3(0, 0, 0), vec3(bad[i], 0, 0));   // a lost memory is no harm
+        s = blobby_project(&one, vec3(0, 0, 0), vec3(bad[i], 0, 0));   // invalid memory does no harm
         assert_true(s.converged);
     }
     double tiny = 0.05;   // below T there is no surface
@@ -175,7 +175,7 @@ static void centre_and_far_away(void **state)
     assert_true(!s.converged && vec3_is_finite(s.foot));
 }
 
-// On a tube's axis every foot is as good; the answer is the radius, and the same each time.
+// On the axis of a tube all closest points are equally near; the result is the radius, and the same each time.
 static void tube_axis(void **state)
 {
     (void)state;
@@ -194,7 +194,7 @@ static void tube_axis(void **state)
     assert_true(vec3_distance(on.foot, again.foot) == 0);
 }
 
-// The least distance over a dense sampling of the surface: rays from the centre of every blob, out to the first and each later crossing.
+// The smallest distance over a dense sampling of the surface: all crossings of rays from the centre of every blob.
 static double sampled_distance(const Blobby *m, Vec3 x)
 {
     enum { RAYS = 900, STEPS = 60 };
@@ -235,7 +235,7 @@ static void closest_against_sampling(void **state)
     }
 }
 
-// Inside, at a top of the field (no gradient) or anywhere, whatever the start: the sign of the distance is that of f, and no wall crosses the way.
+// Inside, at a maximum of the field (no gradient) or anywhere, for any start: the sign of the distance is that of f, and there is no wall before the foot.
 static void own_side_from_any_start(void **state)
 {
     (void)state;
@@ -264,7 +264,7 @@ static void own_side_from_any_start(void **state)
     assert_true(inside > 4000);
 }
 
-// Where the field is flat the first foot is any wall's: the nearest is found all the same.
+// Where the field is flat, the first foot may be on any wall: the nearest one is found nevertheless.
 static void nearest_from_a_top_of_the_field(void **state)
 {
     (void)state;
@@ -284,7 +284,7 @@ static void nearest_from_a_top_of_the_field(void **state)
     }
 }
 
-// A row of blobs that thins out: at its middle the field falls fastest along the row, but the wall is beside.
+// A row of blobs that becomes thinner: at its middle the field falls fastest along the row, but the nearest wall is at the side.
 static void tapered_row(void **state)
 {
     (void)state;
@@ -301,7 +301,7 @@ static void tapered_row(void **state)
             Vec3 x = vec3_scale(axis, s);
             SurfacePoint p = blobby_project(&m, x, x);
             assert_true(p.converged);
-            double wide = 0;   // the section's radius here: no nearer wall may be further
+            double wide = 0;   // radius of the section here: the nearest wall may not be further away
             for (double step = 1; step > 1e-10; step /= 2)
                 if (blobby_field(&m, vec3_add_scaled(x, wide + step, vec3_normal_to(axis))) > 0)
                     wide += step;
@@ -310,7 +310,7 @@ static void tapered_row(void **state)
     }
 }
 
-// Near the surface there is no choice of lobes: the foot is the closest point, whatever the model.
+// Near the surface there is only one lobe: the foot is the closest point for any model.
 static void closest_near_the_surface(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-// Contact with a field of shared blobs: exact walls, the lanes against a plain twin on every instruction set, derivatives, feet that are followed against feet
-// from scratch, one wall across cells, kissing vessels, the inlet, motion and mirroring of the scene, places where no field is, no heap.
+// Contact with a field of shared blobs. A foot is the closest point on the wall. Tests: exact walls; the lanes compared with a plain implementation on every
+// instruction set; derivatives; tracked feet compared with feet found without a start; the same wall across cells; touching vessels; the inlet; motion and
+// mirroring of the scene; places without a field; no heap calls.
 #include "blob_tube.h"
 #include "field_line.h"
 #include "geom/field_lanes.h"
@@ -57,7 +58,7 @@ static bool same_hit(const VesselHit *a, const VesselHit *b)
            memcmp(&a->hessian, &b->hessian, sizeof a->hessian) == 0 && a->node == b->node && a->flags == b->flags;
 }
 
-// A tool of points wandering along the tree, `aside` from its axis at most about.
+// A tool of points that move along the tree, at most about `aside` from its axis.
 static Vec3 wander(const VesselTree *t, uint64_t *seed, int step, int steps, Vec3 x, double stride)
 {
     double s = (double)step / steps * (t->node_count - 6.001) + 3;
@@ -89,7 +90,7 @@ static void one_blob_is_a_sphere(void **state)
         u = vec3_unit(u);
         VesselHit hit = ask(v, vec3_add_scaled(t->center[0], d, u), 0, 100);
         assert_int_equal(hit.flags, 0);
-        assert_near(hit.gap, 2 - d, 1e-8 * (1 + d) * (1 + d));    // far off the normal's error counts
+        assert_near(hit.gap, 2 - d, 1e-8 * (1 + d) * (1 + d));    // at large distances the error of the normal counts
         assert_true(vec3_distance(hit.normal, vec3_negate(u)) < 1e-5);
         if (d > 0.4)
             assert_near(sym3_quadratic(&hit.hessian, vec3_normal_to(u)) * d, -1, 1e-4);   // of the last evaluation
@@ -98,7 +99,7 @@ static void one_blob_is_a_sphere(void **state)
     vessel_tree_free(t);
 }
 
-// A straight row of equal blobs is a tube with waves, whose depth falls quickly with the blobs' distance.
+// A straight row of equal blobs is a tube with waves, whose amplitude falls quickly as the blobs get closer.
 static void row_becomes_a_tube(void **state)
 {
     (void)state;
@@ -120,9 +121,9 @@ static void row_becomes_a_tube(void **state)
     assert_true(worst[0] < 5e-2 && worst[1] < 0.5 * worst[0] && worst[2] < 0.3 * worst[1]);
 }
 
-// --- the plain twin ---
+// --- the plain implementation ---
 
-// What a query should say, in the plainest way: feet from many starts by damped steps on what the foot's cell sees, the closest of them.
+// The expected result of a query, computed simply: feet from many starts by damped steps on the field of the foot's cell; the closest of them.
 typedef struct Twin {
     double gap;
     Vec3 foot, normal;
@@ -176,7 +177,7 @@ static Twin twin_of(const VesselTree *t, Vec3 x, int node)
     return best;
 }
 
-// Points that creep along the wall, each answer compared with the twin's.
+// Points that move slowly along the wall; each result is compared with the plain implementation.
 static void walks_against_twin(void **state)
 {
     (void)state;
@@ -251,7 +252,7 @@ static void same_bits_on_every_isa(void **state)
     vessel_tree_free(t);
 }
 
-// A point's answer does not depend on the points it is asked with, nor on which blobs its memory happens to hold.
+// The result for a point depends neither on the other points of the query nor on the blobs in its memory.
 static void alone_as_in_company(void **state)
 {
     (void)state;
@@ -280,7 +281,7 @@ static void alone_as_in_company(void **state)
         VesselMemory a = together[k], b = together[k];
         if (!a.has_foot || a.blobs < 0)
             continue;
-        b.held_for2 = -1;    // has to be made again
+        b.held_for2 = -1;    // the list must be made again
         VesselHit ha, hb;
         vessel_query(v, 1, &x[k], 0.5, &a, &ha);
         vessel_query(v, 1, &x[k], 0.5, &b, &hb);
@@ -305,7 +306,7 @@ static void derivatives_of_the_gap(void **state)
         Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit_vector(&seed));
         VesselMemory memory = {.node = -1};
         VesselHit hit;
-        for (int k = 0; k < 2; k++)    // the Hessian is that of the last evaluation: asked again, of the foot
+        for (int k = 0; k < 2; k++)    // the Hessian is that of the last evaluation; in a second query it is that of the foot
             vessel_query(v, 1, &x, 5, &memory, &hit);
         double bend = sqrt(sym3_quadratic(&hit.hessian, vec3(1, 0, 0)) * sym3_quadratic(&hit.hessian, vec3(1, 0, 0))) + fabs(sym3_trace(&hit.hessian));
         if (fabs(hit.gap) > 0.4 || bend > 4)
@@ -343,7 +344,7 @@ static void derivatives_of_the_gap(void **state)
 
 // --- one wall ---
 
-// Along the wall in steps of 2 um: what the gap changes by beyond the motion is a jump of the wall.
+// Along the wall in steps of 2 um: a change of the gap beyond the motion is a jump of the wall.
 static void no_jump_between_cells(void **state)
 {
     (void)state;
@@ -364,7 +365,7 @@ static void no_jump_between_cells(void **state)
             VesselHit hit;
             vessel_query(v, 1, &x, 5, &memory, &hit);
             assert_int_equal(hit.flags, 0);
-            // another node for the same foot: ask the former one, too
+            // another node for the same foot: query the former node, too
             if (last.gap < HUGE_VAL && last.node != hit.node) {
                 Blobby a = blobby_of(t, last.node), b = blobby_of(t, hit.node);
                 Vec3 ga, gb;
@@ -382,7 +383,7 @@ static void no_jump_between_cells(void **state)
     vessel_tree_free(t);
 }
 
-// Two arms of a hairpin whose walls touch: from five radii behind the bend on each is a tube as if the other were not there.
+// Two arms of a hairpin whose walls touch: from five radii behind the bend on, each is a tube as if the other did not exist.
 static void kissing_vessels_keep_apart(void **state)
 {
     (void)state;
@@ -434,7 +435,7 @@ static void inlet_is_open(void **state)
         Vec3 at = {x, 0.7, 0};
         vessel_query(v, 1, &at, 0.5, &memory, &hit);
         assert_int_equal(hit.flags, x < 0 ? VESSEL_BEYOND : 0);
-        if (last.gap < 1) {      // smooth across the plane: the gap changes as the normal says, the normal as the Hessian says
+        if (last.gap < 1) {      // smooth across the plane: the gap changes according to the normal, the normal according to the Hessian
             assert_near(last.gap - hit.gap, 0.01 * 0.5 * (hit.normal.x + last.normal.x), 2e-5);
             Vec3 bends = vec3_scale(vec3_sub(last.normal, hit.normal), 100);
             assert_true(vec3_distance(bends, sym3_mul_vec(&hit.hessian, vec3(1, 0, 0))) < 0.1);
@@ -495,7 +496,7 @@ static void moved_and_mirrored_scenes(void **state)
     }
 }
 
-// --- where there is no field ---
+// --- places without a field ---
 
 static void nowhere_is_survived(void **state)
 {
@@ -524,7 +525,7 @@ static void nowhere_is_survived(void **state)
         assert_true(hit.gap > 0.6 && hit.gap < 1.2);
         assert_near(vec3_norm(hit.normal), 1, 1e-9);
     }
-    for (int trial = 0; trial < 300; trial++) {      // from outside, also of all supports, the answer leads home
+    for (int trial = 0; trial < 300; trial++) {      // from outside, even outside all supports, the result leads back
         int node = 5 + trial % 50, steps = 0;
         Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit_vector(&seed));
         VesselMemory m = {.node = node};
@@ -541,7 +542,7 @@ static void nowhere_is_survived(void **state)
     vessel_tree_free(t);
 }
 
-// VESSEL_FAR is a bound: no wall of the point's part is nearer, and it is said only beyond reach.
+// VESSEL_FAR is a bound: no wall of the point's part is nearer, and it is set only beyond reach.
 static void far_is_far(void **state)
 {
     (void)state;
@@ -567,7 +568,7 @@ static void far_is_far(void **state)
     vessel_tree_free(t);
 }
 
-// A memory that is copied and put back repeats to the bit; queries ask for no memory.
+// A memory that is saved and restored gives bit-identical results; queries allocate nothing.
 static void copies_repeat_and_heap_rests(void **state)
 {
     (void)state;
@@ -602,7 +603,7 @@ static void copies_repeat_and_heap_rests(void **state)
     vessel_tree_free(t);
 }
 
-// More blobs about a point than a memory holds: the whole list answers, and says the same.
+// If there are more blobs around a point than a memory can hold, the whole list is used, with the same result.
 static void crowded_places(void **state)
 {
     (void)state;
@@ -631,7 +632,8 @@ static void crowded_places(void **state)
     vessel_tree_free(t);
 }
 
-// A thin lumen beside a wide one, in the same cells, but hidden from their centres by the wide one's wall: a point that crosses it meets the wall across.
+// A thin lumen beside a wide one, in the same cells, but hidden from their centres by the wall of the wide one: a point that crosses it finds the opposite
+// wall.
 static void cleft_behind_the_wall(void **state)
 {
     (void)state;
@@ -669,7 +671,7 @@ static void cleft_behind_the_wall(void **state)
     vessel_tree_free(t);
 }
 
-// A vessel like a sponge: blobs at random places of a wide tube, which leave ridges, septa and pockets.
+// A vessel like a sponge: blobs at random places of a wide tube, which form ridges, septa and pockets.
 static VesselTree *sponge(void)
 {
     enum { LONG = 60, EACH = 12 };
@@ -693,7 +695,7 @@ static VesselTree *sponge(void)
     return t;
 }
 
-// A ball that rolls along a rough wall, with septa and ridges: where its foot was followed the wall is as near as a search from scratch finds it.
+// A ball that rolls along a rough wall with septa and ridges: the tracked wall is as near as the wall found by a search without a start.
 static void rough_walls_are_met(void **state)
 {
     (void)state;
@@ -733,7 +735,7 @@ static void rough_walls_are_met(void **state)
     vessel_tree_free(t);
 }
 
-// No more than 0.01 mm from the zero of the field of all blobs? Not where no node knows all lumen: its field ends there without a wall.
+// Is the foot within 0.01 mm of the zero of the field of all blobs? Not required where no node knows the whole lumen: its field ends there without a wall.
 static bool is_on_whole_wall(const VesselTree *t, Vec3 foot)
 {
     double f = -1;
@@ -771,7 +773,7 @@ static VesselTree *fork(uint64_t *seed)
     return t;
 }
 
-// Far from its cell a node does not see all lumen, and its field ends where there is no wall: no foot is there.
+// Far from its cell a node does not know the whole lumen, and its field ends where there is no wall: a foot may not be there.
 static void no_wall_where_a_field_ends(void **state)
 {
     (void)state;
@@ -798,7 +800,7 @@ static void no_wall_where_a_field_ends(void **state)
     assert_true(asked > FORKS * PLACES / 2 && ends == 0);
 }
 
-// A model that contradicts itself: from the middle on nodes miss every second blob, so that their wall is narrower. That is marked, and throws nobody.
+// A model that contradicts itself: from the middle on, nodes lack every second blob, so that their wall is narrower. This is flagged, and no tool jumps.
 static void contradiction_is_told(void **state)
 {
     (void)state;
@@ -838,7 +840,7 @@ static void contradiction_is_told(void **state)
 
 enum { HOLLOWS = 14, WALL_POINTS = 3000 };
 
-// A ball of a vessel with hollows and humps wherever chance has it.
+// A spherical vessel with hollows and humps at random places.
 static VesselTree *hollow_ball(uint64_t *seed)
 {
     VesselTree *t = vessel_tree_create_shared(1, 0, HOLLOWS);
@@ -860,7 +862,7 @@ static VesselTree *hollow_ball(uint64_t *seed)
     return t;
 }
 
-// Points of the wall on rays from the middle, where the inlet does not bend it.
+// Points of the wall on rays from the middle, away from the inlet.
 static void find_wall(const VesselTree *t, uint64_t *seed, Vec3 *wall)
 {
     Blobby blobs = blobby_of(t, 0);
@@ -890,15 +892,15 @@ static Vec3 nearest_of(const Vec3 *wall, Vec3 x)
     return wall[best];
 }
 
-// The gap is the way to the nearest point of the wall: no point of the wall is nearer than that. A ball is led along a wall in whose hollows it has two
-// feet, by the wall's points, not by what is answered; a foot that is followed must give way to the other one.
+// The gap is the distance to the nearest point of the wall: no point of the wall is nearer. A ball moves along a wall in whose hollows it has two feet. Its
+// path is given by points of the wall, not by the results; a tracked foot must be replaced by the nearer one.
 static void no_wall_is_nearer(void **state)
 {
     (void)state;
     static Vec3 wall[WALL_POINTS];
     int asked = 0, off = 0, far_off = 0;
     double worst = 0;
-    // of seeds 100 to 159 those where answers were most off before the rings were looked at: by up to 0.126 mm
+    // the seeds of 100 to 159 with the largest errors before rings were searched: up to 0.126 mm
     static const uint64_t from[] = {109, 110, 111, 151};
     for (size_t n = 0; n < sizeof from / sizeof from[0]; n++) {
         uint64_t seed = from[n];

@@ -1,5 +1,5 @@
-// A sampled distance against the vessel that it samples: orders of convergence, which side a point is on however far out, open ends, memory, turned, mirrored
-// and scaled, kissing walls, bad options.
+// A sampled distance compared with the sampled vessel: orders of convergence; the side of a point at any distance; open ends; memory; rotated, mirrored and
+// scaled vessels; touching walls; bad options.
 #include "geom/grid_vessel.h"
 #include "random_numbers.h"
 
@@ -74,7 +74,7 @@ static VesselHit ask(const Vessel *vessel, Vec3 x, double reach)
 }
 
 typedef struct Errors {
-    double gap, normal, rms_gap, rms_normal;     // largest, and mean squares' roots
+    double gap, normal, rms_gap, rms_normal;     // largest, and root mean square
     int count;
 } Errors;
 
@@ -104,7 +104,7 @@ static Errors errors_of(const Sampled *s, double within)
     return e;
 }
 
-// Linear interpolation of a distance whose curvatures are 1 / (r - gap) at most, r = 1, a cell deeper still.
+// Bound for linear interpolation of a distance whose curvatures are at most 1 / (r - gap), r = 1, at one cell more depth.
 static void check_bounds(const Errors *e, double cell, double within)
 {
     double curvature = 1 / (1 - within - cell);
@@ -143,7 +143,7 @@ static void turned_and_scaled(void **state)
     }
 }
 
-// Where the exact gap is far from zero the grid is never wrong about the side, and what it says is a bound.
+// Where the exact gap is far from zero, the grid always gives the right side, and its value is a bound.
 static void sides_are_right(void **state)
 {
     (void)state;
@@ -170,7 +170,7 @@ static void sides_are_right(void **state)
     }
 }
 
-// A wire leaves by the bell and finds no wall out there; upstream the lumen continues.
+// A wire that leaves through the bell finds no wall outside; upstream the lumen continues.
 static void open_ends(void **state)
 {
     (void)state;
@@ -187,7 +187,7 @@ static void open_ends(void **state)
         VesselHit hit = ask(s->grid, vec3_add_scaled(s->center[0], step, in), 0.2);
         assert_true(hit.gap > 0.2);
     }
-    // beside the tube is outside all the same
+    // a point beside the tube is outside
     Vec3 aside = vec3_normal_to(in);
     for (double step = 1.4; step < 5; step += 0.1) {
         VesselHit hit = ask(s->grid, vec3_add_scaled(s->center[5], step, aside), 0.2);
@@ -196,7 +196,7 @@ static void open_ends(void **state)
     free_sampled(s);
 }
 
-// What a point remembers saves work and changes no answer that is not a bound; bounds stay bounds.
+// The memory of a point saves time and changes only results that are bounds; bounds stay bounds.
 static void memory_changes_nothing(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 // Surfaces: the derived table of marching cubes, closed manifolds facing outwards, a sphere's area and volume with order 2, the Hausdorff bound
-// voxel^2 / (2 R) of docs/references.md, trees whose models join, what cannot be meshed, and the cost.
+// voxel^2 / (2 R) of docs/references.md, trees whose models join, rejected input, and the time.
 #include "blob_tube.h"
 #include "geom/cube_triangles.h"
 #include "geom/isosurface.h"
@@ -189,7 +189,7 @@ static void tree_joins_without_gap(void **state)
         double f = blobby_gradient(&b, x, &g);
         off += fabs(f) > 1e-9 * vec3_norm(g);
         assert_true(vec3_distance(m->normal[v], vec3_unit(vec3_negate(g))) < 1e-9);
-        // its node is that of its power cell, but for the way to the surface
+        // its node is that of its power cell, except for the distance to the surface
         int best = power_nearest(t, x);
         double behind = power_distance(x, t->center[node], 1) - power_distance(x, t->center[best], 1);
         worst = fmax(worst, behind);

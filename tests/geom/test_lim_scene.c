@@ -1,5 +1,5 @@
-// The wall of a real model as a tool feels it: its jump where the point's node changes, the same answers on every instruction set, and what 80 points
-// sliding along it cost. test_lim_scene [MODEL.h5 ...] (default: scenes/aneurism/aneurism-local.h5; skipped where that was not made).
+// The wall of a real model in contact with a tool: its jump where the point's node changes, identical results on every instruction set, and the time for 80
+// points that slide along it. test_lim_scene [MODEL.h5 ...] (default: scenes/aneurism/aneurism-local.h5; skipped if that does not exist).
 #include "base/simd.h"
 #include "geom/vessel.h"
 #include "random_numbers.h"
@@ -48,7 +48,7 @@ static Vessel *make(const VesselTree *tree, LimField field)
     return v;
 }
 
-// Lanes parallel to the links between nodes, 0.2 mm inside the wall, in steps of 1 um; what the gap changes where the node does. Sorted.
+// Paths parallel to the links between nodes, 0.2 mm inside the wall, in steps of 1 um; the changes of the gap where the node changes. Sorted.
 static int collect_jumps(const VesselTree *t, LimField field, double *jump, int capacity)
 {
     Vessel *v = make(t, field);
@@ -146,7 +146,7 @@ static double now_us(void)
     return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
 }
 
-// Points 0.2 mm from the wall go 0.05 mm a step to and fro. `path` (STEPS x POINTS) is filled by the first run and followed by others.
+// Points 0.2 mm from the wall move 0.05 mm per step back and forth. `path` (STEPS x POINTS) is filled by the first run and used by the others.
 static double slide(const VesselTree *t, const Course *c, LimField field, Vec3 (*path)[POINTS], bool fill, VesselHit *last)
 {
     Vessel *v = make(t, field);
@@ -172,7 +172,7 @@ static double slide(const VesselTree *t, const Course *c, LimField field, Vec3 (
         for (int i = 0; i < POINTS && fill; i++) {
             Vec3 from = place(t, c, s[i]), to = place(t, c, s[i] += way), along = vec3_sub(to, from);
             Vec3 aside = vec3_sub(x[i], from), tangent = vec3_unit(along);
-            x[i] = vec3_add_scaled(vec3_add(x[i], along), -0.1 * vec3_dot(aside, tangent), tangent);   // stays beside its place
+            x[i] = vec3_add_scaled(vec3_add(x[i], along), -0.1 * vec3_dot(aside, tangent), tangent);   // stays at the same place along the vessel
             x[i] = hit[i].flags ? vec3_add_scaled(x[i], 0.05, out[i]) : vec3_add_scaled(x[i], fmax(-0.03, fmin(0.03, 0.2 - hit[i].gap)), hit[i].normal);
         }
     }

@@ -1,5 +1,5 @@
-// Contact with a fitted tree: the lanes against their plain twin on every instruction set, gaps against the slow projection, derivatives,
-// points that must not be called far, ways back from outside, the inlet, motion and mirroring of the scene, the wall's jump between nodes.
+// Contact with a fitted tree: the lanes compared with a plain implementation on every instruction set, gaps compared with the slow projection, derivatives,
+// points that must not be flagged as far, the return from outside, the inlet, motion and mirroring of the scene, the jump of the wall between nodes.
 #include "base/simd.h"
 #include "blob_tube.h"
 #include "geom/foot_lanes.h"
@@ -29,7 +29,7 @@ static VesselTree *helix_tree(void)
     return blob_tube(line, NODES, OVERLAP, BLOBS, 1);
 }
 
-// Every node has its own random blobs about the helix: neighbours agree only roughly, as where a fit is poor.
+// Every node has its own random blobs about the helix: neighbours agree only roughly, as in a poor fit.
 static VesselTree *rough_tree(double roughness)
 {
     VesselTree *t = helix_tree();
@@ -103,7 +103,7 @@ static void lanes_against_twin(void **state)
     }
 }
 
-// A tool of points wandering in and out of the lumen along the tree.
+// A tool of points that move in and out of the lumen along the tree.
 static Vec3 wander(const VesselTree *t, uint64_t *seed, int step, int steps, Vec3 x, double reach)
 {
     double s = (double)step / steps * (t->node_count - 1.001);
@@ -141,7 +141,7 @@ static void same_bits_on_every_isa(void **state)
     vessel_tree_free(t);
 }
 
-// What the program's level is decides where nothing else is asked for.
+// Without an explicit choice the program's SIMD level is used.
 static void kernels_follow_the_level(void **state)
 {
     (void)state;
@@ -171,7 +171,7 @@ static void one_blob_is_a_sphere(void **state)
         Vec3 u = random_unit_vector(&seed);
         double d = random_in(&seed, 0.3, trial % 2 ? 2.5 : 30);
         if (u.x > -0.6)
-            u.x = -0.6 - fabs(u.x);   // downstream of the inlet, which looks along -x, and of the zone in which the section there is carried on
+            u.x = -0.6 - fabs(u.x);   // downstream of the inlet, which faces -x, and of the zone in which the section there is continued
         u = vec3_unit(u);
         VesselHit hit = ask(v, vec3_add_scaled(t->center[0], d, u), 0, 100);
         assert_int_equal(hit.flags, 0);
@@ -186,7 +186,7 @@ static void one_blob_is_a_sphere(void **state)
     vessel_tree_free(t);
 }
 
-// Warm queries of a wandering point: never worse than the slow projection from scratch, the foot on the surface, and no history to speak of.
+// Queries of a moving point with memory: never worse than the slow projection without a start; the foot is on the surface and hardly depends on the history.
 static void gaps_against_slow_projection(void **state)
 {
     (void)state;
@@ -271,7 +271,7 @@ static void derivatives_of_the_gap(void **state)
     vessel_tree_free(t);
 }
 
-// From several millimetres outside the answer still says which way is back, and following it leads home.
+// From several millimetres outside, the result still points towards the lumen, and following it leads back.
 static void back_from_outside(void **state)
 {
     (void)state;
@@ -319,7 +319,7 @@ static void inlet_is_open(void **state)
         VesselTree *t = blob_tube(line, N, O, 11, 1);
         for (int64_t j = 0; j < t->blob_count && !extrapolated; j++)
             if (t->blob_center[j].x < 0)
-                t->blob_center[j].x = 0;   // what a fit without points upstream gives: everything piles up at the end
+                t->blob_center[j].x = 0;   // as in a fit without points upstream: all blobs are at the end
         Vessel *v = make(t, LIM_SWITCH, 0);
         Vec3 p, d;
         assert_true(v->inlet(v, &p, &d));
@@ -333,7 +333,7 @@ static void inlet_is_open(void **state)
             assert_near(hit.hessian.xx, 0, 1e-9);
             assert_true(ask(v, vec3(x, 2, 0), 0, 1).gap < -0.5);
         }
-        // just inside, walking out along the wall: no cap shows, the normal stays across
+        // from just inside outwards along the wall: there is no cap, and the normal stays transverse
         VesselMemory memory = {.node = -1};
         VesselHit last = {.gap = HUGE_VAL};
         for (double x = 3; x >= -3; x -= 0.01) {
@@ -342,7 +342,7 @@ static void inlet_is_open(void **state)
             vessel_query(v, 1, &at, 0.5, &memory, &hit);
             assert_int_equal(hit.flags, x < 0 ? VESSEL_BEYOND : 0);
             if (hit.node == 0 && last.node == 0 && last.gap < 1) {
-                // smooth across the plane: the gap changes as the normal says, the normal as the Hessian says
+                // smooth across the plane: the gap changes according to the normal, the normal according to the Hessian
                 assert_near(last.gap - hit.gap, 0.01 * 0.5 * (hit.normal.x + last.normal.x), 2e-5);
                 Vec3 bends = vec3_scale(vec3_sub(last.normal, hit.normal), 100);
                 assert_true(vec3_distance(bends, sym3_mul_vec(&hit.hessian, vec3(1, 0, 0))) < 0.1);
@@ -407,7 +407,7 @@ static void moved_and_mirrored_scenes(void **state)
         vessel_tree_free(t[i]);
 }
 
-// Slides points along the wall by 1 um: what the gap changes beyond the motion is the wall's jump between neighbouring models.
+// Slides points along the wall by 1 um: a change of the gap beyond the motion is the jump of the wall between neighbouring models.
 static double worst_jump(const VesselTree *t, LimField field)
 {
     Vessel *v = make(t, field, 0);
@@ -441,7 +441,7 @@ static void blend_has_no_jump(void **state)
     VesselTree *t = rough_tree(0.02);
     double paper = worst_jump(t, LIM_SWITCH), blend = worst_jump(t, LIM_BLEND);
     print_message("the wall's worst change over 1 um of travel: switch %.4f mm, blend %.5f mm\n", paper, blend);
-    assert_true(paper > 0.005);            // the test sees jumps
+    assert_true(paper > 0.005);            // the test can detect jumps
     assert_true(blend < 0.1 * paper);
     vessel_tree_free(t);
 }
@@ -472,8 +472,8 @@ static void nodes_without_blobs(void **state)
     vessel_tree_free(u);
 }
 
-// One model of a fork: a point that follows the outer wall of one arm and then crosses to the carina finds that wall in time, though the remembered
-// foot stays the locally closest; the same on the return path.
+// One model of a fork: a point that follows the outer wall of one arm and then crosses to the carina finds that wall in time, although the remembered foot
+// stays the locally closest one; the same on the return path.
 static void another_wall_comes_closer(void **state)
 {
     (void)state;
@@ -508,16 +508,17 @@ static void another_wall_comes_closer(void **state)
         assert_true(s.converged && hit.flags == 0);
         if (fabs(s.distance) < 0.6)
             assert_near(hit.gap, s.distance, 1e-6);
-        double side = vec3_dot(hit.normal, vec3(1.1, -1.61, 0));   // along the way across, or against it
+        double side = vec3_dot(hit.normal, vec3(1.1, -1.61, 0));   // in the direction of the crossing, or against it
         sides += step > 0 && side * last < 0;
         last = side;
     }
-    assert_int_equal(sides, 2);   // it did change sides, there and back
+    assert_int_equal(sides, 2);   // the side changed on both paths
     v->destroy(v);
     vessel_tree_free(t);
 }
 
-// The clearance that one query leaves holds about its own place: a flat lumen is 2.38 mm from its middle to either wall, asked there and then beside a wall.
+// The clearance stored by a query is valid only around its place: in a flat lumen, 2.38 mm from the middle to either wall, a point is queried there and then
+// beside a wall.
 static void clearance_holds_about_its_place(void **state)
 {
     (void)state;
@@ -548,8 +549,8 @@ static void clearance_holds_about_its_place(void **state)
     vessel_tree_free(t);
 }
 
-// A vessel whose blobs grow along it: from its axis the field falls fastest towards the thin end, and a foot there once put points to sleep beside the
-// near wall. However a point comes to where it is, what is called far is far.
+// A vessel whose blobs grow along it: from its axis the field falls fastest towards the thin end. A foot there once made points near the wall sleep. For any
+// history of a point, a wall that is flagged as far must be far.
 static void far_is_far_in_a_taper(void **state)
 {
     (void)state;
@@ -595,7 +596,7 @@ static void far_is_far_in_a_taper(void **state)
     vessel_tree_free(t);
 }
 
-// The boxes find what a look at every node finds, of equals the first; whatever is asked.
+// The search by boxes finds the same node as a search over all nodes (of equal ones the first), for any query.
 static void nearest_through_boxes(void **state)
 {
     (void)state;
@@ -624,8 +625,8 @@ static void nearest_through_boxes(void **state)
     }
 }
 
-// Within a node's ball the few planes that are kept for it say what all near nodes say: points go where power_walk sends them. On a vessel that bends and
-// changes its width, with a branch.
+// Within a node's ball the few planes stored for it give the same result as all near nodes: points get the node that power_walk finds. For a vessel with a
+// bend, varying width and a branch.
 static void planes_against_walk(void **state)
 {
     (void)state;
@@ -667,8 +668,8 @@ static double now_us(void)
     return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
 }
 
-// Points that swing about the axis, where all sides are nearly as close: what they cost, against points that swing as much beside the wall, and the
-// share of answers that are unsure or further off than the closest side by more than a hundredth.
+// Points that oscillate about the axis, where all sides are nearly equally close: their time compared with points that oscillate as much near the wall, and the
+// fraction of results that are unsure or more than a hundredth further away than the closest side.
 static double swing(const VesselTree *t, double aside, int *bad)
 {
     enum { P = 40, ROUNDS = 300 };
@@ -696,7 +697,7 @@ static double swing(const VesselTree *t, double aside, int *bad)
         }
     }
     v->destroy(v);
-    for (int k = 0; k <= ROUNDS / 2; k++) {     // the median, by picking the least ever again
+    for (int k = 0; k <= ROUNDS / 2; k++) {     // the median, by repeatedly selecting the smallest
         int least = k;
         for (int j = k; j < ROUNDS; j++)
             least = used[j] < used[least] ? j : least;
@@ -731,7 +732,7 @@ static void on_the_axis(void **state)
         line[i] = vec3_scale(along, 0.5 * i);
     VesselTree *t = blob_tube(line, N, 4, 9, 1);
     uint64_t seed = 7;
-    for (int64_t j = 0; j < t->blob_count; j++)      // as round as a fit is
+    for (int64_t j = 0; j < t->blob_count; j++)      // as round as a fitted tube
         t->blob_center[j] = vec3_add(t->blob_center[j], random_in_box(&seed, 1e-4));
     Vessel *v = make(t, LIM_SWITCH, 0);
     double used[2] = {HUGE_VAL, HUGE_VAL};
@@ -760,7 +761,7 @@ static void on_the_axis(void **state)
     vessel_tree_free(t);
 }
 
-// Not a check: prints the cost of 80 points near the wall (all projected) and of a tool lying in the lumen, 10 blobs a node.
+// Not a check: prints the time for 80 points near the wall (all projected) and for a tool in the lumen, 10 blobs per node.
 static void cost(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// Closed or not, what closes a surface, and what decimation keeps: closedness, genus, parts, rims, volume, thin branches.
+// Checks whether surfaces are closed, how they are closed, and what decimation preserves: closedness, genus, parts, rims, volume, thin branches.
 #include "geom/mesh_closure.h"
 #include "geom/mesh_decimate.h"
 #include "geom/tree_surface.h"
@@ -29,7 +29,7 @@ static void closed_surfaces_are_known(void **state)
     assert_int_equal(closure_of(&torus).open_edges, 0);
     // an inscribed polyhedron is 11 / triangles smaller (mean sagitta of triangles of its area), more where they differ in size as the octahedron's do
     assert_near(closure_of(&ball).volume / (4 * PI / 3), 1, 1.5 * 11 / ball.triangle_count);
-    // every triangle with its own corners: the same places, other indices
+    // every triangle with separate vertices: the same places, other indices
     TriangleMesh soup = mesh_room(3 * ball.triangle_count, ball.triangle_count);
     for (int t = 0; t < ball.triangle_count; t++) {
         for (int k = 0; k < 3; k++)
@@ -38,7 +38,7 @@ static void closed_surfaces_are_known(void **state)
     }
     assert_int_equal(closure_of(&soup).open_edges, 0);
     assert_near(closure_of(&soup).volume, closure_of(&ball).volume, 1e-12);
-    // two prisms with one edge in common: four triangles there, and rays still go in as often as out
+    // two prisms with a common edge: four triangles meet there, and rays still enter as often as they leave
     const Vec3 left[4] = {{-1, -1, 0}, {0, -1, 0}, {0, 0, 0}, {-1, 0, 0}}, right[4] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     TriangleMesh both = mesh_and(prism_mesh(left, 4, 1), prism_mesh(right, 4, 1), vec3(0, 0, 0), false);
     SurfaceCensus census;
@@ -61,7 +61,7 @@ static void rims_get_lids(void **state)
     assert_int_equal(closure.turned_edges, 0);
     assert_int_equal(lids.triangle_count, 2 * 48);
     assert_true(closure.unevenness < 1e-9);
-    // Pappus: section times the way of its middle; a polygon of 48 corners is 1 - 2 pi^2 / (3 48^2) of the disc, the rings cut the arc a little
+    // Pappus: section times the path of its centre; a polygon of 48 corners is 1 - 2 pi^2 / (3 48^2) of the disc, and the rings shorten the arc slightly
     double section = 48 * sin(PI / 48) * cos(PI / 48) * radius * radius;
     assert_near(closure.volume / (section * (length + 10 * 0.5 + 5)), 1, 1e-3);
     for (int k = 0; k < 2; k++)
@@ -69,7 +69,7 @@ static void rims_get_lids(void **state)
                          vec3_distance(lids.middle[k], vec3_add_scaled(vec3(length + 10 * sin(0.5), 10 - 10 * cos(0.5), 0), 5, vec3(cos(0.5), sin(0.5), 0)))),
                     0, 1e-9);
     mesh_lids_free(&lids);
-    // a triangle that faces the other way is no rim
+    // a triangle that faces the other way is not a rim
     int swapped = tube.triangle[100][1];
     tube.triangle[100][1] = tube.triangle[100][2];
     tube.triangle[100][2] = swapped;
@@ -90,7 +90,7 @@ static void spheres_keep_their_volume(void **state)
         assert_true(less->triangle_count > triangles * 9 / 10);
         assert_int_equal(census.open_edges + census.turned_edges + census.non_manifold_edges, 0);
         assert_int_equal(census.euler, 2);
-        // no worse than an inscribed polyhedron of as many like triangles
+        // no worse than an inscribed polyhedron with the same number of equal triangles
         assert_near(census.volume / (4 * PI / 3), 1, 11.0 / triangles);
         for (int v = 0; v < less->vertex_count; v++)
             assert_true(vec3_dot(less->normal[v], vec3_unit(less->vertex[v])) > 0.9);
@@ -132,7 +132,7 @@ static void genus_parts_and_nodes_stay(void **state)
     mesh_clear(&mesh);
 }
 
-// How much of a line lies inside.
+// The length of a line inside.
 static double chord(const TriangleMesh *mesh, Vec3 from, Vec3 along)
 {
     double sum = 0;
@@ -150,7 +150,7 @@ static double chord(const TriangleMesh *mesh, Vec3 from, Vec3 along)
     return sum;
 }
 
-// A bulb of radius 6 from which a branch of radius 0.25 goes out, 25 long: a surface of revolution about x.
+// A bulb of radius 6 with a branch of radius 0.25 and length 25: a surface of revolution about x.
 static TriangleMesh bulb_with_branch(void)
 {
     enum { RINGS = 600, AROUND = 40 };
@@ -187,7 +187,7 @@ static void thin_branches_stay(void **state)
     assert_int_equal(closure_of(less).open_edges, 0);
     for (double x = 6.5; x < 30.5; x += 0.37)
         for (int k = 0; k < 5; k++) {
-            // through the axis, all ways round: a triangular prism would have 0.75 to 0.87
+            // through the axis, in all directions: a triangular prism would have 0.75 to 0.87
             double part = chord(less, vec3(x, 1e-4, 2e-4), vec3(1e-5, cos(0.63 * k), sin(0.63 * k))) / 0.5;
             assert_true(part > 0.7 && part < 1.15);
         }
@@ -205,13 +205,13 @@ static void rims_and_limits_hold(void **state)
     assert_int_equal(after.open_edges, before.open_edges);
     assert_int_equal(after.rims, 2);
     assert_near(after.volume / before.volume, 1, 0.03);
-    // a limit on how far the wall may go costs triangles and saves volume: 2 um root mean square of 1.5 mm is 0.3 %
+    // a limit on the displacement of the wall needs more triangles and preserves volume: 2 um root mean square of 1.5 mm is 0.3 %
     assert_true(careful->triangle_count > 2 * less->triangle_count && careful->triangle_count < tube.triangle_count / 2);
     assert_near(near.volume / before.volume, 1, 2 * 2e-3 / 1.5);
     triangle_mesh_free(less);
     triangle_mesh_free(careful);
     mesh_clear(&tube);
-    // what cannot be less is a tetrahedron; nothing is nothing
+    // the smallest result is a tetrahedron; an empty mesh stays empty
     TriangleMesh ball = sphere_mesh(3), none = mesh_room(1, 1);
     less = mesh_decimate(&ball, 0, HUGE_VAL);
     assert_true(less && less->triangle_count >= 4 && closure_of(less).open_edges == 0 && closure_of(less).volume > 0);
@@ -222,7 +222,7 @@ static void rims_and_limits_hold(void **state)
     mesh_clear(&ball), mesh_clear(&none);
 }
 
-// A corner over each face, at which three triangles meet.
+// A vertex over each face, at which three triangles meet.
 static TriangleMesh with_pyramids(TriangleMesh mesh, double height)
 {
     TriangleMesh all = mesh_room(mesh.vertex_count + mesh.triangle_count, 3 * mesh.triangle_count);
@@ -247,7 +247,7 @@ static int corners_in_common(const int a[3], const int b[3])
     return count;
 }
 
-// However few triangles are asked for: three or more meet at each corner, and no two have the same corners (a pocket of two faces is closed as well).
+// For any small number of triangles, three or more meet at each vertex, and no two have the same vertices (a pocket of two faces would also be closed).
 static void nothing_folds_flat(void **state)
 {
     (void)state;

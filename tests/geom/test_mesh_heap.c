@@ -1,4 +1,4 @@
-// Questions to a mesh make no heap call, Embree's among them.
+// Queries of a mesh make no heap calls, including those by Embree.
 #include "geom/mesh_vessel.h"
 
 #include <setjmp.h>
@@ -33,7 +33,7 @@ static void questions_make_no_heap_call(void **state)
             Vec3 x = {0, 0, 0};
             long before = heap_calls();
             heap_watch(true);
-            for (int i = 0; i < 2000; i++) {     // the first among them, and wide jumps
+            for (int i = 0; i < 2000; i++) {     // including the first query, and large jumps
                 x = i % 100 ? vec3_add(x, vec3_scale(random_unit_vector(&seed), 0.05)) : random_in_box(&seed, 3);
                 vessel_query(vessel, 1, &x, i % 2 ? 0.2 : HUGE_VAL, &memory, &hit);
                 vessel->locate(vessel, x, i % 3 ? memory.node : -1);

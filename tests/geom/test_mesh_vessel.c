@@ -1,4 +1,4 @@
-// A mesh as a vessel against brute force (closest point by Voronoi regions, inside by the winding number) and against exact shapes.
+// A mesh as a vessel, compared with brute force (closest point by Voronoi regions, inside by the winding number) and with exact shapes.
 #include "geom/mesh_vessel.h"
 
 #include "base/simd.h"
@@ -74,7 +74,7 @@ static VesselHit ask_afresh(const Vessel *v, Vec3 x)
 
 // --- Brute force ---
 
-// Closest point by the triangle's Voronoi regions (Ericson 2005, 5.1.5), another way than the vessel's.
+// Closest point by the triangle's Voronoi regions (Ericson 2005, 5.1.5), a different method from the vessel's.
 static double triangle_distance2(Vec3 p, Vec3 a, Vec3 b, Vec3 c)
 {
     Vec3 ab = vec3_sub(b, a), ac = vec3_sub(c, a), ap = vec3_sub(p, a), bp = vec3_sub(p, b), cp = vec3_sub(p, c);
@@ -122,7 +122,7 @@ static TriangleMesh shape_mesh(int shape)
         mesh_crumple(&m, 0.12, 3);
     if (shape == 4)
         m = mesh_and(m, sphere_mesh(12), vec3(2.01, 0, 0), false);
-    if (shape == 6) {    // about their middle coordinates are of 500 mm: floats there are 3e-5 mm apart
+    if (shape == 6) {    // coordinates of about 500 mm: floats there are 3e-5 mm apart
         TriangleMesh other = sphere_mesh(12);
         mesh_crumple(&m, 0.12, 3);
         mesh_crumple(&other, 0.12, 4);
@@ -132,7 +132,7 @@ static TriangleMesh shape_mesh(int shape)
         }
         m = mesh_and(m, other, vec3(1000, 700, 300), false);
     }
-    if (shape == 7)      // each tenth triangle all but flat: 1e-10 mm of height
+    if (shape == 7)      // every tenth triangle is nearly degenerate: 1e-10 mm high
         for (int t = 0; t < m.triangle_count; t += 10) {
             const int *c = m.triangle[t];
             m.vertex[c[2]] = vec3_add_scaled(vec3_mix(m.vertex[c[0]], m.vertex[c[1]], 0.4), 1e-10, vec3_sub(m.vertex[c[2]], m.vertex[c[0]]));
@@ -170,7 +170,7 @@ static void agrees_with_brute_force(void **state)
         uint64_t seed = 17;
         double worst = 0;
         for (int i = 0; i < 400; i++) {
-            // half of them about the wall: moved off a random place of a random triangle
+            // half of the points near the wall: beside a random place of a random triangle
             Vec3 x = vec3_add(middle, random_in_box(&seed, 2.6));
             if (i % 2) {
                 const int *c = m->triangle[(int)random_in(&seed, 0, m->triangle_count)];
@@ -193,7 +193,7 @@ static void agrees_with_brute_force(void **state)
     }
 }
 
-// Steps of all sizes with memory, and jumps: the same bits as without.
+// Steps of all sizes with memory, and jumps: bit-identical to results without memory.
 static void memory_changes_nothing(void **state)
 {
     (void)state;
@@ -222,7 +222,7 @@ static void memory_changes_nothing(void **state)
     }
 }
 
-// Beyond reach a bound may stand for the gap, but only inside, and it must be one.
+// Beyond reach a bound may replace the gap, but only inside, and it must be a valid bound.
 static void far_points_are_bounded(void **state)
 {
     (void)state;
@@ -259,7 +259,7 @@ static void far_points_are_bounded(void **state)
 
 // --- Edges and corners ---
 
-// An L-shaped room: five convex vertical edges of the solid and one that stands into the lumen.
+// An L-shaped room: five convex vertical edges of the solid and one that protrudes into the lumen.
 static const Vec3 room_corner[6] = {{1, 1, 0}, {0, 1, 0}, {0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {1, 2, 0}};
 static TriangleMesh room_mesh(void)
 {
@@ -267,7 +267,7 @@ static TriangleMesh room_mesh(void)
     return prism_mesh(room_corner, 6, 1);
 }
 
-// Blunt and sharp, standing out of the lumen and into it, and a tip at which one side has far more triangles than the others.
+// Blunt and sharp edges that protrude out of the lumen and into it, and a tip at which one side has far more triangles than the others.
 static TriangleMesh edged_mesh(int kind)
 {
     static const Vec3 blade[3] = {{0, 0, 0}, {1.5, -0.06, 0}, {1.5, 0.06, 0}};
@@ -344,12 +344,12 @@ static void derivatives_are_the_gaps(void **state)
         Vec3 slope = {ask_afresh(v, vec3_add(place[i], vec3(h, 0, 0))).gap - ask_afresh(v, vec3_sub(place[i], vec3(h, 0, 0))).gap,
                       ask_afresh(v, vec3_add(place[i], vec3(0, h, 0))).gap - ask_afresh(v, vec3_sub(place[i], vec3(0, h, 0))).gap,
                       ask_afresh(v, vec3_add(place[i], vec3(0, 0, h))).gap - ask_afresh(v, vec3_sub(place[i], vec3(0, 0, h))).gap};
-        // differences over 1e-4 mm at some 0.2 mm from the edge: (h / d)^2 is 2.5e-7 of what they take
+        // differences over 1e-4 mm at about 0.2 mm from the edge: relative error (h / d)^2 = 2.5e-7
         assert_near(vec3_distance(vec3_scale(slope, 0.5 / h), hit.normal), 0, 1e-6);
         Sym3 differences = hessian_by_differences(v, place[i], h);
         near_hessian(&hit.hessian, &differences, 1e-4);
     }
-    // at the edge that stands into the lumen the wall is seen as a cylinder
+    // at the edge that protrudes into the lumen the wall acts as a cylinder
     VesselHit notch = ask_afresh(v, place[1]);
     assert_near(sym3_trace(&notch.hessian), 1 / notch.gap, 1e-9);
     assert_true(notch.gap > 0);
@@ -363,7 +363,7 @@ typedef struct Errors {
     double gap, facet, smooth, hessian;
 } Errors;
 
-// Exact answers inside a ball (kind 0), a torus of 2 and 0.5 (1), and a tube of 0.5 along x (2).
+// Exact results inside a ball (kind 0), a torus of 2 and 0.5 (1), and a tube of 0.5 along x (2).
 static VesselHit exact_hit(int kind, Vec3 x)
 {
     double axis_radius = 2;
@@ -373,7 +373,7 @@ static VesselHit exact_hit(int kind, Vec3 x)
     VesselHit hit = {.gap = (kind == 0 ? 1 : 0.5) - d, .normal = vec3_scale(away, -1 / d)};
     Vec3 other = vec3_cross(hit.normal, along);
     double k1 = -1 / d, k2 = kind == 1 ? -(rho - axis_radius) / (rho * d) : 0;
-    if (kind == 0) {     // both principal directions alike: any two across the normal
+    if (kind == 0) {     // equal principal curvatures: any two directions across the normal
         along = vec3_normal_to(hit.normal);
         other = vec3_cross(hit.normal, along);
         k2 = k1;
@@ -464,7 +464,7 @@ static void moves_with_the_mesh(void **state)
                 // 500 mm away a coordinate is rounded by 6e-14; normals over edges and corners by that over the gap
                 assert_near(a.gap, b.gap, 1e-12);
                 assert_near(vec3_distance(quat_rotate(turn, a.normal), b.normal), 0, 1e-12 + 1e-12 / fabs(a.gap));
-                // which face answers on the line between two may change with rounding
+                // on the line between two faces, rounding may select either one
                 assert_near(sym3_trace(&a.hessian), sym3_trace(&b.hessian), 1e-9 * fmax(1, fabs(sym3_trace(&a.hessian))));
             }
             v->destroy(v);
@@ -501,7 +501,7 @@ static void beyond_a_rim_there_is_no_wall(void **state)
     mesh_clear(&m);
 }
 
-// A wide mouth that a long thin vessel leaves: the cone from its rim to the far one holds more than the vessel. It faces outwards all the same.
+// A long thin vessel that begins at a wide mouth: the cone from its rim to the far one contains more than the vessel. The mesh nevertheless faces outwards.
 static void a_funnel_is_no_inside_out(void **state)
 {
     (void)state;
@@ -589,7 +589,7 @@ static void says_what_it_holds(void **state)
         Vessel *a = vessel_of(&small, (MeshSearch)k, MESH_FACES), *b = vessel_of(&large, (MeshSearch)k, MESH_FACES);
         print_message("%s: %lld triangles, %.0f bytes each\n", search_name[k], (long long)b->primitives, (double)b->bytes / (double)b->primitives);
         assert_true(a->primitives == 8 * 8 * 8 && b->primitives == 8 * 24 * 24);
-        // corners, normals and neighbours alone take 100 bytes
+        // vertices, normals and neighbours alone need 100 bytes
         assert_true(b->bytes > 100 * (size_t)b->primitives && b->bytes > 5 * a->bytes);
         Vec3 point, direction;
         assert_false(a->inlet(a, &point, &direction));
@@ -682,7 +682,7 @@ static void threads_do_not_disturb_each_other(void **state)
     mesh_clear(&m);
 }
 
-// --- Refusals ---
+// --- Rejected meshes ---
 
 static void refused(const TriangleMesh *m, const char *because)
 {
@@ -712,7 +712,7 @@ static void bad_meshes_are_refused(void **state)
     t[1] = kept[2], t[2] = kept[1];
     refused(&m, "face opposite sides");
     memcpy(t, kept, sizeof kept);
-    // three corners in line
+    // three collinear vertices
     Vec3 place = m.vertex[t[2]];
     m.vertex[t[2]] = vec3_mix(m.vertex[t[0]], m.vertex[t[1]], 0.5);
     refused(&m, "no area");

@@ -1,5 +1,5 @@
-// Where a tool gets to from the inlet, against what is known of trees made by hand: a straight tube, a gap, a passage beside the line, a link apart, a
-// vessel that kisses another, a thin diaphragm; turned and mirrored; and local models of the other kernel.
+// The places that a tool can reach from the inlet, for trees with known properties: a straight tube, a gap, a passage beside the centreline, a disconnected
+// link, touching vessels, a thin diaphragm; rotated and mirrored; and local models with the other kernel.
 #include "blob_tube.h"
 #include "geom/reach.h"
 #include "random_numbers.h"
@@ -59,7 +59,7 @@ static void a_straight_tube_is_reached_to_its_end(void **state)
     assert_near(part(reach, REACH_POINT), 1, 0);
     assert_int_equal(reach->stop[0].node, 0);
     reach_free(reach);
-    // clearance: the radius on the axis; beside it what is left; outside below 0. The row of blobs ripples by some thousandths
+    // clearance: on the axis the radius, beside it less, outside negative. The row of blobs has ripples of some thousandths
     assert_near(reach_clearance(tree, vec3(10.1, 0, 0), 20, 3), 1, 0.01);
     assert_near(reach_clearance(tree, vec3(10.1, 0.3, -0.4), 20, 3), 0.5, 0.01);
     assert_near(reach_clearance(tree, vec3(10.1, 0.9, 0.9), 20, 3), 1 - 0.9 * sqrt(2), 0.01);
@@ -138,7 +138,7 @@ static void a_thin_diaphragm_shuts(void **state)
     vessel_tree_free(tree);
 }
 
-// Trunk along x, branch A at an angle that is open, B whose beginning is bare, C whose first node lies too far away.
+// A trunk along x, an open branch A at an angle, B without blobs at its start, C whose first node is too far away.
 static VesselTree *forked(const Mat3 *turn)
 {
     FieldTree *t = fresh();
@@ -170,7 +170,7 @@ static void junctions_are_open_capped_or_apart(void **state)
         // lines: trunk 30, A and its link, B and its link, C without
         double a = 9.5 + 0.5, b = 7.6 + 0.4;
         assert_near(reach->length, 30 + a + b + 6, 1e-9);
-        assert_near(reach->reached[REACH_POINT], 30 + a + 1, 0.15);      // of B what lies in the trunk
+        assert_near(reach->reached[REACH_POINT], 30 + a + 1, 0.15);      // of B only the part in the trunk
         assert_int_equal(reach->stop_count, 2);
         assert_true(reach->stop[0].capped && reach->stop[1].capped);
         assert_true(reach->stop[1].apart && !reach->stop[0].apart);
@@ -222,7 +222,7 @@ static void local_models_are_flooded_too(void **state)
     assert_near(part(reach, REACH_ASIDE), 1, 0);
     assert_near(part(reach, REACH_TOOL), 1, 0);
     reach_free(reach);
-    // one node's model is another vessel's: its cell is shut
+    // the model of one node is that of another vessel: its cell is closed
     for (int64_t b = tree->blob_offset[20]; b < tree->blob_offset[21]; b++)
         tree->blob_center[b] = vec3_add(tree->blob_center[b], vec3(0, 40, 0));
     reach = reach_with(tree, 0.5);

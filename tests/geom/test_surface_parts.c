@@ -1,5 +1,5 @@
-// The surface of trees of shared blobs as sheets: one closed part where the lumen is one, also where it kisses itself or overlaps; what hangs on nothing is
-// found and dropped. Against trees made by hand; turned and mirrored.
+// The surface of trees of shared blobs as sheets: a connected lumen gives one closed part, even if it touches itself or overlaps; disconnected parts are found
+// and dropped. For trees with known properties, also rotated and mirrored.
 #include "geom/ghost_lumens.h"
 #include "geom/surface_parts.h"
 #include "geom/tree_surface.h"
@@ -56,7 +56,7 @@ static SurfaceParts *parts_of(const TriangleMesh *mesh, const VesselTree *tree)
     return parts;
 }
 
-// A trunk that forks: one branch goes straight on, the other runs beside it, its axis `apart` from the first's, and comes from elsewhere.
+// A trunk that forks: one branch continues straight, the other makes a detour and then runs beside it, with its axis `apart` from that of the first.
 static VesselTree *kissing(double apart, const Mat3 *turn)
 {
     FieldTree *t = fresh();
@@ -83,7 +83,7 @@ static void kissing_lumens_are_two_sheets(void **state)
             assert_int_equal(c.parts, 1);
             assert_int_equal(c.euler, 2);                     // no handle: the lumens touch and do not merge
             vertices_are_on_the_wall(mesh, tree);
-            // the second branch is shorter or longer by what it lies nearer or further
+            // the second branch is shorter or longer as it is nearer or further
             double volume = c.volume + PI * (apart[k] - 3);
             if (k == 0 && turn == 0)
                 far_volume = volume;

@@ -1,5 +1,5 @@
-// Surfaces made ready for other tools: edges counted on shapes whose counts are known, specks, the inlet cut open (axis-aligned, oblique, mirrored),
-// volume against a count of the field's sign that shares no code with marching cubes, and what vertices are told of the data.
+// Surfaces prepared for export: edge counts of shapes with known counts, specks, the inlet cut open (axis-aligned, oblique, mirrored), volume compared with a
+// count of the field's sign that is independent of marching cubes, and data values at vertices.
 #include "blob_tube.h"
 #include "geom/tree_surface.h"
 #include "random_numbers.h"
@@ -95,7 +95,7 @@ static void specks_are_dropped(void **state)
     release(&m);
 }
 
-// The wall of a straight tube ends in a flare, whose cones over the other end take away more than those of the wall add.
+// A straight tube that ends in a flare: the cones over the rim of the flare subtract more volume than those of the wall add.
 static void an_open_tube_is_no_speck(void **state)
 {
     (void)state;
@@ -225,7 +225,7 @@ static void the_inlet_opens(void **state)
     vessel_tree_free(t);
     assert_near(turned.volume, plain.volume, 2e-3 * plain.volume);
     assert_near(turned.area, plain.area, 2e-3 * plain.area);
-    assert_near(mirrored.volume, plain.volume, 1e-3 * plain.volume);   // but for the diagonals of the triangles
+    assert_near(mirrored.volume, plain.volume, 1e-3 * plain.volume);   // except for the diagonals of the triangles
     // what chords cut off falls with the square of the cell
     assert_true(plain.volume > coarse.volume && plain.volume - coarse.volume < 0.02 * plain.volume);
 }

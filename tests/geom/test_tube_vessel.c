@@ -1,5 +1,5 @@
-// The exact tube: derivatives of the gap by central differences, distances against sampled centrelines, ends, frames, rigid motion and mirroring,
-// coils that cross, and the messages about bad tubes.
+// The exact tube: derivatives of the gap by central differences, distances compared with sampled centrelines, ends, frames, rigid motion and mirroring, coils
+// that cross, and the messages about bad tubes.
 #include "geom/vessel.h"
 #include "random_numbers.h"
 
@@ -39,7 +39,7 @@ static TubeOptions bend_options(void)
     return (TubeOptions){.start = {1, 2, 3}, .direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 0.8, .piece_count = 4, .piece = bend};
 }
 
-// The same centreline laid by small steps of a rotating frame, independently of the tube's code.
+// The same centreline by small steps of a rotating frame, independent of the tube's code.
 enum { SAMPLES_A_PIECE = 4000 };
 static int sample_bend(Vec3 *out)
 {
@@ -79,7 +79,7 @@ static void distance_to_the_centreline(void **state)
         double least = HUGE_VAL;
         for (int i = 0; i < count; i++)
             least = fmin(least, vec3_norm2(vec3_sub(line[i], x)));
-        // samples lie at most 6 um apart, so that half of that squared over twice the distance is sampling; laying the line drifts by 1e-6
+        // samples are at most 6 um apart: the sampling error is (3 um)^2 over twice the distance; the integrated line drifts by 1e-6
         double tolerance = fmin(3e-3, 0.5 * 9e-6 / sqrt(least)) + 1e-6;
         assert_near(ask(v, x, -1).gap, 0.8 - sqrt(least), tolerance);
         assert_near(ask(v, x, v->locate(v, x, 0)).gap, 0.8 - sqrt(least), tolerance);
@@ -87,7 +87,7 @@ static void distance_to_the_centreline(void **state)
     v->destroy(v);
 }
 
-// The curvature jumps where line and arc meet and where a corner's sphere begins; a difference across such a plane says nothing.
+// The curvature jumps where line and arc meet and where a corner's sphere begins; differences across such a plane are meaningless.
 static bool same_kind(const VesselHit *a, const VesselHit *b) { return a->node == b->node && fabs(sym3_trace(&a->hessian) - sym3_trace(&b->hessian)) < 1e-2; }
 
 static int skipped;
@@ -163,7 +163,7 @@ static void curvatures(void **state)
     assert_near(sym3_quadratic(&inner.hessian, along), 1 / 14.5, 1e-12);    // the wall bulges into the lumen
     assert_near(sym3_quadratic(&outer.hessian, along), -1 / 15.5, 1e-12);
     assert_near(outer.hessian.zz, -2, 1e-12);
-    // on the axis: some unit normal across, the same each time, and bounded curvature
+    // on the axis: some transverse unit normal, the same each time, and bounded curvature
     VesselHit axis = ask(v, vec3(5, 0, 0), -1);
     assert_near(axis.gap, 1, 1e-12);
     assert_near(vec3_norm(axis.normal), 1, 1e-12);
@@ -185,7 +185,7 @@ static void ends(void **state)
     assert_near(before.gap, 0.5 - hypot(0.2, 0.3), 1e-12);
     assert_true(before.normal.x == 0 && before.hessian.xx == 0 && before.normal.y < 0);
     assert_near(sym3_trace(&before.hessian), -1 / hypot(0.2, 0.3), 1e-9);
-    // downstream the bell, and nothing two radii on
+    // downstream the bell, and no wall two radii further
     assert_true(after.flags == VESSEL_OPEN_END && after.gap == HUGE_VAL && vec3_norm(after.normal) == 0);
     assert_true(ask(open, vec3(17, 5.5, 0), -1).flags == VESSEL_BEYOND);
     assert_near(ask(open, vec3(17, 5.5, 0), -1).gap, hypot(0.5, 1) - 0.5, 1e-12);
@@ -200,7 +200,7 @@ static void ends(void **state)
     Vec3 p, d;
     assert_true(open->inlet(open, &p, &d));
     assert_true(vec3_distance(p, vec3(2, 0, 0)) == 0 && vec3_distance(d, vec3(1, 0, 0)) < 1e-15);
-    // a point on the plane of a smooth joint is no corner
+    // a smooth joint is not a corner
     assert_true(fabs(ask(open, vec3(12, 0.2, 0), -1).hessian.xx) < 0.3);
     static const double bad[] = {NAN, INFINITY, 1e200};
     for (int i = 0; i < 3; i++) {
@@ -214,7 +214,7 @@ static void ends(void **state)
     closed->destroy(closed);
 }
 
-// Gap, normal and Hessian agree with each other all the way out of either end, and gap and normal have no step.
+// Gap, normal and Hessian are consistent along a path out of either end, and gap and normal do not jump.
 static void ends_are_smooth(void **state)
 {
     (void)state;
@@ -297,7 +297,7 @@ static void rigid_motion_and_mirror(void **state)
     m->destroy(m);
 }
 
-// Three turns of one circle lie in the same place: a point led along them counts its turns and does not fall back to the first.
+// Three turns of one circle at the same place: a point that moves along them counts its turns and does not fall back to the first.
 static void coils_that_coincide(void **state)
 {
     (void)state;
@@ -317,8 +317,8 @@ static void coils_that_coincide(void **state)
     v->destroy(v);
 }
 
-// A polyline helix of 540 points whose turns nearly touch, as dense as the peer tubes: a point led along the wall that faces the next turn stays in
-// its own, its gap is the exact tube's within the chords' sag, and nodes continue one by one.
+// A polyline helix of 540 points whose turns nearly touch, as dense as the peer tubes: a point that moves along the wall facing the next turn stays in its own
+// turn, its gap equals that of the exact tube within the sag of the chords, and its nodes increase one by one.
 static void turns_that_nearly_touch(void **state)
 {
     (void)state;
@@ -349,7 +349,7 @@ static void turns_that_nearly_touch(void **state)
     v->destroy(v);
 }
 
-// Where segments fold back, cross themselves or are tiny, and for points far away, answers stay finite and unit.
+// For segments that fold back, cross or are tiny, and for points far away, results stay finite and normals stay unit vectors.
 static void strange_tubes(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// Branches, and what is found on them: a Y, a sac, narrow and wide places of known degree, tapers that are neither.
+// Branches and findings on them: a Y, a sac, narrow and wide places of known degree, tapers that are neither.
 #include "geom/blobby.h"
 #include "geom/vessel_findings.h"
 
@@ -105,13 +105,14 @@ static void degrees_are_those_made(void **state)
     f = findings_of(widened, &count);
     assert_true(count >= 1);
     for (int i = 0; i < count; i++)
-        assert_int_equal(f[i].kind, FINDING_DILATATION);   // its flanks are no narrow places
+        assert_int_equal(f[i].kind, FINDING_DILATATION);   // its flanks do not count as narrow places
     assert_near(f->along, 31, 0.51);
     assert_near(f->degree, 100 * (widened(31.5) - 1), 0.5);
     free(f);
 }
 
-// Beside a place of another width the mean of both sides says little: a run is narrow, or wide, against the nearer-by side too, by half the bound.
+// Beside a place of another width, the mean of both sides is not a good reference: a run must also be narrow, or wide, relative to the nearer side, by
+// half the bound.
 static double change_between, width_beyond;
 static double beside(double s) { return s > 33 ? width_beyond : s > 20 && s < 26 ? 2 + change_between : 2; }
 

@@ -1,5 +1,5 @@
-// The wall of a vessel as triangles: closed and facing out, area and volume of exact tubes by Pappus, orders of convergence, rims at open ends, refinement,
-// no slivers, kissing vessels and thin walls, thin beside wide, turned, mirrored and scaled shapes, fitted models, and what cannot be meshed.
+// The wall of a vessel as triangles: closed and facing outwards; area and volume of exact tubes by Pappus; orders of convergence; rims at open ends;
+// refinement; no slivers; touching vessels and thin walls; thin beside wide vessels; rotated, mirrored and scaled shapes; fitted models; rejected input.
 #include "base/disjoint_sets.h"
 #include "blob_tube.h"
 #include "geom/isosurface.h"
@@ -95,7 +95,7 @@ static TubeOptions hook(TubePiece piece[3], Vec3 direction, Vec3 normal, bool cl
                          .closed_ends = closed};
 }
 
-// --- What a mesh must be ---
+// --- Required properties of a mesh ---
 
 static SurfaceCensus census_of(const TriangleMesh *mesh)
 {
@@ -124,7 +124,7 @@ static VesselHit ask(const Vessel *vessel, Vec3 x, int from)
     return hit;
 }
 
-// All within `most` of the wall; returns how many are not within 1e-9 mm.
+// Checks that all vertices are within `most` of the wall; returns the number of those not within 1e-9 mm.
 static int count_off(const TriangleMesh *mesh, const Vessel *vessel, double most)
 {
     int off = 0;
@@ -225,7 +225,7 @@ static Rim rim_of(const TriangleMesh *mesh)
         }
         if (count == 0)
             continue;
-        assert_int_equal(at, v);             // came round
+        assert_int_equal(at, v);             // the loop is closed
         rim.middle[rim.loops] = vec3_scale(rim.middle[rim.loops], 1.0 / count);
         rim.loops++;
     }
@@ -266,7 +266,7 @@ static void tubes_converge(void **state)
     free_tube(tube);
 }
 
-// Turned anyhow, mirrored, moved and scaled: the same area and volume, to the cell's error; no sliver, whatever the lattice does.
+// Rotated at random, mirrored, moved and scaled: the same area and volume within the error of the cell; no slivers for any position of the lattice.
 static void turned_tubes_are_the_same(void **state)
 {
     (void)state;
@@ -296,7 +296,7 @@ static void turned_tubes_are_the_same(void **state)
     }
 }
 
-// The lattice is scaled with the shape: the same triangles but for those that rounding decides, of which powers of two have none.
+// The lattice is scaled with the shape: the triangles are the same except where rounding decides; with powers of two all are the same.
 static void scale_is_no_matter(void **state)
 {
     (void)state;
@@ -317,7 +317,7 @@ static void scale_is_no_matter(void **state)
     triangle_mesh_free(mesh[1]);
 }
 
-// A cylinder upstream, a bell downstream; a rim at each, as far out as the balls reach.
+// A cylinder upstream, a bell downstream, and a rim at the end of each, where the balls end.
 static void open_ends_have_rims(void **state)
 {
     (void)state;
@@ -390,7 +390,7 @@ static void refinement_converges(void **state)
     }
 }
 
-// Rounded to float, as a ray tracer keeps it, no triangle of a fine mesh is without area or turned round.
+// Rounded to float as in a ray tracer, no triangle of a fine mesh has zero area or is reversed.
 static void fine_meshes_survive_floats(void **state)
 {
     (void)state;
@@ -420,9 +420,9 @@ static void fine_meshes_survive_floats(void **state)
     free_tube(tube);
 }
 
-// --- Vessels whose answer depends on the node ---
+// --- Vessels whose results depend on the node ---
 
-// Balls, one a node, each with a wall of its own.
+// Balls, one per node, each with its own wall.
 typedef struct Balls {
     Vessel vessel;
     int count;
@@ -479,7 +479,7 @@ static void thin_beside_wide_is_whole(void **state)
     }
 }
 
-// A wall between two lumens that is much thinner than a cell stays a wall, whichever way it lies.
+// A wall between two lumens that is much thinner than a cell stays a wall in any orientation.
 static void thin_walls_stay_whole(void **state)
 {
     (void)state;
@@ -505,7 +505,7 @@ static void thin_walls_stay_whole(void **state)
     }
 }
 
-// A hairpin whose legs kiss at 0.2 mm.
+// A hairpin whose legs are 0.2 mm apart.
 static void kissing_legs_stay_apart(void **state)
 {
     (void)state;
@@ -563,7 +563,7 @@ static void model_has_one_rim(void **state)
     vessel_tree_free(tree);
 }
 
-// A terrace: its wall steps up where x > 0, by more than a block of cells. The step is closed, though nothing in the blocks beside says that there is one.
+// A terrace: its wall steps up at x = 0 by more than a block of cells. The step is closed, although the neighbouring blocks do not show it.
 static void terrace_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
     (void)vessel, (void)memory;
@@ -596,7 +596,7 @@ static void steps_are_closed(void **state)
     triangle_mesh_free(mesh);
 }
 
-// Balls that cover a plane in rags: rims still run round once, and no part is rim alone.
+// Balls that cover a plane irregularly: rims are still simple loops, and no part consists only of rim vertices.
 static void ragged_cover_has_clean_rims(void **state)
 {
     (void)state;
@@ -641,7 +641,7 @@ static void ragged_cover_has_clean_rims(void **state)
     plane->destroy(plane);
 }
 
-// --- What cannot be meshed ---
+// --- Rejected input ---
 
 static void bad_input(void **state)
 {

@@ -15,7 +15,7 @@
 
 #include "near.h"
 
-// A trunk along x that forks: the upper arm makes a U and comes back to touch the lower one.
+// A trunk along x that forks: the upper arm makes a U-turn and touches the lower one.
 static VesselTree *forked_tree(void)
 {
     enum { N = 40 };
@@ -76,7 +76,7 @@ static void neighbours(void **state)
     assert_true(of9[0] == 8 && of9[1] == 10 && of9[2] == 20);
     assert_int_equal(t->neighbour_offset[1] - t->neighbour_offset[0], 1);
     assert_int_equal(t->neighbour[0], 1);
-    for (int i = 0; i < t->node_count; i++)   // every link is held by both
+    for (int i = 0; i < t->node_count; i++)   // every link is stored at both nodes
         for (int k = t->neighbour_offset[i]; k < t->neighbour_offset[i + 1]; k++) {
             int j = t->neighbour[k], back = 0;
             for (int m = t->neighbour_offset[j]; m < t->neighbour_offset[j + 1]; m++)
@@ -135,7 +135,7 @@ static void rules(void **state)
     BREAK(t->error[3], NAN, "blobs/error_mm[3]");
     BREAK(t->iso_level, 0, "iso_level");
 #undef BREAK
-    t->radius[0] = -1, t->radius[1] = -1, t->kind[0] = 9;   // one fault a rule, the first index
+    t->radius[0] = -1, t->radius[1] = -1, t->kind[0] = 9;   // one fault per rule, with the first index
     faults_clear(&faults);
     assert_false(vessel_tree_validate(t, "m.h5", &faults));
     assert_int_equal(faults.count, 2);
@@ -156,7 +156,7 @@ static void nearest_by_power(void **state)
         double d = power_distance(x, t->center[best], t->radius[best]);
         for (int i = 0; i < t->node_count; i++)
             assert_true(power_distance(x, t->center[i], t->radius[i]) >= d);
-        // where the walk ends no neighbour is better, but for one whose vessel is further than its diameter, and further in radii
+        // where the walk ends, no neighbour is better, except one whose vessel is further away than its diameter, and further in radii
         double here = power_distance(x, t->center[reached], t->radius[reached]), radii = vec3_distance(x, t->center[reached]) / t->radius[reached];
         for (int k = t->neighbour_offset[reached]; k < t->neighbour_offset[reached + 1]; k++) {
             int next = t->neighbour[k];
@@ -169,8 +169,8 @@ static void nearest_by_power(void **state)
     vessel_tree_free(t);
 }
 
-// A point that slides along the lower arm past the place where the upper arm touches it stays with the lower arm, also where it is
-// nearer to the other's nodes; one that goes up the other arm reaches the same place with the other's node.
+// A point that slides along the lower arm past the place where the upper arm touches it keeps a node of the lower arm, even where it is nearer to nodes of the
+// upper one; a point that moves along the upper arm reaches the same place with a node of the upper arm.
 static void kissing_branches(void **state)
 {
     (void)state;
@@ -195,8 +195,8 @@ static void kissing_branches(void **state)
     vessel_tree_free(t);
 }
 
-// A sac before the convex side of a bend, hung on a node up the vessel: every way to it leads over worse nodes. A point inside the sac is found to be
-// there; one pushed out of the lower arm into the kissing arm's wall (above) is not taken across.
+// A sac at the convex side of a bend, attached to a node further upstream: every path to it leads over worse nodes. A point inside the sac is located there; a
+// point that is pushed out of the lower arm into the wall of the touching arm (above) does not change arms.
 static void wide_sac(void **state)
 {
     (void)state;
@@ -252,7 +252,7 @@ static bool is_near(const VesselTree *t, int i, int j)
     return false;
 }
 
-// The way through the tree, by walking up to the common ancestor.
+// The path through the tree, over the common ancestor.
 static double way_between(const VesselTree *t, int i, int j)
 {
     double length = 0;
@@ -264,7 +264,7 @@ static double way_between(const VesselTree *t, int i, int j)
     return length;
 }
 
-// Wide vessels whose nodes are close have hundreds of near ones: all are listed, on both sides.
+// Wide vessels with dense nodes have hundreds of near nodes: all are listed, on both sides.
 static void near_is_complete_and_mutual(void **state)
 {
     (void)state;
@@ -292,7 +292,7 @@ static void near_is_complete_and_mutual(void **state)
     }
     assert_true(most > 150);
     vessel_tree_free(t);
-    // a broken file's nodes, all in one place: lists are cut, alike, in bounded time and memory
+    // nodes of a damaged file, all at one place: lists are truncated in the same way, in bounded time and memory
     enum { HEAP = 20000 };
     t = vessel_tree_create(HEAP, 0, 0);
     for (int i = 0; i < HEAP; i++) {

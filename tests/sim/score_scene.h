@@ -1,4 +1,4 @@
-// A scene from text with its simulator and score, stepped by hand: what the tests of score and sessions share.
+// A scene from text with its simulator and score, stepped by the test: shared by the tests of score and sessions.
 #ifndef SELDINGER_TESTS_SCORE_SCENE_H
 #define SELDINGER_TESTS_SCORE_SCENE_H
 
@@ -26,7 +26,7 @@ typedef struct Practice {
     Simulator *simulator;
     Score *score;
     XrayControl xray;
-    bool watched;            // xray is given
+    bool watched;            // xray is used
 } Practice;
 
 static void practice_end(Practice *p)

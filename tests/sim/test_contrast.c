@@ -1,4 +1,4 @@
-// Contrast agent in vessel trees: mass, speed, the split at forks, reflux, sacs, invariances, odd trees, cost.
+// Contrast agent in vessel trees: mass, speed, the split at forks, reflux, sacs, invariances, degenerate trees, CPU time.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -118,7 +118,7 @@ static void nothing_is_lost_and_nothing_exceeds_one(void **state)
         unsigned draws = seed;
         double injected = 0;
         for (int i = 0; i < 600; i++) {
-            // from a drop to far more than flows, at any node, steps of 0.3 to 30 ms
+            // from a drop to far more than the flow, at any node, steps of 0.3 to 30 ms
             double rate = i % 200 < 120 ? (noise(&draws) % 100) * 0.12 : 0, dt = 0.0003 * (1 + noise(&draws) % 100);
             contrast_advance(contrast, dt, (int)(noise(&draws) % (unsigned)tree->node_count) - 1, rate);
             injected += rate * dt;
@@ -131,7 +131,7 @@ static void nothing_is_lost_and_nothing_exceeds_one(void **state)
     }
 }
 
-// When half of what is injected has come to a node.
+// The time at which the concentration at a node reaches half of the injected one.
 static double arrival_s(Contrast *contrast, int node, double rate, double dt)
 {
     double last = 0, time = 0;
@@ -171,7 +171,7 @@ static void a_front_travels_at_the_speed_of_the_blood(void **state)
     vessel_tree_free(tree);
 }
 
-// Where a whole number of steps fits the branch, a bolus moves as it is: no smear at all.
+// If the branch is a whole number of steps long, a bolus moves without numerical diffusion.
 static void a_bolus_keeps_its_shape(void **state)
 {
     (void)state;
@@ -214,7 +214,7 @@ static void flow_splits_by_the_cube_of_the_radius(void **state)
     vessel_tree_free(uneven);
 }
 
-// Below the tip the mixture is what is injected and what still comes; above and beside it is blood.
+// Below the tip there is a mixture of injected agent and blood; above it and in other branches there is blood.
 static void below_the_tip_only(void **state)
 {
     (void)state;
@@ -235,7 +235,7 @@ static void below_the_tip_only(void **state)
     vessel_tree_free(tree);
 }
 
-// Twice what flows: the branch is full up to the fork, the rest goes into the other branch; what the trunk brings keeps its share there.
+// Injection of twice the flow: the branch is full up to the fork, the rest flows into the other branch, where it mixes with the blood of the trunk.
 static void what_does_not_go_on_goes_back(void **state)
 {
     (void)state;
@@ -252,13 +252,13 @@ static void what_does_not_go_on_goes_back(void **state)
         assert_true(fabs(c[i] - 0.5) < 1e-6);
     for (int i = 0; i < 30; i++)
         assert_true(c[i] == 0);
-    // more than all that flows: out of the inlet too
+    // more than the total flow: also out of the inlet
     for (int i = 0; i < 400; i++)
         contrast_advance(contrast, 0.005, 45, 3.5);
     for (int i = 0; i <= 90; i++)
         assert_true(fabs(c[i] - 1) < 1e-6);
     check_balance(contrast);
-    // and blood takes it all away
+    // then blood washes it out
     for (int i = 0; i < 4000; i++)
         contrast_advance(contrast, 0.005, 45, 0);
     assert_true(contrast_is_clear(contrast));
@@ -276,7 +276,7 @@ static void a_sac_washes_out_exponentially(void **state)
         set_node(tree, i, i - 1, vec3(i, 0, 0), 2);
     set_node(tree, 41, 20, vec3(20, 5, 0), 3);
     tree->kind[41] = NODE_ANEURYSM;
-    ContrastOptions options = steady(80);   // carries away what comes out
+    ContrastOptions options = steady(80);   // carries away the agent that leaves the sac
     options.sac_residence_s = 1.2;
     Contrast *contrast = make(tree, &options);
     assert_true(contrast_flow_ml_s(contrast, 41) == 0);
@@ -288,9 +288,9 @@ static void a_sac_washes_out_exponentially(void **state)
     double start = c[41], volume = contrast_within_ml(contrast);
     assert_true(fabs(volume - start * 4 * PI / 3 * 27 / 1000) < 0.01 * volume);
     contrast_advance(contrast, 1.2, 5, 0);
-    // the vessel's share of what came out is exchange / flow = 0.0012
+    // the concentration in the vessel due to the outflow is exchange / flow = 0.0012
     assert_true(fabs(c[41] / start - exp(-1)) < 0.002 * exp(-1));
-    // injected inside it stays inside, and is full at most
+    // agent injected in the sac stays inside, with a concentration of at most 1
     contrast_reset(contrast);
     contrast_advance(contrast, 0.1, 41, 5);
     assert_true(c[41] > 0.9 && c[41] <= 1);
@@ -299,8 +299,8 @@ static void a_sac_washes_out_exponentially(void **state)
     vessel_tree_free(tree);
 }
 
-// Below the tip each node sees what was injected, diluted by the flow at the tip and later by the blood's transit: the same area under its curve, and a
-// mean time that differs by the transit. The others see nothing.
+// Each node below the tip receives the injected agent, diluted by the flow at the tip and delayed by the transit time: the areas under the curves are equal,
+// and the mean times differ by the transit time. Other nodes receive nothing.
 static void every_node_sees_the_bolus_in_its_time(void **state)
 {
     (void)state;
@@ -340,7 +340,7 @@ static void every_node_sees_the_bolus_in_its_time(void **state)
     assert_true(seen > 50);
 }
 
-// Nodes that a front which has come in at the root has reached.
+// The number of nodes reached by a front from the root.
 static int reached(Contrast *contrast, double seconds)
 {
     int count = 0;
@@ -351,7 +351,8 @@ static int reached(Contrast *contrast, double seconds)
     return count;
 }
 
-// The pulse moves blood by the integral of its speed, 1 + 0.4 (cos a + cos 2a / 2), a the heart's angle: a front is where it would be in steady flow after so long.
+// The pulse moves blood by the integral of its speed, 1 + 0.4 (cos a + cos 2a / 2), with a the phase of the heart: a front is at the place that steady flow
+// reaches after the time given by the integral.
 static void the_pulse_moves_by_its_integral(void **state)
 {
     (void)state;
@@ -405,7 +406,7 @@ static void a_finer_tree_fills_alike(void **state)
             coarse->radius[i] *= 1 - coarse->center[i].x / 200;
         for (int i = 0; tapered && i <= 90; i++)
             fine->radius[i] *= 1 - fine->center[i].x / 200;
-        // halfway between the fork's node and the branch's first, as it is where nodes are halved
+        // halfway between the fork's node and the branch's first, as if nodes were inserted halfway
         fine->radius[31] = (fine->radius[30] + fine->radius[32]) / 2;
         fine->radius[61] = (fine->radius[30] + fine->radius[62]) / 2;
         Contrast *a = make(coarse, NULL), *b = make(fine, NULL);
@@ -449,7 +450,7 @@ static void the_same_calls_give_the_same_bits(void **state)
     vessel_tree_free(tree);
 }
 
-// Ten calls of 1 ms are one of 10 ms, whatever the heart does.
+// Ten calls of 1 ms are equal to one call of 10 ms at any phase of the heart.
 static void the_length_of_a_call_does_not_matter(void **state)
 {
     (void)state;
@@ -478,16 +479,16 @@ static void blood_comes_in_at_the_widest_end(void **state)
     assert_int_equal(contrast_find_inlet(carotid), 0);
     assert_int_equal(contrast_find_inlet(leg), 90);
     Contrast *contrast = make(leg, NULL);
-    // no more than the heart gives, which divides over the root and the other end
+    // at most the flow of the heart, which is divided over the root and the other end
     assert_true(fabs(contrast_flow_ml_s(contrast, 90) - 5000.0 / 60) < 1e-9);
     assert_true(fabs(contrast_flow_ml_s(contrast, 0) + contrast_flow_ml_s(contrast, 60) - 5000.0 / 60) < 1e-9);
     assert_true(contrast_transit_s(contrast, 90) == 0 && contrast_transit_s(contrast, 0) > contrast_transit_s(contrast, 29));
-    // injected in the trunk it goes to the root
+    // agent injected in the trunk flows to the root
     for (int i = 0; i < 20; i++)
         contrast_advance(contrast, 0.005, 15, 5);
     assert_true(contrast_concentration(contrast)[10] > 0 && contrast_concentration(contrast)[20] == 0);
     contrast_free(contrast);
-    // a sac is no end, however wide, and no more is a stub of the trunk
+    // a sac is not an end, even if it is wide, and neither is a stub of the trunk
     VesselTree *sac = fork_tree(30, 2, 1.5, 6), *stub = new_tree(33);
     for (int i = 61; i <= 90; i++)
         sac->kind[i] = NODE_ANEURYSM;
@@ -502,7 +503,7 @@ static void blood_comes_in_at_the_widest_end(void **state)
     vessel_tree_free(stub);
 }
 
-// --- odd trees, bad values ---
+// --- degenerate trees, bad values ---
 
 static void odd_trees_work(void **state)
 {
@@ -527,7 +528,7 @@ static void odd_trees_work(void **state)
         vessel_tree_free(one);
     }
     for (int variant = 0; variant < 3; variant++) {
-        // all in one place; all a sac; radii over eighteen decades
+        // all nodes at one place; all nodes a sac; radii over eighteen decades
         VesselTree *tree = random_tree(200, 9);
         for (int i = 0; i < 200; i++) {
             if (variant == 0)

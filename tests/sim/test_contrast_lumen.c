@@ -1,4 +1,5 @@
-// Contrast agent through the lumens of tools: flow against Poiseuille's law and the annulus, the column's front, where it comes out, the dose.
+// Contrast agent through the lumens of tools: flow compared with Poiseuille's law and the annulus, the front of the column, the place where it leaves, the
+// dose.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -77,7 +78,7 @@ static void assert_close(double value, double expected, double part)
 
 // --- the annulus ---
 
-// Flow between radii k and 1 from the equation of motion itself, (r u')' = -r, u = 0 at both: finite volumes, in that of the open tube (pi / 8).
+// Flow between radii k and 1 from the equation of motion, (r u')' = -r, u = 0 at both: finite volumes, relative to that of the open tube (pi / 8).
 static double flow_by_finite_volumes(double k)
 {
     enum { CELLS = 4000 };
@@ -108,7 +109,7 @@ static void the_annulus_is_the_equation_of_motion_s(void **state)
         print_message("k = %.4f: share %.8f, finite volumes %.8f\n", ratio[i], share, numerical);
     }
     assert_true(lumen_annulus_share(0) == 1 && lumen_annulus_share(1) == 0 && lumen_annulus_share(1.2) == 0);
-    // two flat walls take over without a step
+    // the transition to the formula of two flat walls has no jump
     assert_close(lumen_annulus_share(1 - 0.999e-3), lumen_annulus_share(1 - 1.001e-3) * pow(0.999 / 1.001, 3), 1e-5);
 }
 
@@ -124,12 +125,12 @@ static void flow_is_poiseuille_s_in_series_and_falls_beside_a_tool(void **state)
     // the microcatheter's tip 50 mm before the guide's: the guide's hub at -200 mm, the microcatheter's first section ends at -50 mm
     double annulus = tube_resistance(150, 0.9) / lumen_annulus_share(0.4 / 0.9) + tube_resistance(250, 0.9) / lumen_annulus_share(0.35 / 0.9);
     assert_close(contrast_lumens_passes(lumens, 0, beside), pressure / annulus / 1000, 1e-12);
-    // drawn back by 120 mm, the wire with it
+    // pulled back by 120 mm together with the wire
     const double within[] = {200, 130, 130};
     annulus =
         tube_resistance(30, 0.9) / lumen_annulus_share(0.4 / 0.9) + tube_resistance(300, 0.9) / lumen_annulus_share(0.35 / 0.9) + tube_resistance(70, 0.9);
     assert_close(contrast_lumens_passes(lumens, 0, within), pressure / annulus / 1000, 1e-12);
-    // the wire alone beyond it
+    // only the wire beyond it
     const double wire_beyond[] = {200, 130, 250};
     annulus += tube_resistance(70, 0.9) * (1 / lumen_annulus_share(0.18 / 0.9) - 1);
     assert_close(contrast_lumens_passes(lumens, 0, wire_beyond), pressure / annulus / 1000, 1e-12);
@@ -183,7 +184,7 @@ static void the_front_goes_as_flow_over_area(void **state)
         }
     }
     assert_true(out[0] > 10 && out[1] <= 0 && out[2] <= 0);
-    // the drip washes it out: a sharp rear, all of it at the tip
+    // the saline drip washes it out: a sharp rear front, and all agent leaves at the tip
     double injected = rate * t, drip = 1000 * lumen_default_options().flush_ml_s;
     for (int i = 0; i < (int)((thick + thin + open) / drip / 0.01) + 2; i++)
         contrast_lumens_advance(lumens, 0.01, inserted, -1, 0, out);
@@ -207,7 +208,7 @@ static void without_a_drip_the_column_stays(void **state)
         contrast_lumens_advance(lumens, 0.1, inserted, -1, 0, out);
     assert_close(contrast_lumens_within(lumens, 0), 100, 1e-12);
     assert_true(out[0] <= 0);
-    // what comes in pushes its own volume out, once the column stands at the tip
+    // a tool that is pushed in displaces its volume, after the column has reached the tip
     contrast_lumens_advance(lumens, 0.1, inserted, 0, 1000, out);
     double before = out[0];
     contrast_lumens_advance(lumens, 0.1, pushed, -1, 0, out);
@@ -298,7 +299,7 @@ static void what_is_seen_in_a_lumen_is_what_is_in_it(void **state)
             most = fmax(most, (double)filling[j]);
         }
         assert_close(sum, contrast_lumens_within(lumens, 0), 1e-5);  // floats
-        assert_true(most <= 1 - 0.35 * 0.35 / 0.81 + 1e-6);          // what lies within takes its place
+        assert_true(most <= 1 - 0.35 * 0.35 / 0.81 + 1e-6);          // the inner tool displaces agent
         for (int j = NODES; j < 3 * NODES; j++)
             assert_true(filling[j] <= 0);
     }
@@ -316,7 +317,7 @@ static int most_opaque(ContrastInjection *injection, float *seen)
     return seen[best] > 0 ? best : -1;
 }
 
-// The agent comes out where the tip is then: the guide's at 40 mm, later at 120 mm, though the wire is further in.
+// The agent leaves at the current place of the guide's tip, at 40 mm and later at 120 mm, although the wire is further in.
 static void it_comes_out_at_the_chosen_tool_s_tip(void **state)
 {
     (void)state;
@@ -362,7 +363,7 @@ static void the_lumen_is_the_chosen_tool_s_or_the_next_around_it(void **state)
         assert_int_equal(contrast_injection_tool(of_three, &xray), expected[chosen]);
         assert_int_equal(contrast_injection_tool(of_wire, &xray), -1);
     }
-    // a wire alone: all of it, as if through a catheter that does not exist
+    // only a wire: all agent flows, as through a catheter that does not exist
     const double inserted[TOOLS_MOST] = {100};
     xray.contrast_ml_s = 3;
     assert_close(contrast_injection_flow(of_wire, &xray, inserted), 3, 1e-12);
@@ -407,7 +408,7 @@ static void a_copy_goes_on_the_same_and_no_advance_allocates(void **state)
     scene_free(scene);
 }
 
-// A narrower catheter with more nodes takes the place of one that holds agent: that goes out with it, and the new one passes less.
+// A narrower catheter with more nodes replaces one that contains agent: the agent leaves with the old one, and the flow through the new one is smaller.
 static void another_device_brings_saline(void **state)
 {
     (void)state;
@@ -424,7 +425,7 @@ static void another_device_brings_saline(void **state)
     double wide = contrast_lumens_passes(lumens, 0, withdrawn);
     contrast_lumens_advance(lumens, 0.01, withdrawn, 0, 20, out);
     assert_close(contrast_lumens_within(lumens, 0), 20, 1e-12);
-    assert_true(contrast_lumens_fit(lumens, 0, 0) == 0 && contrast_lumens_fit(lumens, 0, 2) == 0);      // it is in; there is none
+    assert_true(contrast_lumens_fit(lumens, 0, 0) == 0 && contrast_lumens_fit(lumens, 0, 2) == 0);      // this device is in already; that device does not exist
     assert_close(contrast_lumens_fit(lumens, 0, 1), 20, 1e-12);
     assert_true(contrast_lumens_within(lumens, 0) == 0);
     assert_close(wide / contrast_lumens_passes(lumens, 0, withdrawn), tube_resistance(80, 0.4) / tube_resistance(100, 0.6), 1e-9);

@@ -1,4 +1,4 @@
-// Pacing: over load simulated time slows down by what was lost, and nothing is hurried afterwards.
+// Pacing: under overload simulated time falls behind by the lost time, and later steps do not catch up.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -62,7 +62,7 @@ static DriveReport drive(Clock *clock, bool paced, uint64_t *hash)
     return report;
 }
 
-// What is lost is exactly what real time is ahead, whatever else this machine does meanwhile.
+// The lost time is exactly the lead of real time, whatever other load the machine has.
 static void a_stall_slows_simulated_time(void **state)
 {
     (void)state;
@@ -77,17 +77,17 @@ static void a_stall_slows_simulated_time(void **state)
     assert_true(late.deadline_misses >= 1);
     assert_true(late.slowed_s >= (STALL_MS - 1) * 1e-3);
     assert_true(late.latest_s >= (STALL_MS - 1) * 1e-3 && late.latest_s <= late.slowed_s + 1e-12);
-    // the last step ends somewhere within its millisecond, or late and then counted
+    // the last step ends within its millisecond, or late, and then it is counted
     const DriveReport *both[] = {&quiet, &late};
     for (int i = 0; i < 2; i++) {
         assert_true(both[i]->wall_s - both[i]->slowed_s <= STEPS * 1e-3 + 1e-4);
         assert_true(both[i]->wall_s - both[i]->slowed_s >= (STEPS - 1) * 1e-3);
     }
     assert_true(quiet.deadline_misses > 0 || quiet.slowed_s == 0);
-    assert_true(free_hash == calm_hash && calm_hash == stalled_hash);   // pacing is no input
+    assert_true(free_hash == calm_hash && calm_hash == stalled_hash);   // pacing does not change the results
 }
 
-// A run that caught up would do the 50 steps after the stall in a few milliseconds.
+// A run that catches up would make the 50 steps after the stall in a few milliseconds.
 static void nothing_is_hurried_after_a_stall(void **state)
 {
     (void)state;
@@ -95,7 +95,7 @@ static void nothing_is_hurried_after_a_stall(void **state)
     uint64_t hash;
     drive(&clock, true, &hash);
     for (int i = STALL_AT + 1; i + 20 < STEPS; i++)
-        assert_true(clock.end_s[i + 20] - clock.end_s[i] > 19e-3 - 1e-3);   // 20 deadlines lie between, the first step may have ended late in its own
+        assert_true(clock.end_s[i + 20] - clock.end_s[i] > 19e-3 - 1e-3);   // 20 deadlines between; the first step may have ended late in its millisecond
 }
 
 int main(void)

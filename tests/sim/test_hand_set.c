@@ -1,5 +1,5 @@
-// What hands ask for becomes one command a tool: no count of a hand is lost or taken twice, tools that are locked move as one, those let go do not, and each
-// hand feels what it moves.
+// The motions of all hands become one command per tool: no count of a hand is lost or used twice, locked tools move as one, released tools do not move, and
+// each hand gets the force of the tool that it moves.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -82,7 +82,7 @@ static void rates_add_and_stop_holds_all_tools(void **state)
         port[0].push_mm_s = 10;
         port[1].push_mm_s = -4;
         port[1].twist_deg_s = 90;
-        port[2].drives = DRIVES_TOOL + 1;      // of one tool it is that one
+        port[2].drives = DRIVES_TOOL + 1;      // with a single tool, it is that tool
         port[2].push_mm_s = 2;
         ToolCommands commands = hand_set_command(&set, 1);
         assert_command(&commands, 0, tools == 1 ? 8 : 6, 90);
@@ -92,10 +92,10 @@ static void rates_add_and_stop_holds_all_tools(void **state)
         commands = hand_set_command(&set, 1);
         assert_true(commands.tool[0].push_mm_s == 0 && commands.tool[0].twist_deg_s == 0 && commands.tool[1].push_mm_s == 0);
         port[2].buttons = 0;
-        commands = hand_set_command(&set, 1);  // what came while it was stopped does not come afterwards
+        commands = hand_set_command(&set, 1);  // motion during a stop is not applied afterwards
         assert_command(&commands, 0, tools == 1 ? 8 : 6, 90);
         assert_command(&commands, 1, tools == 1 ? 0 : 2, 0);
-        port[0].push_mm_s = NAN;               // a hand that fails does no harm
+        port[0].push_mm_s = NAN;               // a failing hand does no harm
         port[1].push_mm_s = HUGE_VAL;
         port[2].advanced_mm = NAN;
         commands = hand_set_command(&set, 1);
@@ -103,7 +103,7 @@ static void rates_add_and_stop_holds_all_tools(void **state)
     }
 }
 
-// Which tool each kind of hand moves, whichever is chosen.
+// Which tool each kind of hand moves, for each selected tool.
 static void each_hand_moves_its_tool(void **state)
 {
     (void)state;
@@ -127,7 +127,7 @@ static void each_hand_moves_its_tool(void **state)
             assert_true(port[0].force_n == cases[c].chosen + 1);
         }
     choose(1);
-    choose(4);                                 // there is none: nothing changes
+    choose(4);                                 // this tool does not exist: nothing changes
     choose(-1);
     assert_int_equal(set.grip.chosen, 1);
 }
@@ -136,7 +136,7 @@ static void what_is_still_owed_does_not_follow_to_another_tool(void **state)
 {
     (void)state;
     take_hands(2);
-    port[0].advanced_mm = 5;                   // takes 25 steps at the fastest
+    port[0].advanced_mm = 5;                   // needs at least 25 steps
     ToolCommands commands = hand_set_command(&set, 1);
     assert_command(&commands, 0, 200, 0);
     choose(1);
@@ -169,7 +169,7 @@ static void locked_tools_move_as_one_and_are_felt_together(void **state)
     hand_set_answer(&set, &report, 1);
     assert_true(port[0].force_n == 6 && port[1].force_n == 6 && port[2].force_n == 1 && port[0].torque_n_mm == 60 && port[2].torque_n_mm == 10);
 
-    // ways of both hands are fed whole, together no faster than one
+    // the motions of both hands are applied completely, together no faster than one hand
     port[0].push_mm_s = port[1].push_mm_s = port[1].twist_deg_s = port[2].push_mm_s = 0;
     port[0].advanced_mm = 3;
     port[1].advanced_mm = 2;
@@ -183,7 +183,7 @@ static void locked_tools_move_as_one_and_are_felt_together(void **state)
     assert_near(fed[0], 0, 0);
     assert_near(fed[1], 5, 1e-9);
 
-    // three of them, and open again
+    // three locked tools, and unlocked again
     choose(0);
     lock();
     port[2].push_mm_s = 7;
@@ -197,7 +197,7 @@ static void locked_tools_move_as_one_and_are_felt_together(void **state)
     commands = hand_set_command(&set, 1);
     assert_command(&commands, 0, 7, 0);
     assert_command(&commands, 1, 0, 0);
-    // one tool has none to be locked to
+    // a single tool has no partner to lock
     take_hands(1);
     lock();
     assert_true(set.grip.locked == 0 && !hand_grip_pair_is_locked(&set.grip, 1));
@@ -213,10 +213,10 @@ static void a_tool_that_was_let_go_is_moved_by_no_hand(void **state)
     ToolCommands commands = hand_set_command(&set, 1);
     assert_true(commands.released == 1 && commands.tool[0].push_mm_s == 0 && commands.tool[0].twist_deg_s == 0);
     let_go();
-    commands = hand_set_command(&set, 1);      // in hand again: the way it went alone is forgotten
+    commands = hand_set_command(&set, 1);      // held again: the distance that it moved on its own is discarded
     assert_int_equal(commands.released, 0);
     assert_command(&commands, 0, 10, 0);
-    // a lock takes both in hand, letting go opens it
+    // a lock holds both tools, releasing one unlocks them
     let_go();
     lock();
     assert_true(set.grip.released == 0 && set.grip.locked == 2);
@@ -224,7 +224,7 @@ static void a_tool_that_was_let_go_is_moved_by_no_hand(void **state)
     assert_command(&commands, 1, 10, 0);
     let_go();
     assert_true(set.grip.released == 1 && set.grip.locked == 0);
-    // stopped, a tool that is let go stays so
+    // a released tool stays released during a stop
     port[1].buttons = HAND_STOP;
     assert_int_equal(hand_set_command(&set, 1).released, 1);
 }
@@ -235,13 +235,13 @@ static void buttons_choose_lock_and_let_go(void **state)
     (void)state;
     HandGrip grip = {0};
     unsigned before = 0;
-    hand_grip_obey(&grip, 3, HAND_CHOOSE_OUTER | HAND_PEDAL, &before);         // there is none further out
+    hand_grip_obey(&grip, 3, HAND_CHOOSE_OUTER | HAND_PEDAL, &before);         // there is no tool further out
     assert_int_equal(grip.chosen, 0);
     hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER, &before);
     hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER | HAND_PEDAL, &before);
     assert_int_equal(grip.chosen, 1);
     hand_grip_obey(&grip, 3, 0, &before);
-    hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER | HAND_LOCK, &before);          // the innermost with the one around it
+    hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER | HAND_LOCK, &before);          // locks the innermost tool and the one around it
     assert_true(grip.chosen == 2 && grip.locked == 4);
     hand_grip_obey(&grip, 3, HAND_LET_GO, &before);
     assert_true(grip.released == 4 && grip.locked == 0);
@@ -249,7 +249,7 @@ static void buttons_choose_lock_and_let_go(void **state)
     assert_true(grip.chosen == 1 && grip.released == 4);
 }
 
-// Asking for another device takes the tool in hand, alone; only tools and devices that there can be.
+// Requesting another device holds the tool and unlocks it; only existing tools and devices are accepted.
 static void a_device_is_asked_for(void **state)
 {
     (void)state;
@@ -257,7 +257,7 @@ static void a_device_is_asked_for(void **state)
     hand_grip_fit(&grip, 3, 1, 2);
     assert_true(grip.fitted[1] == 2 && grip.locked == 0 && grip.released == 1);
     grip.released = 2;
-    hand_grip_fit(&grip, 3, 1, 2);      // is asked for already
+    hand_grip_fit(&grip, 3, 1, 2);      // was requested already
     assert_int_equal(grip.released, 2);
     hand_grip_fit(&grip, 3, 1, 0);
     assert_true(grip.fitted[1] == 0 && grip.released == 0);
@@ -273,7 +273,7 @@ static void a_device_is_asked_for(void **state)
     assert_int_equal(hand_set_command(&set, 1).fitted[2], 4);
 }
 
-// Any keys in any order: no tool is both locked and let go, and none but those that are there.
+// Any keys in any order: no tool is both locked and released, and only existing tools are affected.
 static void no_grip_contradicts_itself(void **state)
 {
     (void)state;

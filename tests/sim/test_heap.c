@@ -1,5 +1,5 @@
-// A step allocates nothing: calls of the heap between the start of a step and its end are counted. Of the simulation thread alone: a recording's
-// writer may do as it likes.
+// A step allocates nothing: the test counts heap calls between the start and the end of a step, only in the simulation thread; the writer of a recording may
+// allocate.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -19,7 +19,7 @@
 
 static Faults faults;
 
-// As the program's own run does it: a step, then the recording's row.
+// As in the program: a step, then a row of the recording.
 static unsigned run_watched(const char *name, const char *text, const Vessel *vessel, int steps, bool recorded)
 {
     Scene *scene = scene_parse(text, strlen(text), "test", &faults);
@@ -101,7 +101,7 @@ static void a_wire_that_snaps(void **state)
 {
     (void)state;
     need_counting();
-    // let go with 12 rad of bend: more than a step's turn
+    // released with 12 rad of bend: more than the rotation of a step
     unsigned flags = run_watched("a coil let go in a tube",
                                  "seldinger: 1\n" BENT "{line_mm: 60}]}}\n"
                                  "wire: {elements: 100, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.3}]}\n"

@@ -1,5 +1,5 @@
-// A session recorded, gone on from at a moment of it and recorded again: the common part is the same, bit for bit, and what is not the session's own
-// is refused.
+// A session is recorded, continued from a moment and recorded again: the common part is bit-identical, and recordings that are not of this session are
+// rejected.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -68,7 +68,7 @@ static bool score_again(void *context, Simulator *simulator, const ToolCommands 
     return true;
 }
 
-// Simulated again, the recording gives its states and the session's score.
+// Simulating the recording again gives its states and the session's score.
 static void assert_replays(const RecordedRun *run, const ScoreFigures *score)
 {
     Simulator *simulator = simulator_create(trainer.scene, trainer.open.vessel, &faults);
@@ -135,7 +135,7 @@ static void a_session_goes_on_from_a_moment_of_it(void **state)
     RecordedRun *first = load("first.h5");
     assert_replays(first, &score);
 
-    // from 0.3 s on another hand, with the X-ray off
+    // from 0.3 s on with another hand, X-rays off
     options = options_for(again);
     options.resume = first;
     options.resume_s = 0.3;
@@ -182,7 +182,7 @@ static void a_session_goes_on_from_a_moment_of_it(void **state)
     recorded_run_free(second);
 }
 
-// Nothing is left open: what is left would be a leak, or a thread that steps.
+// Everything is closed: otherwise there is a leak, or a thread that still steps.
 static void assert_refused(const LiveSessionOptions *options, const char *reason)
 {
     LiveSession session;
@@ -221,7 +221,7 @@ static void open_coaxial(void)
     assert_non_null(trainer.open.vessel);
 }
 
-// Two hands push two tools, lock them, let one go; recorded, the session gives its states again, and another continues from it.
+// Two hands push two tools, lock them and release one. Simulating the recorded session again gives its states, and another session continues from it.
 static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
 {
     (void)state;
@@ -243,7 +243,7 @@ static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
     hand_grip_lock(&grip, 2);
     realtime_set_grip(session.realtime, &grip);
     wait_for(&session, 0.4);
-    // what a hand feels is what both tools ask of theirs
+    // the force at a hand is the sum for both locked tools
     const StepReport report = realtime_moment(session.realtime)->pose->report;
     assert_true(isfinite(atomic_load(&pair[0].force_n)) && report.push[0] != 0 && report.push[1] != 0);
     wait_for(&session, 0.5);
@@ -269,7 +269,7 @@ static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
     assert_true(run->tool[0].command[2 * 880] == 0 && run->tool[1].released[880] == 1);
     assert_true(run->tool[0].inserted[700] > 4 + 0.3 * 5 + 0.2 * 35 && run->tool[1].inserted[499] > 4 + 0.3 * 30 + 0.1 * 35);
 
-    // from 0.7 s on: the thread is still let go, until it is taken
+    // from 0.7 s on: the released tool stays released until it is held again
     char again[200];
     snprintf(again, sizeof again, "%s", in_folder("coaxial-again.h5"));
     options.record_path = again;
@@ -293,7 +293,7 @@ static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
     trainer = former;
 }
 
-// The operator asks for another wire, too early at first; recorded, the session gives its states again, and another continues from it.
+// The operator requests another wire, first too early. Simulating the recorded session again gives its states, and another session continues from it.
 static void a_tool_is_exchanged_and_replayed(void **state)
 {
     (void)state;
@@ -359,10 +359,10 @@ static void what_is_not_the_recording_of_a_session_is_refused(void **state)
     options.resume_s = 0.3;
     run->command[2 * 100] += 1;
     assert_refused(&options, "step 100 gives another state");
-    assert_int_equal(access(path, F_OK), -1);   // no recording of a session that never was
+    assert_int_equal(access(path, F_OK), -1);   // no recording of a session that did not start
     options.record_path = NULL;
     assert_refused(&options, "step 100 gives another state");
-    options.resume_s = 0.1;                     // up to there it is the recording's
+    options.resume_s = 0.1;                     // up to this time the states are those of the recording
     LiveSession session = open_session(&options);
     assert_near(session.resumed_s, 0.1, 1e-9);
     stop(&session);
@@ -380,7 +380,7 @@ static void a_place_where_nothing_can_be_written_is_told(void **state)
     snprintf(path, sizeof path, "%s/nowhere/session.h5", folder);
     LiveSessionOptions options = options_for(path);
     assert_refused(&options, "nowhere/session.h5");
-    // more hands than a session takes
+    // more hands than a session accepts
     HandPort *many[HANDS_SAMPLED + 1];
     for (int i = 0; i <= HANDS_SAMPLED; i++)
         many[i] = &port;

@@ -1,4 +1,4 @@
-// What stands beside the simulator: the histogram's quantiles, SHA-256, golden tool paths.
+// Helpers of the simulator: quantiles of the histogram, SHA-256, golden tool paths.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -85,7 +85,7 @@ static void sha256_gives_the_standards_vectors(void **state)
 
 // --- golden paths ---
 
-// The shift is that of the last tool's node 2 at the third moment.
+// `shift` moves node 2 of the last tool at the third moment.
 static ToolPath *path_of_tools(int tools, int node_count, int moments, double shift)
 {
     ToolPath *path = calloc(1, sizeof *path);
@@ -119,7 +119,7 @@ static void print_and_parse(int tools)
     PathDifference difference = tool_path_compare(again, path, 1e-5);
     assert_false(difference.differs);
     assert_true(difference.worst_mm < 1e-5);
-    // what is printed twice is the same text
+    // printing twice gives the same text
     size_t second_length;
     char *second = tool_path_print(again, &second_length);
     assert_non_null(second);
@@ -154,7 +154,7 @@ static void a_comparison_names_first_time_node_and_distance(void **state)
     assert_non_null(strstr(difference.remark, "4 of 20"));
     ToolPath *finer = path_of(5, 5, 0);
     assert_true(tool_path_compare(golden, finer, 1).differs);
-    // not-a-number is never within a tolerance
+    // NaN is never within a tolerance
     run->row_count += 4;
     run->row[0].position.x = NAN;
     assert_true(tool_path_compare(golden, run, 1).differs);
@@ -163,7 +163,7 @@ static void a_comparison_names_first_time_node_and_distance(void **state)
     tool_path_free(golden);
 }
 
-// A place is compared with that of the same node of the same tool alone, however near another's is.
+// A place is compared only with that of the same node of the same tool, even if another is nearer.
 static void another_node_in_its_place_is_no_counterpart(void **state)
 {
     (void)state;

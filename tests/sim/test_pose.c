@@ -80,7 +80,7 @@ static void one_tool_is_the_shared_line(void **state)
     stop(simulator, scene, vessel);
 }
 
-// The wire goes out by 15 mm, then the catheter over it and 10 mm further.
+// The wire advances by 15 mm, then the catheter over it and 10 mm further.
 static void tools_end_where_their_tips_are(void **state)
 {
     (void)state;
@@ -105,10 +105,10 @@ static void tools_end_where_their_tips_are(void **state)
         }
         assert_near(fmax(pose_tool_end(pose, 0), pose_tool_end(pose, 1)), pose->node_count - 1, 1e-9);
         assert_int_equal(pose_most_distal(pose), ahead > -1e-6);
-        // where the wire comes out of the catheter, and the other way about
+        // where the wire leaves the catheter, and vice versa
         assert_near(pose_tool_passes(pose, 1, 0), 180 - fmax(ahead, 0), 0.01);
         assert_near(pose_tool_passes(pose, 0, 1), 100 - fmax(-ahead, 0), 0.01);
-        // the mouth is passed by the catheter alone, whatever the wire's own length
+        // only the catheter passes the mouth, whatever the length of the wire
         double mouth = pose->position[pose->first_free_node].x;
         assert_true(mouth > 1 - 0.02 && pose->position[pose->first_free_node - 1].x < 1);
         assert_true(pose->tool[1].is_let_go == (i == 1749) && !pose->tool[0].is_let_go);

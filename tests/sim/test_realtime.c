@@ -1,4 +1,4 @@
-// The 1 kHz thread and replay: what leaves the thread is whole and in order, a pause is no missed deadline, and a session simulated again from its
+// The 1 kHz thread and replay: output of the thread is complete and in order, a pause is not a missed deadline, and a session simulated again from its
 // recording gives the same state at each step.
 #include <setjmp.h>
 #include <stdarg.h>
@@ -163,7 +163,7 @@ static void a_session_replays_bit_for_bit(void **state)
     assert_true(atomic_load(&key->step) >= moment->pose->step);
     assert_true(fabs(atomic_load(&key->force_n)) > 0);
 
-    // a pause: time stands still, no deadline is missed by it
+    // a pause: time stops, and no deadline is missed
     realtime_pause(session, true);
     while (realtime_moment(session)->figures.state != REALTIME_PAUSED)
         nap_ms(1);
@@ -191,7 +191,7 @@ static void a_session_replays_bit_for_bit(void **state)
     rig = rig_open();
     ReplayVerdict verdict = replay_verify(rig.simulator, run, -1, false, NULL, NULL);
     assert_true(verdict.first_different == -1 && verdict.steps == run->step_count && verdict.simulated == hash);
-    // and from its own scene, as a script; a pose of it is the state
+    // also from its own scene as a script; its pose equals the state
     size_t length;
     char *script = replay_script(run, &length);
     Script *parsed = script_parse(script, length, "hand.csv", &faults);
@@ -222,7 +222,7 @@ static void a_session_replays_bit_for_bit(void **state)
     unlink(path);
 }
 
-// What was gone through before the thread took over was not lived in real time.
+// Steps before the start of the thread are not counted as real time.
 static void a_factor_is_not_known_before_a_second(void **state)
 {
     (void)state;

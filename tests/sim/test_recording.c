@@ -1,5 +1,5 @@
-// Recordings: what is read back is what was simulated; a kill at any time leaves a file that opens, whole up to its last flush;
-// so does a full disk and a full index. `test_recording N` kills N recordings at random times; of use under load.
+// Recordings: the values read back are those simulated; a kill at any time leaves a file that can be opened and is complete up to its last flush; so do a full
+// disk and a full index. `test_recording N` kills N recordings at random times; useful under load.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -36,7 +36,7 @@ static const char scene_text[] = "seldinger: 1\n"
                                  "rig: {gravity_m_s2: [0, 0, -9.81]}\n"
                                  "script: [[0, 10, 90], [0.2, -5, 0], [0.4, 0, 0]]\n";
 
-// As many as there can be, each continuing from the one around it; the hands let tips come out and go in again.
+// The maximum number of tools, each longer than the one around it; the hands move tips out and in again.
 static const char tools_text[] =
     "seldinger: 1\n"
     "tools:\n"
@@ -48,7 +48,7 @@ static const char tools_text[] =
     "young_modulus_gpa: 1}]}\n"
     "  - {name: wire, kind: wire, elements: 16, inserted_mm: 14, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
-// The same, each with another that may take its place.
+// The same, each with a device that can replace it.
 static const char devices_text[] =
     "seldinger: 1\n"
     "tools:\n"
@@ -67,7 +67,7 @@ static const char devices_text[] =
 static const char *text_of_scene = scene_text;
 enum { TOOLS = 4 };
 
-// Each tool there and back at its own rhythm, 2 to 4 mm; now and then no hand holds the wire.
+// Each tool moves back and forth at its own rhythm by 2 to 4 mm; sometimes no hand holds the wire.
 static ToolCommands hands_at(int64_t step)
 {
     ToolCommands commands = {.released = step % 500 > 400 ? 8 : 0};
@@ -140,7 +140,7 @@ static void what_is_read_is_what_was_simulated(void **state)
     recorded = run_once(path);
     plain = run_once(NULL);
     assert_int_equal(recorded.steps, 405);
-    // the same run twice, with and without a recording, is the same bits
+    // the same run with and without a recording is bit-identical
     assert_memory_equal(recorded.hash, plain.hash, sizeof *plain.hash * 405);
 
     RecordedRun *run = recorded_run_load(path, &faults);
@@ -164,7 +164,7 @@ static void what_is_read_is_what_was_simulated(void **state)
     recorded_run_free(run);
 }
 
-// All rows of a dataset as a reader that knows nothing of us gets them; NULL if they cannot be read.
+// All rows of a dataset as read by any HDF5 reader; NULL if they cannot be read.
 static double *read_rows(hid_t file, const char *name, hsize_t *rows, hsize_t *values)
 {
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT), space = set >= 0 ? H5Dget_space(set) : -1;
@@ -228,7 +228,7 @@ static void assert_replays(const RecordedRun *run)
     assert_int_equal(verdict.first_different, -1);
     assert_int_equal(verdict.steps, run->step_count);
     simulator_destroy(simulator);
-    // and by the script that it makes
+    // also by the script made from it
     size_t length;
     char *text = replay_script(run, &length);
     ToolNames names = scene_tool_names(scene);
@@ -242,7 +242,7 @@ static void assert_replays(const RecordedRun *run)
         assert_int_equal(read.released, was.released);
         assert_memory_equal(read.fitted, was.fitted, sizeof was.fitted);
     }
-    // what is in at the end stays in
+    // the devices that are in at the end stay in
     ToolCommands after = script_tools_at(script, 1e6, &cursor), last = recorded_run_commands(run, run->step_count - 1);
     assert_memory_equal(after.fitted, last.fitted, sizeof last.fitted);
     script_free(script);
@@ -280,7 +280,7 @@ static void what_is_read_of_several_tools(void **state)
     if (!run)
         fail_msg("%s", faults.text[0]);
     print_message("%d to %d nodes of at most %d\n", least, most, run->node_count);
-    assert_true(least < most);   // nodes come and go
+    assert_true(least < most);   // nodes are added and removed
     assert_int_equal(run->step_count, STEPS);
     assert_int_equal(run->tool_count, TOOLS);
     assert_int_equal(run->frame_count, 1 + 60 + 1);
@@ -297,7 +297,7 @@ static void what_is_read_of_several_tools(void **state)
         pose_from_run(pose, scene, run, k);
         assert_same_pose(pose, seen[run->frame_step[k]]);
     }
-    // beyond the nodes in use there is nothing
+    // there are no values beyond the nodes in use
     int64_t unused = run->frame_nodes[0];
     assert_true(unused < run->node_count && isnan(run->position[unused].x) && isnan(run->s[unused]) && run->vessel_node[unused] == -1);
     assert_replays(run);
@@ -313,7 +313,7 @@ static void what_is_read_of_several_tools(void **state)
     text_of_scene = scene_text;
 }
 
-// --- sessions: what is kept is rounded, poses are changes ---
+// --- sessions: stored values are rounded, poses are stored as differences ---
 
 static void what_is_read_of_a_session(void **state)
 {
@@ -372,7 +372,7 @@ static void what_is_read_of_a_session(void **state)
                 }
         }
         assert_replays(run);
-        // any reader finds frames each second
+        // any reader finds one frame per second
         hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
         hsize_t rows = 0, values = 0;
         double *step = read_rows(file, "/wire/step", &rows, &values);
@@ -405,7 +405,8 @@ static const char exchange_text[] =
     "                {elements: 21, sections: [{length_mm: 70, diameter_mm: 0.4, young_modulus_gpa: 200}]}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
 
-// The wire is asked for too early, drawn back, exchanged twice, pushed in again; then the microcatheter is drawn back and exchanged over it.
+// An exchange of the wire is requested too early; the wire is pulled back, exchanged twice and pushed in again; then the microcatheter is pulled back and
+// exchanged over it.
 static ToolCommands exchange_at(int step)
 {
     ToolCommands commands = {.fitted = {step >= 1000, step < 40 ? 0 : step < 60 ? 1 : step < 300 ? 0 : step < 310 ? 1 : 2}};
@@ -414,7 +415,7 @@ static ToolCommands exchange_at(int step)
     return commands;
 }
 
-// Poses of other lengths and numbers of nodes, replayed to the bit.
+// Poses of other lengths and numbers of nodes, replayed bit for bit.
 static void what_is_read_of_exchanged_tools(void **state)
 {
     (void)state;
@@ -469,7 +470,7 @@ static void what_is_read_of_exchanged_tools(void **state)
     text_of_scene = scene_text;
 }
 
-// A copy with a piece of it changed is refused with these words.
+// A copy with one changed piece is rejected with this message.
 static void expect_refused(const char *path, void (*change)(hid_t file), const char *words)
 {
     char broken[256];
@@ -543,7 +544,7 @@ static void no_profile(hid_t file) { write_value(file, "/tools/1/s_mm", H5T_NATI
 static void lose_exchange(hid_t file) { H5Ldelete(file, "/exchange", H5P_DEFAULT); }
 static void no_such_carrier(hid_t file) { write_value(file, "/tools/2/carrier", H5T_NATIVE_INT, (const hsize_t[]){3, 4}, 2, &(int){7}); }
 
-// Huge and empty: a chunk that was never written takes no room in the file.
+// Huge and empty: a chunk that was never written uses no space in the file.
 static void promise(hid_t file)
 {
     hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
@@ -552,7 +553,7 @@ static void promise(hid_t file)
     H5Pclose(creation);
 }
 
-// By a filter that is none of ours.
+// By a filter that the program does not use.
 static void pack(hid_t file)
 {
     hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
@@ -562,7 +563,7 @@ static void pack(hid_t file)
     H5Pclose(creation);
 }
 
-// A chunk that holds less than its shape needs, as a damaged index would have it.
+// A chunk with fewer bytes than its shape needs, as in a damaged index.
 static void cut_chunk(hid_t file)
 {
     static const double value[605];
@@ -591,7 +592,7 @@ static void link_elsewhere(hid_t file)
     assert_true(H5Lcreate_external(path, "/inserted_mm", file, "/time_s", H5P_DEFAULT, H5P_DEFAULT) >= 0);
 }
 
-// Many chunks that all lie in the same bytes: the index's children are made the first, and the file ends behind it.
+// Many chunks at the same bytes: all children of the index point to the first one, and the file ends behind it.
 enum { SHARED_CHUNKS = 60, SHARED_ROWS = 1 << 18 };
 static void make_shared_chunk(const char *path)
 {
@@ -626,7 +627,7 @@ static void make_shared_chunk(const char *path)
     assert_true(node > 0);
     for (size_t i = 0; i < SHARED_CHUNKS; i++)
         memcpy(bytes + node + 24 + 24 + i * step, &(uint64_t){address}, 8);
-    memcpy(bytes + 44, &(uint64_t){address + size}, 8);     // the end that the superblock states
+    memcpy(bytes + 44, &(uint64_t){address + size}, 8);     // the end of file in the superblock
     rewind(stream);
     assert_int_equal(fwrite(bytes, 1, address + size, stream), address + size);
     assert_int_equal(fclose(stream), 0);
@@ -648,7 +649,7 @@ static void one_chunk_is_not_read_many_times(void **state)
         fail_msg("expected a refusal, got '%s'", run ? "a recording" : faults.text[0]);
 }
 
-// After what_is_read_of_several_tools(), whose file it takes.
+// Runs after what_is_read_of_several_tools() and uses its file.
 static void what_is_broken_is_refused(void **state)
 {
     (void)state;
@@ -742,7 +743,7 @@ static const char *check_rows(hid_t file, const char *name, hsize_t *count, bool
     double *data = read_rows(file, name, &rows, &values);
     if (first)
         *count = rows;
-    bool differs = rows != *count && text_of_scene == scene_text;     // of several tools they lie on several pages
+    bool differs = rows != *count && text_of_scene == scene_text;     // with several tools they are on several pages
     *count = rows < *count ? rows : *count;
     const char *fault = !data ? "cannot be read" : differs ? "rows differ" : unwritten(name, data, values) ? "unwritten rows" : NULL;
     free(data);
@@ -759,7 +760,7 @@ static herr_t check_motion(hid_t group, const char *name, const H5O_info_t *info
     return info->type == H5O_TYPE_DATASET && !data ? -1 : 0;
 }
 
-// Every dataset is read whole: all of one kind (the rows that all have) have the same rows, and every row was written. NULL or what is wrong.
+// Reads every dataset completely: all datasets of one kind have the same number of rows, and every row was written. Returns NULL or a description of the error.
 static const char *check_file(const char *path, hsize_t count[2])
 {
     static const char *const names[2][15] = {
@@ -795,7 +796,7 @@ static const char *check_file(const char *path, hsize_t count[2])
         H5Gclose(motion);
     }
     double *step = fault ? NULL : read_rows(file, "/wire/step", &rows, &values);
-    rows = count[1] < rows ? count[1] : rows;      // of several tools the pages of a kind may be a flush apart
+    rows = count[1] < rows ? count[1] : rows;      // with several tools the pages of a kind may be a flush apart
     if (step && rows > 0 && count[1] > 0 && text_of_scene == scene_text && step[rows - 1] >= (double)count[0])
         fault = "a frame of a step that is not there";
     free(step);
@@ -809,7 +810,7 @@ typedef struct Watched {
     char path[256], copy[256];
     int states, failures, commits, most_writes, writes;
     hsize_t before[2];          // rows of the last commit
-    off_t length, end;          // of the file, and stated, after it
+    off_t length, end;          // length of the file and end in the superblock, after the last commit
     const char *fault;
     atomic_llong committed;
 } Watched;
@@ -820,7 +821,7 @@ static off_t length_of(const char *path)
     return stat(path, &status) == 0 ? status.st_size : -1;
 }
 
-// The end that the superblock (version 1) states.
+// The end of file in the superblock (version 1).
 static off_t stated_end(const char *path)
 {
     uint64_t end = UINT64_MAX;
@@ -852,20 +853,20 @@ static off_t used_end(const char *path)
     return most;
 }
 
-// In the recording's thread: the file as a kill right here would leave it.
+// Called in the recording's thread: checks the file as a kill at this moment would leave it.
 static void look(void *context, bool done)
 {
     Watched *watched = context;
     hsize_t count[2] = {0, 0};
     if (access(watched->path, F_OK) != 0)
-        return;      // has no name yet
+        return;      // the file has no name yet
     const char *fault = copy_file(watched->path, watched->copy) ? check_file(watched->copy, count) : "no copy";
-    if (watched->states == 0) {   // as it got its name
+    if (watched->states == 0) {   // when it got its name
         memcpy(watched->before, count, sizeof count);
         watched->length = length_of(watched->copy);
         watched->end = stated_end(watched->copy);
     }
-    // a reader may have asked for the length before this flush
+    // a reader may have read the length before this flush
     off_t end = stated_end(watched->copy);
     if (!fault && (end <= 0 || end > watched->length))
         fault = "an end that was not true a flush ago";
@@ -977,7 +978,7 @@ static void kill_recordings(int trials)
         pid_t child = fork();
         assert_true(child >= 0);
         if (child == 0)
-            record_for_ever(path, trial % 4 == 0 ? 1000000 : 300);   // chunks that outlast a slow reader, or so small that a border is met
+            record_for_ever(path, trial % 4 == 0 ? 1000000 : 300);   // chunks that last longer than a slow reader needs, or so small that a border is reached
         // the name appears with the first flush
         for (int waited = 0; access(path, F_OK) != 0 && waited < 10000; waited++)
             nap_ms(1);

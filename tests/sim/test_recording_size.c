@@ -1,5 +1,5 @@
-// What an hour of a session costs on the disk, at worst: hands that never rest move a tool of 120 elements deep in a vessel, recorded as the trainer does.
-// test_recording_size SCENE.yaml S: the same in a scene, whose tools are pushed in for 10 s and moved for S seconds; prints what each dataset takes.
+// The largest size of a recorded hour: hands that never rest move a tool of 120 elements deep in a vessel, recorded as in the trainer.
+// test_recording_size SCENE.yaml S: the same in a scene, whose tools are pushed in for 10 s and moved for S seconds; prints the size of each dataset.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -41,7 +41,7 @@ static double uniform(void)
     return (double)(state >> 11) * 0x1p-53;
 }
 
-// A stick read at 125 Hz in 127 steps each way, up to 20 mm/s and 180 deg/s, that wanders with a memory of 0.3 s.
+// A joystick read at 125 Hz with 127 steps in each direction, up to 20 mm/s and 180 deg/s, that moves randomly with a correlation time of 0.3 s.
 static ToolCommands hands_at(int64_t step, int tools, int64_t pushing)
 {
     static ToolCommands held;
@@ -65,7 +65,7 @@ static void nap_ms(long ms) { nanosleep(&(struct timespec){.tv_nsec = ms * 10000
 static double length_of(const char *path)
 {
     struct stat status;
-    nap_ms(300);      // for what is under way
+    nap_ms(300);      // wait for reports in transit
     return stat(path, &status) == 0 ? (double)status.st_size : 0;
 }
 
@@ -81,7 +81,7 @@ static herr_t print_size(hid_t file, const char *name, const H5O_info_t *info, v
     return 0;
 }
 
-// MB an hour, after the tools were pushed in.
+// MB per hour, after the tools were pushed in.
 static double record(const char *path, Scene *scene, const Vessel *vessel, double pushing_s, double moving_s)
 {
     Simulator *simulator = simulator_create(scene, vessel, &faults);
@@ -133,7 +133,7 @@ static void an_hour_takes_at_most_200_mb(void **unused)
     } else {
         assert_true(mb < 200 && (!WHOLE_RUN || mb > 20));      // the hashes alone take 29
     }
-    // and it is simulated again from it
+    // and the session is simulated again from the recording
     RecordedRun *run = recorded_run_load(in_folder("size.h5"), &faults);
     if (!run)
         fail_msg("%s", faults.text[0]);

@@ -1,4 +1,4 @@
-// Scenes: units, defaults, and what is wrong with broken ones, each fault at its line and column, all of a file in one pass.
+// Scenes: units, defaults, and the faults of invalid scenes: each with line and column, all faults of a file in one pass.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@
 #define VERSION "seldinger: 1\n"
 #define WIRE "wire: {sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
 #define SHEATH "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n"
-#define WHOLE VERSION WIRE SHEATH       // three lines; a case adds its own from line 4
+#define WHOLE VERSION WIRE SHEATH       // three lines; a case adds lines from line 4 on
 
 #define REST(list) VERSION SHEATH "wire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]\n  rest: " list "\n"
 #define CASE "{name: a, quantity: push_force_n, reference: 1, tolerance: 1"
@@ -139,7 +139,7 @@ static void a_verify_plan_is_read(void **state)
     const VerifyCase *a = &plan->cases[0], *b = &plan->cases[1];
     assert_int_equal(plan->case_count, 2);
     assert_int_equal(plan->element[1], 20);
-    assert_near(plan->rest_s, 0, 0);                 // a script's end is the moment
+    assert_near(plan->rest_s, 0, 0);                 // the moment is the end of the script
     assert_true(a->quantity == VERIFY_WALL_FORCE && a->take == TAKE_MEAN && a->has_axis && a->axis.z == -1);
     assert_true(a->s_mm == 50 && a->from_s_mm == 20 && a->from_t_s == 1 && a->t_s == 2 && a->scale == 10 && a->order == 1.5);
     assert_near(a->tolerance[0], 0.2, 1e-15);
@@ -155,7 +155,7 @@ static void the_contracts_example_with_sheath_and_rig_is_good(void **state)
 {
     (void)state;
     Scene *scene = good(VERSION WIRE SHEATH "rig:\n  start_mm: [9, 9, 9]\n  direction: [0, 1, 0]\n  fix: [{s_mm: 0, dof: all}]\n");
-    // the sheath says where the wire starts; the rig's fixes stay
+    // the sheath gives the start of the wire; the fixed nodes of the rig remain
     assert_near(scene->wire.start.x, 0, 0);
     assert_near(scene->wire.direction.x, 1, 0);
     assert_int_equal(scene->wire.fix_count, 1);
@@ -359,7 +359,7 @@ static void many_aliases_end(void **state)
     assert_true(faults.count >= 11);
     // a list of a map that holds the list
     assert_null(parse(VERSION "rig: &r {fix: [*r], loads: &l [*l, {s_mm: *l}]}\n" WIRE));
-    // an alias used well
+    // a valid alias
     Scene *scene = good(VERSION SHEATH "wire: {sections: [&s {length_mm: 10, diameter_mm: 0.36, young_modulus_gpa: 80}, *s]}\n");
     assert_int_equal(scene->wire.section_count, 2);
     scene_free(scene);

@@ -72,13 +72,13 @@ static void the_first_tool_is_the_scenes_wire(void **state)
         assert_string_equal(scene->tool[k].name, name[k]);
         assert_int_equal(scene->tool[k].kind, kind[k]);
         assert_near(wire_length(&wire), length[k], 0);
-        assert_near(wire.inserted, 50, 0);           // as the one around it
+        assert_near(wire.inserted, 50, 0);           // that of the tool around it
         assert_near(wire.hand_limit, 20, 0);
         assert_near(scene->tool[k].friction_inside, 0.05, 0);
         assert_true(wire.has_sheath && wire.direction.x == 1 && wire.elements == 200);
     }
     assert_ptr_equal(scene->wire.section, scene->tool[0].wire.section);
-    // an inlet found later moves all of them
+    // an inlet that is found later moves all tools
     scene->wire.start = vec3(1, 2, 3);
     assert_near(scene_tool_wire(scene, 2).start.z, 3, 0);
     scene_free(scene);
@@ -92,7 +92,7 @@ static void each_tool_has_its_own_keys(void **state)
                            "  - {name: b, kind: wire, " SECTION("400", "1", "0") ", inserted_mm: 0, hand_limit_n: 5, elements: 30, damping: {mass_1_s: 1},"
                                                                                  " tip_marker: {length_mm: 5, attenuation_1_mm: 6}, length_mm: 350}\n"));
     const SceneTool *a = &scene->tool[0], *b = &scene->tool[1];
-    assert_near(scene->wire.inserted, 20, 0);        // its own, not the sheath's 50
+    assert_near(scene->wire.inserted, 20, 0);        // its own value, not the sheath's 50
     assert_near(a->wire.inserted, 20, 0);
     assert_near(b->wire.inserted, 0, 0);
     assert_near(a->friction_inside, 0.2, 0);
@@ -108,7 +108,7 @@ static void each_tool_has_its_own_keys(void **state)
     scene_free(scene);
 }
 
-// In a rig all of the first tool lies beyond the start; the others as far as they say, at most to their end.
+// In a rig the whole first tool is beyond the start; the others are inserted by their own lengths, at most to their end.
 static void a_rig_begins_with_the_whole_first_tool(void **state)
 {
     (void)state;
@@ -145,7 +145,7 @@ static void a_script_moves_the_tools_it_names(void **state)
     snprintf(text, sizeof text, THREE "script: %s\n", path);
     Scene *scene = good(text);
     unlink(path);
-    const double want[3][2] = {{3, 2}, {0, 0}, {20, 1}};     // micro is pinned
+    const double want[3][2] = {{3, 2}, {0, 0}, {20, 1}};     // micro is held
     for (int k = 0; k < 3; k++) {
         assert_near(command_of(scene, 0.5, k).push_mm_s, want[k][0], 0);
         assert_near(command_of(scene, 0.5, k).twist_deg_s, want[k][1], 0);
@@ -172,7 +172,7 @@ static void bare_columns_move_the_first_tool(void **state)
         assert_near(command_of(scene, 0.5, 2).push_mm_s, 0, 0);
         scene_free(scene);
     }
-    // in the place, one row moves one tool and the next another
+    // rows in the scene: one row moves one tool and the next another
     Scene *scene = good(THREE "script: [{t_s: 0, micro.push_mm_s: 7, micro.twist_deg_s: 0}, {t_s: 1, wire.push_mm_s: 9, wire.twist_deg_s: 0}, {t_s: 2}]\n");
     assert_near(command_of(scene, 0.5, 1).push_mm_s, 7, 0);
     assert_near(command_of(scene, 0.5, 2).push_mm_s, 0, 0);
@@ -242,7 +242,7 @@ static void each_fault_of_a_script_has_its_place(void **state)
     assert_int_equal(faults.count, 3);
 }
 
-// --- what is wrong ---
+// --- faults ---
 
 typedef struct Broken {
     const char *text, *place, *words;
@@ -348,7 +348,7 @@ static void a_tip_is_shaped_by_hand(void **state)
     scene_free(scene);
 }
 
-// A wall of filled polymer lets more X-rays through than a wire's metal, so that a catheter shows as two lines.
+// A wall of filled polymer attenuates X-rays less than the metal of a wire, so that a catheter appears as two lines.
 static void a_catheter_is_seen_as_polymer(void **state)
 {
     (void)state;
@@ -452,7 +452,7 @@ static void a_device_file_gives_what_the_scene_does_not(void **state)
     assert_near(b->friction_inside, 0.3, 0);
     scene_free(scene);
 
-    // faults in the device have the device's place, beside the scene's own; a quoted stiffness is checked
+    // faults in the device have their place in the device file, besides those of the scene; a given stiffness is checked
     write_text(scene_path, VERSION SHEATH "tools: [{name: a, device: device.yaml, inserted_mm: x}]\n");
     write_text(device_path, DEVICE "kinds: wire\nbending_n_mm2: 100\n");
     faults_clear(&faults);
@@ -505,7 +505,7 @@ static Scene *scene_of(int count, const char *const *device)
     return scene_parse(text, (size_t)used, LIBRARY "scene.yaml", &faults);
 }
 
-// The text at a key of a device file; empty where it has none.
+// The text at a key of a device file; empty if there is none.
 static void device_text(const char *device, const char *key, char *out, size_t capacity)
 {
     char path[200];
@@ -553,7 +553,7 @@ static void every_device_is_a_tool_with_its_source(void **state)
     }
 }
 
-// E pi / 64 (D^4 - d^4) of the shaft. The figures have two to four digits; the moduli they come from are good to the last one.
+// E pi / 64 (D^4 - d^4) of the shaft. The stiffnesses have two to four digits; the moduli computed from them reproduce the last digit.
 static void a_quoted_stiffness_is_that_of_the_shaft(void **state)
 {
     (void)state;
@@ -596,7 +596,7 @@ static void each_device_goes_through_the_one_it_names(void **state)
             fail_msg("%s in %s was not refused", outer, name[i]);
     }
     assert_true(pairs >= 15);
-    // stEVE's wire is shorter than its catheter: a scene draws it out
+    // stEVE's wire is shorter than its catheter: a scene lengthens it
     const char steve[] = VERSION SHEATH "tools: [{name: a, device: steve-simmons.yaml}, {name: b, device: steve-guidewire.yaml, length_mm: 700}]\n";
     faults_clear(&faults);
     Scene *drawn_out = scene_parse(steve, strlen(steve), LIBRARY "scene.yaml", &faults);

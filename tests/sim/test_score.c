@@ -1,4 +1,4 @@
-// The score: its clock and units, the hold, errors by episode, the way through a tree, buckling, forces, points that never grow with a worse figure.
+// The score: its clock and units, the hold, errors by episode, the path through a tree, buckling, forces, and points that never grow with a worse figure.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -103,7 +103,7 @@ static void a_volume_is_found_beside_the_scene(void **state)
     scene_free(scene);
 }
 
-// --- clock, ways, X-rays ---
+// --- clock, distances, X-rays ---
 
 static void the_clock_runs_from_the_first_movement(void **state)
 {
@@ -120,7 +120,7 @@ static void the_clock_runs_from_the_first_movement(void **state)
     assert_int_equal(f.state, SCORE_RUNNING);
     f = practice_go(p, 0, 0.001);
     assert_int_equal(f.state, SCORE_TIME_OUT);
-    ScoreFigures later = practice_go(p, 5, 1);   // nothing counts any more
+    ScoreFigures later = practice_go(p, 5, 1);   // nothing is counted any more
     assert_memory_equal(&f, &later, sizeof f);
     practice_end(p);
 }
@@ -134,7 +134,7 @@ static void ways_are_counted_both_ways(void **state)
     ScoreFigures f = practice_go(p, 10, 0.2);
     assert_near(f.inserted_mm, 17, 1e-6);
     assert_near(f.withdrawn_mm, 5, 1e-6);
-    assert_near(f.path_mm, 22, 0.8);     // in chords of 0.2 mm: up to 0.4 is lost at each of the two turns
+    assert_near(f.path_mm, 22, 0.8);     // in chords of 0.2 mm: up to 0.4 is lost at each of the two reversals
     assert_false(f.has_exercise);
     assert_near(f.points, 0, 0);
     practice_end(p);
@@ -191,7 +191,7 @@ static void moving_blind_is_an_error_once_until_the_pedal(void **state)
         p->xray.pedal = 1;
         practice_go(p, 10, 0.5);
         p->xray.pedal = 0;
-        f = practice_go(p, -10, 0.5);    // either way
+        f = practice_go(p, -10, 0.5);    // in either direction
         assert_int_equal(f.error[ERROR_BLIND].count, 2 * seen);
         practice_end(p);
     }
@@ -207,10 +207,10 @@ static void a_target_must_be_held(void **state)
     assert_int_equal(f.state, SCORE_RUNNING);
     assert_near(f.held_s, 0, 0);
     assert_near(f.least_remaining_mm, 0, 0.2);
-    practice_go(p, -10, 0.6);                      // back into it, to 20
+    practice_go(p, -10, 0.6);                      // back into the target, to 20
     f = practice_go(p, 0, 1.7);
     assert_near(f.held_s, 1.8, 0.01);
-    practice_go(p, 10, 0.2);                       // out: all lost
+    practice_go(p, 10, 0.2);                       // out: the hold is lost
     practice_go(p, -10, 0.2);
     f = practice_go(p, 0, 1.8);
     assert_int_equal(f.state, SCORE_RUNNING);
@@ -236,10 +236,10 @@ static void the_border_decides(void **state)
     }
 }
 
-// --- the way through a tree ---
+// --- the path through a tree ---
 
 // A trunk along x, 0 to 40 mm, radius 2; at 20 mm a branch to +y, 20 mm, radius 1; at its end a sac of two nodes, 8 mm apart.
-// Else every 2 mm a node.
+// Elsewhere there is a node every 2 mm.
 enum { TRUNK = 21, BRANCH = 10, SAC = 2 };
 static VesselTree *forked(double mirror)
 {
@@ -262,41 +262,41 @@ static void the_path_is_measured_along_the_tree(void **state)
 {
     (void)state;
     VesselTree *t = forked(1);
-    ScorePath path;
-    assert_true(score_path_create(&path, t, vec3(0, 0, 0), vec3(20, 15, 0), 1));     // between two nodes of the branch
-    assert_near(score_path_left(&path, vec3(0, 0, 0), 0), 35, 1e-9);
-    assert_near(score_path_left(&path, vec3(1, 0.5, 0), 0), 34, 1e-9);               // between nodes, beside the line
-    assert_near(score_path_left(&path, vec3(40, 0, 0), 20), 35, 1e-9);               // back to the fork, then on
-    assert_near(path.off[5], 0, 0);
-    assert_near(path.off[20], 20 - 2, 1e-9);                                         // beyond the fork, less the trunk's radius
-    assert_near(path.off[TRUNK], 0, 0);
-    score_path_destroy(&path);
-    // the target in the trunk: the branch begins at the trunk's wall; what lies past the target begins behind it
-    assert_true(score_path_create(&path, t, vec3(0, 0, 0), vec3(30, 0, 0), 3));
-    assert_near(path.off[TRUNK], 0, 1e-12);
-    assert_near(path.off[TRUNK + 4], 10 - 2, 1e-9);
-    assert_near(path.off[20], 10 - 3, 1e-9);
-    score_path_destroy(&path);
-    // a sac is one place; the mouth may lie inside the tree, and all upstream of it is off the path
-    assert_true(score_path_create(&path, t, vec3(10, 0, 0), vec3(20, 22.5, 0), 1));
-    assert_near(path.off[TRUNK + BRANCH], 0, 0);
-    assert_near(path.off[TRUNK + BRANCH + 1], 0, 0);
-    assert_near(path.off[0], 10 - 2, 1e-9);
-    score_path_destroy(&path);
-    // downstream of the target to upstream: target in the trunk, mouth at its end
-    assert_true(score_path_create(&path, t, vec3(40, 0, 0), vec3(10, 0, 0), 1));
-    assert_near(score_path_left(&path, vec3(40, 0, 0), 20), 30, 1e-9);
-    assert_near(path.off[15], 0, 0);
-    assert_near(path.off[0], 10 - 2, 1e-9);
-    assert_near(path.off[TRUNK + 9], 20 - 2, 1e-9);
-    score_path_destroy(&path);
-    assert_true(score_path_create(&path, NULL, vec3(0, 0, 0), vec3(3, 4, 0), 1));
-    assert_near(score_path_left(&path, vec3(0, 0, 0), -1), 5, 1e-12);
-    score_path_destroy(&path);
+    ScoreWay way;
+    assert_true(score_way_create(&way, t, vec3(0, 0, 0), vec3(20, 15, 0), 1));       // between two nodes of the branch
+    assert_near(score_way_left(&way, vec3(0, 0, 0), 0), 35, 1e-9);
+    assert_near(score_way_left(&way, vec3(1, 0.5, 0), 0), 34, 1e-9);                 // between nodes, beside the line
+    assert_near(score_way_left(&way, vec3(40, 0, 0), 20), 35, 1e-9);                 // back to the fork, then on
+    assert_near(way.off[5], 0, 0);
+    assert_near(way.off[20], 20 - 2, 1e-9);                                          // beyond the fork, less the trunk's radius
+    assert_near(way.off[TRUNK], 0, 0);
+    score_way_destroy(&way);
+    // the target is in the trunk: the branch begins at the trunk's wall; the part past the target begins behind it
+    assert_true(score_way_create(&way, t, vec3(0, 0, 0), vec3(30, 0, 0), 3));
+    assert_near(way.off[TRUNK], 0, 1e-12);
+    assert_near(way.off[TRUNK + 4], 10 - 2, 1e-9);
+    assert_near(way.off[20], 10 - 3, 1e-9);
+    score_way_destroy(&way);
+    // a sac is one place; the mouth may be inside the tree, and everything upstream of it is off the path
+    assert_true(score_way_create(&way, t, vec3(10, 0, 0), vec3(20, 22.5, 0), 1));
+    assert_near(way.off[TRUNK + BRANCH], 0, 0);
+    assert_near(way.off[TRUNK + BRANCH + 1], 0, 0);
+    assert_near(way.off[0], 10 - 2, 1e-9);
+    score_way_destroy(&way);
+    // the path leads upstream: target in the trunk, mouth at its end
+    assert_true(score_way_create(&way, t, vec3(40, 0, 0), vec3(10, 0, 0), 1));
+    assert_near(score_way_left(&way, vec3(40, 0, 0), 20), 30, 1e-9);
+    assert_near(way.off[15], 0, 0);
+    assert_near(way.off[0], 10 - 2, 1e-9);
+    assert_near(way.off[TRUNK + 9], 20 - 2, 1e-9);
+    score_way_destroy(&way);
+    assert_true(score_way_create(&way, NULL, vec3(0, 0, 0), vec3(3, 4, 0), 1));
+    assert_near(score_way_left(&way, vec3(0, 0, 0), -1), 5, 1e-12);
+    score_way_destroy(&way);
     vessel_tree_free(t);
 }
 
-// The tool goes straight on in the trunk.
+// The tool continues straight in the trunk.
 static void a_wrong_branch_counts_once_each_time(void **state)
 {
     (void)state;
@@ -310,10 +310,10 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     assert_near(f.tool[0].off_way_mm, 4, 1e-9);
     f = practice_go(p, 10, 0.5);                   // at 31 mm
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
-    assert_near(f.error[ERROR_WRONG_BRANCH].last_s, 2.6, 0.03);       // node 14 (28 mm) is the tip's from 27 mm on
+    assert_near(f.error[ERROR_WRONG_BRANCH].last_s, 2.6, 0.03);       // the tip is at node 14 (28 mm) from 27 mm on
     f = practice_go(p, 10, 0.5);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
-    practice_go(p, -10, 1.3);                      // to 23 mm and at once in again: the same error continues
+    practice_go(p, -10, 1.3);                      // to 23 mm and immediately in again: the same error continues
     f = practice_go(p, 10, 0.8);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
     practice_go(p, -10, 1.1);                      // to 20 mm, for a while
@@ -321,7 +321,7 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     f = practice_go(p, 10, 1);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 2);
     practice_end(p);
-    // on the way nothing is counted
+    // on the path nothing is counted
     p = practice_begin("seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n"
                        "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", rules: {wrong_branch_mm: 5}"),
                        t);
@@ -334,7 +334,7 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     vessel_tree_free(t);
 }
 
-// The tool goes straight on where the tree makes a long loop: it leaves one arm and enters the other.
+// The tool continues straight where the tree makes a long loop: it leaves one arm and enters the other.
 static void a_tip_in_another_branch_is_found(void **state)
 {
     (void)state;
@@ -367,7 +367,7 @@ static void a_tip_in_another_branch_is_found(void **state)
                                                                                                          "direction: [1, 0, 0], normal: [0, 1, 0], "           \
                                                                                                          "radius_mm: 2, ends: " ends ", path: [" path "]}}\n"
 
-// The tip is held 18 mm beyond the mouth: what goes in stands in folds.
+// The tip is held 18 mm beyond the mouth: the length pushed in forms folds.
 static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
 {
     (void)state;
@@ -383,7 +383,7 @@ static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
                                                                                                                                            "60}]}}\n%s",
                  exercise[judged]);
         Practice *p = practice_begin(text, NULL);
-        // one bow from wall to wall takes pi^2 1.8^2 / 20 = 1.6 mm
+        // one bow from wall to wall needs pi^2 1.8^2 / 20 = 1.6 mm
         ScoreFigures f = practice_go(p, 10, 0.16);
         assert_near(f.tool[0].lost_limit_mm, 1 + PI * PI * 1.8 * 1.8 / 20, 1e-9);
         assert_near(f.tool[0].lost_mm, 1.6, 0.15);
@@ -400,7 +400,7 @@ static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
     }
 }
 
-// Pushed into a blind end, 32 mm from the mouth, the tool folds within 5 mm, whatever its stiffness.
+// Pushed into a blind end 32 mm from the mouth, a tool of any stiffness folds within 5 mm.
 static void a_blind_end_makes_it_buckle(void **state)
 {
     (void)state;
@@ -430,7 +430,7 @@ static void normal_bends_are_no_buckling(void **state)
         TUBE("{arc: {radius_mm: 10, angle_deg: 60}}, {arc: {radius_mm: 10, angle_deg: 60, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: "
              "200}}, {line_mm: 60}",
              "open") EXERCISE(""),
-        // a curved tip drags across itself along the wall
+        // a curved tip drags along the wall and over itself
         "seldinger: 1\nwire: {elements: 50, sections: [{length_mm: 85, diameter_mm: 0.4, young_modulus_gpa: 20}, {length_mm: 15, diameter_mm: 0.4, "
         "young_modulus_gpa: 5, rest_curvature_1_mm: 0.2}], damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"
         "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2.5, path: [{line_mm: "
@@ -454,7 +454,7 @@ static void normal_bends_are_no_buckling(void **state)
 
 // --- forces ---
 
-// At rest against the end, what the shaft carries into the tip is the wall's resultant on it.
+// At rest against the end, the force in the shaft behind the tip equals the resultant of the wall on the tip.
 static void the_tips_force_is_the_walls(void **state)
 {
     (void)state;
@@ -503,7 +503,7 @@ static void wall_force_is_summed_over_time(void **state)
 
 // --- several tools ---
 
-// The catheter stays behind, the wire goes to the target; then the catheter does.
+// The catheter stays behind while the wire moves to the target; then the catheter follows.
 static void the_named_tool_has_to_be_there(void **state)
 {
     (void)state;
@@ -530,7 +530,7 @@ static void the_named_tool_has_to_be_there(void **state)
     }
 }
 
-// Tools that move together are blind by as much as one of them.
+// Tools that move together count as one for blind motion.
 static void a_pair_moves_once(void **state)
 {
     (void)state;
@@ -567,7 +567,7 @@ static void a_wire_that_is_drawn_back_is_lost(void **state)
     }
 }
 
-// 40 mm of wire behind the hub: they go in as the catheter is drawn out over a wire that is held.
+// 40 mm of wire are behind the hub: they enter as the catheter is pulled out over a held wire.
 static void a_wire_drawn_into_the_hub_is_lost(void **state)
 {
     (void)state;
@@ -581,7 +581,7 @@ static void a_wire_drawn_into_the_hub_is_lost(void **state)
     practice_end(p);
 }
 
-// A catheter that is bent at rest and held straight by a wire: drawn out of it, the wire lets go.
+// A catheter that is curved at rest is held straight by a wire: when the wire is pulled out, the catheter springs.
 static void a_catheter_kicks_when_its_wire_leaves(void **state)
 {
     (void)state;
@@ -597,7 +597,7 @@ static void a_catheter_kicks_when_its_wire_leaves(void **state)
         f = practice_go_tools(p, 0, fast ? -150 : -10, fast ? 0.2 : 3);
         peak[fast] = f.tool[0].kick_peak_mm_s;
         assert_int_equal(f.error[ERROR_KICK].count, fast);
-        assert_near(f.tool[1].kick_peak_mm_s, 0, 5);         // its own hand moved, and before that nothing sprang
+        assert_near(f.tool[1].kick_peak_mm_s, 0, 5);         // its own hand moved, and before that nothing moved suddenly
         practice_end(p);
     }
     print_message("kick at 10 mm/s: %.1f, at 150 mm/s: %.1f mm/s\n", peak[0], peak[1]);
@@ -622,7 +622,8 @@ static ScoreFigures go_with(Practice *p, double outer_mm_s, double inner_mm_s, i
     return score_figures(p->score);
 }
 
-// A wire that is exchanged is neither lost on its way out nor does its place jump; the new one has its own length. Then the catheter is, over it.
+// A wire that is exchanged does not count as lost while it is pulled out, and its place does not jump; the new one has its own length. Then the catheter is
+// exchanged over it.
 static void an_exchange_is_no_error(void **state)
 {
     (void)state;
@@ -635,7 +636,7 @@ static void an_exchange_is_no_error(void **state)
     assert_true(out > 58);
     f = go_with(p, 0, 0, 0, 1, 0.01);
     assert_int_equal(simulator_totals(p->simulator)->exchanges, 1);
-    assert_near(f.withdrawn_mm, out, 0.01);          // nothing was moved
+    assert_near(f.withdrawn_mm, out, 0.01);          // no motion is counted
     assert_near(f.tool[1].spare_mm, spare + 15, 0.1);
     double path = f.path_mm;
     f = go_with(p, 0, 50, 0, 1, 1);
@@ -660,7 +661,7 @@ static void an_exchange_is_no_error(void **state)
     practice_end(p);
 }
 
-// A wire that is drawn out past vessels which lie beside the sheath is in none of them.
+// A wire that is pulled back past vessels beside the sheath is in none of them.
 static void what_is_drawn_out_is_at_the_mouth(void **state)
 {
     (void)state;
@@ -677,7 +678,7 @@ static void what_is_drawn_out_is_at_the_mouth(void **state)
     vessel_tree_free(t);
 }
 
-// The target counts with the device that has to be in it.
+// The target counts only with the required device.
 static void the_device_that_is_asked_for_has_to_be_there(void **state)
 {
     (void)state;
@@ -694,7 +695,7 @@ static void the_device_that_is_asked_for_has_to_be_there(void **state)
     practice_end(p);
 }
 
-// Only once it has stood there, and as often as it leaves.
+// An error only after the tool has stayed there, and each time it leaves.
 static void a_tool_that_stays_keeps_its_place(void **state)
 {
     (void)state;
@@ -719,7 +720,7 @@ static void a_tool_that_stays_keeps_its_place(void **state)
     practice_end(p);
 }
 
-// Each tool's share of the wall's forces, where no other is around it.
+// The part of the wall's forces on each tool where no other tool is around it.
 static void each_tip_bears_its_own(void **state)
 {
     (void)state;
@@ -758,14 +759,14 @@ static void each_tip_bears_its_own(void **state)
     assert_true(count > 0);
     assert_int_equal(event[0].kind, ERROR_TIP_FORCE);
     assert_int_equal(event[0].tool, 1);
-    // drawn back into the catheter the wire touches nothing
+    // pulled back into the catheter, the wire touches nothing
     practice_go_tools(p, 0, -40, 0.8);
     assert_near(practice_go_tools(p, 0, 0, 0.5).tool[1].tip_force_n, 0, 1e-6);
     free(node);
     practice_end(p);
 }
 
-// A tool's place is that of the nodes that are drawn, but for the chord; its velocity is how it moves.
+// A tool's place is that of the drawn nodes, except for the error of the chord; its velocity is that of its motion.
 static void a_tools_place_is_where_it_is(void **state)
 {
     (void)state;
@@ -794,7 +795,7 @@ static void a_tools_place_is_where_it_is(void **state)
         }
     }
     print_message("places: at most %.4f mm off; along it %.2e mm a step\n", off, slip);
-    // h^2 / 8R; and what is no more than 0.04 of an element beyond the tip around it is drawn at that tip
+    // h^2 / 8R; a tip at most 0.04 of an element beyond the tip around it is drawn at that tip
     assert_true(off < 2.5 * 2.5 / (8 * 12) + 0.04 * 2.5);
     assert_true(slip < 5e-3);
     practice_end(p);
@@ -807,7 +808,7 @@ static void a_tools_place_is_where_it_is(void **state)
              "wall_impulse_n_s: 1}")
 
 typedef struct Hand {
-    double wait_s, contrast_ml_s, detour_mm, pedal_off_s;    // what makes it worse
+    double wait_s, contrast_ml_s, detour_mm, pedal_off_s;    // the changes that make the session worse
 } Hand;
 
 static ScoreFigures reach(Hand hand)
@@ -860,7 +861,7 @@ static void nothing_done_is_worth_nothing(void **state)
     p->xray.pedal = 1;
     assert_near(practice_go(p, 0, 1).points, 0, 1e-9);
     ScoreFigures half = practice_go(p, 10, 1);
-    assert_true(half.points > 20 && half.points < 50);       // half the way: at most a quarter; half of all at the very end
+    assert_true(half.points > 20 && half.points < 50);       // half of the path: at most a quarter of the points; at its end half
     practice_end(p);
 }
 
@@ -890,7 +891,7 @@ static void a_mirrored_scene_gives_the_same_score(void **state)
 {
     (void)state;
     ScoreFigures one = through_a_bend(false), two = through_a_bend(true), again = through_a_bend(false);
-    assert_memory_equal(&one, &again, sizeof one);           // and the same run the same bits
+    assert_memory_equal(&one, &again, sizeof one);           // the same run is bit-identical
     assert_int_equal(one.state, SCORE_REACHED);
     assert_int_equal(one.state, two.state);
     assert_true(one.points > 0 && one.points < 100 && one.error_total > 0);

@@ -1,4 +1,4 @@
-// Sessions as files: what is written is read back, every fault is reported, a folder gives a trainee's own in order; a digest is of one recording
+// Sessions as files: written values are read back, every fault is reported, a folder lists a trainee's sessions in order, and a digest belongs to one recording
 // only.
 #include <setjmp.h>
 #include <stdarg.h>
@@ -87,7 +87,7 @@ static void what_is_written_is_read_back(void **state)
     assert_string_equal(back.series_sha256, one.series_sha256);
     assert_int_equal(back.event_count, one.event_count);
     assert_int_equal(back.event[1].kind, one.event[1].kind);
-    assert_true(back.figures.points == one.figures.points && back.figures.path_mm == one.figures.path_mm);       // every digit
+    assert_true(back.figures.points == one.figures.points && back.figures.path_mm == one.figures.path_mm);       // all digits
     for (int i = 0; i < ERROR_COUNT; i++)
         assert_int_equal(back.figures.error[i].count, one.figures.error[i].count);
     char *again = session_json(&back);
@@ -110,7 +110,7 @@ static void the_score_alone_is_json_too(void **state)
     practice_end(p);
 }
 
-// Of two tools: each has its figures, an error says whose it is.
+// With two tools each has its figures, and an error gives its tool.
 static void several_tools_are_read_back(void **state)
 {
     (void)state;
@@ -135,7 +135,7 @@ static void several_tools_are_read_back(void **state)
     char *again = session_json(&back);
     assert_string_equal(again, text);
     free(again);
-    // an older version knew no way that a tip had strayed
+    // an older version had no `strayed_mm`
     for (char *from; (from = strstr(text, "\"strayed_mm\""));) {
         char *to = strchr(from, '\n');
         while (*from != ',')
@@ -151,7 +151,7 @@ static void several_tools_are_read_back(void **state)
     free(text);
 }
 
-// A session of a version that did not know them has no wire lost, no kick, no tip that left its place, and no figure of that.
+// A session of an older version has no lost wires, no kicks and no moved tips, and no figures for them.
 static void an_older_session_is_read(void **state)
 {
     (void)state;
@@ -187,7 +187,7 @@ static void every_prefix_and_a_byte_more_are_refused(void **state)
     assert_false(session_parse(more, length + 2, "more.json", &got, &faults));
     assert_non_null(strstr(faults.text[0], "after the session"));
     faults_clear(&faults);
-    assert_true(session_parse(more, length + 1, "more.json", &got, &faults));     // a line end is none
+    assert_true(session_parse(more, length + 1, "more.json", &got, &faults));     // the line end is not a fault
     free(more);
 }
 

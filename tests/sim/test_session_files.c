@@ -1,4 +1,4 @@
-// What a session leaves in its folder: the folder itself, names that are never taken twice, the session file beside its recording.
+// The files of a session: the folder, unique names, the session file beside its recording.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,13 +27,13 @@ static void the_folder_is_made_where_it_is_wanted(void **state)
     (void)state;
     char out[4096], home[200];
     faults_clear(&faults);
-    for (int again = 0; again < 2; again++) {   // there or not
+    for (int again = 0; again < 2; again++) {   // whether it exists or not
         assert_true(session_folder(in_folder("a/b c/d"), out, sizeof out, &faults));
         assert_string_equal(out, in_folder("a/b c/d"));
         assert_true(is_folder(out));
     }
     assert_true(session_folder(in_folder("e/"), out, sizeof out, &faults) && is_folder(in_folder("e")));
-    // without a wish: as the desktop's rules say
+    // by default: as the rules of the desktop say
     snprintf(home, sizeof home, "%s", in_folder("home"));
     setenv("HOME", home, 1);
     setenv("XDG_DATA_HOME", in_folder("data"), 1);
@@ -119,7 +119,7 @@ static void the_session_file_is_of_its_recording(void **state)
         score_step(score, simulator, &(ToolCommands){.tool = {command}}, &xray);
         assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, &xray));
     }
-    expect_cut_off(0);           // it is being written
+    expect_cut_off(0);           // it is still being written
     assert_true(recording_close(recording, simulator, &faults));
     assert_true(session_files_save(it.scene, "Ada \"the hand\"", "keyboard", "2023-11-14T22:13:20Z", score, path, &faults));
     static Session session;
@@ -144,7 +144,7 @@ static void the_session_file_is_of_its_recording(void **state)
     assert_true(session_load(in_folder("bend.json"), &session, &faults));
     assert_string_equal(session.device, "not known: the session was interrupted");
     memcpy(session.device, saved.device, sizeof saved.device);
-    assert_true(strstr(session.scene_path, saved.scene_path) > session.scene_path);      // named from anywhere
+    assert_true(strstr(session.scene_path, saved.scene_path) > session.scene_path);      // an absolute path
     memcpy(session.scene_path, saved.scene_path, sizeof saved.scene_path);
     assert_memory_equal(&session, &saved, sizeof session);
     // a recording that does not exist

@@ -1,4 +1,5 @@
-// The exact moment of a round section that yields, against its stresses summed over the section; what a shaped tip keeps, against the same sum sprung back.
+// The exact moment of a round section that yields, compared with its stresses summed over the section; the remaining curvature of a shaped tip, compared with
+// the same sum after springback.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// [N mm] of stress times arm over a round section in strips of equal angle, which resolve the ends; E = 1, yield strain 1, r = 1.
+// [N mm] sum of stress times lever over a round section in strips of equal angle, which resolve the ends; E = 1, yield strain 1, r = 1.
 static double summed_moment(double curvature)
 {
     enum { STRIPS = 200000 };
@@ -91,7 +92,7 @@ static void the_tip_keeps_the_angle_at_its_place(void **state)
     assert_true(fabs(sum_of_lengths(out, count) - 120) < 1e-12 && fabs(sum_of_angles(out, count) - 0.75) < 1e-12);
     assert_true(out[1].length == 15 && out[1].rest_curvature == 0 && out[3].rest_curvature == 0);
     assert_true(fabs(out[2].length - shaped.arc) < 1e-12 && fabs(1 / out[2].rest_curvature - shaped.rest_radius) < 1e-12);
-    // held, it lay round the mandrel: more than what is left of it
+    // while held, it was bent around the mandrel: more than the remaining bend
     assert_true(fabs(shaped.bent_angle - shaped.arc / (1 + 0.3556 / 2)) < 1e-12 && shaped.bent_angle > 0.75);
     assert_true(out[2].young_modulus == wire[1].young_modulus && out[2].diameter == wire[1].diameter);
     free(out);

@@ -1,4 +1,4 @@
-// A small exercise in a bent tube and the session of a hand that works in it, for the tests of what records and replays sessions.
+// A small exercise in a bent tube and a session of a hand, for the tests of recording and replay of sessions.
 #ifndef SELDINGER_TESTS_TRAINER_SCENE_H
 #define SELDINGER_TESTS_TRAINER_SCENE_H
 
@@ -59,7 +59,7 @@ static inline void trainer_scene_close(TrainerScene *it)
     *it = (TrainerScene){0};
 }
 
-// All that the figures of two scores hold is the same, bit for bit.
+// Checks that the figures of two scores are bit-identical.
 static inline void assert_same_figures(const ScoreFigures *a, const ScoreFigures *b)
 {
 #define SAME(field) assert_memory_equal(&a->field, &b->field, sizeof a->field)

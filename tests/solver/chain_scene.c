@@ -60,7 +60,7 @@ void chain_scene_destroy(ChainScene *s)
     contact_solver_destroy(s->solver);
 }
 
-// Strains of an element: bending of both ends against the chord (3 + 3, in the plane across t), twist, stretch. Energy e'Ce/2.
+// Strains of an element: bending of both ends relative to the chord (3 + 3, in the plane across t), twist, stretch. Energy e'Ce/2.
 static void add_element(ChainScene *s, int i)
 {
     const ChainSceneOptions *o = &s->options;
@@ -78,7 +78,7 @@ static void add_element(ChainScene *s, int i)
         Vec3 axis = quat_rotate(s->orientation[i + end], vec3(1, 0, 0));
         bend[end] = vec3_cross(t, axis);
         bool tip = (o->elements - i) * l0 <= 15;
-        if (tip) // rest: the ends are turned by -+ curvature l/2 about e3
+        if (tip) // rest: the ends are rotated by -+ curvature l/2 about e3
             bend[end] = vec3_add_scaled(bend[end], (end ? -0.5 : 0.5) * o->tip_curvature * l0, quat_rotate(s->orientation[i + end], vec3(0, 0, 1)));
         bend[end] = vec3_add_scaled(bend[end], -vec3_dot(bend[end], t), t);
     }
@@ -225,7 +225,7 @@ void chain_scene_finish(ChainScene *s)
 
 Vessel *chain_scene_spiral(double radius, bool in_space)
 {
-    // polar radius 15.75 / theta over theta in [pi, 4 pi], as arcs of growing curvature
+    // polar radius 15.75 / theta over theta in [pi, 4 pi], as arcs of increasing curvature
     enum { ARCS = 24 };
     TubePiece piece[ARCS + 1];
     piece[0] = (TubePiece){.length = 12};

@@ -1,5 +1,5 @@
-// A small wire in an exact tube, written independently of solver/wire.c and the step: it makes the contact problems on which
-// the two forms of contact_solve are compared. Linear strain elements about the present chords, matrices as B^T C B, no speed.
+// A small wire in an exact tube, independent of solver/wire.c and the step. It generates the contact problems on which the two forms of contact_solve are
+// compared. Linear strain elements about the present chords, matrices as B^T C B, no velocities.
 #ifndef SELDINGER_TESTS_CHAIN_SCENE_H
 #define SELDINGER_TESTS_CHAIN_SCENE_H
 
@@ -41,11 +41,11 @@ typedef struct ChainScene {
 ChainSceneOptions chain_scene_default_options(void);
 void chain_scene_create(ChainScene *scene, const ChainSceneOptions *options);
 void chain_scene_destroy(ChainScene *scene);
-// Detect, assemble, factor: leaves the problem in chain, factor, b, set.
+// Detects, assembles and factors: writes the problem to chain, factor, b, set.
 void chain_scene_prepare(ChainScene *scene, double advance, double twist);
-// Takes u and the set's forces as the step's result.
+// Applies u and the set's forces as the result of the step.
 void chain_scene_finish(ChainScene *scene);
-// The paper's spiral in space: a straight lead, then arcs whose radius falls and whose plane turns.
+// The paper's spiral in space: a straight lead, then arcs with decreasing radius and rotating plane.
 Vessel *chain_scene_spiral(double radius, bool in_space);
 Vessel *chain_scene_straight(double radius);
 // A closed capsule of 10 mm, entered beside its axis: the wire coils up in it.

@@ -1,4 +1,4 @@
-// Laws of the beam element: no force at rest, force = -dE/dx, invariance, symmetry, tangent against the force's derivative.
+// Laws of the beam element: no force at rest, force = -dE/dx, invariance, symmetry, tangent compared with the derivative of the force.
 #include "base/simd.h"
 #include "solver/beam.h"
 #include "solver/sheath.h"
@@ -73,7 +73,7 @@ static BeamInput input_of(const BeamRest *r)
                        .half_z = r->half_z[0]};
 }
 
-// The exact rest arc, from the origin along +x, bent towards e2 turned by `plane`.
+// The exact rest arc, from the origin along +x, bent towards e2 rotated by `plane`.
 static void at_rest(BeamInput *in, double length, double curvature, double plane)
 {
     double angle = curvature * length;
@@ -179,7 +179,7 @@ static void rigid_motion_changes_nothing(void **state)
     }
 }
 
-// The same beam seen from its other end (e1 reversed, turned about e3 by pi), and in the mirror z -> -z.
+// The same beam seen from its other end (e1 reversed, rotated about e3 by pi), and in the mirror z -> -z.
 static void reversed_and_mirrored(void **state)
 {
     (void)state;
@@ -228,7 +228,7 @@ static void twist_is_exact(void **state)
     }
 }
 
-// Central differences of the gradient; the tangent leaves out moments' share, so compare at rest, and under pure tension.
+// Central differences of the gradient. The tangent neglects the contribution of moments, so it is compared at rest and under pure tension.
 static void tangent_is_the_derivative(void **state)
 {
     (void)state;
@@ -270,7 +270,7 @@ static void tangent_is_the_derivative(void **state)
                     closed = t.k22[(row - 6) * 6 + dof - 6];
                 else
                     closed = row >= 6 ? t.k21[(row - 6) * 6 + dof] : t.k21[(dof - 6) * 6 + row];
-                // under tension the chord is 1 % longer than L: the bow's share follows L
+                // under tension the chord is 1 % longer than L: the contribution of the bow follows L
                 assert_true(fabs(number - closed) < (k < 2 ? 1e-6 : 2e-3) * largest);
             }
         }
@@ -313,8 +313,9 @@ static double energy_spun(const BeamInput *in, Vec3 axis1, Vec3 axis2, double an
     return out.energy;
 }
 
-// An element of rest curvature k0 that is held at k in the same plane resists a spin about its own tangent by EI k k0 a length; J' C J has EI k0^2. A Newton
-// step overshoots where the tangent has less than half of what there is, and swings for ever: tools of a strong rest shape in a bend never came to rest.
+// An element of rest curvature k0 that is held at k in the same plane resists a spin about its own tangent by EI k k0 per length; J' C J has EI k0^2. If the
+// tangent has less than half of the true stiffness, a Newton step overshoots and oscillates without end: tools with a strong rest shape in a bend never came
+// to rest.
 static void spin_of_a_bent_rest_shape(void **state)
 {
     (void)state;
@@ -351,7 +352,7 @@ typedef struct Chain {
     double b[(E + 1) * 6];
 } Chain;
 
-// A straight and a curved section whose border is in the middle of a group of lanes, bent at random, with random inertia.
+// A straight and a curved section, whose border is in the middle of a group of lanes, randomly bent, with random inertia.
 static void make_chain(Chain *c)
 {
     *c = (Chain){0};
@@ -443,7 +444,7 @@ static void assert_near(const double *a, const double *b, int count)
         assert_true(fabs(a[k] - b[k]) <= 1e-13 * largest);
 }
 
-// Kernel = element by element, from any first node on; nothing outside is written; the same bits at every SIMD level.
+// The kernel gives the same result as element by element, from any first node on, writes nothing outside, and is bit-identical at every SIMD level.
 static void chain_equals_elements(void **state)
 {
     (void)state;
@@ -513,8 +514,8 @@ static void sheath_gradient(void **state)
         }
 }
 
-// At l = L the element across the mouth is the ordinary one. It takes the arc's length from sine and cosine, the other from its own
-// polynomial: 1e-9 of the bow apart at the last shape's 0.6 rad, that is 1e-10 mm of an extension of 0.1 mm.
+// At l = L the element across the mouth equals the ordinary one. It computes the arc length from sine and cosine, the ordinary element from a polynomial: at
+// 0.6 rad (the last shape) they differ by 1e-9 of the bow, that is 1e-10 mm of an extension of 0.1 mm.
 static void sheath_joins_the_chain(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws. Compiled for every
-// size N of the blocks.
+// Block-tridiagonal systems compared with dense Cholesky: random chains of many sizes and condition numbers, and laws of the chain. Compiled for every block
+// size N.
 #include "base/simd.h"
 #include "solver/block_chain.h"
 #include "solver/block_condense.h"
@@ -31,7 +31,7 @@ static double uniform(void) // [-1, 1)
     return (double)(seed_state >> 11) * 0x1p-52 - 1;
 }
 
-// A = B B^T of a random lower block-bidiagonal B, well conditioned but for its columns, which are scaled over decades/2: cond(A) is about 10^decades.
+// A = B B^T of a random lower block-bidiagonal B, well conditioned except that its columns are scaled over decades/2: cond(A) is about 10^decades.
 static void random_chain(BlockChain *a, double decades)
 {
     int m = a->count;
@@ -151,7 +151,7 @@ static void solves_as_dense(void **state)
             double *d = dense(&a);
             assert_true(dense_cholesky(d, n));
             dense_solve(d, n, y);
-            // forward error goes with the condition: compare where that is small
+            // the forward error grows with the condition number: compare only if that is small
             for (size_t i = 0; hard == 0 && i < n; i++) {
                 assert_true(fabs(x[i] - y[i]) < 1e-9 * largest(y, n));
                 assert_true(fabs(fused[i] - y[i]) < 1e-9 * largest(y, n));
@@ -288,7 +288,7 @@ static void refuses_indefinite(void **state)
     assert_null(block_factor_create(-1, N));
 }
 
-// The factor reads the lower half of a diagonal block and unit rows stay exact: a constrained degree of freedom gets its value to the bit.
+// The factorisation reads the lower half of a diagonal block, and unit rows stay exact: a constrained degree of freedom gets exactly its value.
 static void unit_rows_are_exact(void **state)
 {
     (void)state;
@@ -317,7 +317,7 @@ static void unit_rows_are_exact(void **state)
     }
 }
 
-// Every instruction set gives the same bits.
+// All instruction sets give bit-identical results.
 static void same_bits_everywhere(void **state)
 {
     (void)state;
@@ -357,7 +357,7 @@ static void load_kept(BlockCondenser *k, int m, int offset, int every)
         block_condenser_side(k)[N * block_condenser_place(k, i) + 4] += 2;
 }
 
-// Another right-hand side and then the first one again, without condensing again: x to the bit.
+// Another right-hand side and then the first one again, without condensing again: x is bit-identical.
 static void turns_to_the_same(BlockCondenser *k, const BlockFactor *f, const BlockChain *a, const double *b, int offset, int every, const double *x)
 {
     size_t n = (size_t)a->count * N;
@@ -375,7 +375,8 @@ static void turns_to_the_same(BlockCondenser *k, const BlockFactor *f, const Blo
     free(y);
 }
 
-// Condensed to a few, many or all nodes, changed there (matrix and load) and expanded again: the changed chain's solution, at every level's same bits.
+// A chain condensed to a few, many or all nodes, changed there (matrix and load) and expanded again gives the solution of the changed chain, bit-identical at
+// every SIMD level.
 static void condensed_solves_as_whole(void **state)
 {
     (void)state;
@@ -448,7 +449,7 @@ static void leave_out(BlockChain *a, int node, int r)
     }
 }
 
-// As chains of coaxial tools have them: in the sheath only some unknowns of a node are coupled to anything, further on fewer and fewer tools.
+// Unknowns as in chains of coaxial tools: in the sheath only some unknowns of a node are coupled to others; further on there are fewer and fewer tools.
 static void condensed_with_unknowns_left_out(void **state)
 {
     (void)state;
@@ -465,7 +466,7 @@ static void condensed_with_unknowns_left_out(void **state)
         for (int i = 0; i < M; i++) {
             for (int q = 0; i < M / 5 && q < 4; q++)
                 leave_out(&a, i, straight[q]);
-            for (int r = 6; r < N; r++)      // every third time the tools end the other way round
+            for (int r = 6; r < N; r++)      // every third time the tools end in the opposite order
                 if (trial % 3 ? r < 6 + i * parts / M * 2 : r >= N - i * parts / M * 2)
                     leave_out(&a, i, r);
         }
@@ -498,7 +499,7 @@ static void condensed_with_unknowns_left_out(void **state)
     block_chain_destroy(&a);
 }
 
-// Unit rows behind a node's live ones, which the factorisation is told of: same solution.
+// Unit rows after a node's live rows, whose number is passed to the factorisation: the solution is the same.
 static void unsymmetric_with_unknowns_left_out(void **state)
 {
     (void)state;

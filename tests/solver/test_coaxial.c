@@ -1,4 +1,4 @@
-// Coaxial tools on one centreline: laws of the element, and chains of them against exact references.
+// Coaxial tools on one centreline: laws of the element, and chains of elements compared with exact references.
 #include "base/simd.h"
 #include "solver/coaxial.h"
 #include "solver/coaxial_lanes.h"
@@ -38,9 +38,8 @@ typedef struct Mix {         // an element of random tools
     CoaxialInput in;
 } Mix;
 
-// Tools of two or three sections, borders inside where `borders` (no two of them near each other: the energy has a
-// kink where two meet); the last tool ends inside where `tip`. Stretched by up to 1 %, bent by `bend` [rad],
-// rest curvature up to `curl` [1/mm].
+// Tools of two or three sections. With `borders` there are section borders inside the element (no two near each other: the energy has a kink where two meet);
+// with `tip` the last tool ends inside. Stretched by up to 1 %, bent by `bend` [rad], rest curvature up to `curl` [1/mm].
 static void make_mix(Mix *m, int count, bool borders, bool tip, double length, double bend, double curl)
 {
     *m = (Mix){0};
@@ -152,7 +151,7 @@ static void gradient_is_exact(void **state)
 
 // --- laws ---
 
-// Everything that an output has, against another's of the same element seen otherwise: `turn` carries this one's vectors to the other's.
+// Compares all outputs with those of the same element in another frame: `turn` rotates the vectors of this one into those of the other.
 static double difference(const CoaxialOutput *a, const CoaxialOutput *b, Quat turn, int count)
 {
     double most = fabs(a->energy - b->energy) / a->energy, force = vec3_norm(a->beam.force2) + fabs(a->gradient[COAXIAL_S2]);
@@ -189,7 +188,7 @@ static void motion_shift_and_numbers_change_nothing(void **state)
         Vec3 sum = vec3_add(vec3_add(here.beam.moment1, here.beam.moment2), vec3_cross(vec3_sub(m.in.x2, m.in.x1), here.beam.force2));
         assert_true(vec3_norm(sum) < 1e-10 * (vec3_norm(here.beam.force2) + vec3_norm(here.beam.moment1)));
 
-        // a tool and its sections 64 mm on
+        // a tool and its sections shifted by 64 mm
         CoaxialSection section[SECTIONS];
         CoaxialTool tool = {m.tool[1].count, section};
         in = m.in;
@@ -219,7 +218,7 @@ static void motion_shift_and_numbers_change_nothing(void **state)
     assert_true(motion < ROUNDING && shift < ROUNDING && number < ROUNDING);
 }
 
-// The carrier is but a name where the tools are alike in length: any whole tool may carry.
+// If the tools have equal length, any whole tool can be the carrier.
 static void any_tool_may_carry(void **state)
 {
     (void)state;
@@ -239,8 +238,8 @@ static void any_tool_may_carry(void **state)
 static Quat mirrored(Quat q) { return (Quat){q.w, -q.x, -q.y, q.z}; }
 static Vec3 mirrored_vec(Vec3 v, double axial) { return vec3(axial * v.x, axial * v.y, -axial * v.z); }
 
-// In the mirror z -> -z angles about the tangent and curvatures towards e3 change sign. From the other end (e1 and e2 reversed: half a turn about e3) S
-// counts the other way, angles too, curvatures towards e2 change sign twice and those towards e3 once.
+// In the mirror z -> -z, angles about the tangent and curvatures towards e3 change sign. Seen from the other end (e1 and e2 reversed: half a turn about e3), S
+// and angles are counted in the opposite direction, curvatures towards e2 change sign twice and those towards e3 once.
 static void mirrored_and_reversed(void **state)
 {
     (void)state;
@@ -387,8 +386,8 @@ static void one_tool_is_a_beam(void **state)
     assert_true(worst < 1e-12 && worst_tangent < 1e-12);
 }
 
-// Two elements whose middle node the wire's place `at` passes: sum of energies, and of the absolute forces and moments. No strain, no torque in the wire, as at
-// a tip that is free to slide and to turn.
+// Two elements; the place `at` of the wire passes their middle node. Returns the sum of energies, and of absolute forces and moments. The wire has no strain
+// and no torque, as at a tip that is free to slide and to rotate.
 static void two_elements(bool tip, double twist, double at, double *energy, double *force)
 {
     static const CoaxialSection tube[1] = {{.end = 60, .bending = 60, .axial = 2e3, .torsion = 46, .shear = 1e3, .curve = {0.03, 0}}};
@@ -404,7 +403,7 @@ static void two_elements(bool tip, double twist, double at, double *energy, doub
         in.span[0] = (CoaxialSpan){.tool = &tool[0], .s1 = 0, .s2 = 1.5};
         in.span[1] = (CoaxialSpan){.tool = &tool[1], .s1 = at, .phi1 = turned, .phi2 = turned};
         CoaxialOutput out;
-        // as long as the line is, and where the other element leaves off
+        // as long as the line, starting where the other element ends
         double length = 1.5;
         for (int i = 0; i < 20; i++) {
             in.span[0].s2 = length;
@@ -422,8 +421,9 @@ static void two_elements(bool tip, double twist, double at, double *energy, doub
     }
 }
 
-// Neither where a border between sections passes a node, nor where a tip does. A tip's angle follows the frames' twist and not the element's, whose rest chord
-// turns a little with the tool: with a twist of 0.15 rad that leaves a jump of 3e-7 of the energy (7e-4 if the angle did not follow) and 3e-4 of the forces.
+// Energy and forces do not jump when a border between sections or a tip passes a node. The angle of a tip follows the twist of the frames and not that of the
+// element, whose rest chord rotates slightly with the tool: with a twist of 0.15 rad this leaves a jump of 3e-7 of the energy (7e-4 if the angle did not
+// follow) and 3e-4 of the forces.
 static void nothing_jumps_at_a_node(void **state)
 {
     (void)state;
@@ -449,11 +449,11 @@ typedef struct Chain {
     Vec3 x[NODES_MAX];
     Quat q[NODES_MAX];
     double place[NODES_MAX][TOOLS], turn[NODES_MAX][TOOLS];        // S and phi of each tool at each node
-    bool is_fixed[NODES_MAX][BLOCK];           // x, rotation, then S and phi of tool 0, of tool 1
+    bool is_fixed[NODES_MAX][BLOCK];           // x, rotation, then S and phi of tool 0 and of tool 1
     struct {
         int count, tool[TOOLS];                // the carrier first
-        bool has_tip;                          // of the last one
-        double spread;                         // of all
+        bool has_tip;                          // of the last tool
+        double spread;          // of all tools
     } element[NODES_MAX];
     Vec3 end_force;                            // [N] on the last node
     double gradient[FREE_MAX];
@@ -489,7 +489,7 @@ static double chain_energy(const Chain *c)
     return sum;
 }
 
-// Place of an element's unknown in the chain.
+// Index of an element's unknown in the chain.
 static int unknown_at(const Chain *c, int e, int i)
 {
     if (i < 12)
@@ -628,7 +628,7 @@ static void chain_move(Chain *c, const Chain *from, double share)
     }
 }
 
-// How much of a step leaves every tool a tenth of its length between two nodes: a linearised step may be longer than a short element.
+// The fraction of a step that leaves every tool at least a tenth of its length between two nodes: a linearised step may be longer than a short element.
 static double room(const Chain *c)
 {
     double share = 1;
@@ -643,7 +643,7 @@ static double room(const Chain *c)
     return share;
 }
 
-// To a step of 1e-10 (mm, rad). True where it gets there.
+// Iterates until the step is below 1e-10 (mm, rad). True if it converges.
 static bool chain_settle(Chain *c, int most)
 {
     static Chain before;
@@ -676,7 +676,7 @@ static void fix(Chain *c, int node, int first, int last)
         c->is_fixed[node][i] = true;
 }
 
-// --- 1: a straight tool goes into a clamped curved one ---
+// --- 1: a straight tool is inserted into a clamped curved one ---
 
 static const double LONG = 60;
 
@@ -704,8 +704,8 @@ static void straight_into_curved(Chain *c, int elements, double d)
     fix(c, 0, 0, BLOCK - 1);
 }
 
-// Everything is a circle's arc: exact where the border falls on a node, but for the tools' own stretch, T / EA with T = .03 + EI/2 .03^2 N (what pulls
-// B in, A feels). In the middle of an element the cubic's bow is not that of two arcs: its share of h^3, once.
+// All shapes are arcs of circles: the result is exact if the border is at a node, except for the stretch of the tools, T / EA with T = .03 + EI/2 .03^2 N (the
+// force that pulls B in acts on A). With the border in the middle of an element, the cubic differs from the two arcs by a term of order h^3.
 static const double STRETCH = 0.048 / 1e6;
 
 static void straight_tool_in_curved_tube(void **state)
@@ -736,13 +736,13 @@ static void straight_tool_in_curved_tube(void **state)
                       elements, error[0], order, error[1], turned, low, high, most);
         assert_true(error[1] < 3 * 30 * STRETCH && fabs(turned) < 3 * STRETCH);
         assert_true(ripple < 1e-6 && fabs(low / 0.03 - 1) < 1e-6);
-        assert_true(before == 0 || elements == 45 || order > 2.7);       // 45: the stretch is all that is left
+        assert_true(before == 0 || elements == 45 || order > 2.7);       // 45: only the error of the stretch remains
         assert_true(elements < 45 || error[0] < 3 * 30 * STRETCH + 2e-6);
         before = error[0];
     }
 }
 
-// --- 2: two curved tubes turned against each other ---
+// --- 2: two curved tubes rotated against each other ---
 
 static void two_curved(Chain *c, int elements, double length)
 {
@@ -764,7 +764,7 @@ static void two_curved(Chain *c, int elements, double length)
     fix(c, elements, 9, 9);
 }
 
-// The tip's angle given, the base's is sought at which the tip is free: the torque that it would take is 0.
+// For a given angle of the tip, finds the base angle at which the tip is free, i.e. without torque.
 static double base_of(Chain *c, double tip)
 {
     int last = c->nodes - 1;
@@ -798,7 +798,7 @@ static void two_curved_tubes(void **state)
         double length = n < 2 ? (2 + n) / root : known[n].length, before = 0;
         for (int elements = 8; elements <= WHOLE_OR_SHORT(32, 16); elements *= 2) {
             two_curved(&c, elements, length);
-            // up to the fold, where the base's angle is largest: then parabolas
+            // up to the fold, where the base angle is largest; then by parabolas
             double step = n == 0 ? 0.1 : 0.03, tip = 0, base[3] = {0}, degree = PI / 180;
             do {
                 best = c;
@@ -829,7 +829,7 @@ static void two_curved_tubes(void **state)
         }
         assert_true(!WHOLE_RUN || before < 0.03);
     }
-    // below L sqrt(c) = pi / 2 the base goes on as the tip does, all the way round; above it turns back before
+    // for L sqrt(c) < pi / 2 the base angle grows with the tip's angle through a whole turn; otherwise it turns back before
     for (int n = 0; n < 2; n++) {
         two_curved(&c, 16, (n ? 1.65 : 1.5) / root);
         double last = 0, now = 0;
@@ -846,10 +846,10 @@ static void two_curved_tubes(void **state)
 
 // --- 3: a wire with a J at its end leaves a straight catheter ---
 
-static int catheter_elements = 30;             // 2 mm each; nodes of the wire past its tip are at fixed places of the wire
+static int catheter_elements = 30;             // 2 mm each; nodes of the wire beyond the catheter's tip are at fixed places of the wire
 static const double WIRE = 200, BEND = 15;
 
-// On the cubic between two nodes: a node put in on the chord would be off by more than a short element's length.
+// A point on the cubic between two nodes: the error of a node inserted on the chord would exceed the length of a short element.
 static Vec3 on_the_line(const Chain *c, int i, double t)
 {
     double part = vec3_distance(c->x[i], c->x[i + 1]), left = 1 - t;
@@ -858,8 +858,8 @@ static Vec3 on_the_line(const Chain *c, int i, double t)
     return vec3_add_scaled(vec3_add_scaled(x, t * left * left, t1), -t * t * left, t2);
 }
 
-// The wire's tip stands d past the catheter's base. Nodes of the wire whose place has passed the tip by more than `margin` are there; their pose and the
-// catheter's are kept from `from` where it has them.
+// The tip of the wire is d past the catheter's base. There are nodes for the places of the wire that have passed the tip by more than `margin`; their pose and
+// that of the catheter are copied from `from` if it has them.
 static void leaving(Chain *c, const Chain *from, double d, double step, double margin)
 {
     static const CoaxialSection catheter[1] = {{.end = 60, .bending = 60, .axial = 1e5, .torsion = 46, .shear = 1e7}};
@@ -876,7 +876,7 @@ static void leaving(Chain *c, const Chain *from, double d, double step, double m
         c->x[n] = from ? old.x[i] : vec3(h * i, 0, 0);
         c->q[n] = from ? old.q[i] : quat_identity();
         c->place[n][0] = h * i;
-        // a wire that was not at the node comes there as it would lie unstrained
+        // a wire that was not at the node enters there without strain
         bool was_in = from && old.place[i][1] < WIRE && !old.is_fixed[i][8] && i > 0;
         c->place[n][1] = was_in ? old.place[i][1] + shift : first + h * i;
         fix(c, n, 6, 7);
@@ -891,7 +891,7 @@ static void leaving(Chain *c, const Chain *from, double d, double step, double m
     for (int j = outside - 1; j >= 0; j--, n++) {
         double place = WIRE - j * step;
         c->place[n][1] = place;
-        // on the line as it was, as far from the catheter's tip, or straight on from its end
+        // on the old line at the same distance from the catheter's tip, or straight on from its end
         double arc = place - at_tip, here = 0;
         int i = from ? catheter_elements : 0, end = from ? old.nodes - 1 : 0;
         for (; i < end; here += vec3_distance(old.x[i], old.x[i + 1]), i++) {
@@ -934,9 +934,9 @@ static Vec3 leaving_tip(double d, double *angle)
     return tip;
 }
 
-// Sharp: the force is that of the bend's waste, EIc EIw / (EIc + EIw) kappa^2 / 2 = .075 N, from where the bend's tip leaves to where its other end does.
-// The path is exact but for the stretch by it, some .1 N / 1e5 N of 60 mm. Out and back, every visit finds the first one's answer; the first
-// element of the wire is as short as a hundredth of the others.
+// The force of a wire whose bend leaves the catheter is EIc EIw / (EIc + EIw) kappa^2 / 2 = .075 N from the exit of the bend's tip to that of its other end.
+// The path is exact except for the stretch by this force, about .1 N / 1e5 N of 60 mm. Out and back, every visit of a place gives the result of the first
+// visit; the first element of the wire is as short as a hundredth of the others.
 static void bend_leaves_a_catheter(void **state)
 {
     (void)state;
@@ -971,7 +971,7 @@ static void bend_leaves_a_catheter(void **state)
     assert_true(worst_push < 1e-6 && worst_tip < 2e-4 && worst_again < 1e-7 && shortest < 0.1);
 }
 
-// Borders within elements: the tip in error by the border elements' h^3, once they are no more than a few.
+// Borders within elements: the error of the tip is of order h^3 of the elements with borders.
 static void order_of_a_bend_at_a_tip(void **state)
 {
     (void)state;
@@ -994,7 +994,7 @@ static void order_of_a_bend_at_a_tip(void **state)
     catheter_elements = 30;
 }
 
-// --- 4: a wire through a bend that it cannot move ---
+// --- 4: a wire through a rigid bend ---
 
 static void wire_in_a_stiff_bend(void **state)
 {
@@ -1035,7 +1035,7 @@ static void wire_in_a_stiff_bend(void **state)
         }
         print_message("wire in a bend, %d elements: %.6f to %.6f N before and after, %.6f to %.6f N in it: %.6f lower\n", elements, straight[0], straight[1],
                       bent[0], bent[1], straight[0] - bent[0]);
-        // the tube gives way by EI_wire / EI_tube = 1e-5, twice that in the square
+        // the tube deflects by EI_wire / EI_tube = 1e-5, twice that in the square
         assert_true(fabs(straight[1] - bent[0] - 0.075) < 3e-5 * 0.075 + 1e-6 && fabs(straight[0] - bent[1] - 0.075) < 3e-5 * 0.075 + 1e-6);
     }
 }
@@ -1076,7 +1076,8 @@ static void eigenvalues(double (*a)[DENSE_MAX], int n, double *value)
         value[i] = a[i][i];
 }
 
-// Any state: symmetric and positive semi-definite. Unknowns in units of a stiffness each, so that rounding of the axial one does not hide the others.
+// In any state the tangent is symmetric and positive semi-definite. Each unknown is scaled by its stiffness, so that rounding of the axial one does not hide
+// the others.
 static void tangent_is_positive(void **state)
 {
     (void)state;
@@ -1102,7 +1103,7 @@ static void tangent_is_positive(void **state)
     assert_true(lowest > -1e-10);
 }
 
-// Of the true Hessian against the tangent, over a chain's free unknowns.
+// Eigenvalues of the true Hessian relative to the tangent, for the free unknowns of a chain.
 static void spread(Chain *c, double *low, double *high)
 {
     static double a[DENSE_MAX][DENSE_MAX], b[DENSE_MAX][DENSE_MAX], value[DENSE_MAX];
@@ -1149,8 +1150,8 @@ static void spread(Chain *c, double *low, double *high)
         *low = fmin(*low, value[i]), *high = fmax(*high, value[i]);
 }
 
-// In equilibrium. With no load it is the Hessian to 1e-3, however the tools are turned and wherever borders, tips and mouths are. What a load's moments and
-// compression add is left out where it is negative; Newton's method converges where the largest is below 2.
+// In equilibrium without load, the tangent equals the Hessian within 1e-3 for all rotations of the tools and all places of borders, tips and mouths. The
+// tangent neglects negative contributions of a load's moments and compression; Newton's method converges if the largest eigenvalue is below 2.
 static void tangent_against_the_true_hessian(void **state)
 {
     (void)state;
@@ -1190,9 +1191,9 @@ static void tangent_against_the_true_hessian(void **state)
 
 // --- the mouth ---
 
-// A curved wire in a straight sheath that ends at the origin: node 0 in it (place given), node 1 at the mouth (pose given, S and phi unknown: the carrier of
-// both elements), nodes 2 to 4 fixed to the wire and outside. The mouth pulls with EI kappa^2 / 2 at any length outside, the outside is a circle's arc,
-// and Newton's method gets there from a length a hundred times off, either way.
+// A curved wire in a straight sheath that ends at the origin: node 0 is in the sheath (place given), node 1 at the mouth (pose given, S and phi unknown: the
+// carrier of both elements), nodes 2 to 4 are fixed to the wire and outside. The mouth pulls with EI kappa^2 / 2 for any length outside, and the part outside
+// is an arc. Newton's method converges from a start length a hundred times too long or too short.
 static void carrier_at_a_mouth(void **state)
 {
     (void)state;
@@ -1226,14 +1227,14 @@ static void carrier_at_a_mouth(void **state)
         double pull = out.tension[0], length = c.place[2][0] - c.place[1][0], angle = 0.1 * (length + 3);
         Vec3 tip = vec3(sin(angle) / 0.1, 0.6 * (1 - cos(angle)) / 0.1, 0.8 * (1 - cos(angle)) / 0.1);
         worst = fmax(worst, fabs(pull / 0.2 - 1)), worst_tip = fmax(worst_tip, vec3_distance(tip, c.x[4]));
-        // stretched by T / EA = 2e-5 of 2 mm, and the straightened arc's length is right to (.1 rad)^4 / 120 of it
+        // stretched by T / EA = 2e-5 of 2 mm; the relative error of the straightened arc's length is (.1 rad)^4 / 120
         assert_true(fabs(pull / 0.2 - 1) < 1e-4 && fabs(length - outside[n]) < 1e-4 && vec3_distance(tip, c.x[4]) < 1e-5);
     }
     print_message("mouth: pull off by %.1e of itself, tip by %.1e mm, at most %d iterations\n", worst, worst_tip, most);
     assert_true(most < 12);
 }
 
-// Not a test: SELDINGER_TIMES=1.
+// Not a test: prints times with SELDINGER_TIMES=1.
 static void print_times(void)
 {
     for (int count = 1; count <= COAXIAL_TOOLS_MAX; count++)
@@ -1270,7 +1271,7 @@ static void print_times(void)
 
 // --- eight at a time ---
 
-typedef struct Dense {       // gradient, tangent, and what else a tile tells, of one element; a carrier's unknowns stay 0
+typedef struct Dense {       // gradient, tangent and the other results of a tile for one element; a carrier's unknowns stay 0
     double gradient[UNKNOWNS], tangent[UNKNOWNS][UNKNOWNS];
 } Dense;
 
@@ -1348,11 +1349,11 @@ static void straight_mix(Mix *m, int count)
     make_mix(m, count, false, false, 1.5, 0.3, 0);
     m->in.span[0].is_fixed = true;
     m->in.span[0].phi1 = m->in.span[0].phi2 = 0;
-    for (int k = 0; k < count; k++)          // some longer than it, some shorter
+    for (int k = 0; k < count; k++)          // some spans are longer than the element, some shorter
         m->in.span[k].spread = 1.5 * 1.002;
 }
 
-// The lanes of a tile = the elements one by one; the same bits at every SIMD level, and however many of the lanes are taken.
+// The lanes of a tile give the same result as single elements, bit-identical at every SIMD level and for any number of used lanes.
 static void lanes_equal_elements(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// Coaxial tools in the stepper: exact references reached by moving hands, what comes and goes at tips, tools in a tube, save and restore.
+// Coaxial tools in the stepper: exact references reached by moving hands, nodes added and removed at tips, tools in a tube, save and restore.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +12,7 @@
 #include "tube_scene.h"
 #include "tests/short_run.h"
 
-// A tube or rod of this bending stiffness [N mm2], whatever its material.
+// A tube or rod with this bending stiffness [N mm2].
 static WireSection tube_section(double length, double bending, double curvature, double outer, double inner)
 {
     double second = PI / 64 * (outer * outer * outer * outer - inner * inner * inner * inner);
@@ -74,7 +74,7 @@ static const StepReport *step_released(Stepper *s, const StepCommand *command, u
 
 static const StepReport *step_tools(Stepper *s, const StepCommand *command) { return step_released(s, command, 0); }
 
-// Tool k moves by a distance and a turn in so many steps, then all rest.
+// Tool k moves by a distance and an angle in a number of steps, then all tools rest.
 static const StepReport *move_tool(Stepper *s, int k, double distance, double turn, int steps, int rest)
 {
     StepCommand command[STEP_TOOLS_MAX] = {{0}}, none[STEP_TOOLS_MAX] = {{0}};
@@ -87,7 +87,7 @@ static const StepReport *move_tool(Stepper *s, int k, double distance, double tu
     return r;
 }
 
-// Reference 1 of issue 14: a straight wire of EI 40 in a clamped tube of EI 60 and curvature 0.05: 0.03 where both are.
+// Reference 1 of issue 14: a straight wire of EI 40 in a clamped tube of EI 60 and curvature 0.05: the curvature is 0.03 where both are.
 static void a_straight_wire_in_a_curved_tube(void **state)
 {
     (void)state;
@@ -114,11 +114,11 @@ static void a_straight_wire_in_a_curved_tube(void **state)
         assert_true(least > 0.03 * (1 - 1e-4) && most < 0.03 * (1 + 1e-4));
         stepper_destroy(c.stepper);
     }
-    // what is left is the tools' own stretch
+    // the remaining error is the stretch of the tools
     assert_true(error[WHOLE_OR_SHORT(1, 0)] < 2e-3);
 }
 
-// Reference 2: phi'' = c sin phi, phi'(L) = 0. At a base of 197.7856 degrees, L sqrt(c) = 2, the fold; below it, the tip turns with the base.
+// Reference 2: phi'' = c sin phi, phi'(L) = 0. At a base of 197.7856 degrees, L sqrt(c) = 2, the fold; below it, the tip rotates with the base.
 static void turned_tubes_follow_up_to_the_fold(void **state)
 {
     (void)state;
@@ -183,7 +183,7 @@ static void a_bend_leaves_the_catheter(void **state)
     stepper_destroy(c.stepper);
 }
 
-// Flush and with the same J, tools lie in each other without a force, and either way out of there costs energy: they rest, and at rest nothing is gained.
+// Two tools with flush tips and the same J-shape lie in each other without a force, and motion in either direction needs energy: they rest and gain no energy.
 static void equal_bends_with_flush_tips_rest(void **state)
 {
     (void)state;
@@ -207,14 +207,14 @@ static void equal_bends_with_flush_tips_rest(void **state)
         moved = fmax(moved, fabs(stepper_state(c.stepper)->slide[tip] - at));
         before = e;
     }
-    // beyond the fiftieth of an element: half the EI that the two have in series, times the curvature squared
+    // beyond a fiftieth of an element: half the EI of the two in series, times the curvature squared
     double beyond = 0.5 * 0.8 * 1.2 / (0.8 + 1.2) * 0.08 * 0.08;
     print_message("gained %.1e of %.1e mJ, moved by %.1e mm, push %.1e N (%.1e beyond)\n", gained, before.elastic, moved, push, beyond);
     assert_true(gained < 1e-9 && moved < 1e-6 && push < beyond);
     stepper_destroy(c.stepper);
 }
 
-// Out of the sheath: 0.1 N while the bend leaves straight into the open, 0.1 - 0.075 where it comes into the catheter; no energy from nowhere.
+// The bend leaves the sheath: 0.1 N if it leaves straight into free space, 0.1 - 0.075 N if it enters the catheter; energy is conserved.
 static void tools_leave_the_sheath(void **state)
 {
     (void)state;
@@ -249,8 +249,9 @@ static void tools_leave_the_sheath(void **state)
     stepper_destroy(c.stepper);
 }
 
-// Two bends turned against each other hold a torque T along the sheath, where the inner tool becomes softer. Drawing that place back by d lengthens the soft part
-// under torque: T2 / 2 (1 / GJ' - 1 / GJ) d goes to the hand. Without it all of that was lost on the way back, and came from nowhere on the way in.
+// Two bends rotated against each other cause a torque T along the sheath, in which the inner tool becomes softer at one place. Pulling that place back by d
+// lengthens the soft part under torque: the work T2 / 2 (1 / GJ' - 1 / GJ) d goes to the hand. Without this term the energy was lost on the way back and was
+// created on the way in.
 static void a_softer_part_turned_in_the_sheath_does_work(void **state)
 {
     (void)state;
@@ -282,8 +283,8 @@ static void a_softer_part_turned_in_the_sheath_does_work(void **state)
     stepper_destroy(c.stepper);
 }
 
-// Reference 5: a wire of EI 65.96 pulled through line, quarter circle and line, mu 0.1; two rods in contact at a clearance gave these. Here the tools share
-// their line, and the clearance only spreads what they bear (step_coaxial.c).
+// Reference 5: a wire of EI 65.96 pulled through line, quarter circle and line, mu 0.1; the values are from two rods in contact with a clearance. Here the
+// tools share their line, and the clearance only spreads the contact pressure (step_coaxial.c).
 static void friction_in_a_bend(void **state)
 {
     (void)state;
@@ -314,14 +315,15 @@ static void friction_in_a_bend(void **state)
     }
 }
 
-// Three tools: the wire pulled alone slides in the middle one, which the outer tube's friction holds; wire and middle one pulled together slide in the outer one.
-// Either way it is reference 5, R 20 and clearance 0.05, with the stiffness of what is bent inside. Energy is accounted for.
-// Reference 4: a thread over a bend of 90 degrees with mu 0.1, a weight at its end: exp(0.1 pi / 2) = 1.1701 of the weight to pull it up, 1/1.1701 to let it down.
+// Three tools: if the wire is pulled alone, it slides in the middle tool, which the friction of the outer tube holds; if wire and middle tool are pulled
+// together, they slide in the outer one. In both cases the result is reference 5, R 20 and clearance 0.05, with the stiffness of the tools that slide. Energy
+// is balanced. Reference 4: a thread over a bend of 90 degrees with mu 0.1 and a weight at its end: 1.1701 = exp(0.1 pi / 2) times the weight to pull it up,
+// 1/1.1701 to lower it.
 static void a_thread_over_a_bend(void **state)
 {
     (void)state;
     for (int fine = 0; fine < WHOLE_OR_SHORT(2, 1); fine++) {
-        double arc = 20 * PI / 2, g = 0.0981;   // heavy, so that its stiffness does not count
+        double arc = 20 * PI / 2, g = 0.0981;   // heavy, so that its stiffness is negligible
         WireSection tube[3] = {tube_section(20, 1e5, 0, 1.5, 0.14), tube_section(arc, 1e5, 0.05, 1.5, 0.14), tube_section(20, 1e5, 0, 1.5, 0.14)};
         Coaxial c = {0};
         c.section[1][0] = tube_section(180, 0.0032, 0, 0.1, 0);
@@ -365,7 +367,7 @@ static void friction_acts_between_neighbours(void **state)
         StepCommand rest[3] = {{0}};
         for (int k = 0; k < 600; k++)
             step_tools(c.stepper, rest);
-        // the wire alone, or wire and middle together: between these two nothing slips then
+        // the wire alone, or wire and middle tool together, without slip between these two
         StepCommand pull[3] = {{0}, {moved ? -0.005 : 0, 0}, {-0.005, 0}};
         const StepReport *r = NULL;
         for (int k = 0; k < 400; k++)
@@ -382,7 +384,7 @@ static void friction_acts_between_neighbours(void **state)
     assert_true(fabs((push[1][1] + push[1][2]) / (-0.191 * 50 / 65.96) - 1) < 0.1);
 }
 
-// Turned as a whole by `turn`, or its mirror image in the plane of its first bend.
+// The scene rotated by `turn`, or mirrored at the plane of its first bend.
 static Vessel *winding_tube_as(Quat turn, bool mirrored)
 {
     TubePiece piece[] = {line_piece(20), arc_piece(15, 90, 0), line_piece(10), arc_piece(10, 90, mirrored ? -90 : 90), line_piece(30)};
@@ -451,7 +453,7 @@ static void three_tools_stay_in_the_tube(void **state)
     print_message("deepest %.4f mm, at most %d nodes of %d, %d steps stopped at the contact solve's cap\n", deepest, nodes, stepper_node_capacity(c.stepper),
                   stuck);
     assert_true(deepest < 0.05 && nodes > 85 && stuck < 60);
-    // every tool's nodes lie on one line, in order, as far apart as they are along the tool
+    // the nodes of all tools lie on one line, in order, at the distances that they have along the tool
     for (int k = 0; k < 3; k++) {
         ToolNode node[122];
         int count = stepper_tool_nodes(c.stepper, k, NULL);
@@ -466,7 +468,7 @@ static void three_tools_stay_in_the_tube(void **state)
     vessel->destroy(vessel);
 }
 
-// Law 6: turned as a whole, and as its mirror image with the twists the other way round, a scene goes the same way.
+// Law 6: a scene that is rotated, or mirrored with opposite twists, gives the same motion.
 static void turned_and_mirrored_scenes_go_the_same_way(void **state)
 {
     (void)state;
@@ -543,7 +545,7 @@ static void hands_stop_and_slip(void **state)
     c.options.wire = tool_options(c.section[0], 1, 15, 0);
     c.inner[0] = tool_options(c.section[1], 1, 30, 10);
     start(&c, 1, false);
-    // pulled out of the hub it stops with its tip there, pushed in with its end there
+    // pulled out of the hub it stops with its tip at the hub, pushed in with its end at the hub
     StepCommand pull[2] = {{0}, {-0.5, 0}}, push[2] = {{0}, {0.5, 0}};
     unsigned flags = 0;
     for (int i = 0; i < 40; i++)
@@ -565,9 +567,9 @@ static void hands_stop_and_slip(void **state)
     assert_non_null(strstr(why, "too short"));
 }
 
-// Nodes and unknowns come and go as borders, bends and tips pass the mouth, the tip and nodes: the energy is that of the same pose before and after. What it
-// may change by is the strain of the last length up to a node, what eight parts of a line miss of its curve, and that a border is spread from the node on that has
-// left the mouth.
+// Nodes and unknowns are added and removed as borders, bends and tips pass the mouth, the tip and nodes: the energy of the same pose must be equal before and
+// after. It may change by the strain of the last length up to a node, by the error of a line of eight parts, and because a border is spread only after its node
+// has left the mouth.
 static void events_leave_the_energy(void **state)
 {
     (void)state;
@@ -590,7 +592,7 @@ static void events_leave_the_energy(void **state)
             command[1] = (StepCommand){0.01, 0.001};
         else if (i < 6000)
             command[1].advance = -0.02;
-        else         // the catheter goes back to the mouth, and out again around a wire that is turned in it
+        else         // the catheter is pulled back to the mouth and pushed out again around a wire that is rotated in it
             command[0].advance = i < 7050 ? -0.02 : 0.02;
         double before = stepper_elastic_energy(c.stepper);
         step_feed_tools(c.stepper, command, 0);
@@ -601,14 +603,14 @@ static void events_leave_the_energy(void **state)
         step_solve(c.stepper);
         assert_int_equal(step_report(c.stepper)->flags, 0);
     }
-    // the tip is held until it is a fiftieth of an element past the mouth: by what it takes to straighten that much of both
+    // the tip is held until it is a fiftieth of an element past the mouth, by the force that straightens this length of both
     double at_mouth = (0.5 * 60 * 0.06 * 0.06 + 0.5 * 20 * 0.1 * 0.1) * 0.02 * 120 / 57;
     print_message("%d events, at most %.1e of %.3f mJ, at the mouth %.1e (%.1e)\n", events, most[0], highest, most[1], at_mouth);
     assert_true(events >= 40 && most[0] < 1e-4 * highest && most[1] < at_mouth);
     stepper_destroy(c.stepper);
 }
 
-// A tool's end stops at the hub of the tool that it goes into, which is behind the outermost's.
+// The end of a tool stops at the hub of the tool around it, which is behind the outermost hub.
 static void end_stops_at_the_hub_around_it(void **state)
 {
     (void)state;
@@ -626,7 +628,7 @@ static void end_stops_at_the_hub_around_it(void **state)
         flags |= step_tools(c.stepper, push)->flags;
     assert_int_equal(flags, STEP_FULLY_INSERTED);
     assert_true(fabs(stepper_tool_inserted(c.stepper, 2) - 55) < 1e-9);
-    // and goes back with that hub
+    // and moves back with that hub
     for (int i = 0; i < 10; i++)
         step_tools(c.stepper, pull);
     assert_true(fabs(stepper_tool_inserted(c.stepper, 1) - 30) < 1e-9 && fabs(stepper_tool_inserted(c.stepper, 2) - 50) < 1e-9);
@@ -641,7 +643,7 @@ static double furthest_moved(const Vec3 *before, const WireState *w, int shift, 
     return most;
 }
 
-// A catheter is drawn back over its wire and another, longer one goes in; the wire then for a stiff one. What stays inside does not notice.
+// A catheter is pulled back over its wire and exchanged for a longer one; then the wire is exchanged for a stiff one. The tools that stay inside do not move.
 static void tools_are_exchanged_at_the_hub(void **state)
 {
     (void)state;
@@ -656,7 +658,7 @@ static void tools_are_exchanged_at_the_hub(void **state)
     c.options = (StepperOptions){.contact = contact_default_options(),
                                  .vessel = vessel,
                                  .wall_friction = 0.05,
-                                 .inner_friction = {0}}; // which would hold a twist that the old one took with it
+                                 .inner_friction = {0}}; // friction would hold a twist that the old tool took with it
     c.options.wire = tool_options(c.section[0], 2, 80, 1);
     c.options.wire.damping_stiffness = 0.2;
     c.options.wire.damping_mass = 1e-3;
@@ -693,7 +695,7 @@ static void tools_are_exchanged_at_the_hub(void **state)
     assert_true(stepper_exchange(s, 0, 1) == EXCHANGE_DONE);
     move_tool(s, 1, 0, 0, 1, 0);
     assert_true(stepper_hash(s) == hash);
-    // the new one goes in over the wire, the wire comes out and a stiff one goes in
+    // the new catheter is inserted over the wire, then the wire is pulled out and a stiff one is inserted
     move_tool(s, 0, 25, 0, 1500, 50);
     move_tool(s, 1, -(stepper_tool_inserted(s, 1) - stepper_tool_inserted(s, 0) + 182) + 0.2, 0, WHOLE_OR_SHORT(8000, 2500), 200);
     for (int i = 0; i < 40; i++)
@@ -710,8 +712,8 @@ static void tools_are_exchanged_at_the_hub(void **state)
     vessel->destroy(vessel);
 }
 
-// A bend of which 9 mm are still inside is about to pull itself out of its catheter by 0.075 N; the 6 mm outside did so by 0.045 N. In a sheath, so that hands
-// can slip.
+// A bend that is still 9 mm inside pulls itself out of its catheter with 0.075 N; the 6 mm outside did so with 0.045 N. The tools are in a sheath, so that
+// hands can slip.
 static const double SOFTER = 0.0774597;      // [1/mm]
 static void start_kick(Coaxial *c, double limit, double valve, double inner_density)
 {
@@ -732,8 +734,9 @@ static void start_kick(Coaxial *c, double limit, double valve, double inner_dens
     move_tool(c->stepper, 1, 6.02, 0, 602, 0);
 }
 
-// The outermost hand bears its own tool's push, not the sum of all (0 here), and slips above its limit of 0.05 N while the other hand keeps its tool where it is:
-// the catheter goes back by 9 mm with 0.025 N, and is then braked by 0.05 N over 4.5 mm. The less, the finer the steps, but for what the J takes along.
+// The outermost hand holds the push of its own tool, not the sum of all (0 here), and slips above its limit of 0.05 N while the other hand holds its tool: the
+// catheter moves back by 9 mm with 0.025 N, and is then braked by 0.05 N over 4.5 mm. The difference falls with the step size, except for the energy that the J
+// takes along.
 static void the_outermost_hand_slips_by_its_own_push(void **state)
 {
     (void)state;
@@ -762,7 +765,8 @@ static void the_outermost_hand_slips_by_its_own_push(void **state)
     assert_true(error[1] > 0 && error[1] < error[0] && error[1] < 0.015 * 13.49);
 }
 
-// Nobody holds the J: a valve of 0.1 N does, and takes it along with the catheter's hub, whose hand then feels nothing; one of 0.03 N lets it slide out.
+// No hand holds the J. A valve of 0.1 N holds it and moves it with the catheter's hub, so that the catheter's hand has no force; a valve of 0.03 N lets it
+// slide out.
 static void a_valve_holds_what_no_hand_does(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// Random hands on random coaxial tools in random tubes: two to four of them, of materials from soft plastic to steel, curved ends, friction, hands that let go, and
-// a jump back to a checkpoint. Nothing may diverge, go through the wall, ask a hand for more than its limit, or repeat differently.
+// Random hands on random coaxial tools in random tubes: two to four of them, of materials from soft plastic to steel, curved ends, friction, hands that
+// release, and a jump back to a checkpoint. No run may diverge, pass the wall, exceed the limit of a hand, or differ when repeated.
 //   test_coaxial_stress [FIRST COUNT]    runs seeds FIRST to FIRST + COUNT - 1 and prints a line for each
 #include <setjmp.h>
 #include <stdarg.h>
@@ -66,7 +66,7 @@ static void make_tool(Run *run, Draws *random, int k, double outer, double inner
         run->section[k][2].rest_curvature = draw(random, 0, 0.25);
         run->section[k][2].rest_plane = draw(random, -PI, PI);
     }
-    for (int i = 1; i < SECTIONS; i++) {         // a tip that its catheter can bear: a kick of 1 N
+    for (int i = 1; i < SECTIONS; i++) {         // a tip that its catheter can hold with a force of 1 N
         double bending = wire_stiffness(&run->section[k][i]).bending;
         run->section[k][i].rest_curvature = fmin(run->section[k][i].rest_curvature, sqrt(2 * 1 / bending));
     }
@@ -109,7 +109,7 @@ static bool make(Run *run, Draws *random)
     return run->stepper != NULL;
 }
 
-typedef struct Hands {       // each keeps a speed for a while
+typedef struct Hands {       // each hand keeps a speed for a while
     StepCommand command[STEP_TOOLS_MAX];
     unsigned released;
 } Hands;

@@ -1,6 +1,6 @@
-// Never through the wall: tools from soft to stiff and coarse to fine are pushed, pulled, spun and jammed in closed tubes. No step leaves a node more
-// than 0.2 mm outside, 99 of 100 steps none more than 20 um, and the wire never holds energy that hand and tension cannot have given. Depth is
-// judged twice: by the solver's own report and by this file's distance to lines and arcs, which shares nothing with the vessel's code.
+// Tools never pass the wall: tools from soft to stiff and coarse to fine are pushed, pulled, rotated and jammed in closed tubes. No step leaves a node more
+// than 0.2 mm outside, 99 of 100 steps no node more than 20 um, and the energy of the wire never exceeds the work of hand and tension. The depth is measured
+// twice: by the solver's report and by this file's distance to lines and arcs, which is independent of the vessel's code.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,10 +15,10 @@
 
 enum { PIECES_MAX = 12, STEPS_MAX = 6000 };
 
-// --- a tube of its own ---
+// --- the tube, independent of geom ---
 
 typedef struct Part {
-    Vec3 start, tangent, normal;     // frame where the part begins; an arc turns towards normal
+    Vec3 start, tangent, normal;     // frame at the start of the part; an arc bends towards normal
     double length, bend, angle;      // line: bend 0
 } Part;
 
@@ -55,7 +55,7 @@ static double distance_to_part(const Part *p, Vec3 x)
     Vec3 y = vec3_sub(x, p->start);
     if (p->bend == 0)
         return vec3_norm(vec3_add_scaled(y, -fmax(0, fmin(p->length, vec3_dot(y, p->tangent))), p->tangent));
-    // in the arc's plane, seen from its centre: the nearest angle, then the distance to the point there
+    // in the plane of the arc: the nearest angle about its centre, then the distance to the point there
     double along = vec3_dot(y, p->tangent), across = p->bend - vec3_dot(y, p->normal), angle = atan2(along, across);
     if (angle < 0.5 * p->angle - PI)
         angle += 2 * PI;
@@ -90,7 +90,7 @@ static const Tube coil = {.count = 10,
 static const Tube dead_end = {.count = 3, .radius = 0.48, .piece = {LINE(15), ARC(15, 70, 0), LINE(10)}};
 static const Tube wide = {.count = 3, .radius = 4, .piece = {LINE(30), ARC(30, 90, 0), LINE(60)}};
 
-// --- a tool and what is done to it ---
+// --- a tool and its motion ---
 
 typedef struct Move {
     int steps;
@@ -158,7 +158,7 @@ typedef struct Outcome {
     int steps, limited, unconverged, linearised_again;
     unsigned flags;
     double reported, outside;        // [mm] worst
-    double p99;                      // [mm] of the steps' deepest nodes, measured here
+    double p99;                      // [mm] depth of the deepest node of each step, measured by this file
     double push, energy;             // largest, [N], [mJ]
 } Outcome;
 
@@ -216,7 +216,7 @@ static void never_through_the_wall(void **state)
         assert_int_equal(o.flags & (STEP_DIVERGED | STEP_DEEP | STEP_OUT_OF_VESSEL), 0);
         assert_true(o.outside < 0.2 && o.reported < 0.2);
         assert_true(o.p99 < 0.02);
-        // squeezed all along by 3 % (where the hand stalls) and what the step that reaches it adds, and coiled as tightly as the lumen is wide
+        // bound: compressed along its whole length by 3 % (where the hand stops) plus the last step, and coiled as tightly as the lumen is wide
         double strain = 0.04, turn = c->diameter / (4 * c->tube->radius);
         assert_true(o.energy < 0.5 * ea * length * (strain * strain + turn * turn));
         assert_true(o.push < strain * ea);

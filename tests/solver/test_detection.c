@@ -1,4 +1,5 @@
-// Which points of the wire ask the wall, and which need not: points between nodes, sleepers, far points, and how smoothly contacts take over.
+// Which points of the wire query the wall, and which need not: points between nodes, sleepers (points that are not queried for some steps), far points, and how
+// smoothly contacts pass from one point to the next.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -66,8 +67,8 @@ static void levers_follow_the_cubic(void **state)
     assert_int_equal(slot_count_of(100), 15);
 }
 
-// [mm] by which the cubic through the nodes, sampled a hundred times an element, is outside the tube at worst; the wire's mouth element counts
-// from the mouth.
+// [mm] largest distance by which the cubic through the nodes, sampled a hundred times per element, is outside the tube; the element across the mouth counts
+// from the mouth on.
 static double deepest_of_curve(const Stepper *s, const Vessel *tube, double radius)
 {
     const WireState *w = stepper_state(s);
@@ -94,8 +95,8 @@ static double deepest_of_curve(const Stepper *s, const Vessel *tube, double radi
     return deepest;
 }
 
-// Elements from short to far longer than the bend's room: at no time in a quasi-static push is any point of the wire outside by more than 0.05 mm,
-// and the push converges.
+// Elements from short to much longer than the bend allows: in a quasi-static push no point of the wire is ever outside by more than 0.05 mm, and the push
+// converges.
 static void coarse_elements_stay_inside(void **state)
 {
     (void)state;
@@ -141,7 +142,7 @@ static void coarse_elements_stay_inside(void **state)
 
 // --- a ridge between two nodes ---
 
-// A floor at z = 0 with a ridge across it: a cylinder along y at x = RIDGE_AT that comes out by 0.2 mm, half as wide as an element.
+// A floor at z = 0 with a ridge across it: a cylinder along y at x = RIDGE_AT that protrudes by 0.2 mm, half as wide as an element.
 static const double RIDGE_AT = 2.25, RIDGE_RADIUS = 0.5, RIDGE_DEEP = 0.3;
 
 static void ridge_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -163,7 +164,7 @@ static int ridge_locate(const Vessel *v, Vec3 point, int from)
     return 0;
 }
 
-// Both nodes of an element see a flat floor, and the wire falls on what is between them.
+// Both nodes of an element see a flat floor, and the wire falls on the ridge between them.
 static void a_ridge_between_nodes_holds(void **state)
 {
     (void)state;
@@ -222,11 +223,11 @@ typedef struct Run {
     double radius, advance, twist;       // [mm], [mm] and [rad] a step
     double size;                         // [mm] of an element
     int in, out;                         // steps
-    double share;                        // of all questions that may be left: at 200 mm/s nobody sleeps for long, and who wakes in mid-step asks twice
+    double share;                        // largest fraction of queries left: at 200 mm/s no point sleeps long, and a point that wakes in a step queries twice
 } Run;
 
-// A J tip in a wide tube with bends. The same twice: once with sleepers, once asking for every point in every step; now and then the first is
-// restored from a checkpoint into a stepper of its own.
+// A J-tip in a wide tube with bends, run twice: once with sleepers, once querying every point in every step; sometimes the first run is restored from a
+// checkpoint into a separate stepper.
 static void sleepers_miss_nothing(void **state)
 {
     (void)state;
@@ -266,7 +267,7 @@ static void sleepers_miss_nothing(void **state)
             memset(s[1]->points.clearance, 0, (size_t)s[1]->points.count * sizeof *s[1]->points.clearance);
             for (int j = 0; j < 2; j++)
                 step_once(s[j], advance, run[k].twist);
-            // from the same state, so that what a step does is compared and not how small differences grow
+                    // both start from the same state, so that single steps are compared and not the growth of small differences
             for (int n = 0; n < s[0]->state.node_count; n++)
                 apart = fmax(apart, vec3_distance(s[0]->state.position[n], s[1]->state.position[n]));
             for (int p = 0; p < s[0]->points.count; p++) {
@@ -289,13 +290,13 @@ static void sleepers_miss_nothing(void **state)
     }
 }
 
-// --- what the hand feels ---
+// --- the force at the hand ---
 
 typedef struct Smoothness {
     double mean, jump, ripple;           // [N]; of the mean: the largest change in a step, the largest swing within an element's length
 } Smoothness;
 
-// 5 mm/s through a bend: once the tip is well inside until it nears the bend's end. The swing is that about a straight line over the length.
+// 5 mm/s through a bend, measured from where the tip is well inside the bend until it is near its end. The ripple is the deviation from a straight line.
 static Smoothness slow_push(double bend, double friction, double size)
 {
     enum { MOST = 4000 };
@@ -340,14 +341,14 @@ static void push_is_smooth(void **state)
             Smoothness r = slow_push(bend[k], friction[j], 1);
             print_message("bend %g mm, mu %g, elements of 1 mm: mean push %.4f N, largest change in a step %.3f %%, swing within an element %.2f %%\n", bend[k],
                           friction[j], r.mean, 100 * r.jump, 100 * r.ripple);
-            // contacts at nodes alone: swings of 2.4 and 1.8 % in the bend of 8 mm
+            // with contacts at nodes only: ripples of 2.4 and 1.8 % in the bend of 8 mm
             assert_true(r.jump < 2e-3 && r.ripple < (friction[j] > 0 ? 0.011 : 0.018));
         }
 }
 
-// The phantom scene's wire with its J tip, 5 mm/s from 40 to 80 mm: past the sheath's mouth, over the borders of local models, through the
-// siphon, and on where the tip is stuck and the push grows to many times the mean. No step changes force or torque by 5 % of
-// their means, or of what they are where that is more (8.6 % where a point that pressed followed the next local model at once).
+// The phantom scene's wire with its J-tip, 5 mm/s from 40 to 80 mm: out of the sheath, over the borders of local models, through the siphon, and on while the
+// tip is stuck and the push grows to many times the mean. No step changes force or torque by 5 % of the larger of mean and present value (8.6 % if a pressed
+// point switched to the next local model at once).
 static void push_through_local_models_is_smooth(void **state)
 {
     (void)state;
@@ -407,7 +408,7 @@ static bool all_finite(const Stepper *s)
     return true;
 }
 
-// Along a coordinate axis as askew: the tip pushed against a closed tube's end buckles to the wall.
+// Along a coordinate axis and along an oblique one: a tip that is pushed against the closed end of a tube buckles to the wall.
 static void buckles_on_the_axis(void **state)
 {
     (void)state;
@@ -431,13 +432,13 @@ static void buckles_on_the_axis(void **state)
         }
         print_message("pushed on the axis along (%g, %g, %g): %.4f mm off it, push %.3f N\n", way[k].x, way[k].y, way[k].z, off[k], push[k]);
         assert_true(all_finite(s) && off[k] > 1.8 && off[k] < 1.83);
-        assert_true(push[k] < 15);      // held straight it would push back with 120 N; how it coils is chance
+        assert_true(push[k] < 15);      // held straight the wire would push back with 120 N; the shape of its coil is not determined
         stepper_destroy(s);
         tube->destroy(tube);
     }
 }
 
-// Thrown several radii out, or far away: finite for ever, and back inside.
+// A wire moved several radii outside, or far away: all values stay finite, and it returns inside.
 static void comes_back_from_outside(void **state)
 {
     (void)state;
@@ -459,14 +460,14 @@ static void comes_back_from_outside(void **state)
         b.options.wire.damping_stiffness = 0.2, b.options.wire.damping_mass = 1e-4;
         Stepper *s = bench_make(&b);
         feed(s, 8, 400);
-        // the distal half of what is out, sideways
+        // the distal half of the part outside the sheath is moved sideways
         Vec3 side = b.options.wire.normal;
         for (int i = 0; i < s->state.node_count; i++) {
             double part = fmin(1, fmax(0, (i - s->first_free - 3) / 3.0));
             s->state.position[i] = vec3_add_scaled(s->state.position[i], part * throw [k / 2], side);
             s->points.clearance[i] = 0;
         }
-        double outside = 0;   // by the wall nearest to where a node now is, be it another branch's
+        double outside = 0;   // relative to the wall nearest to the node, even if that is in another branch
         for (int i = s->first_free; i < s->state.node_count; i++) {
             VesselMemory memory = {.node = -1};
             VesselHit hit;

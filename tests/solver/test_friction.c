@@ -16,7 +16,7 @@ typedef struct Pulley {
     const char *name;
     int piece_count;
     TubePiece piece[5];
-    double radius, angle;        // [mm, rad] of the bends, together
+    double radius, angle;        // [mm, rad] of the bends; total angle
     double length;               // [mm] inserted
     Vec3 exit;                   // unit
 } Pulley;
@@ -39,7 +39,7 @@ static const Pulley OUT_OF_PLANE = {
 typedef struct Drag {
     double force;            // [N] at the sheath, mean over the last element's length of travel
     double torque;           // [N mm]
-    double ripple;           // greatest less least there, over the mean
+    double ripple;           // (largest less smallest force over that length) / mean
     unsigned flags;
 } Drag;
 
@@ -47,11 +47,11 @@ typedef struct Draw {
     const Pulley *pulley;
     double clearance, friction, tension;
     double speed, turn;      // [mm/ms, rad/ms] of the hand
-    double travel, size, dt; // [mm] until the end (turned only: of the skin), [mm] of an element, [ms]
-    double distal_friction;  // < 0: one section; else of what lies beyond the line between two bends
+    double travel, size, dt; // [mm] until the end (if only rotated: of the skin), [mm] of an element, [ms]
+    double distal_friction;  // < 0: one section; else friction of the part beyond the line between two bends
 } Draw;
 
-// A tension at the tip (push: a thrust), laid on without friction, then the wire is drawn (pushed, turned).
+// A tension at the tip (push: a thrust) is applied without friction, then the wire is pulled (pushed, rotated).
 static Drag draw_so(const Draw *o)
 {
     const Pulley *p = o->pulley;
@@ -76,7 +76,7 @@ static Drag draw_so(const Draw *o)
     b.options.dt = o->dt;
     b.options.wire.damping_mass = 1e-4, b.options.wire.damping_stiffness = 0.2;
     if (o->distal_friction >= 0) {
-        // the border: half way between the bends, and half way through the travel
+        // the border between the sections is halfway between the bends after half of the travel
         b.section[1] = b.section[0];
         b.section[0].length = 10 + p->piece[0].length + p->piece[1].arc_radius * p->piece[1].angle + 5 + o->travel;
         b.section[0].length = o->size * round(b.section[0].length / o->size);
@@ -125,9 +125,9 @@ static Drag draw_sections(const Pulley *p, double clearance, double proximal, do
     return draw_so(&o);
 }
 
-// Pull over bends that the wire follows on their inner walls, at R = tube radius - clearance, R/2a of it, a = T R^2/EI: then what the bending stiffness takes
-// off at the bends' ends is just the clearance, and wire and tube are straight behind. In a bend the tension is less by e = EI/(2 R^2); friction acts
-// on the tool's skin, whose way is shorter by r/R:     T_prox = (T - e) exp(mu theta (1 - r/R)) + e
+// Pull over bends whose inner walls the wire follows, at R = tube radius - clearance. The clearance is R/2a, a = T R^2/EI: it equals the deflection by the
+// bending stiffness at the ends of the bends, so that wire and tube are straight behind them. In a bend the tension is smaller by e = EI/(2 R^2); friction acts
+// on the skin of the tool, whose path is shorter by r/R:     T_prox = (T - e) exp(mu theta (1 - r/R)) + e
 // (checked by elastica of 400 links with the same friction: 90 deg, a = 20: 0.99481 of T exp(mu theta) at mu 0.1, 0.98373 at 0.3; this formula 0.9943, 0.9845).
 // docs/references.md: within 2 % of T exp(mu theta).
 static double pulled(const Pulley *p, double tension, double friction, double clearance)
@@ -188,9 +188,10 @@ static void friction_does_not_depend_on_speed(void **state)
         }
 }
 
-// Drawn and turned at once: the skin slips at the angle gamma to the axis, tan gamma = r omega / v'. What acts around pushes the wire up the wall's side until the
-// wall's pressure N carries both: N = q / sqrt(1 + mu^2 sin^2 gamma) of the tension's q = T/R, and along the axis mu' = mu cos gamma / sqrt(1 + mu^2 sin^2 gamma) is
-// left of mu. Turned without drawing: no friction along, the torque is mu r (T - e) theta / sqrt(1 + mu^2).
+// Pulled and rotated at once: the skin slips at the angle gamma to the axis, tan gamma = r omega / v'. The circumferential friction pushes the wire up the side
+// of the wall until the wall's pressure N balances both: N = q / sqrt(1 + mu^2 sin^2 gamma) with q = T/R from the tension, and the effective friction along the
+// axis is mu' = mu cos gamma / sqrt(1 + mu^2 sin^2 gamma). Rotated without pulling: no friction along the axis, the torque is mu r (T - e) theta / sqrt(1 +
+// mu^2).
 static void turning_takes_friction_away(void **state)
 {
     (void)state;
@@ -212,7 +213,7 @@ static void turning_takes_friction_away(void **state)
         }
 }
 
-// Each section brings its own friction: the distal one lies in the second bend.
+// Each section has its own friction: the distal one lies in the second bend.
 static void sections_have_their_own_friction(void **state)
 {
     (void)state;
@@ -228,7 +229,7 @@ static void sections_have_their_own_friction(void **state)
 }
 
 typedef struct Rest {
-    double creep;            // [mm] largest way of a node in the last 10 s
+    double creep;            // [mm] largest displacement of a node in the last 10 s
     double force;            // [N] sum of wall forces
 } Rest;
 
@@ -236,7 +237,7 @@ static Rest leave(Stepper *s)
 {
     int nodes = stepper_state(s)->node_count;
     Vec3 *place = calloc((size_t)nodes, sizeof *place);
-    settle(s, 500, 500, 0);          // the motion's own end
+    settle(s, 500, 500, 0);          // the end of the motion
     memcpy(place, stepper_state(s)->position, (size_t)nodes * sizeof *place);
     settle(s, WHOLE_OR_SHORT(10000, 500), WHOLE_OR_SHORT(10000, 500), 0);
     Rest r = {0, wall_of(s).sum};

@@ -1,5 +1,5 @@
-// The contact solve: both forms against each other, against enumeration of active sets on dense matrices, and against the laws themselves
-// (momentum, Signorini, Coulomb), on a wire pushed through tubes and on random problems. Prints iterations, residuals and times.
+// The contact solve: both forms compared with each other, with enumeration of active sets on dense matrices, and with the laws (momentum, Signorini, Coulomb),
+// for a wire pushed through tubes and for random problems. Prints iterations, residuals and times.
 #include "chain_scene.h"
 
 #include <setjmp.h>
@@ -37,7 +37,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// --- The laws, written from contact.h alone ---
+// --- The laws, as stated in contact.h ---
 
 static Vec3 displacement(const ContactPoint *p, const double *u)
 {
@@ -57,7 +57,7 @@ typedef struct Laws {
     double pull;         // largest tensile force
     double complement;   // largest |f_n (gap + d_n)|
     double cone;         // largest (|f_t| - mu f_n)+ / f_n
-    double direction;    // [N] largest over contacts of the lesser of |f_t + mu f_n d_t/|d_t|| (slides) and stiffness |d_t| (sticks)
+    double direction;    // [N] largest over contacts of the smaller of |f_t + mu f_n d_t/|d_t|| (slides) and stiffness |d_t| (sticks)
     double top;          // largest force
 } Laws;
 
@@ -103,7 +103,7 @@ static Laws check_laws(const BlockChain *a, const double *b, const ContactSet *s
             laws.cone = fmax(laws.cone, t);
         if (fn <= 0 || p->friction == 0)
             continue;
-        // it sticks, or the force is -mu f_n along the sliding: the smaller of both errors, as force
+        // the contact sticks, or the force is -mu f_n along the sliding: the smaller of both errors, as a force
         double slip = slide > 0 ? vec3_norm(vec3_add_scaled(ft, p->friction * fn / slide, dt)) : 0;
         laws.direction = fmax(laws.direction, fmin(slip, stiffness * slide));
     }
@@ -198,7 +198,7 @@ static void problem_randomise(Problem *p, double young, double length, double fr
         v = vec3_add_scaled(v, 0.05, t);
         p->b[6 * i] = mass * v.x, p->b[6 * i + 1] = mass * v.y, p->b[6 * i + 2] = mass * v.z;
     }
-    // loads of the size that moves a node by some tenths of a millimetre in the step: stiffness of a bending wave's length
+    // loads that move a node by some tenths of a millimetre in the step: stiffness over the length of a bending wave
     double wave = pow(k / (mass / length), 0.25), load = 2 * k / pow(wave, 3);
     for (int n = 0; n < 3; n++) {
         int i = (int)(fabs(uniform()) * m);
@@ -237,7 +237,8 @@ static void assert_laws(const Problem *p, double tolerance, const char *what)
     double u = 0;
     for (int i = 0; i < 6 * p->chain.count; i++)
         u = fmax(u, fabs(p->u[i]));
-    // momentum to the rounding of a solve (some hundred eps) and the cut of forces to their cones, of which a node may have several; nothing pulls; cone to rounding; violations times the stiffness of a node are small against the forces
+    // Momentum holds to the rounding of a solve (some hundred eps) and the projection of forces to their cones, of which a node may have several. No contact
+    // pulls. Cones hold to rounding. Violations times the stiffness of a node are small compared with the forces.
     if (!(l.momentum <= 1e-12 * (a * u + b + top) + 10 * tolerance * top && l.pull == 0 && l.cone <= 1e-9 &&
           l.penetration * a <= 1e3 * tolerance * top + 1e-12 * a && l.complement * a <= 1e3 * tolerance * top * top + 1e-12 * a * top &&
           l.direction <= 1e3 * tolerance * top + 1e-12 * a)) {
@@ -247,7 +248,7 @@ static void assert_laws(const Problem *p, double tolerance, const char *what)
     }
 }
 
-// Frictionless, few contacts: every active set by dense elimination; the one that is consistent is the solution.
+// Without friction and with few contacts: all active sets are solved by dense elimination; the consistent one is the solution.
 static void agrees_with_enumeration(void **state)
 {
     (void)state;
@@ -257,8 +258,8 @@ static void agrees_with_enumeration(void **state)
         int nodes = K + trial % 9;
         problem_create(&p, nodes, K);
         problem_randomise(&p, trial % 2 ? 80000 : 200, 1.5, 0, -0.002);
-        for (int i = 0; i < K; i++) // a node each, or W is singular and forces are not unique
-            p.set.point[i].is_between = false, p.set.point[i].xi = 0, p.set.point[i].node = i;
+        for (int i = 0; i < K; i++) // one node per contact, or W is singular and forces are not unique
+            p.set.point[i].xi = 0, p.set.point[i].node = i;
         double w[K][K], q[K], best[K];
         double *v = malloc((size_t)nodes * 6 * sizeof *v);
         block_factor_solve(p.factor, p.b, v);
@@ -333,8 +334,8 @@ static void agrees_with_enumeration(void **state)
     }
 }
 
-// Soft to stiff, short to long elements, no to strong friction, none to 200 contacts, gaps that never close and overlap at the start, bad
-// warm starts, several contacts at one place: laws hold where it converges; where it does not, nothing penetrates or leaves its cone.
+// Soft to stiff, short to long elements, no to strong friction, none to 200 contacts, gaps that never close, overlap at the start, bad warm starts, several
+// contacts at one place: if the solver converges, the laws hold; if not, no contact penetrates or leaves its cone.
 static void survives_random_problems(void **state)
 {
     (void)state;
@@ -411,7 +412,7 @@ static void scene_destroy(ChainScene *wire, Vessel *vessel)
     vessel->destroy(vessel);
 }
 
-// Every 100th state of a push through the spiral is solved by both forms, to the end.
+// Both forms solve every 100th state of a push through the spiral until they converge.
 static void both_forms_agree(void **state)
 {
     (void)state;
@@ -482,7 +483,7 @@ static void both_forms_agree(void **state)
     }
 }
 
-// Cost and convergence over whole runs, warm-started as the step does it.
+// Time and convergence over whole runs, with warm starts as in the step.
 static void wire_in_tubes(void **state)
 {
     (void)state;
@@ -571,7 +572,7 @@ static void wire_in_tubes(void **state)
             failed += !r.converged;
             active = r.active > active ? r.active : active;
             candidates = w.set.count > candidates ? w.set.count : candidates;
-            if (i >= 50) // a J tip that starts straight springs open across the tube at once
+            if (i >= 50) // a J-tip that starts straight springs open across the tube at once
                 penetration = fmax(penetration, w.penetration);
             residual = r.converged ? fmax(residual, r.residual) : residual;
             assert_true(r.cone_violation <= 1e-9 && isfinite(r.residual));
@@ -584,12 +585,12 @@ static void wire_in_tubes(void **state)
                       scenes[n].name, active, candidates, iterations[steps / 2], iterations[steps * 99 / 100], iterations[steps - 1], us[steps / 2],
                       us[steps * 99 / 100], us[steps - 1], residual, failed, 1e3 * penetration);
         assert_true(failed <= steps / 100);
-        assert_true(penetration < (scenes[n].straight ? 0.05 : 0.02)); // of the wall's curvature and the turning of the normal in a step, not of the solve
+        assert_true(penetration < (scenes[n].straight ? 0.05 : 0.02)); // due to the wall's curvature and the rotation of the normal in a step, not to the solve
         scene_destroy(&w, vessel);
     }
 }
 
-// Contacts between nodes with levers of any direction: both forms reach the same forces, under which the laws hold.
+// Contacts between nodes with levers in all directions: both forms reach the same forces, and the laws hold.
 static void levers(void **state)
 {
     (void)state;
@@ -628,8 +629,8 @@ static void levers(void **state)
     }
 }
 
-// The wall's curvature as the second derivative of its energy -f H(d, d)/2 with d the axis' motion: entry by entry from finite differences of
-// the motion that contact.h states (exact, for the energy is quadratic).
+// The wall's curvature as the second derivative of its energy -f H(d, d)/2, with d the motion of the axis: each entry from finite differences of the motion
+// given in contact.h (exact, because the energy is quadratic).
 static void curvature_follows_levers(void **state)
 {
     (void)state;
@@ -646,7 +647,7 @@ static void curvature_follows_levers(void **state)
         for (int e = 0; e < 2; e++)
             c.lever[e] = vec3_scale(draw_unit(), 0.5);
         Vec3 e = vec3_normal_to(c.normal), f = vec3_cross(c.normal, e);
-        double along = -0.5 - fabs(uniform()), across = -0.2; // hollow: both eigenvalues of -H positive
+        double along = -0.5 - fabs(uniform()), across = -0.2; // concave: both eigenvalues of -H positive
         c.hessian = (Sym3){along * e.x * e.x + across * f.x * f.x, along * e.x * e.y + across * f.x * f.y, along * e.x * e.z + across * f.x * f.z,
                            along * e.y * e.y + across * f.y * f.y, along * e.y * e.z + across * f.y * f.z, along * e.z * e.z + across * f.z * f.z};
         c.force = vec3_scale(c.normal, 3);
@@ -672,7 +673,7 @@ static void curvature_follows_levers(void **state)
     }
 }
 
-// A mirrored problem has the mirrored solution, to rounding; the same problem the same bits, whatever the work space solved before.
+// A mirrored problem has the mirrored solution, to rounding. The same problem has a bit-identical solution, whatever the work space contained before.
 static void mirrored_and_repeated(void **state)
 {
     (void)state;
@@ -717,7 +718,7 @@ static void mirrored_and_repeated(void **state)
         }
         memcpy(first, p.set.point, (size_t)contacts * sizeof *start);
         memcpy(p.set.point, start, (size_t)contacts * sizeof *start);
-        problem_solve(&p, CONTACT_POINTWISE, 7, 1e-9); // leaves something else in the work space
+        problem_solve(&p, CONTACT_POINTWISE, 7, 1e-9); // leaves other values in the work space
         memcpy(p.set.point, start, (size_t)contacts * sizeof *start);
         double *u = malloc((size_t)nodes * 6 * sizeof *u);
         problem_solve(&p, CONTACT_BLOCK, 200, 1e-9);
@@ -736,7 +737,7 @@ static void mirrored_and_repeated(void **state)
     }
 }
 
-// A node that cannot move along the normal bears no force and does not disturb the others; one that is held across it still pushes.
+// A node that cannot move along the normal has no contact force and does not disturb the others; a node that is held only across it still pushes.
 static void held_nodes(void **state)
 {
     (void)state;

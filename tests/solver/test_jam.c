@@ -1,5 +1,6 @@
-// A wire of 0.6 mm and 100 GPa that a hand without limit forces into an S whose lumen is 0.02 mm wider, closed at its end: it locks at 850 N. Each step still ends,
-// after a bounded number of contact iterations, without going through the wall, and half of the steps cost no more than 30 of a free one's.
+// A hand without a limit forces a wire of 0.6 mm and 100 GPa into an S-shaped tube whose lumen is 0.02 mm wider and closed at its end: the wire locks at 850 N.
+// Each step must still end after a bounded number of contact iterations without passing the wall, and the median step may take at most 30 times as long as a
+// free one.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +19,7 @@
 enum { FREE = 100, STEPS = 1500, JAMMED_FROM = 750 };
 
 typedef struct JamFigures {
-    double free_us, jammed_us;           // CPU time of a step, median
+    double free_us, jammed_us;           // median CPU time of a step
     double iterations, most_iterations;  // of a jammed step: median, most
     double push, deepest;                // [N], [mm]
 } JamFigures;
@@ -84,9 +85,9 @@ static void a_jammed_tool_costs_little(void **state)
         JamFigures f = force_in(friction);
         print_message("friction %.1f: push up to %.0f N; a step %.0f us (free %.0f us), %.0f contact iterations, at most %.0f; deepest %.4f mm\n", friction,
                       f.push, f.jammed_us, f.free_us, f.iterations, f.most_iterations, f.deepest);
-        assert_true(f.push > 500);                                           // it is a jam
-        assert_true(f.iterations <= 35 && f.jammed_us < 30 * f.free_us);     // 51 to 73 iterations where nothing ends a step
-        assert_true(f.most_iterations <= 200);                                // 289 where nothing ends a step
+        assert_true(f.push > 500);                                           // the wire is jammed
+        assert_true(f.iterations <= 35 && f.jammed_us < 30 * f.free_us);     // 51 to 73 iterations without the limit
+        assert_true(f.most_iterations <= 200);                                // 289 without the limit
         assert_true(f.deepest < 0.05);
     }
 }

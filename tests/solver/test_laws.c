@@ -30,7 +30,7 @@ static Vec3 random_vec(double scale)
 }
 static Quat random_turn(void) { return quat_from_rotation_vector(vec3_scale(vec3_unit(random_vec(1)), 3 * draw_unit())); }
 
-// --- a chain of its own, without a stepper ---
+// --- a chain without a stepper ---
 
 enum { E = 40, M = E + 1, PADDED = M + BEAM_PADDING, UNKNOWNS = 6 * M };
 typedef struct Chain {
@@ -41,7 +41,7 @@ typedef struct Chain {
     Quat q[M];
 } Chain;
 
-// Straight, curved in two planes, thin and soft, a tube: diameters, stiffness, curvature and its plane jump at every border.
+// Sections: straight, curved in two planes, thin and soft, a tube. Diameter, stiffness, curvature and its plane jump at every border.
 static const WireSection motley[] = {
     {.length = 20, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3, .friction = -1},
     {.length = 15, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3, .rest_curvature = 0.12, .friction = -1},
@@ -57,7 +57,7 @@ static const WireSection motley[] = {
     {.length = 8, .diameter = 0.2, .young_modulus = 500, .poisson_ratio = 0.48, .density = 1e-2, .rest_plane = -2, .rest_curvature = 0.3, .friction = -1}};
 enum { SECTIONS = sizeof motley / sizeof *motley };
 
-// At rest: arc after arc from the origin, curvatures times `curl`.
+// The rest shape: successive arcs from the origin, with curvatures times `curl`.
 static void chain_at_rest(Chain *c, double curl)
 {
     *c = (Chain){0};
@@ -157,7 +157,7 @@ static void no_force_at_rest_nor_at_borders(void **state)
     chain_at_rest(&c, 1);
     chain_force(&c, b);
     double energy = chain_energy(&c);
-    chain_bend(&c, 1e-2);        // what a hundredth of a millimetre and radian would give
+    chain_bend(&c, 1e-2);        // the force for a hundredth of a millimetre and radian
     chain_force(&c, bent);
     double force = largest(b, 0, 6, UNKNOWNS) / largest(bent, 0, 6, UNKNOWNS), moment = largest(b, 3, 6, UNKNOWNS) / largest(bent, 3, 6, UNKNOWNS);
     print_message("at rest: force %.1e, moment %.1e of those of a random 0.01 mm and rad; energy %.1e mJ\n", force, moment, energy);
@@ -260,7 +260,7 @@ static double tangent_error(double curl, double h)
     return error;
 }
 
-// At rest no part of the tangent is left out: it is the derivative of the force, straight or curved.
+// At rest no part of the tangent is neglected: it is the derivative of the force, for straight and curved wires.
 static void tangent_is_the_derivative_of_force(void **state)
 {
     (void)state;
@@ -275,7 +275,7 @@ static void tangent_is_the_derivative_of_force(void **state)
     for (double curl = 1; curl > 0.2; curl /= 2) {
         double error = tangent_error(curl, 1e-6);
         print_message("tangent against the force's derivative: curvature x %.2f error %.2e\n", curl, error);
-        assert_true(error < 1e-8);       // the difference's rounding
+        assert_true(error < 1e-8);       // rounding of the difference
     }
 }
 
@@ -305,7 +305,7 @@ static double growth(Stepper *s, int steps, double *lost)
     return most;
 }
 
-// Loaded until it holds still, then let go.
+// Loaded until it is at rest, then released.
 static Stepper *plucked(Bench *b, Vec3 force, double dt)
 {
     WireOptions *w = &b->options.wire;
@@ -362,7 +362,7 @@ static void energy_never_grows(void **state)
             }
 }
 
-// The whole run of a wire of all sections, pushed, turned and loaded, moved rigidly and mirrored.
+// A whole run of a wire with all sections, pushed, rotated and loaded; the same moved rigidly and mirrored.
 static Stepper *wandering(Quat turn, Vec3 shift, double mirror)
 {
     Bench b;
@@ -429,7 +429,7 @@ typedef struct Flight {
     double linear, angular, energy;      // relative losses
 } Flight;
 
-// A free wire thrown with a turn of `rate` [rad/ms] about its centre, flown for `time`.
+// A free wire that flies for `time` and rotates at `rate` [rad/ms] about its centre.
 static Flight fly(const Bench *bench, double rate, double time)
 {
     Bench b = *bench;
@@ -440,7 +440,7 @@ static Flight fly(const Bench *bench, double rate, double time)
     Wire wire;
     char why[256];
     assert_true(wire_create(&wire, &b.options.wire, why, sizeof why));
-    // velocities are the state's; the start must not know of elements
+    // velocities are those of the state; the start must not depend on elements
     WireState *w = (WireState *)(uintptr_t)stepper_state(s);
     Vec3 centre = vec3(wire.total_length / 2, 0, 0), axis = vec3(0, 0.6 * rate, 0.8 * rate);
     for (int i = 0; i < w->node_count; i++) {
@@ -472,14 +472,14 @@ static void momentum_of_a_flying_wire(void **state)
         Flight f = fly(&b, 0.02, 100);
         print_message("flying: h %.2f ms, 100 ms: linear momentum off by %.1e, angular by %.3e, energy by %.3e\n", h, f.linear, f.angular, f.energy);
         assert_true(f.linear < 1e-7);
-        // implicit Euler: a chord of the circle is flown, the part across it of the velocity is lost: first order in h
+        // implicit Euler: the motion is along a chord of the circle, and the velocity across it is lost: first order in h
         if (before.angular > 0)
             assert_true(before.angular / f.angular > 1.8 && before.angular / f.angular < 2.2);
         before = f;
     }
 }
 
-// Stiffness damping knows strain only: what a turning wire loses with and without it is the same to first order in h.
+// Stiffness damping acts only on strain: the loss of a rotating wire is the same with and without it, to first order in h.
 static void damping_leaves_rigid_rotation_alone(void **state)
 {
     (void)state;
@@ -499,7 +499,7 @@ static void damping_leaves_rigid_rotation_alone(void **state)
     }
 }
 
-// What a small force here moves there is what the same force there moves here.
+// Reciprocity: a small force at A moves B as much as the same force at B moves A.
 static void reciprocity(void **state)
 {
     (void)state;
@@ -509,7 +509,7 @@ static void reciprocity(void **state)
         bench_motley(&b, 50, QUASI_STATIC);
         double at[2] = {52, 31.7};
         Vec3 force[2] = {vec3(0, 1e-9, 0), vec3(0, 0, 1e-9)};
-        // bent at rest first: reference without the force
+        // first bent at rest: the reference without the force
         Stepper *s = bench_make(&b);
         settle(s, 30, 200, 1e-13);
         Checkpoint *rest = stepper_save(s, NULL);
@@ -542,10 +542,10 @@ static void reciprocity(void **state)
 typedef struct Trace {
     double force_mean, torque_mean;      // of the absolute values
     double force_jump, torque_jump;      // largest in a step
-    double beyond;                       // by how much a force is outside of its neighbours' range 20 steps before and after: a spike
+    double beyond;                       // spike: distance of a force from the range of its neighbours 20 steps before and after
 } Trace;
 
-// Fed at `speed` [mm/ms], after the loads have been taken up.
+// Fed at `speed` [mm/ms] after the loads are applied.
 static Trace feed(Stepper *s, double speed, double twist, int steps)
 {
     enum { AWAY = 20 };
@@ -594,7 +594,7 @@ static void no_spike_as_nodes_pass_the_mouth(void **state)
                 b.section[1].young_modulus = kind >= 3 ? 8e3 : 80e3;
                 w->section_count = 2;
             }
-            bool border = kind >= 3;         // passes the mouth, at 15 mm
+            bool border = kind >= 3;         // a border passes the mouth, at 15 mm
             if (border)
                 w->inserted = pull ? 17 : 13;
             bench_load(&b, 60, vec3(0, -0.002, 0.001), vec3(0, 0, 0.5), 200);
@@ -604,7 +604,7 @@ static void no_spike_as_nodes_pass_the_mouth(void **state)
                           pull ? "pull" : "push", name[kind], t.force_mean, 100 * t.force_jump / t.force_mean, 100 * t.beyond / t.force_mean, t.torque_mean,
                           100 * t.torque_jump / t.torque_mean);
             assert_true(t.beyond < 0.02 * t.force_mean);
-            // where the stiffness at the mouth changes, the configurational push -M^2 / 2 EI truly steps
+            // where the stiffness at the mouth changes, the configurational push -M^2 / 2 EI really jumps
             if (!border)
                 assert_true(t.force_jump < 0.01 * t.force_mean);
             if (kind > 0)
@@ -613,7 +613,7 @@ static void no_spike_as_nodes_pass_the_mouth(void **state)
         }
 }
 
-// --- what it costs ---
+// --- times ---
 
 static double now_us(void)
 {
@@ -628,7 +628,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Printed, not judged: medians of CPU time of the two stages, 220 mm with a curved tip, moving; the state's hash must not know the SIMD level.
+// Printed, not checked: median CPU time of the two stages, for a moving wire of 220 mm with a curved tip. The hash of the state must not depend on the SIMD
+// level.
 static void times_of_assembly_and_correction(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// A tool does not pass through itself: coils in a sac, judged by this file's own distances; a loop whose end presses on its own base, against the elastica;
-// the laws of the contact; the same whichever form solves it, mirrored, saved and restored, and with two tools.
+// A tool does not pass through itself: coils in a sac, measured by this file's own distances; a loop whose end presses on its own base, compared with the
+// elastica; the laws of contact; the same result from both contact solvers, mirrored, saved and restored, and with two tools.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,7 +14,7 @@
 #include "tests/short_run.h"
 #include "tube_scene.h"
 
-// --- how near a tool is to itself, by its own means: the cubics cut into short lines, each against each ---
+// --- distance of a tool to itself, independent of the solver: the cubics as short lines, all pairs ---
 
 enum { CUTS = 6, POINTS_MAX = 2000 };
 
@@ -31,7 +31,7 @@ static double between_lines(Vec3 p, Vec3 p2, Vec3 q, Vec3 q2)
 {
     Vec3 d = vec3_sub(p2, p), e = vec3_sub(q2, q), r = vec3_sub(p, q);
     double a = vec3_norm2(d), f = vec3_norm2(e), b = vec3_dot(d, e), best = HUGE_VAL, det = a * f - b * b;
-    // the inner minimum, or one with an end
+    // the interior minimum, or one at an end
     if (det > 1e-12 * a * f) {
         double s = (b * vec3_dot(e, r) - f * vec3_dot(d, r)) / det, t = (a * vec3_dot(e, r) - b * vec3_dot(d, r)) / det;
         if (s >= 0 && s <= 1 && t >= 0 && t <= 1)
@@ -46,7 +46,7 @@ static double between_lines(Vec3 p, Vec3 p2, Vec3 q, Vec3 q2)
     return sqrt(best);
 }
 
-// [mm] least distance of two places of the axis with at least `arc` between them, where it is out of the sheath, which leads along +x.
+// [mm] smallest distance of two places of the axis that are at least `arc` apart along it, outside the sheath, which is along +x.
 static double least_distance(const WireState *w, double length, double mouth, double arc)
 {
     static Vec3 point[POINTS_MAX];
@@ -67,7 +67,7 @@ static double least_distance(const WireState *w, double length, double mouth, do
 
 // --- a sac ---
 
-// A ball of a vessel, nearly; the wire enters beside its axis.
+// A nearly spherical vessel; the wire enters beside its axis.
 typedef struct Sac {
     Bench bench;
     Vessel *vessel;
@@ -110,8 +110,8 @@ static double sac_distance(const Sac *sac)
 }
 
 typedef struct Coil {
-    double least, overlap;   // [mm] distance to itself; overlap that the solver tells of
-    int contacts;            // most at a time
+    double least, overlap;   // [mm] distance to itself; overlap reported by the solver
+    int contacts;            // largest number at a time
     int limited, unconverged;
     double deepest;          // [mm] in the wall
 } Coil;
@@ -136,7 +136,7 @@ static Coil coil_up(SelfContactMode mode, double radius, double speed, double le
     return coil;
 }
 
-// 60 mm at the speed of a hand and at four times that, in elements that are longer and shorter than the tool is thick.
+// 60 mm at the speed of a hand and at four times that, with elements longer and shorter than the diameter of the tool.
 static void a_wire_coils_in_a_sac(void **state)
 {
     (void)state;
@@ -158,8 +158,8 @@ static void a_wire_coils_in_a_sac(void **state)
 
 // --- a loop whose end presses on its own base ---
 //
-// Clamped along x on 30 mm, then 270 degrees of rest radius R, then straight, back down, to `dip` mm beyond the base's axis. Elastica with the base's force F,
-// along y, at its end:
+// Clamped along x over 30 mm, then 270 degrees of rest radius R, then straight back down to `dip` mm beyond the axis of the base. Elastica with the base's
+// force F, along y, at its end:
 //   EI (kappa - kappa_0) = F (x_tip - x),   x' = cos theta, y' = sin theta,   from (0, 0, 0) at the end of the base to y = 2 r at the tip.
 
 enum { STEPS = 4000 };
@@ -168,7 +168,7 @@ static double tip_height(double bend, double straight, double force, double stif
 {
     double arc = 1.5 * PI * bend, length = arc + straight, x = 0, y = 0, theta = 0;
     for (int k = 0; k < STEPS; k++) {
-        // the midpoint rule, whose steps end at the border
+        // midpoint rule, with steps that end at the border
         double from = k < STEPS / 2 ? arc * 2 / STEPS : (length - arc) * 2 / STEPS, rest = k < STEPS / 2 ? 1 / bend : 0;
         double bent = rest + force * (x_tip - x) / stiffness, half = theta + 0.5 * from * bent, middle = x + 0.5 * from * cos(theta);
         theta += from * (rest + force * (x_tip - middle) / stiffness);
@@ -238,7 +238,7 @@ static void a_loop_presses_on_its_base(void **state)
 
 // --- laws ---
 
-// Pushes until there are so many contacts, and some steps more.
+// Pushes until there are that many contacts, and then some more steps.
 static void until_it_touches(Stepper *s, double speed, int contacts, int more)
 {
     for (int k = 0; k < 2000 && step_once(s, speed, 0)->self_contacts < contacts; k++)
@@ -250,7 +250,7 @@ static void until_it_touches(Stepper *s, double speed, int contacts, int more)
 
 static Vec3 of(const double *u, int node, int from) { return vec3(u[6 * node + from], u[6 * node + from + 1], u[6 * node + from + 2]); }
 
-// What each node gets of a pair's force adds up to nothing, and so does what it turns by about the origin; where it slips, it drags against the slip.
+// The forces of a pair on all nodes sum to zero, and so do their moments about the origin; the friction of a slipping pair is opposite to the slip.
 static void forces_are_equal_and_opposite(void **state)
 {
     (void)state;
@@ -354,7 +354,7 @@ static void mirrored_and_restored(void **state)
     sac_end(&right);
 }
 
-// A tool that cannot touch itself: the same bits with and without.
+// A tool that cannot touch itself: bit-identical with and without self-contact.
 static void nothing_near_changes_no_bit(void **state)
 {
     (void)state;
@@ -392,7 +392,7 @@ static void two_tools_coil(void **state)
         sac_make(&sac, off ? SELF_CONTACT_OFF : SELF_CONTACT_ON);
         Coil coil = {.least = HUGE_VAL};
         for (int k = 0; k < 1100; k++) {
-            // the wire ahead, the catheter after it
+            // the wire first, the catheter after it
             StepCommand command[STEP_TOOLS_MAX] = {{.advance = k > 300 ? 0.04 : 0}, {.advance = 0.05}};
             step_feed_tools(sac.stepper, command, 0);
             step_solve(sac.stepper);

@@ -1,4 +1,4 @@
-// What a shared centreline gives up: a wire with clearance in a catheter's bend, as two rods in contact (two_rods.h), against both on one line.
+// The error of a shared centreline: a wire with clearance in the bend of a catheter, as two rods in contact (two_rods.h), compared with both on one line.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,7 +16,7 @@
 static const double PI_ = 3.14159265358979323846;
 static const double BEFORE = 40, RADIUS = 20, AFTER = 2;     // [mm]
 
-// With `links` in 90 degrees.
+// With `links` links in 90 degrees.
 static TwoRods bend(double degrees, double clearance, int links, bool is_held)
 {
     TwoRods rods;
@@ -56,7 +56,7 @@ static void the_gradient_is_the_energy_s(void **state)
         rods.x[k] = x - step;
         double down = two_rods_energy(&rods);
         rods.x[k] = x;
-        // the hub's and the end's turns have no bending of their own
+        // rotations at the hub and at the end have no bending energy
         assert_true(fabs((up - down) / (2 * step) - g[k]) < 1e-6 * fmax(1, fabs(g[k])));
     }
     free(g);
@@ -78,7 +78,7 @@ static double push_at(TwoRods *rods, int reach)
 
 static int middle_of_bend(const TwoRods *rods, double degrees) { return (int)lround((BEFORE + RADIUS * degrees * PI_ / 360) / rods->h); }
 
-// On one line: EI / 2 R^2 where the catheter is held, EIc EIw / (EIc + EIw) / 2 R^2 where it gives.
+// On one line: EI / 2 R^2 if the catheter is held, EIc EIw / (EIc + EIw) / 2 R^2 if it is free.
 static void one_line_pushes_as_the_closed_forms(void **state)
 {
     (void)state;
@@ -91,7 +91,7 @@ static void one_line_pushes_as_the_closed_forms(void **state)
     }
 }
 
-// From a hand that pushes to one that draws, `force` each way: the difference of the wire's length within.
+// The change of the wire's length in the catheter when the hand changes from pushing to pulling with `force`.
 static double lost_motion(TwoRods *rods, double force)
 {
     double length[2];
@@ -105,8 +105,8 @@ static double lost_motion(TwoRods *rods, double force)
     return length[0] - length[1];
 }
 
-// With the force the wire comes to lie along the outer wall pushed and along the inner one drawn. At both ends of the bend it crosses over, which takes its
-// share; what a further 90 degrees add has no ends: exactly 2 c pi / 2 as soon as the middle lies on the walls.
+// With increasing force the pushed wire lies along the outer wall and the pulled wire along the inner one. At both ends of the bend it crosses over, which
+// reduces the lost motion; a further 90 degrees have no ends and add exactly 2 c pi / 2 as soon as the middle lies on the walls.
 static void lost_motion_is_two_c_theta_but_for_the_ends(void **state)
 {
     (void)state;
@@ -144,7 +144,7 @@ static void finer_links_change_little(void **state)
 }
 
 // --- the study ---
-// Up to 0.5 N: harder pressed, the wire snakes through the straight part in many ways of nearly the same energy.
+// Up to 0.5 N: with more compression the wire buckles in the straight part into many shapes of nearly the same energy.
 
 typedef struct Tip {
     double x, y, angle, exit;
@@ -161,7 +161,7 @@ static Tip tip_of(TwoRods *rods)
 static void what_one_line_gives_up(void **state)
 {
     (void)state;
-    NEED_WHOLE_RUNS();       // the others go the same ways
+    NEED_WHOLE_RUNS();       // the others are the same computations
     static const double clearance[] = {0.02, 0.05, 0.1, 0.2};
     const double degree = 180 / PI_, force = 0.2;
     for (int is_held = 1; is_held >= 0; is_held--) {

@@ -1,5 +1,5 @@
-// Chains of more than six unknowns a node in the contact solve, and friction between coaxial tools: exact answers of springs that hold and slip,
-// and the laws of contact.h, checked by code of this file alone, where slides meet the wall's contacts.
+// Chains with more than six unknowns per node in the contact solve, and friction between coaxial tools (slides): exact solutions of springs that stick and
+// slip, and the laws of contact.h, checked by independent code in this file, for slides together with contacts of the wall.
 #include "chain_scene.h"
 #include "tests/short_run.h"
 
@@ -86,7 +86,7 @@ static void unit_row(Problem *p, int node, int k, double value)
     p->b[p->size * node + k] = value;
 }
 
-// Stiffness k between nodes i and i+1 against g . (unknowns of i, unknowns of i+1).
+// Adds the stiffness k between nodes i and i+1 for g . (unknowns of i, unknowns of i+1).
 static void add_spring(Problem *p, int i, double k, const double *g)
 {
     const int n = p->size;
@@ -102,7 +102,7 @@ static void add_spring(Problem *p, int i, double k, const double *g)
 
 static bool is_free(const Problem *p, int node, int k) { return contact_is_free(&p->chain, node, k); }
 
-// The largest of all errors over what a solve of this tolerance may leave: momentum, the wall's laws, the slides' laws. At most 1 where they hold.
+// The largest error relative to the tolerance of the solve: momentum, the wall's laws, the slides' laws. At most 1 if they hold.
 static double broken(const Problem *p, double tolerance)
 {
     const int n = p->size, all = n * p->nodes;
@@ -133,9 +133,9 @@ static double broken(const Problem *p, double tolerance)
     for (int i = 0; i < all; i++)
         momentum = fmax(momentum, fabs(r[i]));
     free(r);
-    // rounding of a solve, and the cut of forces to their cones
+    // rounding of a solve, and the projection of forces to their cones
     worst = fmax(worst, momentum / (1e-12 * (a * u + b + top) + 10 * tolerance * top));
-    // violations times the stiffness of a node are small against the forces
+    // violations times the stiffness of a node are small compared with the forces
     const double small = 1e3 * tolerance * top + 1e-12 * a;
     for (int k = 0; k < p->set.count; k++) {
         const ContactPoint *c = &p->set.point[k];
@@ -170,12 +170,12 @@ static void assert_laws(const Problem *p, double tolerance)
     assert_true(worst <= 1);
 }
 
-// --- Springs with exact answers ---
+// --- Springs with exact solutions ---
 
 static const int sizes[] = {8, 10, 12};
 
-// A node on springs k and c = k radius^2 against S and phi, loaded by (f, radius f'), and a slide: a spring of bound / give from what it held, until it
-// slips. Step after step under the same load it stays where it is. What it starts from, nonsense included, does not matter.
+// A node with springs k and c = k radius^2 for S and phi, loaded by (f, radius f'), and a slide: a spring of stiffness bound / give from its last force, until
+// it slips. In further steps with the same load it stays in place. The start values, even meaningless ones, do not change the result.
 static void gives_and_holds_at(ContactForm form, int size, int unknown, int trial)
 {
     const double radius = 0.4, k = 30, bound = 0.7, give = 1e-3, own = bound / give;
@@ -185,11 +185,11 @@ static void gives_and_holds_at(ContactForm form, int size, int unknown, int tria
         for (int q = 0; q < size; q++)
             *diagonal(&p, i, q, q) = 5;
     double angle = trial % 8 * PI / 4, load = trial / 8 % 2 ? 0.6 * bound : 3 * bound, held = trial / 16 % 2 ? 0.5 * bound : 0, at = 0;
-    bool across = trial / 32;            // what it held is along the load, or across it
+    bool across = trial / 32;            // its last force is along the load, or across it
     const int s = size + unknown, phi = s + 1;
     *diagonal(&p, 1, unknown, unknown) = k;
     *diagonal(&p, 1, unknown + 1, unknown + 1) = k * radius * radius;
-    p.b[size] = 2;                       // a neighbour that has nothing to do with it
+    p.b[size] = 2;                       // an independent neighbour
     p.set.slide[0] = (ContactSlide){.node = 1,
                                     .unknown = unknown,
                                     .radius = radius,
@@ -233,7 +233,7 @@ static void gives_and_holds(void **state)
                     gives_and_holds_at(form ? CONTACT_POINTWISE : CONTACT_BLOCK, sizes[t], unknown, trial);
 }
 
-// In a constrained unknown, or with no radius, a slide is inert; with no bound there is none.
+// A slide on a constrained unknown, or with radius 0, has no effect; with bound 0 there is no slide.
 static void held_and_frictionless(void **state)
 {
     (void)state;
@@ -268,12 +268,12 @@ static void held_and_frictionless(void **state)
 enum { CHAIN = 101 };
 static const double chain_spring = 50, chain_bound = 0.11, chain_radius = 0.3, chain_give = 1e-4;
 
-// How far the nodes of a chain go that is held at its last node and pulled at its first, and the slides' forces. From the pulled end on slides slip and take off their
-// bounds; the rest of the chain and of the slides are springs, `firm` that of all from a node on.
+// The displacements of the nodes of a chain that is held at its last node and pulled at its first, and the forces of the slides. From the pulled end on, slides
+// slip and reduce the tension by their bounds; the rest of the chain and of the slides are springs, `firm` being the stiffness of all from a node on.
 static void pulled_chain(double pull, double *moved, double *force)
 {
     const double k = chain_spring, own = chain_bound / chain_give;
-    double firm[CHAIN], tension[CHAIN];        // of the spring behind a node
+    double firm[CHAIN], tension[CHAIN];        // tension of the spring behind a node
     firm[CHAIN - 1] = HUGE_VAL;
     for (int i = CHAIN - 2; i >= 0; i--)
         firm[i] = own + (i + 2 == CHAIN ? k : k * firm[i + 1] / (k + firm[i + 1]));
@@ -334,8 +334,8 @@ static void pull_chain(ContactForm form, int size, double angle, double pull, in
     destroy(&p);
 }
 
-// A tool of springs held at its far end and pulled (turned, or both at once) at the near one, from less than one bound to more than all, from rest in one step,
-// which no hand does. Then the pull is turned round: from the slip that there was it is found in as many iterations as a step has.
+// A tool of springs, held at its far end and pulled (rotated, or both) at the near end, from less than one bound to more than all, from rest in one step, which
+// is harder than any hand motion. Then the pull is reversed: from the former slip the solution is found within the iterations of a step.
 static void chain_takes_off_bounds(void **state)
 {
     (void)state;
@@ -384,7 +384,7 @@ static void embed(const ChainScene *w, int size, double coupling, double drive, 
             for (int turn = 0; turn < 2; turn++) {
                 double g[24] = {0};
                 for (int k = 0; k < 3; k++) {
-                    int row = 3 * turn + k; // rows that are held stay unit rows
+                    int row = 3 * turn + k; // rows of constrained unknowns stay unit rows
                     g[row] = contact_free_dofs(&w->chain, i) >> row & 1 ? -coupling * t[k] : 0;
                     g[size + row] = contact_free_dofs(&w->chain, i + 1) >> row & 1 ? coupling * t[k] : 0;
                 }
@@ -415,7 +415,7 @@ static void scene_advance(ChainScene *w, int steps)
     chain_scene_prepare(w, 0.05, 0.005);
 }
 
-// Unknowns that know nothing of the first six leave them alone; where they do, the laws hold.
+// Unknowns that are not coupled to the first six do not change them; if they are coupled, the laws hold.
 static void more_unknowns(void **state)
 {
     (void)state;
@@ -458,7 +458,7 @@ static void more_unknowns(void **state)
                 destroy(&p);
             }
         }
-        // as if no form had been tried
+        // the state before any form was tried
         memcpy(w.set.point, start, (size_t)w.set.count * sizeof *start);
         free(start);
     }
@@ -466,7 +466,7 @@ static void more_unknowns(void **state)
     vessel->destroy(vessel);
 }
 
-// Slides of every tool at every third to every node, from loose to tight, with the wall's contacts: the laws hold, and both forms give the same.
+// Slides of all tools at every third node up to every node, from weak to strong, with contacts of the wall: the laws hold, and both forms give the same result.
 static void slides_and_walls(void **state)
 {
     (void)state;
@@ -481,7 +481,7 @@ static void slides_and_walls(void **state)
             int size = sizes[trial % 3], every = 1 + trial / 3 % 3, tools = (size - 6) / 2, places = (w.nodes - 1) / every;
             const double coupling = trial % 2 ? 0.8 : 0.1, bounds[] = {1e-3, 1e-2, 0.1};
             embed(&w, size, coupling, 1, tools * places, &p);
-            for (int k = 0; k < p.set.slide_count; k++) // not in the chain's order
+            for (int k = 0; k < p.set.slide_count; k++) // not in the order of the chain
                 p.set.slide[k] = (ContactSlide){.node = every * (k % places),
                                                 .unknown = 6 + 2 * (k / places),
                                                 .radius = 0.1 + 0.05 * (k / places),
@@ -510,13 +510,13 @@ static void slides_and_walls(void **state)
             assert_laws(&p, 1e-6);
             memcpy(u, p.u, (size_t)(p.nodes * size) * sizeof *u);
             memcpy(first, p.set.slide, bytes);
-            // the same bits again from the same set and the same expected motion
+            // bit-identical again from the same set and the same expected motion
             memset(p.u, 0, (size_t)(p.nodes * size) * sizeof *u);
             memcpy(p.set.slide, start, bytes);
             memcpy(p.set.point, points, walls);
             solve(&p, CONTACT_BLOCK, 200, 1e-6);
             assert_memory_equal(u, p.u, (size_t)(p.nodes * size) * sizeof *u);
-            // from its own solution little is left to do
+            // a start from its own solution needs few iterations
             r = solve(&p, CONTACT_BLOCK, 200, 1e-6);
             warm = r.iterations > warm ? r.iterations : warm;
             assert_true(r.converged);

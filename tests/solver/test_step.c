@@ -1,7 +1,7 @@
-// The wire against exact solutions (docs/references.md), with the convergence order, and the laws of a step.
+// The wire compared with exact solutions (docs/references.md), with the order of convergence, and the laws of a step.
 // Errors are printed: `test_step` alone shows the table.
 //
-// The element's bow makes it fourth order in bending, where docs/references.md expects second: bounds here are those of this element.
+// The cubic shape of the element makes it fourth order in bending, where docs/references.md expects second order: bounds here are those of this element.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -48,12 +48,12 @@ static void cantilever_elastica(void **state)
     for (int k = 0; k < 5; k++) {
         double before = 0;
         for (int n = 10; n <= 40; n *= 2) {
-            // 1 m of 0.36 mm: shear and stretch, which the elastica has not, are below 1e-7
+            // 1 m of 0.36 mm: shear and stretch, which the elastica neglects, are below 1e-7
             Bent bent = cantilever(1000, n, elastica[k][0], quat_identity());
             double error = fabs(bent.w / elastica[k][1] - 1), angle = fabs(bent.angle - elastica[k][3]), u = fabs(bent.u - elastica[k][2]);
             print_message("cantilever alpha %-5g N %-3d w error %.1e  u %.1e  angle %.1e\n", elastica[k][0], n, error, u, angle);
             assert_true(error < 4e-5 && angle < 4e-5 && u < 4e-5);
-            // references have eight digits: an order can be seen above 1e-7 only
+            // references have eight digits: an order can be measured only above 1e-7
             if (before > 1.6e-6)
                 assert_true(before / error > 8);
             before = error;
@@ -87,7 +87,8 @@ static void rolled_up_by_an_end_moment(void **state)
     }
 }
 
-// Long thin elements that turn by up to 0.94 rad come to rest too, at 1 ms: an iteration whose tangent lacks a part of the bow goes to and fro for ever.
+// Long thin elements that bend by up to 0.94 rad also come to rest, at 1 ms: with a tangent that neglects a part of the bow the iteration oscillates without
+// end.
 static void slender_elements_roll_up(void **state)
 {
     (void)state;
@@ -166,7 +167,7 @@ static void torsion(void **state)
         Quat q = stepper_state(s)->orientation[n];
         double at_axis = tip_of(s).z + quat_rotate(q, vec3(0, 2, 0)).z, error = fabs(force / at_axis / 0.2018769 - 1);
         print_message("coil spring N %-3d stiffness error %.1e\n", n, error);
-        // the arc stands away from its chord: the torque on an element lacks angle^2/6
+        // the arc is away from its chord: the torque on an element is too small by angle^2/6
         double angle = 10 * PI / n;
         assert_true(error < 1.1 * angle * angle / 6);
         if (before > 0)
@@ -176,7 +177,7 @@ static void torsion(void **state)
     }
 }
 
-// Grows the perturbation's answer under this share of Euler's load? Steps are Newton iterations: below, each change is smaller than the last.
+// Does a perturbation grow under this fraction of Euler's load? Steps are Newton iterations: below the critical load each change is smaller than the last.
 static bool buckles(uint8_t near, uint8_t far, double load, int n)
 {
     Bench b;
@@ -285,7 +286,7 @@ static void momentum_is_kept(void **state)
     Bench b;
     bench_start(&b, 60, 30, 1);
     b.options.wire.fix_count = 0;
-    b.section[0].rest_curvature = 0.05;      // springs as soon as it is let go
+    b.section[0].rest_curvature = 0.05;      // springs as soon as it is released
     Stepper *s = bench_make(&b);
     double mass = 6.5653e-4 * 2;
     for (int k = 0; k < 200; k++) {
@@ -300,7 +301,7 @@ static void momentum_is_kept(void **state)
     stepper_destroy(s);
 }
 
-// Let go from a small deflection; frequency by the tip's zero crossings.
+// Released from a small deflection; frequency by the zero crossings of the tip.
 static double frequency(int n, bool *energy_grew)
 {
     Bench b;
@@ -355,7 +356,7 @@ static void energy_never_grows_in_large_motion(void **state)
     (void)state;
     Bench b;
     bench_start(&b, 60, 40, 1);
-    b.section[0].young_modulus = 100;        // slow enough to swing widely, without contact or damping
+    b.section[0].young_modulus = 100;        // soft enough for slow, large oscillations, without contact or damping
     b.section[0].rest_curvature = 0.03;
     Stepper *s = bench_make(&b);
     double energy = HUGE_VAL;
@@ -438,7 +439,7 @@ static void bench_sheath(Bench *b, double length, int elements, double inserted)
     b->options.wire.inserted = inserted;
 }
 
-// Free in space: pushed and pulled it stays straight and feels its inertia only; twisted it turns.
+// Free in space: a pushed or pulled wire stays straight with only inertial forces; a twisted wire rotates.
 static void sheath_guides(void **state)
 {
     (void)state;
@@ -474,7 +475,7 @@ static void sheath_guides(void **state)
     stepper_destroy(s);
 }
 
-// A dead force across the tip of a wire that comes out: the push back is -M^2/(2 EI) at every length, smooth as nodes pass the mouth.
+// A transverse dead force at the tip of a wire that leaves the sheath: the push at the hand is -M^2/(2 EI) at every length, and smooth as nodes pass the mouth.
 static void push_back_of_a_bent_wire(void **state)
 {
     (void)state;
@@ -500,7 +501,7 @@ static void push_back_of_a_bent_wire(void **state)
     stepper_destroy(s);
 }
 
-// A curved wire is straight inside: pulling it in stores EI k0^2/2 a length.
+// A curved wire is straight in the sheath: pulling it in stores EI k0^2/2 per length.
 static void rest_curvature_is_straightened(void **state)
 {
     (void)state;

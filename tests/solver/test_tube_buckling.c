@@ -1,4 +1,4 @@
-// Buckling of wires that walls confine, and the whip of a curved wire in a curved tube, all without friction, against closed forms.
+// Buckling of wires confined by walls, and the whip of a curved wire in a curved tube, all without friction, compared with closed forms.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -67,7 +67,7 @@ static void strut_over_a_wall(void **state)
                 assert_true(w.sum == 0);
             } else {
                 assert_true(fabs(row(name, "wall force N", strut_wall(force, length, h), w.sum)) < 5e-3);
-                // the flat part's end lies between two nodes
+                // the end of the flat part lies between two nodes
                 double error = fabs(row(name, "shortening mm", strut_shortening(force, length, h), length - tip_of(s).x));
                 assert_true(error < (elements == 20 ? 1e-2 : 3e-3) && w.deepest < 1e-9);
             }
@@ -78,7 +78,7 @@ static void strut_over_a_wall(void **state)
     }
 }
 
-// A wire that lies at the bottom of a horizontal tube of radial clearance r under its weight w, pinned, thrust F. A small load q sin(px) across moves it by
+// A pinned wire lies at the bottom of a horizontal tube of radial clearance r under its weight w, with thrust F. A small transverse load q sin(px) moves it by
 //   q / (EI p^4 - F p^2 + w / r),  unbounded at Dawson and Paslay's F = 2 sqrt(EI w / r) for p = (w / (EI r))^(1/4)
 static void sinusoidal_buckling_under_weight(void **state)
 {
@@ -116,7 +116,7 @@ static void sinusoidal_buckling_under_weight(void **state)
             Stepper *s = bench_make(&b);
             if (c)
                 stepper_restore(s, c);
-            settle(s, 10, 1000, 1e-13);         // thrust is explicit: the error falls by F/Fcr a step
+            settle(s, 10, 1000, 1e-13);         // thrust is explicit: the error falls by F/Fcr per step
             c = stepper_save(s, c);
             double amplitude = stepper_state(s)->position[elements / 2].y;
             inverse[k] = q / amplitude;
@@ -131,7 +131,7 @@ static void sinusoidal_buckling_under_weight(void **state)
             }
             stepper_destroy(s);
         }
-        // Southwell: where 1/amplitude comes to zero
+        // Southwell: the load at which 1/amplitude becomes zero
         double zero = 0.9 + inverse[2] * 0.4 / (inverse[1] - inverse[2]);
         assert_true(fabs(row("under weight", "buckling load N", critical, zero * critical)) < 1e-3);
         checkpoint_free(c);
@@ -139,11 +139,11 @@ static void sinusoidal_buckling_under_weight(void **state)
     tube->destroy(tube);
 }
 
-// Whip. A wire of rest curvature k0 in a ring of radius R that it fills, turned at its base: the angle phi between its plane and the ring's obeys
+// Whip. A wire of rest curvature k0 in a ring of radius R that it fills is rotated at its base: the angle phi between its plane and the ring's obeys
 //   GJ phi'' = EI k0/R sin phi,  phi'(S) = 0 at the tip;  a straight part l0 before it twists by its torque;  base angle = phi(0) + l0 |phi'(0)|
-// (the pendulum; integrated from the tip at 1e-12 with scipy). Where S sqrt(EI k0 / (R GJ)) > pi/2 the base angle has a largest value, over which the tip
-// snaps; a wire of 1 (k0 0.05, S 20: 1.317) turns round only with the straight part's twist: fold at 181.17 deg; the other (2.793): at 278.13 deg.
-// With a clearance c each end of the curved part lies free over a length like sqrt(c R): the error falls with sqrt(c).
+// (the pendulum; integrated from the tip at 1e-12 with scipy). If S sqrt(EI k0 / (R GJ)) > pi/2, the base angle has a largest value, beyond which the tip
+// snaps. The first wire (k0 0.05, S 20: 1.317) folds only because of the twist of its straight part, at 181.17 deg; the other (2.793) at 278.13 deg.
+// With a clearance c each end of the curved part is free over a length of order sqrt(c R): the error falls with sqrt(c).
 typedef struct WhipCase {
     double k0, ring, curved, snap;
     int count;
@@ -221,9 +221,9 @@ static void whip(void **state)
     }
 }
 
-// A long wire under the thrust F in a straight tube of radial clearance r coils: F = 2 EI sin^2 psi cos psi / r^2, pitch 2 pi r / tan psi, pressed on the wall by
-// EI sin^4 psi / r^3 a length. Pushed on with friction, 1/F_tip = 1/F_prox + mu r L / (4 EI) (small psi; the wire is off the wall near its ends). A weak
-// load across, removed before anything is measured, says which way round. Ends are free of the helix over a pitch or two: the middle 40 % is measured.
+// A long wire under the thrust F in a straight tube of radial clearance r forms a helix: F = 2 EI sin^2 psi cos psi / r^2, pitch 2 pi r / tan psi, wall
+// pressure EI sin^4 psi / r^3 per length. With friction, 1/F_tip = 1/F_prox + mu r L / (4 EI) (small psi; the wire is off the wall near its ends). A small
+// transverse load, removed before the measurement, determines the handedness. The helix does not reach the ends by a pitch or two: the middle 40 % is measured.
 typedef struct Coil {
     double pitch, pressure;
 } Coil;

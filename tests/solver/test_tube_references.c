@@ -1,4 +1,4 @@
-// A wire in curved channels without friction against independent equilibria.
+// A wire in curved channels without friction, compared with independently computed equilibria.
 //
 // References (the arc of docs/references.md, and ours): the planar inextensible elastica as N straight links with hinges EI/ds, clamped at the origin
 // along +x, |offset from the centreline| <= clearance at every joint; energy minimised with an augmented Lagrangian, Newton with the exact Hessian,
@@ -54,7 +54,7 @@ static Stepper *planar_make(const PlanarCase *c, const Vessel *tube, double size
 {
     Bench b;
     bench_in_tube(&b, tube, 0, c->length, (int)(c->length / size + 0.5), 0, dt);
-    b.section[0].diameter = 0.05;            // thin: next to no shear and stretch
+    b.section[0].diameter = 0.05;            // thin: negligible shear and stretch
     section_stiffness(&b.section[0], bending);
     if (c->rest_length > 0) {
         b.section[1] = b.section[0];
@@ -83,8 +83,8 @@ static void planar(const PlanarCase *c)
         row(name, "clamp moment N mm", c->moment, w.moment.z);
         row(name, "sheath push N", push, got);
         print_message("%-34s tip off by %.5f mm, deepest %.1e mm\n", name, tip, w.deepest);
-        // a contact sits at a node, so that a short lever between two contacts is off by an element at worst: clamp moment 2 %
-        // docs/references.md: 1 mm elements, energy 0.5 %, forces 1 to 2 %, tip 0.02 mm, violation 0.005 mm; refined ones a tenth of the former
+        // a contact is at a node, so that a short lever between two contacts is wrong by up to an element: clamp moment 2 %
+        // docs/references.md: 1 mm elements, energy 0.5 %, forces 1 to 2 %, tip 0.02 mm, violation 0.005 mm; finer elements a tenth of these
         bool fine = k == 2;
         assert_true(energy < (fine ? 5e-4 : 5e-3) && sum < (fine ? 5e-3 : 2e-2) && tip < (fine ? 4e-3 : 2e-2) && w.deepest < 1e-6);
         double scale = c->sum / 2;
@@ -107,7 +107,7 @@ static void equilibria_of_wires_in_channels(void **state)
         planar(&PLANAR[k]);
 }
 
-// The same equilibrium whatever the stiffness: forces are proportional to EI; and whatever the time step, reached in real time steps with damping.
+// The same equilibrium for any stiffness (forces are proportional to EI), and for any time step, also with steps of real time and damping.
 static void stiffness_and_step_make_no_difference(void **state)
 {
     (void)state;
@@ -146,8 +146,8 @@ static void stiffness_and_step_make_no_difference(void **state)
     tube->destroy(tube);
 }
 
-// A long wire fills a tube of two bends out of one plane but for 0.02 mm; whatever its elements' length, it is the tube's curve: U = EI theta / (2 R) where
-// it reaches round, less what the clearance gives.
+// A long wire fills a tube with two bends in different planes except for 0.02 mm. For any element length it follows the tube: U = EI theta / (2 R) for the
+// angle that it reaches, less the effect of the clearance.
 static void mesh_makes_no_difference(void **state)
 {
     (void)state;
@@ -174,7 +174,7 @@ static void mesh_makes_no_difference(void **state)
     tube->destroy(tube);
 }
 
-// gap = lumen's radius - the tool's: wires of any diameter, bent by the same clearance, give the same forces over EI.
+// gap = radius of the lumen - radius of the tool: wires of any diameter with the same clearance give the same forces over EI.
 static void clearance_is_lumen_less_tool(void **state)
 {
     (void)state;
@@ -195,12 +195,12 @@ static void clearance_is_lumen_less_tool(void **state)
         assert_true(fabs(node[60].gap) < 1e-9);      // the tip rests on the outer wall
         char name[64];
         snprintf(name, sizeof name, "arc, diameter %g mm", diameter[k]);
-        // EA = 16 EI / d^2 and shear count for the thick one
+        // EA = 16 EI / d^2 and shear are not negligible for the thick wire
         assert_true(fabs(row(name, "energy mJ", c->energy, stepper_elastic_energy(s))) < 5e-3);
         stepper_destroy(s);
         tube->destroy(tube);
     }
-    // a wire of two diameters along the wall of a straight tube: a thick part, a thin one; straight both, they touch by the thick one alone
+    // a straight wire with a thick and a thin part along the wall of a straight tube: only the thick part touches
     TubePiece piece = line_piece(100);
     Vessel *tube = tube_of(&piece, 1, 0.18);
     Bench b;
@@ -237,7 +237,7 @@ static void tip_of_a_curved_wire_on_a_straight_wall(void **state)
         settle(s, 5, 100, 1e-10);
         Wall w = wall_of(s);
         assert_true(fabs(row("rest curvature, straight wall", "tip force N", expected, w.sum)) < 5e-3);
-        // it bends in its own plane: the force is opposite to e2 turned by the plane's angle
+        // the wire bends in its own plane: the force is opposite to e2 rotated by the angle of the plane
         Vec3 to = vec3(0, cos(b.section[0].rest_plane), sin(b.section[0].rest_plane));
         assert_true(fabs(vec3_dot(w.force, to) / w.sum + 1) < 1e-4);
         stepper_destroy(s);

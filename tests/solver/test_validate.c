@@ -1,4 +1,4 @@
-// What a step leaves behind keeps its invariants in a run with friction through a bend; each one broken by hand is found.
+// The state after a step satisfies all invariants in a run with friction through a bend; a deliberate violation of each is found.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// Sections, layout, mass, and what is refused.
+// Sections, layout, mass, and rejected options.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -40,7 +40,7 @@ static void borders_fall_on_nodes(void **state)
     assert_false(wire_create(&w, &b.options.wire, why, sizeof why));
 }
 
-// An element turns by 0.3 rad at rest at most where there are enough of them, in proportion where there are not.
+// With enough elements each bends by at most 0.3 rad at rest; otherwise in proportion.
 static void curved_sections_get_more_elements(void **state)
 {
     (void)state;

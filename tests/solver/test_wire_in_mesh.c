@@ -1,5 +1,6 @@
-// A wire pushed into a bent tube of triangles, as they are, with curvature and with smooth normals, beside the exact tube: it stays inside. With smooth normals
-// it runs as in the exact tube. On planes, whose curvature no step can see coming, its tip swings from face to face, deeper than in any smooth wall.
+// A wire is pushed into a bent tube of triangles (flat, with curvature, with smooth normals) and into the exact tube; it stays inside. With smooth normals it
+// moves as in the exact tube. On flat triangles, whose change of direction a step cannot foresee, its tip swings from face to face and penetrates deeper than
+// in a smooth wall.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,7 +22,7 @@ typedef struct Passage {
     unsigned flags;
 } Passage;
 
-// [mm] that x is beyond the exact tube's wall, from lines and arc.
+// [mm] distance of x beyond the wall of the exact tube, from lines and arc.
 static double outside(Vec3 x, double tool_radius)
 {
     Vec3 y = vec3_sub(x, vec3(STRAIGHT, BEND, 0));
@@ -76,7 +77,7 @@ static void stays_inside_a_meshed_tube(void **state)
         Passage p = push_through(vessel);
         print_message("%-12s  push %8.5f N, deepest %.4f mm\n", vessel->kind, p.push, p.deepest);
         assert_false(p.flags & (STEP_DIVERGED | STEP_OUT_OF_VESSEL | STEP_DEEP | STEP_DETECTION_UNSURE));
-        // planes: no node's centre may leave. The others: as far as the middles of 32 sides are from the circle, 2.9 um, and as much for the step's turn
+        // flat: no centre of a node may leave. Others: the distance of a 32-sided polygon from the circle, 2.9 um, and as much for the rotation in a step
         assert_true(p.deepest < (normals == MESH_FACES ? TOOL_RADIUS : 2 * RADIUS * (1 - cos(PI / 32))));
         assert_true(fabs(p.push / reference.push - 1) < (normals == MESH_FACES ? 0.2 : 0.01));
         vessel->destroy(vessel);

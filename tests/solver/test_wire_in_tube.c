@@ -1,4 +1,4 @@
-// The wire against walls: exact solutions of docs/references.md "Wire and walls" and the incline.
+// The wire in contact with walls: exact solutions of docs/references.md "Wire and walls" and the incline.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -36,7 +36,7 @@ static void bench_pushed(Bench *b, const Vessel *vessel, double friction, double
 static void incline(void **state)
 {
     (void)state;
-    // a wire lying along the slope of a plane whose normal is +z; gravity is turned instead of the plane
+    // a wire along the slope of a plane whose normal is +z; gravity is rotated instead of the plane
     static const struct {
         double angle, moved;
     } slope[] = {{11.2, 0}, {15, 3.25154}};
@@ -63,7 +63,7 @@ static void incline(void **state)
     }
 }
 
-// The wire fills the tube but for 0.02 mm: F = EI / (2 R^2) while the tip is in the bend.
+// The wire fills the tube except for 0.02 mm: F = EI / (2 R^2) while the tip is in the bend.
 static void frictionless_push_through_a_bend(void **state)
 {
     (void)state;
@@ -90,7 +90,7 @@ static void frictionless_push_through_a_bend(void **state)
         u1 = stepper_elastic_energy(s);
         print_message("bend R %g: mean push %.5f N, EI/2R^2 %.5f (%+.2f %%); dU/dL %+.2f %%; deepest %.1e mm\n", bend, sum / count, expected,
                       100 * (sum / count / expected - 1), 100 * ((u1 - u0) / (count * speed) / expected - 1), deepest);
-        // 10 mm/s: Rayleigh damping takes half a per cent
+        // 10 mm/s: Rayleigh damping accounts for half a per cent
         assert_true(fabs(sum / count / expected - 1) < 0.01 && fabs((u1 - u0) / (count * speed) / expected - 1) < 0.005);
         assert_true(deepest < 1e-3);
         stepper_destroy(s);
@@ -127,7 +127,7 @@ static void equilibrium_in_an_arc(void **state)
     tube->destroy(tube);
 }
 
-// A J tip pushed and turned in a tube, then pulled out fast: contained, no step lost.
+// A J-tip is pushed and rotated in a tube, then pulled out fast: it stays inside, and no step fails.
 static void stays_inside(void **state)
 {
     (void)state;

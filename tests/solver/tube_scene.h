@@ -60,7 +60,7 @@ static inline double row(const char *name, const char *what, double reference, d
     return error;
 }
 
-typedef struct Wall {        // what the wall does to the wire
+typedef struct Wall {        // action of the wall on the wire
     Vec3 force;              // [N] resultant
     Vec3 moment;             // [N mm] about the origin
     double sum;              // [N] of magnitudes

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A node's gradient hangs on the two nodes to either side of it.
+// A node's gradient depends on the two nodes on either side of it.
 enum { BAND = 5, COLORS = 10, ITERATIONS = 1000 };
 
 bool two_rods_make(TwoRods *rods, double before, double radius, double angle, double after, double h)
@@ -21,7 +21,7 @@ bool two_rods_make(TwoRods *rods, double before, double radius, double angle, do
                       .gradient = calloc(2 * nodes, sizeof *rods->gradient)};
     if (!rods->rest || !rods->x || !rods->gradient)
         return false;
-    // a border of the arc at a node takes half of its turn there
+    // at a node on the border of the arc, half of the angle
     for (int i = first; i <= first + bend; i++)
         rods->rest[i] = angle / bend * (i == first || i == first + bend ? 0.5 : 1);
     for (int i = 0; i <= links; i++)
@@ -52,7 +52,7 @@ static Link link_at(const TwoRods *rods, int i)
     return link;
 }
 
-// Hands a link's derivatives on to its two nodes.
+// Adds a link's derivatives to those of its two nodes.
 static void spread(TwoRods *rods, int i, const Link *link)
 {
     const double *x = rods->x + 2 * i;
@@ -101,7 +101,7 @@ double two_rods_energy(TwoRods *rods)
 
 static int value_count(const TwoRods *rods) { return 2 * (rods->links + 1); }
 
-// Hub clamped, no node beyond the end; held: no turn moves. Where no wire is there is no w.
+// The hub is clamped, and there is no node beyond the end. If the catheter is held, all angles are fixed. Nodes without a wire have no w.
 static bool is_fixed(const TwoRods *rods, int k)
 {
     int node = k / 2;
@@ -129,11 +129,11 @@ typedef struct Work {
     double *hessian, *bending;       // (values, 2 BAND + 1)
     double *factor;                  // (values, BAND + 1)
     double *d, *from, *scratch;      // (values)
-    double shift;                    // from step to step: more where a step had to be cut, less where it was good
+    double shift;                    // larger after a step that had to be shortened, smaller after a good step
     bool *fixed;
 } Work;
 
-// Second derivatives by differences of the gradient, all values that share none at once: (count, 2 BAND + 1).
+// Second derivatives by differences of the gradient, for all independent values at once: (count, 2 BAND + 1).
 static void find_hessian(TwoRods *rods, double mu, double *hessian, double *scratch)
 {
     const double step = 1e-6;
@@ -171,7 +171,7 @@ static void angle_slope(const TwoRods *rods, int i, double slope[4])
     slope[3] = (-vx * c1 - vy * s1) * x[2] / 2;
 }
 
-// Gauss and Newton's part of the bending's second derivatives.
+// Gauss-Newton part of the second derivatives of the bending energy.
 static void find_bending(const TwoRods *rods, double *bending)
 {
     memset(bending, 0, (size_t)value_count(rods) * (2 * BAND + 1) * sizeof *bending);
@@ -193,8 +193,7 @@ static void find_bending(const TwoRods *rods, double *bending)
     }
 }
 
-// (H + shift B) at (i, j), symmetric. B, of bending alone, is not negative: what buckles is held by it, and soft
-// modes stay soft.
+// (H + shift B) at (i, j), symmetric. B, the bending part, is positive semi-definite: it stabilises buckling modes and leaves soft modes soft.
 static double entry(const Work *work, double shift, int i, int j)
 {
     const double floor = 1e-11;
@@ -202,7 +201,7 @@ static double entry(const Work *work, double shift, int i, int j)
     return 0.5 * (work->hessian[ij] + work->hessian[ji]) + shift * 0.5 * (work->bending[ij] + work->bending[ji]) * (i == j ? 1 + floor : 1);
 }
 
-// Solves (H + shift B) d = -g on the free values by Cholesky within the band. False where that is not positive definite.
+// Solves (H + shift B) d = -g for the free values by banded Cholesky. False if the matrix is not positive definite.
 static bool find_direction(const TwoRods *rods, const Work *work, double shift)
 {
     int count = value_count(rods);
@@ -233,7 +232,7 @@ static bool find_direction(const TwoRods *rods, const Work *work, double shift)
     return true;
 }
 
-// The largest force or moment, over a radius [N], that is not in balance.
+// The largest unbalanced force, or moment over a radius [N].
 static double imbalance(const TwoRods *rods, const bool *fixed)
 {
     double worst = 0;
@@ -242,7 +241,7 @@ static double imbalance(const TwoRods *rods, const bool *fixed)
     return worst;
 }
 
-// The part of the way along d that leaves room to the bounds.
+// The largest fraction of d that stays within the bounds.
 static double free_way(const TwoRods *rods, const double *d)
 {
     double part = 1;
@@ -252,7 +251,7 @@ static double free_way(const TwoRods *rods, const double *d)
     return part;
 }
 
-// One step; false where none leads down.
+// One step; false if no step reduces the energy.
 static bool descend(TwoRods *rods, double mu, Work *work)
 {
     size_t count = (size_t)value_count(rods);
@@ -279,7 +278,7 @@ static bool descend(TwoRods *rods, double mu, Work *work)
     return false;
 }
 
-// mu [mJ] ends where a node pressed with 0.1 mN stands 1e-6 mm before its wall.
+// mu [mJ] ends at a value at which a node pressed with 0.1 mN is 1e-6 mm from its wall.
 static int find_least(TwoRods *rods, Work *work)
 {
     const double first = 1e-4, last = 1e-10, balanced = 1e-6;    // links of 0.25 mm, EI / h^3 of 1,000 N/mm: rounding leaves 1e-7 N
@@ -308,7 +307,7 @@ int two_rods_solve(TwoRods *rods)
         work.scratch = work.from + count;
         for (int k = 0; k < (int)count; k++) {
             work.fixed[k] = is_fixed(rods, k);
-            if (k % 2 == 0)      // away from the wall that the last answer lay on
+            if (k % 2 == 0)      // away from the wall of the last solution
                 rods->x[k] = fmax(-0.9 * rods->clearance, fmin(0.9 * rods->clearance, rods->x[k]));
         }
         steps = find_least(rods, &work);

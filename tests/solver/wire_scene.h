@@ -7,7 +7,7 @@
 #define EI_STANDARD 65.958366            // [N mm2] of the standard wire (docs/references.md)
 #define GJ_STANDARD 50.7372
 
-static const double QUASI_STATIC = 1e6;  // [ms] a step so long that inertia is nothing: a step is a Newton iteration of statics
+static const double QUASI_STATIC = 1e6;  // [ms] a step so long that inertia is negligible: a step is a Newton iteration of statics
 
 typedef struct Bench {
     WireSection section[4];
@@ -65,7 +65,7 @@ static inline Vec3 tip_of(const Stepper *s)
     return w->position[w->node_count - 1];
 }
 
-// Steps without command until no node moves by more than `least` in a step, at least `first` steps; all flags seen.
+// Steps without command until no node moves by more than `least` in a step, at least `first` steps. Returns all flags that occurred.
 static inline unsigned settle(Stepper *s, int first, int most, double least)
 {
     unsigned flags = 0;
