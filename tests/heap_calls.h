@@ -16,8 +16,9 @@ static long heap_calls(void) { return 0; }
 static void heap_watch(bool on) { (void)on; }
 #else
 #define COUNTS_HEAP 1
-static _Thread_local bool watched;
-static _Thread_local long calls;
+// volatile: without inlining a compiler takes it that malloc() neither reads nor writes them
+static _Thread_local volatile bool watched;
+static _Thread_local volatile long calls;
 
 static long heap_calls(void) { return calls; }
 static void heap_watch(bool on) { watched = on; }

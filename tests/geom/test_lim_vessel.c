@@ -517,8 +517,44 @@ static void another_wall_comes_closer(void **state)
     vessel_tree_free(t);
 }
 
-// The clearance stored by a query is valid only around its place: in a flat lumen, 2.38 mm from the middle to either wall, a point is queried there and then
-// beside a wall.
+// A long box with a flat end. A point goes from that end along the axis, and the foot in the middle of the end stays the locally closest: no step of Newton
+// leaves it. The looks around the point find the side walls before they are nearer than 0.7 of its distance, and no clearance reaches through them.
+static void nearer_side_walls_are_found(void **state)
+{
+    (void)state;
+    enum { LONG = 25, WIDE = 5, ALL = LONG * WIDE * WIDE };
+    VesselTree *t = vessel_tree_create(1, 0, ALL);
+    for (int i = 0; i < ALL; i++) {
+        t->blob_center[i] = vec3(0.5 * (i % LONG - LONG / 2), 0.5 * (i / LONG % WIDE - WIDE / 2), 0.5 * (i / LONG / WIDE - WIDE / 2));
+        t->blob_width[i] = 0.15;
+    }
+    t->blob_offset[1] = ALL;
+    t->center[0] = vec3(-5, 0, 0);
+    t->radius[0] = 2;
+    t->direction[0] = vec3(1, 0, 0);
+    t->parent[0] = -1;
+    vessel_tree_link(t);
+    Blobby m = blobby_of(t, 0);
+    Vessel *v = lim_vessel_create(t);
+    VesselMemory memory = {.node = 0};
+    for (int k = 0; k <= 80; k++) {
+        Vec3 x = vec3(6 - 0.1 * k, 0, 0);
+        VesselHit hit;
+        vessel_query(v, 1, &x, 100, &memory, &hit);
+        double nearest = blobby_project(&m, x, x).distance;
+        assert_int_equal(hit.flags, 0);
+        assert_true(0.7 * hit.gap < nearest);
+        assert_true(memory.clearance - vec3_distance(x, memory.clear_place) < nearest);
+        if (k == 0)
+            assert_near(hit.normal.x, -1, 1e-6);    // from the end …
+        if (k == 80)
+            assert_near(hit.gap, nearest, 1e-6);    // … to a side wall
+    }
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// The clearance that one query leaves holds about its own place: a flat lumen is 2.38 mm from its middle to either wall, asked there and then beside a wall.
 static void clearance_holds_about_its_place(void **state)
 {
     (void)state;
@@ -815,6 +851,7 @@ int main(void)
         cmocka_unit_test(blend_has_no_jump),
         cmocka_unit_test(nodes_without_blobs),
         cmocka_unit_test(another_wall_comes_closer),
+        cmocka_unit_test(nearer_side_walls_are_found),
         cmocka_unit_test(clearance_holds_about_its_place),
         cmocka_unit_test(far_is_far_in_a_taper),
         cmocka_unit_test(nearest_through_boxes),
