@@ -3,16 +3,13 @@
 
 #include "geom/geom.h"
 #include "recon/recon.h"
-#ifdef SELDINGER_RENDER
 #include "render/render.h"
-#endif
 
 #include <stdio.h>
 #include <stdlib.h>
 
 enum { COMPARED = 10 };
 
-#ifdef SELDINGER_RENDER
 typedef struct Compared {
     double before;           // [mm] clearance in the other model
     int index;
@@ -76,7 +73,6 @@ static bool draw(const JunctionSheets *sheets, const char *title, const VesselTr
     reach_free(reach);
     return drawn;
 }
-#endif
 
 bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, Faults *faults)
 {
@@ -86,7 +82,6 @@ bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const
         faults_add(faults, sheets->picture, 0, 0, "no picture: the tree has no fitted model to draw");
         return false;
     }
-#ifdef SELDINGER_RENDER
     VesselTree *before = sheets->before ? tree_file_load(sheets->before, NULL, faults) : NULL;
     Volume *volume = sheets->volume ? volume_load(sheets->volume, faults) : NULL;
     bool good = (!sheets->before || before) && (!sheets->volume || volume);
@@ -98,9 +93,4 @@ bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const
     volume_free(volume);
     vessel_tree_free(before);
     return good;
-#else
-    (void)title;
-    faults_add(faults, sheets->picture, 0, 0, "no picture: built without pictures");
-    return false;
-#endif
 }

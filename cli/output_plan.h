@@ -26,6 +26,8 @@ typedef struct OutputPlan {
 void output_plan_write(OutputPlan *plan, const char *option, const char *path);
 // The same for what only whole files can hold (HDF5, PNG): a device, a pipe or "-" is a fault too.
 void output_plan_write_file(OutputPlan *plan, const char *option, const char *path);
+// A picture or film: a fault where this build draws none.
+void output_plan_picture(OutputPlan *plan, const char *option, const char *path);
 // What `option` writes becomes several files: beside NAME.EXT also NAME-2.ENDING or NAME_00000.ENDING and on.
 void output_plan_series(OutputPlan *plan, const char *option, const char *ending);
 // `what` the user knows it as: "--script", "the scene".

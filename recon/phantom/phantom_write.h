@@ -11,7 +11,7 @@ typedef struct PhantomFiles {
     int option_count;                // that made it, kept in the trees' files
     const char (*option)[2][64];     // (option_count) key and value
     double cell_mm;                  // grid of a surface's triangles
-    VolumeOptions volume;
+    VolumeOptions volume;            // its noise has the shape's seed and one more, whatever `seed` says
 } PhantomFiles;
 
 // `path` says by its extension what: .h5 points, .stl or .ply the surface, .nrrd a volume; beside the last two F-truth.h5 with the true centreline and exact
