@@ -4,9 +4,7 @@
 #include "cli/fit_options.h"
 #include "cli/output_plan.h"
 #include "recon/recon.h"
-#ifdef SELDINGER_RENDER
 #include "render/render.h"
-#endif
 
 #include <stdlib.h>
 #include <string.h>
@@ -16,8 +14,8 @@ static VesselTree *load_tree(const FitCommand *command, TreeFileInfo *info, Faul
     OutputPlan plan = {.faults = faults};
     output_plan_write_file(&plan, "-o", command->output);
     output_plan_write(&plan, "--json", command->json);
-    output_plan_write_file(&plan, "--picture", command->picture);
-    output_plan_write_file(&plan, "--junctions", command->junctions.picture);
+    output_plan_picture(&plan, "--picture", command->picture);
+    output_plan_picture(&plan, "--junctions", command->junctions.picture);
     output_plan_series(&plan, "--junctions", ".png");
     output_plan_read(&plan, "the tree", command->tree);
     output_plan_read_volume(&plan, "--volume", command->junctions.volume);
@@ -67,14 +65,8 @@ static bool tell(const FitCommand *command, const TreeFit *fit, Faults *faults)
 
 static bool draw(const FitCommand *command, const VesselTree *model, Faults *faults)
 {
-    bool good = junction_pages_draw(&command->junctions, command->output ? command->output : command->tree, model, faults);
-#ifdef SELDINGER_RENDER
+    bool good = junction_sheets_draw(&command->junctions, command->output ? command->output : command->tree, model, faults);
     return good && (!command->picture || picture_model_fit(command->picture, model, faults));
-#else
-    if (command->picture)
-        faults_add(faults, command->picture, 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
-    return good && !command->picture;
-#endif
 }
 
 static int call(void *structure, Faults *faults)

@@ -8,8 +8,6 @@
 #include "recon/recon.h"
 #include "render/render.h"
 #include "sim/sim.h"
-#ifdef SELDINGER_RENDER
-#endif
 
 #include <stdlib.h>
 
@@ -67,15 +65,8 @@ static bool add_reach(cJSON *object, const VesselTree *tree, InfoCommand *comman
 
 static bool draw(const InfoCommand *command, const VesselTree *tree, const TreeFileInfo *info, Faults *faults)
 {
-#ifdef SELDINGER_RENDER
     double voxel = tree_file_number(info, "voxel_mm", 0.2);
     return !command->picture || picture_model_error(command->picture, command->file, tree, voxel > 0 ? voxel : 0.2, faults);
-#else
-    (void)tree, (void)info;
-    if (command->picture)
-        faults_add(faults, command->picture, 0, 0, "no picture: built without pictures");
-    return !command->picture;
-#endif
 }
 
 static bool describe_tree_file(cJSON *object, InfoCommand *command, Faults *faults)
@@ -122,8 +113,8 @@ static void plan_files(const InfoCommand *command, FileKind kind, Faults *faults
                                       : "--junctions");
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--report", command->report);
-    output_plan_write_file(&plan, "--picture", command->picture);
-    output_plan_write_file(&plan, "--junctions", junctions->picture);
+    output_plan_picture(&plan, "--picture", command->picture);
+    output_plan_picture(&plan, "--junctions", junctions->picture);
     output_plan_series(&plan, "--junctions", ".png");
     output_plan_read(&plan, "the file", command->file);
     output_plan_read(&plan, "--before", junctions->before);

@@ -2,16 +2,13 @@
 
 #include "geom/geom.h"
 #include "recon/recon.h"
-#ifdef SELDINGER_RENDER
 #include "render/render.h"
-#endif
 
 #include <stdio.h>
 #include <stdlib.h>
 
 enum { COMPARED = 10 };
 
-#ifdef SELDINGER_RENDER
 typedef struct Compared {
     double before;           // [mm] clearance in the other model
     int index;
@@ -77,7 +74,6 @@ static bool draw(const JunctionPages *wanted, const char *title, const VesselTre
     reach_free(reach);
     return drawn;
 }
-#endif
 
 bool junction_pages_draw(const JunctionPages *wanted, const char *title, const VesselTree *model, Faults *faults)
 {
@@ -87,10 +83,9 @@ bool junction_pages_draw(const JunctionPages *wanted, const char *title, const V
         faults_add(faults, wanted->picture, 0, 0, "no picture: the tree has no fitted model to draw");
         return false;
     }
-#ifdef SELDINGER_RENDER
-    VesselTree *before = wanted->before ? tree_file_load(wanted->before, NULL, faults) : NULL;
-    Volume *volume = wanted->volume ? volume_load(wanted->volume, faults) : NULL;
-    bool good = (!wanted->before || before) && (!wanted->volume || volume);
+    VesselTree *before = sheets->before ? tree_file_load(sheets->before, NULL, faults) : NULL;
+    Volume *volume = sheets->volume ? volume_load(sheets->volume, faults) : NULL;
+    bool good = (!sheets->before || before) && (!sheets->volume || volume);
     if (before && !vessel_tree_is_model(before)) {
         faults_add(faults, sheets->before, 0, 0, "is a tree without a model; make one with `seldinger fit`");
         good = false;
@@ -99,9 +94,4 @@ bool junction_pages_draw(const JunctionPages *wanted, const char *title, const V
     volume_free(volume);
     vessel_tree_free(before);
     return good;
-#else
-    (void)title;
-    faults_add(faults, wanted->picture, 0, 0, "no picture: built without pictures");
-    return false;
-#endif
 }

@@ -64,6 +64,15 @@ void output_plan_write_file(OutputPlan *plan, const char *option, const char *pa
         add(plan, option, path, output_check_file(path, plan->faults));
 }
 
+void output_plan_picture(OutputPlan *plan, const char *option, const char *path)
+{
+    output_plan_write_file(plan, option, path);
+#ifndef SELDINGER_RENDER
+    if (path)
+        faults_add(plan->faults, option, 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
+#endif
+}
+
 void output_plan_series(OutputPlan *plan, const char *option, const char *ending)
 {
     for (int i = 0; i < plan->count; i++)

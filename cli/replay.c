@@ -4,9 +4,7 @@
 #include "cli/replay_options.h"
 #include "cli/output_plan.h"
 #include "sim/sim.h"
-#ifdef SELDINGER_RENDER
 #include "render/render.h"
-#endif
 
 #include <inttypes.h>
 #include <math.h>
@@ -40,7 +38,6 @@ static int simulate_again(const ReplayOptions *options, const RecordedRun *run, 
 // Pictures and films.
 static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
-#ifdef SELDINGER_RENDER
     FilmOptions film = film_default_options();
     film.width = options->width;
     film.height = options->height;
@@ -57,18 +54,11 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
     bool good = !options->picture || film_picture(options->picture, &film, run, scene, open, faults);
     film.from_s = options->from_s;
     return (!options->movie || film_movie(options->movie, &film, run, scene, open, faults)) && good;
-#else
-    (void)run, (void)scene, (void)open;
-    if (options->picture || options->movie)
-        faults_add(faults, options->picture ? "--picture" : "--movie", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
-    return faults->count == 0;
-#endif
 }
 
 // The window; a session goes on from a moment of it where the user wants that.
 static int show(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
-#ifdef SELDINGER_RENDER
     ReplayWindowOptions window = {.name = options->recording,
                                   .width = options->width,
                                   .height = options->height,
@@ -102,11 +92,6 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
     if (figures.recording[0] && !options->quiet)
         printf("%s\n", figures.recording);
     return code;
-#else
-    (void)run, (void)scene, (void)open, (void)options;
-    faults_add(faults, "replay", 0, 0, "this build has no window; --verify and --scene work, or build with -DSELDINGER_RENDER=ON");
-    return EXIT_BAD_INPUT;
-#endif
 }
 
 // The scene's folder gets three files; the recording's own scene may lie in it.
@@ -115,8 +100,8 @@ static void plan_outputs(const ReplayOptions *options, const RecordedRun *run, c
     static const char *const part[] = {"scene.yaml", "hand.csv", "scene.golden.csv"};
     char path[3][PATH_MAX];
     OutputPlan plan = {.faults = faults};
-    output_plan_write_file(&plan, "--picture", options->picture);
-    output_plan_write_file(&plan, "--movie", options->movie);
+    output_plan_picture(&plan, "--picture", options->picture);
+    output_plan_picture(&plan, "--movie", options->movie);
     bool is_there = options->scene_folder && access(options->scene_folder, F_OK) == 0;
     for (int i = 0; is_there && i < 3; i++)
         if (snprintf(path[i], sizeof path[i], "%s/%s", options->scene_folder, part[i]) < (int)sizeof path[i])

@@ -3,7 +3,7 @@
 #define SELDINGER_CLI_RUN_FILES_H
 
 #include "cli/output_plan.h"
-#include "cli/run_chart.h"
+#include "render/render.h"
 #include "sim/sim.h"
 
 typedef struct RunFiles {    // NULL: not requested

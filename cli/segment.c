@@ -5,9 +5,7 @@
 #include "base/base.h"
 #include "cli/output_plan.h"
 #include "recon/recon.h"
-#ifdef SELDINGER_RENDER
 #include "render/render.h"
-#endif
 
 #include <stdlib.h>
 #include <time.h>
@@ -40,17 +38,11 @@ static bool write_json(const SegmentCommand *command, const VesselTree *tree, co
 // Returns false with a fault if no picture can be drawn; the tree is written all the same.
 static bool draw_picture(const SegmentCommand *command, const Volume *volume, const VesselTree *tree, Faults *faults)
 {
-    char message[512] = "built without pictures";
-    bool drawn = false;
-#ifdef SELDINGER_RENDER
+    char message[512];
     PictureOptions picture = picture_default_options();
     picture.title = command->volume;
-    drawn =
+    bool drawn =
         picture_of_tree(command->picture, &picture, volume->size, volume->origin, volume->axis, volume->value, 0, 0, tree, 0, NULL, message, sizeof message);
-#else
-    (void)volume;
-    (void)tree;
-#endif
     if (!drawn)
         faults_add(faults, command->picture, 0, 0, "no picture: %s", message);
     return drawn;
@@ -89,7 +81,7 @@ static void plan_files(const SegmentCommand *command, Faults *faults)
     OutputPlan plan = {.faults = faults};
     output_plan_write_file(&plan, "-o", command->out);
     output_plan_write(&plan, "--json", command->json);
-    output_plan_write_file(&plan, "--picture", command->picture);
+    output_plan_picture(&plan, "--picture", command->picture);
     output_plan_read_volume(&plan, "the volume", command->volume);
     output_plan_read(&plan, "--trace", command->trace);
 }

@@ -32,7 +32,7 @@ static bool measure(const SynthCommand *command, const Shape *shape, Faults *fau
 static int call(void *structure, Faults *faults)
 {
     const SynthCommand *command = structure;
-    Shape *shape = shape_create(command->shape, command->option_count, command->files.option, "synth", faults);
+    Shape *shape = shape_create(command->files.name, command->files.option_count, command->files.option, "synth", faults);
     OutputPlan plan = {.faults = faults};
     output_plan_write_file(&plan, "-o", command->output);
     output_plan_write(&plan, "--json", command->json);

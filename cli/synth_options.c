@@ -2,15 +2,14 @@
 
 #include "cli/cli.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 static void set_option(SynthCommand *command, const char *key, const char *value)
 {
-    int at = 0;
-    while (at < command->option_count && strcmp(command->option[at][0], key))
+    int at = 0, *count = &command->files.option_count;
+    while (at < *count && strcmp(command->option[at][0], key))
         at++;
-    command->option_count += at == command->option_count;
+    *count += at == *count;
     snprintf(command->option[at][0], 64, "%s", key);
     snprintf(command->option[at][1], 64, "%s", value);
 }
@@ -40,13 +39,9 @@ static const char *take_voxel(void *structure, const Option *option, const char 
 }
 
 #define AT(member) OPTION_AT(SynthCommand, member)
-#define SHAPE(name, default, text)                                                                                                                             \
+#define SHAPE(name, value, default, text)                                                                                                                      \
     {                                                                                                                                                          \
-        name, "X", OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option                                                            \
-    }
-#define COUNT(name, default, text)                                                                                                                             \
-    {                                                                                                                                                          \
-        name, "N", OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option                                                            \
+        name, value, OPTION_NUMBER, AT(option), text, .otherwise = default, .take = take_shape_option                                                          \
     }
 static const Option options[] = {
     {"output", "F", OPTION_FILE, AT(output), "what to write, by its extension", .letter = 'o'},
@@ -54,25 +49,25 @@ static const Option options[] = {
     {"json", "F.json", OPTION_FILE, AT(json), "figures of --measure as JSON; - is standard output"},
     CLI_QUIET(SynthCommand, quiet, "no summary"),
     {"points", "N", OPTION_NUMBER, AT(option), "samples of a vessel node", .otherwise = "108", .take = take_shape_option, .group = "shape"},
-    COUNT("sac-points", "1500", "samples of an aneurysm node"),
-    SHAPE("noise-mm", "0", "standard deviation of the samples' noise along the normal [mm]"),
-    COUNT("seed", "1", "of noise and of the samples' places"),
-    SHAPE("spacing", "0.5", "distance of nodes in local radii"),
-    SHAPE("blend-mm", "0: 0.6 times the branch's radius", "width of the joints [mm]"),
-    SHAPE("length-mm", "4", "capsules: segment [mm]; y: trunk and daughters, twig: vessel"),
-    SHAPE("radius-mm", "1; tree: of the trunk, default 1.6", "of the tube [mm]"),
-    SHAPE("bend-radius-mm", "4", "arc, bifurcation, helix: centreline [mm]"),
-    SHAPE("rise-mm", "0; helix: its rise, default 12", "spiral: how far it winds out of its plane [mm]"),
-    SHAPE("turns", "2", "helix"),
-    SHAPE("angle-deg", "37.5", "y: of each daughter against the trunk"),
-    SHAPE("twig-radius-mm", "0.2", "twig: the tiny vessel"),
-    COUNT("branches", "51", "tree: segments between bifurcations, up to 200"),
-    COUNT("sacs", "0", "tree: aneurysms on its branches"),
-    COUNT("blocks", "6, 0", "bone, tree: dense blocks beside the vessels"),
-    SHAPE("gap-mm", "0.2; bone, tree: from wall to block, default 0", "kissing: from wall to wall [mm]"),
+    SHAPE("sac-points", "N", "1500", "samples of an aneurysm node"),
+    SHAPE("noise-mm", "X", "0", "standard deviation of the samples' noise along the normal [mm]"),
+    SHAPE("seed", "N", "1", "of noise and of the samples' places"),
+    SHAPE("spacing", "X", "0.5", "distance of nodes in local radii"),
+    SHAPE("blend-mm", "X", "0: 0.6 times the branch's radius", "width of the joints [mm]"),
+    SHAPE("length-mm", "X", "4", "capsules: segment [mm]; y: trunk and daughters, twig: vessel"),
+    SHAPE("radius-mm", "X", "1; tree: of the trunk, default 1.6", "of the tube [mm]"),
+    SHAPE("bend-radius-mm", "X", "4", "arc, bifurcation, helix: centreline [mm]"),
+    SHAPE("rise-mm", "X", "0; helix: its rise, default 12", "spiral: how far it winds out of its plane [mm]"),
+    SHAPE("turns", "X", "2", "helix"),
+    SHAPE("angle-deg", "X", "37.5", "y: of each daughter against the trunk"),
+    SHAPE("twig-radius-mm", "X", "0.2", "twig: the tiny vessel"),
+    SHAPE("branches", "N", "51", "tree: segments between bifurcations, up to 200"),
+    SHAPE("sacs", "N", "0", "tree: aneurysms on its branches"),
+    SHAPE("blocks", "N", "6, 0", "bone, tree: dense blocks beside the vessels"),
+    SHAPE("gap-mm", "X", "0.2; bone, tree: from wall to block, default 0", "kissing: from wall to wall [mm]"),
     {"gap-voxels", "X", OPTION_NUMBER, AT(gap_voxels), "the same in voxels (the least edge)", .most = 100, .otherwise = ""},
-    SHAPE("crossing-deg", "0: side by side", "kissing: angle of the two vessels"),
-    SHAPE("scale", "1", "of the whole shape"),
+    SHAPE("crossing-deg", "X", "0: side by side", "kissing: angle of the two vessels"),
+    SHAPE("scale", "X", "1", "of the whole shape"),
     {"cell-mm", "X", OPTION_NUMBER, AT(files.cell_mm), "grid of the triangles", .least = 0.005, .most = 10, .unit = "mm", .group = "surface"},
     {"voxel-mm", "X|X,Y,Z", OPTION_NUMBER, AT(files.volume.voxel_mm), "edges along the grid's axes", .unit = "mm", .otherwise = "0.2", .take = take_voxel,
      .group = "volume"},
@@ -116,10 +111,9 @@ static bool take_grey_values(SynthCommand *command)
 static const char *check(void *structure)
 {
     SynthCommand *command = structure;
-    VolumeOptions *volume = &command->files.volume;
+    const double *voxel = command->files.volume.voxel_mm;
     static char missing[400];
-    double seed = 1;
-    if (!command->shape) {
+    if (!command->files.name) {
         snprintf(missing, sizeof missing, "missing a shape: %s", shape_names());
         return missing;
     }
@@ -131,15 +125,9 @@ static const char *check(void *structure)
         return "--json goes with --measure MODEL.h5";
     if (command->gap_voxels >= 0) {
         char gap[64];
-        snprintf(gap, sizeof gap, "%.17g", command->gap_voxels * fmin(volume->voxel_mm[0], fmin(volume->voxel_mm[1], volume->voxel_mm[2])));
+        snprintf(gap, sizeof gap, "%.17g", command->gap_voxels * fmin(voxel[0], fmin(voxel[1], voxel[2])));
         set_option(command, "gap_mm", gap);
     }
-    for (int i = 0; i < command->option_count; i++)
-        if (!strcmp(command->option[i][0], "seed"))
-            seed = strtod(command->option[i][1], NULL);
-    volume->seed = (uint64_t)seed + 1;
-    command->files.name = command->shape;
-    command->files.option_count = command->option_count;
     command->files.option = (const char(*)[2][64])command->option;
     return NULL;
 }
@@ -156,7 +144,7 @@ const OptionTable synth_options = {
     .set_defaults = set_defaults,
     .check = check,
     .takes_argument = true,
-    .argument = offsetof(SynthCommand, shape),
+    .argument = offsetof(SynthCommand, files.name),
     .may_be_missing = true,
     .too_many = "one shape at a time, not also ",
 };

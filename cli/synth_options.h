@@ -8,10 +8,9 @@
 enum { SHAPE_OPTIONS = 19 };
 
 typedef struct SynthCommand {
-    const char *shape, *output, *measure, *json;
-    int option_count;
+    const char *output, *measure, *json;
     char option[SHAPE_OPTIONS][2][64];
-    PhantomFiles files;
+    PhantomFiles files;              // their options are those above
     double gap_voxels;               // < 0: not given
     double background_grey, noise_grey, band_grey;   // the first two -1: not given
     bool quiet;

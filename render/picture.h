@@ -30,9 +30,6 @@ typedef struct PictureOptions {
 } PictureOptions;
 PictureOptions picture_default_options(void);
 
-// True if pictures can be drawn on this machine. Returns false with the reason.
-bool picture_available(char *message, size_t capacity);
-
 // --- a run ---
 typedef struct PictureScene {
     const TriangleMesh *vessel; // NULL: no vessel drawn (rigs, planes)

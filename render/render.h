@@ -12,6 +12,7 @@
 #include "render/picture.h"
 #include "render/picture_model.h"
 #include "render/picture_moments.h"
+#include "render/run_chart.h"
 
 // the window
 #include "render/replay_window.h"

@@ -1,6 +1,7 @@
 #include "recon/phantom/phantom_write.h"
 
 #include "base/base.h"
+#include "recon/phantom/phantom_parts.h"
 #include "recon/tree_file.h"
 #include "recon/volume/volume_file.h"
 
@@ -102,12 +103,13 @@ static void beside(const char *output, const char *extension, const char *what, 
 
 static bool write_volume(const PhantomFiles *files, const Shape *shape, const char *path, FILE *out, Faults *faults)
 {
-    const VolumeOptions *options = &files->volume;
-    Volume *volume = shape_volume_with(shape, options, faults);
-    bool good = volume && volume_save_nrrd(volume, path, options->contrast_grey > 0 ? "uint8" : "float", faults);
+    VolumeOptions options = files->volume;
+    options.seed = shape->seed + 1;
+    Volume *volume = shape_volume_with(shape, &options, faults);
+    bool good = volume && volume_save_nrrd(volume, path, options.contrast_grey > 0 ? "uint8" : "float", faults);
     if (good && out)
-        fprintf(out, "%d x %d x %d voxels of %g x %g x %g mm\n", volume->size[0], volume->size[1], volume->size[2], options->voxel_mm[0], options->voxel_mm[1],
-                options->voxel_mm[2]);
+        fprintf(out, "%d x %d x %d voxels of %g x %g x %g mm\n", volume->size[0], volume->size[1], volume->size[2], options.voxel_mm[0], options.voxel_mm[1],
+                options.voxel_mm[2]);
     volume_free(volume);
     return good;
 }

@@ -10,8 +10,8 @@ typedef struct PhantomFiles {
     const char *name;                // name of the shape
     int option_count;                // options with which it was created; recorded in the trees' files
     const char (*option)[2][64];     // (option_count) key and value
-    double cell_mm;                  // [mm] grid spacing for a surface's triangles
-    VolumeOptions volume;
+    double cell_mm;                  // grid of a surface's triangles
+    VolumeOptions volume;            // its noise has the shape's seed and one more, whatever `seed` says
 } PhantomFiles;
 
 // The extension of `path` selects the contents: .h5 points, .stl or .ply the surface, .nrrd a volume. Beside the last two it also writes F-truth.h5 with the

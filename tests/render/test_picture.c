@@ -22,6 +22,14 @@
 static char folder[] = "/tmp/seldinger_picture_XXXXXX";
 static bool is_available;
 
+// Whether a context can be made here.
+static bool picture_available(char *message, size_t capacity)
+{
+    GlContext *context = gl_context_create(message, capacity);
+    gl_context_destroy(context);
+    return context != NULL;
+}
+
 static int make_folder(void **state)
 {
     (void)state;

@@ -1,8 +1,6 @@
-#include "cli/run_chart.h"
+#include "render/run_chart.h"
 
-#ifdef SELDINGER_RENDER
-#include "render/render.h"
-#endif
+#include "render/picture.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -88,7 +86,6 @@ void run_chart_step(RunChart *chart, const Simulator *simulator)
     chart->rows += rows;
 }
 
-#ifdef SELDINGER_RENDER
 enum { LABEL_SIZE = 96 };
 
 static void name_row(const Scene *scene, ScriptRow *row, char *label)
@@ -122,7 +119,7 @@ static int list_events(const Scene *scene, double start_s, double end_s, Picture
     return count;
 }
 
-bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const char *path, char *message, size_t capacity)
+bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const char *path, Faults *faults)
 {
     double *const *v = chart->value;
     const Scene *scene = simulator_scene(simulator);
@@ -151,13 +148,9 @@ bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const cha
     PictureEvent event[16];
     char label[16][LABEL_SIZE];
     int events = list_events(scene, v[TIME][0], simulator_time_s(simulator), event, label, 16);
-    return picture_of_series(path, &look, chart->rows, v[TIME], (int)(sizeof panel / sizeof panel[0]), panel, events, event, message, capacity);
+    char message[512];
+    bool drawn = picture_of_series(path, &look, chart->rows, v[TIME], (int)(sizeof panel / sizeof panel[0]), panel, events, event, message, sizeof message);
+    if (!drawn)
+        faults_add(faults, path, 0, 0, "no chart: %s", message);
+    return drawn;
 }
-#else
-bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const char *path, char *message, size_t capacity)
-{
-    (void)chart, (void)simulator, (void)path;
-    snprintf(message, capacity, "this build has no pictures");
-    return false;
-}
-#endif

@@ -1,6 +1,6 @@
 // The figures of a run over time, for `run --chart`: forces at the hand and the wall, contacts, depth, cost.
-#ifndef SELDINGER_CLI_RUN_CHART_H
-#define SELDINGER_CLI_RUN_CHART_H
+#ifndef SELDINGER_RENDER_RUN_CHART_H
+#define SELDINGER_RENDER_RUN_CHART_H
 
 #include "sim/sim.h"
 
@@ -11,7 +11,7 @@ RunChart *run_chart_create(int64_t expected_steps);
 void run_chart_free(RunChart *chart);
 // After a step. Allocates nothing. Of a long run, least and greatest of several steps are kept, so that no spike is lost.
 void run_chart_step(RunChart *chart, const Simulator *simulator);
-// False with one line in `message`.
-bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const char *path, char *message, size_t capacity);
+// False with a fault.
+bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const char *path, Faults *faults);
 
 #endif
