@@ -7,7 +7,8 @@
 //   static void (*const turn_on[SIMD_COUNT])(...) = SIMD_FORMS(turn);
 //   ... turn_on[simd_level()](...);
 //
-// Several kernels with one signature of use are a structure: SIMD_EACH(MACRO), where MACRO(set) makes its initialiser of names that end in `_##set`.
+// Several kernels that are used together can be grouped in a structure: SIMD_EACH(MACRO), where MACRO(set) makes the initialiser from names that end in
+// `_##set`.
 #ifndef SELDINGER_BASE_SIMD_KERNEL_H
 #define SELDINGER_BASE_SIMD_KERNEL_H
 

@@ -65,7 +65,7 @@ static bool tell(const FitCommand *command, const TreeFit *fit, Faults *faults)
 
 static bool draw(const FitCommand *command, const VesselTree *model, Faults *faults)
 {
-    bool good = junction_sheets_draw(&command->junctions, command->output ? command->output : command->tree, model, faults);
+    bool good = junction_pages_draw(&command->junctions, command->output ? command->output : command->tree, model, faults);
     return good && (!command->picture || picture_model_fit(command->picture, model, faults));
 }
 

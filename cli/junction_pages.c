@@ -1,4 +1,4 @@
-#include "cli/junction_sheets.h"
+#include "cli/junction_pages.h"
 
 #include "geom/geom.h"
 #include "recon/recon.h"
@@ -83,11 +83,11 @@ bool junction_pages_draw(const JunctionPages *wanted, const char *title, const V
         faults_add(faults, wanted->picture, 0, 0, "no picture: the tree has no fitted model to draw");
         return false;
     }
-    VesselTree *before = sheets->before ? tree_file_load(sheets->before, NULL, faults) : NULL;
-    Volume *volume = sheets->volume ? volume_load(sheets->volume, faults) : NULL;
-    bool good = (!sheets->before || before) && (!sheets->volume || volume);
+    VesselTree *before = wanted->before ? tree_file_load(wanted->before, NULL, faults) : NULL;
+    Volume *volume = wanted->volume ? volume_load(wanted->volume, faults) : NULL;
+    bool good = (!wanted->before || before) && (!wanted->volume || volume);
     if (before && !vessel_tree_is_model(before)) {
-        faults_add(faults, sheets->before, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+        faults_add(faults, wanted->before, 0, 0, "is a tree without a model; make one with `seldinger fit`");
         good = false;
     }
     good = good && draw(wanted, title, model, before, volume, faults);

@@ -26,9 +26,9 @@ typedef struct OutputPlan {
 void output_plan_write(OutputPlan *plan, const char *option, const char *path);
 // As output_plan_write() for formats that need a regular file (HDF5, PNG): a device, a pipe or "-" is a fault too.
 void output_plan_write_file(OutputPlan *plan, const char *option, const char *path);
-// A picture or film: a fault where this build draws none.
+// A picture or film. Adds a fault if this build draws none.
 void output_plan_picture(OutputPlan *plan, const char *option, const char *path);
-// What `option` writes becomes several files: beside NAME.EXT also NAME-2.ENDING or NAME_00000.ENDING and on.
+// Declares that `option` writes several files: NAME.EXT and also NAME-2.ENDING, … or NAME_00000.ENDING, ….
 void output_plan_series(OutputPlan *plan, const char *option, const char *ending);
 // `what`: the name of the input for the user: "--script", "the scene".
 void output_plan_read(OutputPlan *plan, const char *what, const char *path);

@@ -10,7 +10,7 @@ typedef struct PhantomFiles {
     const char *name;                // name of the shape
     int option_count;                // options with which it was created; recorded in the trees' files
     const char (*option)[2][64];     // (option_count) key and value
-    double cell_mm;                  // grid of a surface's triangles
+    double cell_mm;                  // [mm] grid spacing for a surface's triangles
     VolumeOptions volume;            // its noise has the shape's seed and one more, whatever `seed` says
 } PhantomFiles;
 

@@ -186,7 +186,7 @@ static void words_of_the_command_line(void **state)
         {"synth capsule --radius-mm 0 -o out.h5", "radius_mm is '0'; expected a number from"},
         {"synth capsule --noise-grey 11 -o out.nrrd", "need --contrast-grey"},
         {"synth capsule --contrast-grey 0 -o out.nrrd", "--contrast-grey: '0' is not valid"},
-        {"synth capsule -o out.xyz", "valid: .h5, .stl, .ply, .nrrd"},
+        {"synth capsule -o out.xyz", "expected .h5, .stl, .ply or .nrrd"},
         {"export", "expected one file"},
         {"info", "one file is needed"}};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)

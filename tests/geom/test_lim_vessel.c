@@ -554,7 +554,8 @@ static void nearer_side_walls_are_found(void **state)
     vessel_tree_free(t);
 }
 
-// The clearance that one query leaves holds about its own place: a flat lumen is 2.38 mm from its middle to either wall, asked there and then beside a wall.
+// The clearance stored by a query is valid only around its place: in a flat lumen, 2.38 mm from the middle to either wall, a point is queried there and then
+// beside a wall.
 static void clearance_holds_about_its_place(void **state)
 {
     (void)state;

@@ -262,37 +262,37 @@ static void the_path_is_measured_along_the_tree(void **state)
 {
     (void)state;
     VesselTree *t = forked(1);
-    ScoreWay way;
-    assert_true(score_way_create(&way, t, vec3(0, 0, 0), vec3(20, 15, 0), 1));       // between two nodes of the branch
-    assert_near(score_way_left(&way, vec3(0, 0, 0), 0), 35, 1e-9);
-    assert_near(score_way_left(&way, vec3(1, 0.5, 0), 0), 34, 1e-9);                 // between nodes, beside the line
-    assert_near(score_way_left(&way, vec3(40, 0, 0), 20), 35, 1e-9);                 // back to the fork, then on
-    assert_near(way.off[5], 0, 0);
-    assert_near(way.off[20], 20 - 2, 1e-9);                                          // beyond the fork, less the trunk's radius
-    assert_near(way.off[TRUNK], 0, 0);
-    score_way_destroy(&way);
+    ScorePath path;
+    assert_true(score_path_create(&path, t, vec3(0, 0, 0), vec3(20, 15, 0), 1));       // between two nodes of the branch
+    assert_near(score_path_left(&path, vec3(0, 0, 0), 0), 35, 1e-9);
+    assert_near(score_path_left(&path, vec3(1, 0.5, 0), 0), 34, 1e-9);                 // between nodes, beside the line
+    assert_near(score_path_left(&path, vec3(40, 0, 0), 20), 35, 1e-9);                 // back to the fork, then on
+    assert_near(path.off[5], 0, 0);
+    assert_near(path.off[20], 20 - 2, 1e-9);                                          // beyond the fork, less the trunk's radius
+    assert_near(path.off[TRUNK], 0, 0);
+    score_path_destroy(&path);
     // the target is in the trunk: the branch begins at the trunk's wall; the part past the target begins behind it
-    assert_true(score_way_create(&way, t, vec3(0, 0, 0), vec3(30, 0, 0), 3));
-    assert_near(way.off[TRUNK], 0, 1e-12);
-    assert_near(way.off[TRUNK + 4], 10 - 2, 1e-9);
-    assert_near(way.off[20], 10 - 3, 1e-9);
-    score_way_destroy(&way);
+    assert_true(score_path_create(&path, t, vec3(0, 0, 0), vec3(30, 0, 0), 3));
+    assert_near(path.off[TRUNK], 0, 1e-12);
+    assert_near(path.off[TRUNK + 4], 10 - 2, 1e-9);
+    assert_near(path.off[20], 10 - 3, 1e-9);
+    score_path_destroy(&path);
     // a sac is one place; the mouth may be inside the tree, and everything upstream of it is off the path
-    assert_true(score_way_create(&way, t, vec3(10, 0, 0), vec3(20, 22.5, 0), 1));
-    assert_near(way.off[TRUNK + BRANCH], 0, 0);
-    assert_near(way.off[TRUNK + BRANCH + 1], 0, 0);
-    assert_near(way.off[0], 10 - 2, 1e-9);
-    score_way_destroy(&way);
+    assert_true(score_path_create(&path, t, vec3(10, 0, 0), vec3(20, 22.5, 0), 1));
+    assert_near(path.off[TRUNK + BRANCH], 0, 0);
+    assert_near(path.off[TRUNK + BRANCH + 1], 0, 0);
+    assert_near(path.off[0], 10 - 2, 1e-9);
+    score_path_destroy(&path);
     // the path leads upstream: target in the trunk, mouth at its end
-    assert_true(score_way_create(&way, t, vec3(40, 0, 0), vec3(10, 0, 0), 1));
-    assert_near(score_way_left(&way, vec3(40, 0, 0), 20), 30, 1e-9);
-    assert_near(way.off[15], 0, 0);
-    assert_near(way.off[0], 10 - 2, 1e-9);
-    assert_near(way.off[TRUNK + 9], 20 - 2, 1e-9);
-    score_way_destroy(&way);
-    assert_true(score_way_create(&way, NULL, vec3(0, 0, 0), vec3(3, 4, 0), 1));
-    assert_near(score_way_left(&way, vec3(0, 0, 0), -1), 5, 1e-12);
-    score_way_destroy(&way);
+    assert_true(score_path_create(&path, t, vec3(40, 0, 0), vec3(10, 0, 0), 1));
+    assert_near(score_path_left(&path, vec3(40, 0, 0), 20), 30, 1e-9);
+    assert_near(path.off[15], 0, 0);
+    assert_near(path.off[0], 10 - 2, 1e-9);
+    assert_near(path.off[TRUNK + 9], 20 - 2, 1e-9);
+    score_path_destroy(&path);
+    assert_true(score_path_create(&path, NULL, vec3(0, 0, 0), vec3(3, 4, 0), 1));
+    assert_near(score_path_left(&path, vec3(0, 0, 0), -1), 5, 1e-12);
+    score_path_destroy(&path);
     vessel_tree_free(t);
 }
 

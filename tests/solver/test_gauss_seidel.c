@@ -259,7 +259,7 @@ static void agrees_with_enumeration(void **state)
         problem_create(&p, nodes, K);
         problem_randomise(&p, trial % 2 ? 80000 : 200, 1.5, 0, -0.002);
         for (int i = 0; i < K; i++) // one node per contact, or W is singular and forces are not unique
-            p.set.point[i].xi = 0, p.set.point[i].node = i;
+            p.set.point[i].is_between = false, p.set.point[i].xi = 0, p.set.point[i].node = i;
         double w[K][K], q[K], best[K];
         double *v = malloc((size_t)nodes * 6 * sizeof *v);
         block_factor_solve(p.factor, p.b, v);
