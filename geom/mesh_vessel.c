@@ -256,7 +256,7 @@ static bool is_on_rim(const MeshVessel *m, int triangle, int feature)
     return feature >= ON_VERTEX ? m->on_rim[m->corner[triangle][feature - ON_VERTEX]] : m->across[triangle][feature - ON_EDGE] < 0;
 }
 
-// [mm] closer to an edge or a vertex than this, its curvature is that at this distance; it would grow without bound, and no tool's centre gets there.
+// [mm] At smaller distances from an edge or a vertex the curvature of this distance is used, because it grows without bound. No tool's centre comes so close.
 static const double LEAST_DISTANCE = 0.02;
 
 static Sym3 facet_hessian(const MeshVessel *m, int triangle, const Foot *foot, double gap, Vec3 normal)

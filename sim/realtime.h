@@ -19,7 +19,7 @@ typedef struct RealtimeOptions {
     int hand_count;                  // at most HANDS_SAMPLED
     HandPort *const *hand;           // (hand_count) borrowed, each with one writer
     HandGrip grip;                   // initial grip: default the first tool selected, none locked or released
-    XrayControl xray;                // the same
+    XrayControl xray;                // initial X-ray controls
     double pose_ms;                  // simulated time between published poses, default 10
     bool paused;                     // at the start
     // On the thread, after each step; must not wait. May be NULL.
@@ -35,9 +35,9 @@ typedef enum {
     REALTIME_RUNNING,
     REALTIME_PAUSED,
     REALTIME_DIVERGED,
-    REALTIME_UNRECORDED
-} RealtimeState; // the last: the recording failed, and
-                                                                                                             // the session stopped with it
+    REALTIME_UNRECORDED      // the recording failed, and the session stopped with it
+} RealtimeState;
+
 typedef struct RealtimeFigures {
     RealtimeState state;
     int64_t deadline_misses;
@@ -54,7 +54,7 @@ typedef struct Moment {
     void *extra;                     // (extra_bytes)
 } Moment;
 
-// Starts the thread. NULL with a fault.
+// Starts the thread. Returns NULL with a fault if that fails.
 Realtime *realtime_start(const RealtimeOptions *options, Faults *faults);
 // The following calls are for one thread, the window's.
 void realtime_set_xray(Realtime *realtime, const XrayControl *xray);
@@ -63,7 +63,7 @@ void realtime_pause(Realtime *realtime, bool paused);
 // The newest published pose; unchanged until the next call. NULL before the first.
 const Moment *realtime_moment(Realtime *realtime);
 double realtime_cpu_s(const Realtime *realtime);   // CPU time of the thread so far [s]
-// Ends and joins the thread, returns the figures of the whole session, frees. Simulator and recording belong to the caller again.
+// Ends and joins the thread, frees, and returns the figures of the whole session. Simulator and recording belong to the caller again.
 RealtimeFigures realtime_stop(Realtime *realtime);
 
 #endif

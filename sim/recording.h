@@ -44,8 +44,8 @@
 
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
-    double
-        pose_ms; // > 0 for a session: simulated time between its poses (/motion), some of which are frames; values are rounded. Default 0: everything is exact
+    double pose_ms;          // > 0 for a session: simulated time between its poses (/motion), some of which are frames; values are rounded.
+                             // Default 0: everything is exact
     double flush_s;          // simulated time per chunk; flushes wait for whole chunks, and for at least half that time in wall time. Default 0.2
     const char *trainee, *date;      // of a session (session_date()), else NULL
     int64_t expected_steps;  // determines the size of the chunks and of their index; 0 or 1: unknown, at most 14 hours

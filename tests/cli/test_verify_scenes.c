@@ -126,7 +126,7 @@ static void a_case_names_its_tool(void **state)
     write_two_tools(
         "{name: x, quantity: wall_force_n, s_mm: 3, reference: 5, tolerance: 1}, {name: y, tool: core, quantity: wall_force_n, reference: 5, tolerance: 1}");
     assert_int_equal(check("two.yaml"), 2);
-    assert_non_null(strstr(output, "'wall_force_n' of several tools is that of all of them"));
+    assert_non_null(strstr(output, "'wall_force_n' of several tools covers all of them"));
     assert_non_null(strstr(output, "'tool' has no effect here"));
 }
 
