@@ -58,12 +58,10 @@ static const struct {
               {"peer b", "scenes/peer/tube-b-centreline.csv", "scenes/peer/prepare brings it"},
               {"peer c", "scenes/peer/tube-c-centreline.csv", "scenes/peer/prepare brings it"}};
 static const char legend[] =
-    "exact: the true wall, if it can be queried; lim: one field of shared blobs; lim fine: the same fitted ten times closer; lim-blend: local models,\n"
-    "neighbours blended; lim-switch: the paper's method, only a point's own model; mesh full, warm, cached: flat triangles, searched by Embree without "
-    "a start value,\n"
-    "within the last distance, and only if the cached neighbourhood is not enough; mesh curved: triangles with the curvature of the wall as Hessian; mesh "
-    "smooth: interpolated\n"
-    "normals; grid: a sampled distance, trilinear, with the mesh's edge as its cell\n";
+    "exact: the true wall, if it can be queried; lim: one field of shared blobs; lim fine: the same fitted ten times closer; lim-blend: local\n"
+    "models, neighbours blended; lim-switch: the paper's method, only a point's own model; mesh full, warm, cached: flat triangles, searched by Embree\n"
+    "without a start value, within the last distance, and only if the cached neighbourhood is not enough; mesh curved: triangles with the curvature\n"
+    "of the wall as Hessian; mesh smooth: interpolated normals; grid: a sampled distance, trilinear, with the mesh's edge as its cell\n";
 static const char *const in_quick[] = {"capsule", "spiral"}, *const clamped[] = {"capsule", "spiral", "phantom", "peer b"},
                          *const clamped_quick[] = {"capsule"};
 static const int caps[CAPS] = {50, 100, 200, 1000};
@@ -819,20 +817,19 @@ static const char *check(void *structure)
 }
 
 static const Option rows[] = {
-    BENCH_OPTIONS(CollisionBench, common, "capsule and spiral; 300 steps, meshes to 12,000 triangles, fewer clamps; of a SCENE too"),
-    {"chart", "F.svg", OPTION_FILE, OPTION_AT(CollisionBench, chart), "a chart of them"},
+    BENCH_OPTIONS(CollisionBench, common, "only capsule and spiral, or SCENE; 300 steps, meshes to 12,000 triangles, fewer iteration limits"),
+    {"chart", "F.svg", OPTION_FILE, OPTION_AT(CollisionBench, chart), "a chart of the figures"},
 };
 
 static const OptionTable table = {
     .program = "seldinger bench collision",
-    .does = "local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, spurious friction",
+    .does = "implicit models compared with meshes searched by Embree, the exact wall and a sampled distance: time, error, artificial friction",
     .usage = "[SCENE...] [options]",
     .intro =
-        "Implicit models (LIM: one field of blobs, and local models) against triangle meshes searched by Embree, the exact wall and a sampled distance, in one "
-        "run: the "
-        "surfaces of Kerrien 2017, Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop, artificial "
-        "friction, clamped contact iterations, growth. Run it from the project's folder. Times are CPU times.\n"
-        "SCENE, instead of those: its vessel (tube, shape or model) as about 100,000 triangles, with its own tool and script.",
+        "Implicit models (LIM: one field of blobs, and local models) compared with triangle meshes searched by Embree, the exact wall and a sampled distance: "
+        "the surfaces of Kerrien 2017, Table 6, the phantom, the aneurysm and the peer tubes; time and error on the same recorded motion, closed-loop runs, "
+        "artificial friction, limited contact iterations, growth with the size. Run it from the project's folder. Times are CPU times.\n"
+        "SCENE, instead of these: its vessel (tube, shape or model) as about 100,000 triangles, with its own tool and script.",
     .exits = "0 done; 1 the model missed a verdict; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, CollisionBench),
     .check = check,

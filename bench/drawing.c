@@ -300,18 +300,17 @@ static int call(void *options, Faults *faults)
 }
 
 static const Option rows[] = {
-    {"seconds", "S", OPTION_NUMBER, OPTION_AT(DrawingBench, seconds), "of each turn of the second table", .least = 1, .most = 3600, .otherwise = "10"},
-    BENCH_OPTIONS(DrawingBench, common, "a third of the pictures, turns of 3 s"),
+    {"seconds", "S", OPTION_NUMBER, OPTION_AT(DrawingBench, seconds), "duration of each part of the second table", .least = 1, .most = 3600, .otherwise = "10"},
+    BENCH_OPTIONS(DrawingBench, common, "a third of the images, parts of 3 s"),
 };
 
 static const OptionTable table = {
     .program = "seldinger bench drawing",
-    .does = "the trainer's pictures: CPU time, and the 1 kHz thread with and without them",
+    .does = "images of the trainer: CPU time, and the 1 kHz thread with and without rendering",
     .usage = "[SCENE] [options]",
     .intro =
-        "Draws the trainer off screen (EGL), views and panels together, from moments of the scene's script: CPU time of all drawing threads for a picture, "
-        "with C-arm "
-        "and camera still and turning. Then the 1 kHz thread beside 30 pictures a second and beside none, in turns: how late it wakes, what a step costs.\n"
+        "Renders the trainer off screen (EGL), views and panels together, at moments of the scene's script: CPU time of all drawing threads for an image, with "
+        "C-arm and camera still and rotating. Then, alternately with and without 30 images a second: the latency of the 1 kHz thread and the time of a step.\n"
         "SCENE: default scenes/phantom/scene.yaml.",
     .exits = "0 done; 2 wrong usage, bad input, or no EGL",
     CLI_OPTIONS(rows, DrawingBench),

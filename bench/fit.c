@@ -154,7 +154,7 @@ static int table_3(const FitBench *bench, FILE *text, cJSON *root, Faults *fault
         cJSON *rows = cJSON_AddArrayToObject(root, "table3");
         for (int s = 0; s < LIM_TRIAL_SHAPES; s++)
             kept = report_shape(&table, s, text, rows) && kept;
-        fputs("\nBounds: p90 of how far least squares, started at the truth, moves the surface by the same noise.\n", text);
+        fputs("\nBounds: p90 of the distance by which the same noise moves the surface in a least-squares fit that starts at the truth.\n", text);
     } else {
         faults_add(faults, "bench fit", 0, 0, "not enough memory");
     }
@@ -361,17 +361,17 @@ static int call(void *options, Faults *faults)
 static const char *const presets[] = {"default", "paper", NULL};
 static const Option options[] = {
     {"table3", NULL, OPTION_FLAG, OPTION_AT(FitBench, table3),
-     "one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with what least squares could reach; exit code 1 "
-     "where a "
-     "median of blobs, the share that meets t_g, or d compared with the noise misses its limit"},
+     "one local model of 300 noisy points, four shapes, 10 levels of noise, 30 runs each (section 5.3.2), with the limit of least squares; exit code 1 if a "
+     "median "
+     "of blobs, the share that meets t_g, or d compared with the noise misses its limit"},
     {"tables45", NULL, OPTION_FLAG, OPTION_AT(FitBench, tables45),
-     "whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs a node, triangles a blob, time; the angiogram of "
-     "scenes/aneurism, "
-     "segmented first (where ../shared/data has it), a random tree and the phantom; and what one local model of 540 points and 10 blobs takes"},
+     "whole trees for t_g of 1, 1.5, 2.5 voxels and N_s of 30, 50, 100: classes of d_a, blobs per node, triangles per blob, time; the angiogram of "
+     "scenes/aneurism (segmented first, if it is in ../shared/data), a random tree and the phantom; and the time of one local model of 540 points and 10 "
+     "blobs"},
     {"tree", "F.h5", OPTION_FILE, OPTION_AT(FitBench, tree), "for --tables45, instead: a tree of points (`segment`, `synth`); may be given several times",
      .count = offsetof(FitBench, tree_count), .times = MOST_TREES},
     {"preset", "NAME", OPTION_CHOICE, OPTION_AT(FitBench, preset), "default, or paper: the published values and method", .choices = presets, .otherwise = ""},
-    BENCH_OPTIONS(FitBench, common, "6 runs a level; t_g of 1.5 voxels and N_s of 100 alone"),
+    BENCH_OPTIONS(FitBench, common, "6 runs per level; only t_g of 1.5 voxels and N_s of 100"),
 };
 
 static const char *check(void *structure)

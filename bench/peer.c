@@ -213,9 +213,10 @@ static const OptionTable table = {
     .program = "seldinger bench peer",
     .does = "the scenes with which SOFA and BeamAdapter were measured, with their figures",
     .usage = "[options]",
-    .intro = "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube, on "
-             "local models "
-             "fitted to it and on a mesh of it, beside the peer's figures. Run it from the project's folder, after scenes/peer/prepare. CPU times.",
+    .intro =
+        "The scenes of scenes/peer, with which SOFA and BeamAdapter were measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, with the exact tube, local "
+        "models fitted to it and a mesh of it as the wall, together with the peer's figures. Run it from the project's folder, after scenes/peer/prepare. "
+        "Times are CPU times.",
     .exits = "0 done; 1 a run on tube or models ended early, stalled, or had a node more than 0.05 mm outside the wall; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, PeerBench),
     .too_many = "unexpected argument ",

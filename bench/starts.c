@@ -313,17 +313,16 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
     }
     bool *judged = seeds >= ENOUGH ? kept : NULL;   // one or two seeds cannot estimate a rate
     if (good) {
-        fprintf(out, "right: the start within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused; warn: "
-                     "tracked, with a\n"
-                     "warning (other than that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: from the click to the "
-                     "axis found [true\n"
-                     "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted).\n"
-                     "In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
-        print_verdict(out, "right of those that can be seen [%]", percent(right, seen), 80, true, judged);
-        print_verdict(out, "refused of those that can be seen [%]", percent(false_refusals, seen), 10, false, judged);
-        print_verdict(out, "not refused of the hidden [%]", percent(missing, hidden), 5, false, judged);
-        print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 5, false, judged);
-        print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 0, false, NULL);
+        fprintf(out,
+                "right: the start is within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: rejected;\n"
+                "warn: tracked with a warning (except that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: distance\n"
+                "of the click from the axis found [true radii], mean and largest; radius: found over true; turn.: the root is not at the trunk's end\n"
+                "(labels of these are not counted). In the last four kinds noise hides the vessel or there is none: a rejection is correct.\n");
+        print_verdict(out, "right, of the visible [%]", percent(right, seen), 80, true, judged);
+        print_verdict(out, "rejected, of the visible [%]", percent(false_refusals, seen), 10, false, judged);
+        print_verdict(out, "not rejected, of the hidden [%]", percent(missing, hidden), 5, false, judged);
+        print_verdict(out, "wrong without a warning, of all [%]", percent(silent, seen + hidden), 5, false, judged);
+        print_verdict(out, "wrong without a warning, of all [%]", percent(silent, seen + hidden), 0, false, NULL);
     } else if (faults->count == 0) {
         faults_add(faults, "bench track", 0, 0, "not enough memory");
     }

@@ -408,15 +408,12 @@ static const OptionTable table = {
     .program = "seldinger bench torture",
     .does = "random hands, tools and vessels, compared with the true wall",
     .usage = "[options]",
-    .intro = "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four "
-             "in each other), "
-             "vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is judged by the true wall, "
-             "not by what "
-             "the contact saw: a node more than 0.2 mm outside, or outside without being reported; a number that is none; single steps that gain more than "
-             "1e-3 of the "
-             "work (where no element is bent by more than a radian: a kink); a tool that is stuck where a finer run is not. The scene of each run that fails "
-             "is kept and "
-             "can be replayed.",
+    .intro =
+        "Random scripts (push and pull up to 100 mm/s, twist up to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four "
+        "coaxial tools), vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is compared with "
+        "the true wall, not with that of the contact. A run fails if a node is more than 0.2 mm outside, or outside without a report; if a value is not a "
+        "number; if single steps gain more than 1e-3 of the work (unless an element is bent by more than a radian: a kink); or if a tool is stuck but not in "
+        "a finer run. The scene of each failed run is kept and can be run again.",
     .exits = "0 done; 1 a run failed; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, Torture),
     .set_defaults = set_defaults,

@@ -390,10 +390,10 @@ static void print_groups(FILE *out, const Group *groups, int count)
         }
     }
     fprintf(out,
-            "\nlength: share of the true length that was tracked. centre, radius: mean errors [voxel]. radius: after the known bias b^2 / (2 R), which is\n"
-            "the first term only; exact: after the true steepest edge of a blurred disc; |.|: mean of its absolute value. MHT: without bias. inv., mm: runs\n"
-            "of two radii or more that are no vessel of the tree, and their length; att.: links between places that are far apart in the true tree; bg:\n"
-            "links that leave the lumen. Only for whole trees: a run a branch is judged on its branch alone. s/tree: CPU seconds.\n");
+            "\nlength: tracked fraction of the true length. centre, radius: mean errors [voxel]. radius: after the known bias b^2 / (2 R), which is only the\n"
+            "first term; exact: after the true steepest edge of a blurred disc; |.|: mean of its absolute value. MHT: without bias. inv., mm: runs of two\n"
+            "radii or more outside the vessels of the tree, and their length; att.: links between places that are far apart in the true tree; bg: links\n"
+            "that leave the lumen. Only for whole trees: a run for one branch is judged on this branch alone. s/tree: CPU seconds.\n");
 }
 
 // Time per tracked length and per node: narrow vessels have more nodes per millimetre, and larger trees have more narrow vessels.
@@ -530,9 +530,9 @@ static int call(void *structure, Faults *faults)
 }
 
 static const Option options[] = {
-    {"trees", "N", OPTION_INT, OPTION_AT(TrackBench, trees), "random trees (51 branches each) at a level of noise", .least = 1, .most = MOST_TREES,
+    {"trees", "N", OPTION_INT, OPTION_AT(TrackBench, trees), "random trees (51 branches each) per noise level", .least = 1, .most = MOST_TREES,
      .otherwise = "5"},
-    {"click", NULL, OPTION_FLAG, OPTION_AT(TrackBench, click_only), "whole trees from one click alone, without the other trackers"},
+    {"click", NULL, OPTION_FLAG, OPTION_AT(TrackBench, click_only), "only whole trees from one click, without the other trackers"},
     {"starts", "N", OPTION_INT, OPTION_AT(TrackBench, starts), "clicks in noisy volumes of each kind", .least = 1, .most = 100, .otherwise = "8"},
     {"only-starts", NULL, OPTION_FLAG, OPTION_AT(TrackBench, only_starts), "only these clicks"},
     BENCH_OPTIONS(TrackBench, common, "one small tree at 5 % noise and one tree of each difficulty"),
@@ -552,13 +552,11 @@ static const OptionTable table = {
     .program = "seldinger bench track",
     .does = "trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times",
     .usage = "[options]",
-    .intro = "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least "
-             "200 branches of "
-             "two voxels' radius or more at each of 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms; anisotropic, "
-             "fading, "
-             "clipped volumes. Then what a millimetre of vessel costs in trees of two sizes, and clicks in volumes as noisy as VascuSynth's (contrast 12 to 15 "
-             "of 255, "
-             "noise 11 to 21, a bright band), refusals and warnings counted.",
+    .intro =
+        "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least 200 "
+        "branches with a radius of two voxels or more at each of 0, 5, 10 and 20 % noise; touching vessels 0.5 to 3 voxels apart; bone in contact; aneurysms; "
+        "anisotropic, fading and clipped volumes. Then the time per millimetre of vessel in trees of two sizes, and clicks in volumes as noisy as VascuSynth's "
+        "(contrast 12 to 15 of 255, noise 11 to 21, a bright band), with counts of rejections and warnings.",
     .exits = "0 done; 1 a required figure was missed; 2 wrong usage or bad input",
     CLI_OPTIONS(options, TrackBench),
     .check = check,

@@ -758,25 +758,24 @@ static int call(void *options, Faults *faults)
 }
 
 static const Option rows[] = {
-    {"click", "F", OPTION_FILE, OPTION_AT(WallBench, tree[CLICK]), "stands for the one-click tree (a tree or a model)"},
-    {"five", "F", OPTION_FILE, OPTION_AT(WallBench, tree[FIVE]), "for the five branches"},
-    {"arch", "F", OPTION_FILE, OPTION_AT(WallBench, tree[ARCH]), "for the arch"},
-    {"rows", "A,B", OPTION_TEXT, OPTION_AT(WallBench, wanted), "of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step",
+    {"click", "F", OPTION_FILE, OPTION_AT(WallBench, tree[CLICK]), "replaces the one-click tree (a tree or a model)"},
+    {"five", "F", OPTION_FILE, OPTION_AT(WallBench, tree[FIVE]), "replaces the tree of the five branches"},
+    {"arch", "F", OPTION_FILE, OPTION_AT(WallBench, tree[ARCH]), "replaces the tree of the arch"},
+    {"rows", "A,B", OPTION_TEXT, OPTION_AT(WallBench, wanted), "any of: jumps points truth noise blobs fit junctions flood spread stiff spiral push step",
      .take = take_rows, .otherwise = "all"},
-    {"seeds", "N", OPTION_INT, OPTION_AT(WallBench, seeds), "fits of `spread`", .least = 2, .most = 20},
+    {"seeds", "N", OPTION_INT, OPTION_AT(WallBench, seeds), "number of fits for `spread`", .least = 2, .most = 20},
     {"work", "DIR", OPTION_FOLDER, OPTION_AT(WallBench, folder), "folder in which trees and models are written and kept", .otherwise = "a temporary folder"},
-    BENCH_OPTIONS(WallBench, common, "only what is given, no synthetic angiograms, stiff wires for 1 s"),
+    BENCH_OPTIONS(WallBench, common, "only the given files, no synthetic angiograms, stiff wires for 1 s"),
 };
 
 static const OptionTable table = {
     .program = "seldinger bench wall",
     .does = "one table about the wall of fitted trees: agreement, accuracy, ostia, reach, tools in it",
     .usage = "[options] [TREE.h5|MODEL.h5 ...]",
-    .intro = "The wall of fitted trees in one table: value, what it must be, what is aimed at, met or missed. Trees are fitted by `seldinger fit` first, "
-             "models are taken as "
-             "they are. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch, each skipped where it is "
-             "not here. "
-             "Run it from the project's folder. Figures of the first table row by row; CPU times are the commands' own.",
+    .intro = "The wall of fitted trees in one table: value, required value, desired value, met or missed. Trees are first fitted by `seldinger fit`; models "
+             "are used "
+             "unchanged. Without files: one click on ../shared/data/aneurism.nrrd, the five branches of scenes/aneurism and the arch; those without data are "
+             "skipped. Run it from the project's folder. Rows are printed as they are measured; CPU times are those of the commands.",
     .exits = "0 done; 1 a required value was missed; 2 wrong usage or bad input",
     CLI_OPTIONS(rows, WallBench),
     .set_defaults = set_defaults,

@@ -1,5 +1,5 @@
-// Files of a test in a folder of its own: the test defines `folder`, a template for mkdtemp, before it includes this. Where the folder is to hold something
-// from the start, the test's own set-up calls make_folder().
+// A separate folder for the files of a test: the test defines `folder`, a template for mkdtemp, before it includes this header. If the folder needs files from
+// the start, the set-up of the test calls make_folder().
 #ifndef SELDINGER_TESTS_FOLDER_H
 #define SELDINGER_TESTS_FOLDER_H
 
@@ -13,7 +13,7 @@ static inline int make_folder(void **state)
     return mkdtemp(folder) ? 0 : -1;
 }
 
-// The program's cache of models is in it too: none of another run is found.
+// The program's cache of models is in this folder too, so that models of other runs are not found.
 static inline int make_folder_with_cache(void **state) { return make_folder(state) == 0 ? setenv("SELDINGER_CACHE", folder, 1) : -1; }
 
 static inline const char *in_folder(const char *name)

@@ -1,5 +1,5 @@
-// Counts calls of the heap and of the page mapper by this thread, by functions of the test program that stand in front of the C library's, of
-// whatever library calls. Include once a program, after cmocka.h.
+// Counts calls of the heap and of mmap by this thread: functions of the test program replace those of the C library, for calls by any library. Include once per
+// program, after cmocka.h.
 #ifndef SELDINGER_TESTS_HEAP_CALLS_H
 #define SELDINGER_TESTS_HEAP_CALLS_H
 
@@ -88,7 +88,7 @@ static void need_counting(void)
     skip();
 }
 
-// The counter counts: this test would see a call.
+// Checks the counter: the test would notice a call.
 static void the_counter_counts(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// Runs that are long for the numbers that they check. Under the sanitizers, which take ten times as long and look for other faults, a shorter one goes
-// through the same code; the numbers are those of the optimised build, which runs them whole.
+// Some runs are long because of the figures that they check. Under the sanitizers, which are ten times slower and detect other faults, a shorter run covers the
+// same code; the optimised build makes the whole run and checks the figures.
 #ifndef SELDINGER_TESTS_SHORT_RUN_H
 #define SELDINGER_TESTS_SHORT_RUN_H
 
@@ -8,10 +8,10 @@
 #else
 #define WHOLE_RUN 1
 #endif
-// So many steps, rounds or cases.
+// The number of steps, rounds or cases.
 #define WHOLE_OR_SHORT(whole, shorter) (WHOLE_RUN ? (whole) : (shorter))
 
-// Skips a test of numbers alone, whose code others go through; for cmocka's tests.
+// Skips a cmocka test that checks only figures, if other tests cover its code.
 #define NEED_WHOLE_RUNS()                                                                                                                                      \
     do {                                                                                                                                                       \
         if (!WHOLE_RUN) {                                                                                                                                      \

@@ -1,5 +1,5 @@
-// Runs a fuzz target without libFuzzer: every file of a corpus folder whole, cut at every length (at most 2,000 of them, evenly
-// spread), with a trailing byte, and with single bytes flipped (at most 2,000). Under ASan and UBSan this is the parsers' regression test.
+// Runs a fuzz target without libFuzzer, with every file of a corpus folder: whole, cut at every length (at most 2,000, evenly spread), with a trailing byte,
+// and with single bytes flipped (at most 2,000). Under ASan and UBSan this is the regression test of the parsers.
 // usage: corpus_NAME [MOST] FOLDER...; MOST lengths and bytes instead of 2,000.
 #include <dirent.h>
 #include <stdint.h>
@@ -11,7 +11,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void try_input(const uint8_t *data, size_t size)
 {
-    // an exact allocation, so that a read past the end is seen
+    // an exact allocation, so that a read past the end is detected
     uint8_t *copy = malloc(size ? size : 1);
     if (!copy)
         exit(2);

@@ -1,5 +1,5 @@
-// A file of unknown kind, as `info` opens it: its kind by its content, then by the reader of that kind. Covers: cli/file_kind.c base/text_file.c
-// base/whole_file.c
+// A file of unknown kind, as `info` opens it: the kind is recognised by the content, then the reader of that kind is called.
+// Covers: cli/file_kind.c base/text_file.c base/whole_file.c
 #include "cli/file_kind.h"
 #include "recon/surface/surface_file.h"
 #include "recon/tree_file.h"

@@ -1,4 +1,4 @@
-// Any bytes as centrelines: VTP, Markups, SWC. What is taken is written as each of them, and read again.
+// Any bytes as centrelines: VTP, Markups, SWC. Accepted centrelines are written in each of these formats, and read again.
 // Covers: recon/surface/centreline_file.c recon/surface/vtp_file.c
 #include "recon/surface/centreline_file.h"
 

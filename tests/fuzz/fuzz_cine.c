@@ -1,5 +1,5 @@
-// A cine file that is taken can be played and is written again as the same bytes; one of version 2 as version 3, and that as the same bytes. The input's last
-// eight bytes stand for its checksum, which a fuzzer could not find.
+// An accepted cine file can be played and is written again as the same bytes; one of version 2 is written as version 3, and that again as the same bytes. The
+// target replaces the last eight bytes of the input by the checksum, which a fuzzer could not find.
 // Covers: render/cine.c
 #include "render/cine.h"
 

@@ -1,11 +1,11 @@
-// A scene that is taken can be run: the exact vessels of a scene and ten steps of its tools. Each node stays a number, or the step says that it diverged.
+// An accepted scene can be run: the exact vessels of a scene and ten steps of its tools. Each node stays finite, or the step reports that it diverged.
 // Covers: geom/tube_vessel.c geom/plane_vessel.c sim/simulator.c solver/wire.c
 #include "sim/simulator.h"
 
 #include <stdint.h>
 #include <stdlib.h>
 
-enum { MOST_ELEMENTS = 60 };     // of all devices: what a fuzzer has time for
+enum { MOST_ELEMENTS = 60 };     // total of all tools, limited for the speed of the fuzzer
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -1,6 +1,6 @@
-// Force ticks against a lying device: each byte is a tick (when it comes, what is wanted, whether the simulation and the device live) and
-// what becomes of the reports sent in it. Whatever the bytes are: no effect is started but at a known zero or while it plays, none while the
-// guard says zero; a force never grows faster than its slew, nor beyond its limit; what ends a session is tried.
+// Force ticks with a lying device: each byte is a tick (its time, the desired force, whether the simulation and the device are alive) and the result of the
+// reports sent in it. For any bytes: an effect is started only at a known zero or while it plays, and never while the guard requires zero; a force never grows
+// faster than its slew, nor beyond its limit; the reports that end a session are always tried.
 // Covers: input/force_feedback.c input/force_guard.c
 #include "tests/input/hid_recordings.h"
 #include "tests/input/lying_device.h"
@@ -29,7 +29,7 @@ static void require(bool good)
         abort();
 }
 
-// What the host can know: the last magnitude that was said to be taken, -1 after one that was not.
+// The host's knowledge: the last acknowledged magnitude, -1 after one that was not acknowledged.
 typedef struct Known {
     int magnitude[LYING_BLOCKS];
     int64_t started_us[LYING_BLOCKS];    // 0: at rest

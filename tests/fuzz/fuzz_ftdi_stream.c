@@ -1,4 +1,4 @@
-// Any bytes as what an FTDI chip sends: the first two say the packet size and how the rest is cut into transfers.
+// Any bytes as the data of an FTDI chip: the first two bytes give the packet size and the division of the rest into transfers.
 // Covers: input/ftdi_stream.c input/usb_encoder.c
 #include "input/usb_encoder.h"
 

@@ -1,5 +1,5 @@
-// Any bytes as a report descriptor and reports: length of the descriptor (2 bytes), it, then reports each with a length byte before it. What is taken
-// keeps its promises: fields within their reports, values within their bits, forces encoded whole, ports finite.
+// Any bytes as a report descriptor and reports: length of the descriptor (2 bytes), the descriptor, then reports, each after a length byte. For accepted
+// descriptors, fields are within their reports, values within their bits, forces encoded completely, ports finite.
 // Covers: input/hid_report.c input/force_feedback.c input/map_state.c
 #include "input/force_feedback.h"
 #include "input/map_state.h"
@@ -25,7 +25,7 @@ static void check_fields(const HidDescriptor *descriptor)
             abort();
 }
 
-// `answer`: what the device says of a block and of its memory.
+// `answer`: the reply of the device about a block and its memory.
 static void try_force(const HidDescriptor *descriptor, const uint8_t *answer, size_t length)
 {
     PidLayout layout;

@@ -1,4 +1,4 @@
-// A surface and its centrelines: what `import` makes of them. A tree that is valid, or faults. Centrelines of a surface alone take seconds, whatever it is.
+// A surface and its centrelines, as for `import`: the result is a valid tree, or faults. The computation of centrelines takes seconds and is left out.
 // Covers: recon/surface/import_surface.c recon/surface/import_skeleton.c recon/surface/import_ostia.c recon/surface/import_wall.c recon/surface/mesh_tree.c
 #include "recon/surface/import_surface.h"
 #include "tests/fuzz/given_files.h"
@@ -25,7 +25,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ImportOptions options = import_default_options();
     options.threads = 1;
     options.spacing = 1;
-    options.points_per_node = 8;     // as quick as it goes
+    options.points_per_node = 8;     // for speed
     faults_clear(&faults);
     given_files(data, size, names);
     SurfaceMesh *mesh = mesh_load_repaired(given_path("surface"), 1, "--scale ", &check, &faults);

@@ -1,4 +1,4 @@
-// Any bytes as a table of points. A table has its columns and finite numbers alone, which read again from their digits are the same.
+// Any bytes as a table of points. An accepted table has its columns and only finite numbers, which are the same when printed and read again.
 // Covers: base/number_table.c
 #include "base/number_table.h"
 

@@ -1,4 +1,4 @@
-// Any bytes as a recording: faults, or a run whose every figure can be looked at. The reader rehearses each file in a child process, which makes this slow.
+// Any bytes as a recording: faults, or a run all of whose figures can be accessed. The reader first reads each file in a child process, which makes this slow.
 // Covers: sim/recorded_run.c recon/hdf5_reader.c recon/hdf5_source.c
 #include "sim/recording.h"
 #include "tests/fuzz/given_files.h"

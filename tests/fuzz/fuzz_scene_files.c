@@ -1,4 +1,4 @@
-// A scene and what it names: a device's file, a polyline, a script of several tools.
+// A scene and the files to which it refers: a device file, a polyline, a script for several tools.
 // Covers: sim/scene.c sim/scene_tools.c sim/rest_shape.c sim/tip_shaping.c
 #include "sim/scene.h"
 #include "tests/fuzz/given_files.h"

@@ -1,4 +1,4 @@
-// Any bytes as a script: a script that keeps its promises, or faults.
+// Any bytes as a script: a valid script, or faults.
 // Covers: input/script.c base/number_table.c
 #include "input/script.h"
 

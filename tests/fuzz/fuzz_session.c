@@ -1,4 +1,4 @@
-// Any bytes as a session: one within its ranges that is written and read alike, or faults.
+// Any bytes as a session: a session within its ranges that is the same when written and read again, or faults.
 // Covers: sim/session.c sim/score_json.c
 #include "sim/session.h"
 

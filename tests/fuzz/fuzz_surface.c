@@ -1,5 +1,5 @@
-// Any bytes as a surface: STL, PLY, OBJ, VTP; what is read is repaired. Covers: recon/surface/surface_file.c recon/surface/vtp_file.c
-// recon/surface/mesh_check.c
+// Any bytes as a surface: STL, PLY, OBJ, VTP; accepted surfaces are repaired.
+// Covers: recon/surface/surface_file.c recon/surface/vtp_file.c recon/surface/mesh_check.c
 #include "recon/surface/mesh_check.h"
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// Any bytes as a golden tool path: one that is taken is written as a text that gives the same path, and does not differ from itself.
+// Any bytes as a golden tool path: an accepted path is written as a text that gives the same path, and does not differ from itself.
 // Covers: sim/compare.c
 #include "sim/compare.h"
 

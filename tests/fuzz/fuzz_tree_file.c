@@ -1,5 +1,5 @@
-// Tree files as bytes: whatever they are, tree_file_parse returns a valid tree or faults. The HDF5 library itself is not ours: where it is
-// known to crash on damaged bytes the corpus stays away (its 1.10 metadata carry checksums, so flipped headers are refused by it).
+// Any bytes as a tree file: tree_file_parse returns a valid tree or faults. The HDF5 library is not tested: the corpus avoids damaged bytes on which it is
+// known to crash (metadata of version 1.10 has checksums, so that it rejects changed headers).
 // Covers: recon/tree_file.c recon/hdf5_reader.c
 #include "recon/tree_file.h"
 

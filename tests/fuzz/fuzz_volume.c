@@ -1,6 +1,6 @@
-// Any bytes as a volume: NRRD, MetaImage, NIfTI headers and data. Detached files are looked for in a folder that does not exist. Covers:
-// recon/volume/volume_file.c recon/volume/volume_format.c recon/volume/volume_nrrd.c recon/volume/volume_metaimage.c recon/volume/volume_nifti.c
-// recon/volume/volume_dicom.c
+// Any bytes as a volume: NRRD, MetaImage, NIfTI headers and data. Detached files are searched in a folder that does not exist.
+// Covers: recon/volume/volume_file.c recon/volume/volume_format.c recon/volume/volume_nrrd.c recon/volume/volume_metaimage.c recon/volume/volume_nifti.c
+// Covers: recon/volume/volume_dicom.c
 #include "recon/volume/volume_file.h"
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// A volume whose samples lie in other files: its header, then the files that a header can name (a.raw, 1.raw, 2.raw, the pair's image).
+// A volume whose samples are in other files: its header, then the files to which a header can refer (a.raw, 1.raw, 2.raw, the pair's image).
 // Covers: recon/volume/volume_file.c recon/volume/volume_format.c recon/volume/volume_nrrd.c recon/volume/volume_metaimage.c recon/volume/volume_nifti.c
 #include "recon/volume/volume_file.h"
 #include "tests/fuzz/given_files.h"

@@ -1,4 +1,4 @@
-// Words of the command line and of devices: each line of the input as each of them. What is taken is within its range.
+// Words of the command line and of devices: each line of the input as each of them. Accepted values are within their ranges.
 // Covers: base/option_table.c cli/arguments.c base/options.c input/gamepad.c
 #include "cli/cli.h"
 #include "input/gamepad.h"
@@ -44,7 +44,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     char *copy = malloc(size + 1), *next = copy;
     static FILE *nowhere;
     if (!nowhere)
-        stderr = nowhere = fopen("/dev/null", "w");     // messages about what is not valid
+        stderr = nowhere = fopen("/dev/null", "w");     // messages about invalid words
     memcpy(copy, data, size);
     copy[size] = '\0';
     for (char *line; (line = strsep(&next, "\n"));)

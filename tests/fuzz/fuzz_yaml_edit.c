@@ -1,4 +1,4 @@
-// The input's first two lines are a path of plain keys and a value, the rest is a text in which they are put. What was one YAML document stays one.
+// The first two lines of the input are a path of plain keys and a value; the rest is a text into which the value is written. A valid YAML document stays valid.
 // Covers: base/yaml_edit.c
 #include "base/yaml_edit.h"
 #include "base/yaml_reader.h"

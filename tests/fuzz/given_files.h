@@ -1,4 +1,5 @@
-// What a fuzz target reads by path: the input's bytes as files of a folder in memory, or in /tmp, that goes when the program ends.
+// Files for fuzz targets that read by path: writes the bytes of the input as files of a folder in memory, or in /tmp, which is removed at the end of the
+// program.
 #ifndef SELDINGER_TESTS_GIVEN_FILES_H
 #define SELDINGER_TESTS_GIVEN_FILES_H
 
@@ -8,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-// Between two files of an input; it stands in the targets' dictionaries.
+// Separator of two files of an input; it is in the dictionaries of the targets.
 #define GIVEN_CUT "\n%%%%\n"
 
 static char given_folder[64];
@@ -40,7 +41,7 @@ static inline void given_begin(const char *const *names)
     atexit(given_remove);
 }
 
-// Writes one file for each of `names` (NULL-terminated, the same in each call) that the input has a part for, and removes the others of the call before.
+// Writes a file for each of `names` (NULL-terminated, the same in each call) for which the input has a part, and removes the other files of the previous call.
 // An input without GIVEN_CUT is the first file.
 static inline void given_files(const uint8_t *data, size_t size, const char *const *names)
 {

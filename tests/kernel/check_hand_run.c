@@ -1,9 +1,9 @@
-// Whether a recorded run is what the uhid joystick's log says that the hand did and felt (uhid_joystick.c). The two clocks are not the same, so:
-//   - the commands of the steps are the axis's values times MM_S, in the order in which they were sent, of LED_STEPS steps at least; the tool moved by
-//     their sum;
-//   - the force comes from where the tool pushes back, stays within MAX_N, grows at no more than SLEW_N_S, and is at last what was recorded;
-//   - it was zero at the end, and the device found no fault with any report.
-// usage: check_hand_run RECORDING LOG LED_STEPS MM_S FULL_SCALE_N MAX_N SLEW_N_S. Prints what it found; exit status 1 where something is wrong.
+// Compares a recorded run with the log of the uhid joystick, i.e. with the motion of the hand and the force on it (uhid_joystick.c). The two clocks differ, so:
+//   - the commands of the steps must be the values of the axis times MM_S, in the order in which they were sent, in at least LED_STEPS steps; the tool must have
+//     moved by their sum;
+//   - the force must have the direction of the tool's push, stay within MAX_N, grow by at most SLEW_N_S, and end at the recorded value;
+//   - it must be zero at the end, and the device must have found no fault in any report.
+// usage: check_hand_run RECORDING LOG LED_STEPS MM_S FULL_SCALE_N MAX_N SLEW_N_S. Prints the results; exit status 1 if a check fails.
 #include "sim/recording.h"
 
 #include <inttypes.h>
@@ -85,7 +85,7 @@ static double median(double *values, int count)
     return values[count / 2];
 }
 
-// Each step's command is an axis value that had been sent, never an older one than the step before had.
+// The command of each step is a value of the axis that was sent before, never older than that of the previous step.
 static void check_commands(const RecordedRun *run, const Log *log, double mm_s, int steps_wanted)
 {
     int at = -1, steps_led = 0, values_used = 0;
@@ -124,7 +124,7 @@ static double force_at(const Series *force, double t)
 
 static void check_force(const RecordedRun *run, const Log *log, double full_scale_n, double max_n, double slew_n_s)
 {
-    const double unit = full_scale_n / LARGEST, lateness_s = 0.1;   // by which reports may come bunched on a busy machine
+    const double unit = full_scale_n / LARGEST, lateness_s = 0.1;   // largest delay of reports on a busy machine
     const Series *force = &log->force;
     double first = -1, last = -1, largest = 0, steepest = 0;
     for (int i = 0; i < force->count; i++) {
@@ -135,7 +135,7 @@ static void check_force(const RecordedRun *run, const Log *log, double full_scal
             last = i + 1 < force->count ? force->entry[i + 1].t : log->ended;
         largest = fmax(largest, abs(now->value));
     }
-    // of what was sent, as the device lets go by itself where it is told too late to continue
+    // of the sent force, as the device releases by itself if a renewal is late
     for (int i = 0; i < log->sent.count; i++) {
         for (int j = 0; j < i; j++) {
             double rise = (abs(log->sent.entry[i].value) - abs(log->sent.entry[j].value)) * unit;
@@ -160,7 +160,7 @@ static void check_force(const RecordedRun *run, const Log *log, double full_scal
     CHECK(largest * unit <= max_n + unit, "more force than %.4f N", max_n);
     CHECK(steepest <= slew_n_s, "the force grew faster than %.3f N/s", slew_n_s);
     CHECK(expected > 0, "no push force to feel was recorded");
-    // towards smaller X, where the hand came from; 5 %: the force of a real run wavers by 2 % about its median
+    // towards smaller X, from where the hand came; 5 %: the force of a real run varies by 2 % about its median
     CHECK(fabs(got + expected) <= 0.05 * expected + 2 * unit, "felt %.4f N instead of %.4f N", got, -expected);
     CHECK(force->count && force->entry[force->count - 1].value == 0, "the force did not end");
 }

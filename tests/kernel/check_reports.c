@@ -1,10 +1,10 @@
-// Whether a recorded run took every report that a swinging uhid joystick sent (uhid_joystick.c, `swing`), and how old the newest was at each step.
-//   - each report turns the dial by one count, so step i's turn so far is N_i counts: N_i reports had been read by then, the last N the number sent;
-//   - the push of a step is the axis of a report from N_{i-1} to N_{i+1}: several are read at once, and rate and way are published one after the other;
+// Checks that a recorded run used every report that a swinging uhid joystick sent (uhid_joystick.c, `swing`), and how old the newest was at each step.
+//   - each report turns the dial by one count, so the rotation N_i up to step i is the number of reports read by then; the last N is the number sent;
+//   - the push of a step is the axis of a report from N_{i-1} to N_{i+1}: several are read at once, and rate and distance are published one after the other;
 //   - report k was sent at t_k on the kernel's clock. A step ends i * dT after the first, and later where simulated time slowed down, never earlier. So
 //     t_{N_j} - j dT of every earlier step j is a lower bound of the time that passed in between, and with the largest of them comes a lower bound of a
 //     report's age in step i, measured from the freshest that any step had: max_{j <= i} (t_{N_j} - j dT) - (t_{N_i} - i dT).
-// usage: check_reports RECORDING LOG MM_S DEG_PER_COUNT. Prints what it found; exit status 1 where something is wrong.
+// usage: check_reports RECORDING LOG MM_S DEG_PER_COUNT. Prints the results; exit status 1 if a check fails.
 #include "sim/recording.h"
 
 #include <inttypes.h>
@@ -59,7 +59,7 @@ static bool read_log(const char *path, Sent *sent)
     return file != NULL;
 }
 
-// Whether one of these reports says this push.
+// True if one of these reports has this push.
 static bool is_said(const Sent *sent, int64_t first, int64_t last, double push, double mm_s)
 {
     for (int64_t k = first < 1 ? 1 : first; k <= last && k <= sent->count; k++)
@@ -68,7 +68,7 @@ static bool is_said(const Sent *sent, int64_t first, int64_t last, double push, 
     return false;
 }
 
-// How many reports had been read by each step.
+// The number of reports read by each step.
 static int64_t *count_taken(const RecordedRun *run, double deg_per_count)
 {
     double turned = 0;

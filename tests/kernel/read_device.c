@@ -1,5 +1,5 @@
-// Reads a HID device as the program's own input layer does (hidapi, its descriptor, its fields) and prints what each report says, one line a report:
-// `USAGE VALUE USAGE VALUE ...`, constants left out. usage: read_device PRODUCT REPORTS. Prints `ready` once it listens; gives up after 30 s of silence.
+// Reads a HID device with the program's input layer (hidapi, descriptor, fields) and prints the content of each report in one line: `USAGE VALUE USAGE VALUE
+// ...`, without constants. usage: read_device PRODUCT REPORTS. Prints `ready` once it listens; gives up after 30 s of silence.
 #include "input/hid_device.h"
 #include "input/hid_report.h"
 

@@ -1,6 +1,6 @@
-// Reads the first gamepad as the trainer does (GLFW's layout of it, our built-in map), without the trainer's pictures, which an emulated processor
-// takes a minute to draw first. Prints `ready NAME`, then a line whenever it changes: `push MM_S twist DEG_S buttons BITS state STATE`.
-// usage: read_gamepad SECONDS. Needs a display, as GLFW does.
+// Reads the first gamepad as the trainer does (GLFW's layout, our built-in map), without the trainer's images, which take an emulated processor a minute to
+// draw. Prints `ready NAME`, then a line whenever it changes: `push MM_S twist DEG_S buttons BITS state STATE`. usage: read_gamepad SECONDS. Needs a display,
+// as GLFW does.
 #define GLFW_INCLUDE_NONE
 #include "input/gamepad.h"
 

@@ -1,21 +1,22 @@
 // A force-feedback joystick that exists only in the kernel (uhid): to every program it is a HID device on a bus. Commands come by standard input, one
 // per line; each is answered by a line on standard output when it is done. Input reports go out every 8 ms while the device is open.
 //   usage: uhid_joystick NAME VENDOR:PRODUCT LOG [SERIAL [LIE]]      (ids in hexadecimal)
-// LIE: wide, its X has 64 bits; mixed, its input report has no id though others have; full, it never has room for an effect. The kernel takes them all.
-//   axis X DIAL      from now on the stick is at X (-32767..32767) and the dial turns by DIAL counts a report
+// LIE: wide: its X has 64 bits; mixed: its input report has no id although others have one; full: it never has space for an effect. The kernel accepts all of
+// them.
+//   axis X DIAL      from now on the stick is at X (-32767..32767) and the dial turns by DIAL counts per report
 //   yield K          the hand yields: X becomes X + K * force / 100, the force as the device plays it (-10000..10000, > 0 to greater X)
 //   every MS         from now on the reports' interval
-//   swing N          from now on X swings once to and fro in N reports and the dial turns by 1 count a report: its sum tells how many were read
+//   swing N          from now on X swings back and forth once in N reports and the dial turns by 1 count per report: its sum is the number of reports read
 //   quiet | loud     no reports although open; reports again
-//   flood N          N reports as fast as the kernel takes them, the last with the dial at 0
+//   flood N          N reports as fast as the kernel accepts them, the last with the dial at 0
 //   short            one report of 2 bytes, where the descriptor says 6
 //   unplug | plug    destroys the device, creates it again
 //   wait WHAT [N]    answers when WHAT has happened: opened, closed, force (the device plays one), rest (none any more), reports (N more have
 //                    gone out), written (N output and feature reports have come in all); gives up after 25 s
 //   quit
-// LOG: one event a line, `TIME_US KIND ...`: axis X (when it changes), sent X (each report of a swing, in place of axis), force F (what the motor does, when it changes), effect ... and fault TEXT
-// (a report that the device class definition does not allow, USB HID PID 1.0: an effect that was never created, a wrong length ...).
-// The device follows that definition by itself, sharing no code with the program under test: Create New Effect, PID Block Load, Set Effect,
+// LOG: one event a line, `TIME_US KIND ...`: axis X (when it changes), sent X (each report of a swing, in place of axis), force F (what the motor does, when it
+// changes), effect ... and fault TEXT (a report that the device class definition does not allow, USB HID PID 1.0: an effect that was never created, a wrong
+// length ...). The device follows that definition by itself, sharing no code with the program under test: Create New Effect, PID Block Load, Set Effect,
 // Set Constant Force, Effect Operation, PID Device Control, Device Gain, Block Free; its motor plays magnitude * gain while the effect runs.
 #include <errno.h>
 #include <fcntl.h>
@@ -77,7 +78,7 @@ typedef struct {
     bool made, configured, running;
     int gain, magnitude;
     int duration_ms;         // 0: for ever
-    double along_x;          // which part of a magnitude > 0 pushes the stick to greater X
+    double along_x;          // fraction of a magnitude > 0 that pushes the stick to greater X
     long long ends_us;       // while it runs; 0: never
 } Effect;
 
@@ -87,7 +88,7 @@ typedef struct {
     int fd;
     FILE *log;
     bool plugged, open, quiet, actuators, paused;
-    int device_gain, last_made;   // last_made: index that PID Block Load tells, 0 after a failure
+    int device_gain, last_made;   // last_made: index in PID Block Load, 0 after a failure
     Effect effects[EFFECTS + 1];
     int base, dial, yield, axis, force, interval_ms;
     int swing;               // reports of one swing; 0: none
@@ -120,7 +121,7 @@ static void send_event(const Device *device, const struct uhid_event *event)
     }
 }
 
-// The descriptor, or what a liar says in its place; its length in bytes.
+// The descriptor, or a false one; returns its length in bytes.
 static size_t describe(unsigned char *out, const char *lie)
 {
     static const unsigned char id[] = {0x85, INPUT}, sixteen_bits[] = {0x75, 0x10};
@@ -161,7 +162,7 @@ static void unplug(Device *device)
     note(device, "unplugged");
 }
 
-// What the motor does now: the sum of the running effects, -10000..10000, > 0 to greater X.
+// The present force of the motor: the sum of the running effects, -10000..10000, > 0 to greater X.
 static void update_force(Device *device)
 {
     double total = 0;
@@ -340,10 +341,10 @@ static void take_event(Device *device)
         give_feature(device, &event.u.get_report);
 }
 
-// Takes what the kernel has for us and sends the input report that is due. A slow machine skips reports: no device hurries.
+// Reads events of the kernel and sends the input report that is due. On a slow machine reports are skipped, as a real device does not catch up.
 static void turn(Device *device, struct pollfd *commands)
 {
-    const int wait_ms = device->force || device->interval_ms < 4 ? 1 : 4;   // an effect that ends is seen in time
+    const int wait_ms = device->force || device->interval_ms < 4 ? 1 : 4;   // so that the end of an effect is noticed in time
     struct pollfd both[2] = {{.fd = device->fd, .events = POLLIN}, {.fd = commands ? commands->fd : -1, .events = POLLIN}};
     if (poll(both, 2, wait_ms) > 0 && both[0].revents & POLLIN)
         take_event(device);
@@ -379,7 +380,7 @@ static bool wait_for(Device *device, const char *what, long count)
     return false;
 }
 
-// One command; false when it was `quit`. What it found goes to standard output.
+// Executes one command; false if it was `quit`. The result is written to standard output.
 static bool obey(Device *device, char *line)
 {
     char verb[16] = "", what[16] = "";

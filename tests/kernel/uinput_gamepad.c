@@ -1,4 +1,4 @@
-// A gamepad that exists only in the kernel (uinput), to every program an Xbox 360 controller. Commands by standard input, one per line, each answered
+// A gamepad that exists only in the kernel (uinput); programs see an Xbox 360 controller. Commands by standard input, one per line, each answered
 // by `done`: `stick X Y` moves the left one (-32767..32767, Y > 0 towards the user), `button CODE VALUE` (linux/input-event-codes.h), `quit`.
 #include <errno.h>
 #include <fcntl.h>

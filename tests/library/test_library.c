@@ -1,4 +1,4 @@
-// The library from outside: public headers and libseldinger.so alone.
+// The library as used by a host program: only public headers and libseldinger.so.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -180,7 +180,7 @@ static void a_bad_hand_moves_nothing(void **state)
     sel_simulator_destroy(simulator);
 }
 
-// --- the host keeps what is its own ---
+// --- settings of the host are unchanged ---
 
 static void the_host_keeps_its_settings(void **state)
 {
@@ -292,7 +292,7 @@ static SelScene *build_phantom(double first_push, double inserted_mm)
     return built;
 }
 
-// A decimal comma, in a language made for the test.
+// A decimal comma, in a locale made for the test.
 static void the_host_may_speak_german(void **state)
 {
     (void)state;
@@ -319,7 +319,7 @@ static void the_host_may_speak_german(void **state)
     sel_scene_destroy(built);
 }
 
-// What a file and a structure say alike is the same scene, bit for bit.
+// The same scene from a file and from structures gives bit-identical results.
 static void a_scene_in_code_is_that_of_the_file(void **state)
 {
     (void)state;
@@ -403,7 +403,7 @@ static void a_tube_in_code_is_a_tube(void **state)
     sel_simulator_destroy(simulator);
 }
 
-// What is read agrees with itself.
+// Values read in different ways are consistent.
 static void what_is_read_agrees(void **state)
 {
     (void)state;
@@ -474,7 +474,7 @@ static void structures_may_grow(void **state)
     good(sel_simulator_report(simulator, &shorter, offsetof(SelReport, contacts)));
     assert_true(shorter.flags == whole.flags && shorter.contacts == 0x01010101);
     sel_simulator_destroy(simulator);
-    SelSimulatorOptions options = {.size = offsetof(SelSimulatorOptions, keeps_score)};       // and no more: the default holds
+    SelSimulatorOptions options = {.size = offsetof(SelSimulatorOptions, keeps_score)};       // an older structure: the default is used
     SelScore score;
     good(sel_simulator_create(context, scene, &options, &simulator));
     good(sel_simulator_score(simulator, &score, sizeof score));
@@ -558,7 +558,7 @@ static void an_unwritable_recording_is_an_error(void **state)
 enum { SIZE = 36, LENGTH = 60 };
 static const double edge_mm = 0.5, radius_mm = 2;
 
-// A bright cylinder along z, its edge as blurred by the voxels as an average over them is.
+// A bright cylinder along z, whose edge is blurred like an average over voxels.
 static SelVolume *cylinder(void)
 {
     static float value[LENGTH][SIZE][SIZE];
@@ -629,7 +629,7 @@ static void expect_same_file(const char *one, const char *other)
     assert_int_equal(system(command), 0);
 }
 
-// The verbs and the library write the same trees and models, byte for byte, with what stands in them about their making.
+// The verbs and the library write byte-identical trees and models, including the attributes about their origin.
 static void files_are_those_of_the_program(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// The host's allocator: all of the library's memory comes from it and goes back to it, and where it refuses some the call fails and the program goes on.
-// usage: test_library_memory [REFUSALS]: how many refusals of each story are tried, spread over all of its allocations; default 4
+// The host's allocator: the library gets all of its memory from it and returns it, and if an allocation fails, the call fails and the program continues.
+// usage: test_library_memory [REFUSALS]: number of failed allocations tried in each story, spread over all of its allocations; default 4
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@
 static char folder[] = "/tmp/seldinger-memory-XXXXXX";
 #include "tests/folder.h"
 
-// --- an allocator that counts and refuses; what is lost stays in its list ---
+// --- an allocator that counts and fails; lost memory stays in its list ---
 
 typedef struct Block {
     struct Block *before, *after;
@@ -28,7 +28,7 @@ typedef struct Block {
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static Block all = {.before = &all, .after = &all};
-static long live, asked, refused_at;     // refused_at: the allocation that is refused, and all after it; 0: none
+static long live, asked, refused_at;     // refused_at: the allocation that fails, and all after it; 0: none
 static bool is_foreign;
 
 static bool may_have(void)
@@ -94,7 +94,7 @@ static void *resize(void *user, void *memory, size_t bytes)
     return longer;
 }
 
-// --- stories; each ends with all that it had destroyed, and returns its first error ---
+// --- stories (sequences of calls); each destroys all its handles at the end and returns its first error ---
 
 static const char tube[] =
     "seldinger: 1\n"
@@ -217,7 +217,7 @@ static void all_memory_comes_from_the_host_and_goes_back(void **state)
     assert_false(is_foreign);
 }
 
-// A step, with its score and its recording, and what is read of it.
+// A step with score and recording, and functions that read its results.
 static void a_step_allocates_nothing(void **state)
 {
     (void)state;
@@ -268,7 +268,7 @@ static long count_of(Story told)
     return asked - before;
 }
 
-// The last refusals of a story may be those of a thread that needs less than it asks for.
+// The last failures of a story may be in a thread that needs less memory than it requests.
 static void a_refusal_is_an_error(void **state)
 {
     (void)state;
@@ -288,7 +288,7 @@ static void a_refusal_is_an_error(void **state)
             unseen += status == SEL_OK;
             sel_context_destroy(context);
         }
-        assert_int_equal(count_of(story[i]) > 0, 1);     // all is as it was
+        assert_int_equal(count_of(story[i]) > 0, 1);     // everything works as before
     }
     print_message("%d refusals: %d errors, %d without effect\n", errors + unseen, errors, unseen);
     assert_true(unseen * 10 <= errors);

@@ -1,5 +1,5 @@
-// What was done in a recording, one line: simulated s, way of all tools [mm], turns of all [deg], X-rays [s], contrast [ml], exchanges, shaped tips, bookmarks.
-// usage: count_practice RECORDING. tests/torture/practice sums the lines, so that a soak in which nothing happened is seen.
+// Prints the activity in a recording in one line: simulated s, motion of all tools [mm], rotation of all [deg], X-rays [s], contrast [ml], exchanges, shaped
+// tips, bookmarks. usage: count_practice RECORDING. tests/torture/practice sums the lines, so that a soak test without activity is noticed.
 #include "sim/recording.h"
 
 #include <math.h>

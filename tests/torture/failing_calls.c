@@ -1,13 +1,12 @@
-// Calls that fail when they are asked to: loaded before the program (LD_PRELOAD).
-//   FAIL_HEAP=N    of what the program's own code allocates, told by the address that the call returns to, the Nth is refused (1: the first)
-//   FAIL_LIST=F of all whose numbers the file F holds, rising, each is refused in a process of its own, which continues from there in a copy of the
-//   working folder,
-//                  FAIL_FOLDER/forks/N/work, with `said` and `complained` beside it; not where other threads run, as they would not continue. Much
-//                  faster than one by one
-//   FAIL_FILE=N    of the system calls on files below FAIL_FOLDER (a path that ends with /) and on standard output, the Nth fails with FAIL_ERROR, of any library:
-//                  they are trapped by seccomp where that is permitted (x86-64)
-//   FAIL_MODE      once (default); full: the Nth and all later ones that write; gone: the Nth and all later ones; short: reads and writes move half of what is
-//                  asked, at least a byte; interrupted: each of them ends with EINTR every other time
+// Makes chosen calls fail; loaded before the program (LD_PRELOAD).
+//   FAIL_HEAP=N    the Nth allocation by the program's own code (recognised by the return address) fails (1: the first)
+//   FAIL_LIST=F    the file F has numbers of allocations in ascending order. Each of them fails in a forked process, which continues in a copy of the working
+//                  folder, FAIL_FOLDER/forks/N/work, with its output in `said` and `complained` beside it. Not if other threads run, as they do not survive a
+//                  fork. Much faster than one by one
+//   FAIL_FILE=N    the Nth system call on files below FAIL_FOLDER (a path that ends with /) and on standard output fails with FAIL_ERROR, in any library:
+//                  the calls are trapped by seccomp where that is permitted (x86-64)
+//   FAIL_MODE      once (default); full: the Nth and all later ones that write; gone: the Nth and all later ones; short: reads and writes transfer half of the
+//                  requested bytes, at least one; interrupted: each of them ends with EINTR every other time
 // At the end FAIL_LOG gets the count of allocations and of file calls, then a line for each place in the program that allocates: the number of its first call,
 // its address. The call that failed is written there at once: `failed`, the call, the file; or `fork`, its number, the process's status, its place.
 #define _GNU_SOURCE      // dl_iterate_phdr, RTLD_NEXT
@@ -73,12 +72,12 @@ static void see(uintptr_t address, long count)
     }
 }
 
-// --- in a process of its own ---
+// --- in a forked process ---
 
 enum { MOST_LISTED = 1 << 17, FORK_SECONDS = 60 };
 static long list[MOST_LISTED];
 static int list_count, list_next;
-static char work[PATH_MAX], copy[PATH_MAX];      // the working folder and what it is in that process
+static char work[PATH_MAX], copy[PATH_MAX];      // the working folder, and its copy for that process
 
 static void copy_bytes(const char *from, const char *to)
 {
@@ -104,8 +103,7 @@ static int copy_entry(const char *path, const struct stat *status, int kind, str
     return 0;
 }
 
-// Each open file again, where it stood: those of the working folder as their copies, the others so that both processes have a place of their own in
-// them.
+// Reopens each open file at its position: files of the working folder as their copies, others so that both processes have separate positions.
 static void open_anew(void)
 {
     for (int i = 0; i < 64; i++) {
@@ -132,7 +130,7 @@ static void open_anew(void)
     }
 }
 
-// True in the process that is to continue without its memory.
+// True in the process that continues with the failed allocation.
 static bool is_fork(long count, uintptr_t place_of)
 {
     struct stat tasks;
@@ -244,7 +242,7 @@ FILE *open_memstream(char **text, size_t *length)
 #include <sys/syscall.h>
 #include <ucontext.h>
 
-// What is called from here alone goes through the filter.
+// The filter passes only calls from here.
 long real_call(long call, long a, long b, long c, long d, long e, long f);
 extern char after_real_call[];
 __asm__(".text\n.globl real_call\n.type real_call,@function\nreal_call:\n"
@@ -362,7 +360,7 @@ static bool trap_file_calls(void)
     return sigaction(SIGSYS, &trap, NULL) == 0 && prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &code) == 0;
 }
 
-// A thread that takes no signals would be killed by its first call of those.
+// A thread that blocks signals would be killed by its first trapped call.
 int pthread_sigmask(int how, const sigset_t *set, sigset_t *before)
 {
     typedef int Mask(int, const sigset_t *, sigset_t *);
@@ -389,7 +387,7 @@ __attribute__((constructor)) static void begin(void)
     fail_error = getenv("FAIL_ERROR") ? (int)number("FAIL_ERROR") : EIO;
     dl_iterate_phdr(find_program, NULL);
     int log_now = log_path ? open(log_path, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0666) : -1;
-    if (log_now >= 0) {      // out of the way of numbers that the program expects
+    if (log_now >= 0) {      // away from the file descriptors that the program expects
         log_file = fcntl(log_now, F_DUPFD_CLOEXEC, 200);
         close(log_now);
     }

@@ -1,7 +1,7 @@
-// Mutants of each kind of HDF5 file that is read: trees, models, recordings of one tool and of several, sessions (the last three are packed). Each is changed in its structure (links, shapes, types,
-// storage, attributes, values) through the HDF5 library, or in its bytes, and read in a process of its own that may use little memory and time. Reading must end
-// well: with faults, or with data of which each byte can be looked at; never by a signal, nor with more memory than the reader states.
-// usage: hdf5_mutants [COUNT [SEED]]; COUNT mutants of each kind, default 150.
+// Mutants of each kind of HDF5 file that the program reads: trees, models, recordings of one tool and of several, sessions (the last three are compressed).
+// Each is changed in its structure (links, shapes, types, storage, attributes, values) through the HDF5 library, or in its bytes, and read in a separate
+// process with little memory and time. Reading must end with faults, or with data of which each byte can be accessed; never by a signal, nor with more memory
+// than the reader declares. usage: hdf5_mutants [COUNT [SEED]]; COUNT mutants of each kind, default 150.
 #include "base/whole_file.h"
 #include "recon/tree_file.h"
 #include "sim/drive.h"
@@ -73,7 +73,7 @@ static void make_recording(const char *text, RecordingOptions options, const cha
     Scene *scene = scene_parse(text, strlen(text), "r.yaml", &faults);
     Simulator *simulator = scene ? simulator_create(scene, NULL, &faults) : NULL;
     need(simulator, "make a simulator");
-    options.flush_s = 0.02;          // less than it lasts: several chunks
+    options.flush_s = 0.02;          // shorter than the run: several chunks
     options.expected_steps = 60;
     Recording *recording = recording_create(path, simulator, &options, &faults);
     need(recording, "make a recording");
@@ -87,7 +87,7 @@ static void make_recording(const char *text, RecordingOptions options, const cha
     scene_free(scene);
 }
 
-// A text of any length, as other writers have it: it lies in a heap without a checksum.
+// A text of variable length, as other programs write it: it is stored in a heap without a checksum.
 static void put_variable_text(const char *path)
 {
     const char *text = "from another writer";
@@ -173,7 +173,7 @@ static hid_t any_type(void)
     }
 }
 
-// A dataset of any shape, type and storage in the place of another.
+// Replaces a dataset by one of another shape, type and storage.
 static void put_other_dataset(hid_t file, const char *path)
 {
     int rank = 1 + below(4), rows = 1 << below(22);
@@ -326,7 +326,7 @@ static void change_structure(const char *path)
 
 // --- changes of bytes ---
 
-// Where the library's own structures begin, or anywhere: data are most of a file, and the least of it to go wrong.
+// At the start of the library's structures, or anywhere: data is most of a file, and rarely causes errors.
 static size_t any_place(const unsigned char *bytes, size_t length)
 {
     static const char *const sign[] = {"TREE", "SNOD", "HEAP", "OHDR", "OCHK", "FRHP", "GCOL"};
@@ -361,7 +361,7 @@ static size_t change_bytes(unsigned char *bytes, size_t length)
     return below(20) == 0 ? next() % length : length;
 }
 
-// --- reading in a process of its own ---
+// --- reading in a separate process ---
 enum { REFUSED = 0, READ = 1, WITHOUT_REASON = 2 };
 enum { SECONDS = 20 };
 #define ADDRESS_SPACE ((rlim_t)1 << 30)

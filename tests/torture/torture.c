@@ -1,8 +1,9 @@
-// What the program does not decide, in bulk: memory that is refused, files that fail, SIGKILL at any moment, and limits. One table of commands; of each a copy is
-// first run undisturbed, and again, disturbed. Whatever happens: no signal ends the program; a run that ends well has written the same bytes as without; another
-// one says why in one message; what was there before is there whole, or the new file is; nothing unfinished is left.
+// Many external failures: allocations, file operations, SIGKILL at any moment, and resource limits. Each command of a table is run first without a failure,
+// then with it. In all cases: no signal ends the program; a successful run writes the same bytes as without the failure; a failed run gives the reason in one
+// message; the old file or the new one is complete; no unfinished file is left.
 // usage: torture SELDINGER FAILING_CALLS.so heap|files|kills|limits [N [SEED]] [VERB...]
-//   N      cases of each command, evenly over what can fail (kills: in all), default 8; from 100 on of the larger commands too. 0: each one, of the small commands
+//   N      cases per command, evenly over all calls that can fail (kills: in total), default 8; from 100 on also of the larger commands.
+//          0: all, of the small commands
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -27,14 +28,14 @@
 #define HAS_PICTURES false
 #endif
 
-// --- what is run ---
+// --- the commands ---
 
 enum { LARGE = 1, WINDOW = 2, CLOCKED = 4, GOES_ON = 8, DRAWS = 16 };
 typedef struct Case {
-    const char *command;   // IN/: the inputs' folder; it runs in an empty one
-    const char *outputs;   // names of the files that it makes; former ones are there before
-    const char *uses;      // inputs that are copied to where it runs
-    int traits;            // WINDOW: needs a display. CLOCKED: what it says or writes depends on the clock. GOES_ON: does without what fails, and reports it.
+    const char *command;   // IN/: the folder of inputs; the command runs in an empty folder
+    const char *outputs; // names of the files that it writes; older versions of them exist before
+    const char *uses;    // inputs that are copied to its folder
+    int traits;          // WINDOW: needs a display. CLOCKED: its output depends on the clock. GOES_ON: continues without the failed part, and reports it.
                            // DRAWS: pictures
 } Case;
 
@@ -176,7 +177,7 @@ static bool is_same(const char *a, const char *b)
     return same;
 }
 
-// What was there before: the text above, or an input that was copied.
+// The old file: the text above, or an input that was copied.
 static bool is_former(const char *name)
 {
     size_t length;
@@ -211,7 +212,7 @@ typedef struct Disturbance {
     const char *mode, *error, *list;
     double patience_s;
     double kill_s;               // 0: not killed
-    void (*limit)(long value);   // in the process, before the program
+    void (*limit)(long value);   // called in the process, before the program starts
     long value;
 } Disturbance;
 
@@ -266,7 +267,7 @@ static void become(const char *folder, const char *command, int complain, const 
     _exit(125);
 }
 
-// Through a pipe: no limit of files is one of messages.
+// Through a pipe, so that limits of files do not apply to messages.
 static void keep_complaints(int from)
 {
     static char text[1 << 16];
@@ -352,7 +353,7 @@ static int attempt(const Case *c, const Disturbance *disturbance)
     return run(in("work", ""), c->command, disturbance);
 }
 
-// --- what a run has left ---
+// --- the files after a run ---
 
 typedef struct Left {
     const Case *c;
@@ -402,7 +403,7 @@ static int judge_file(const char *path, const struct stat *status, int kind, str
     return 0;
 }
 
-// NULL, or what is wrong with the files.
+// NULL, or a description of the error in the files.
 static const char *odd_file(const Case *c, bool failed, bool killed)
 {
     char names[400];
@@ -415,7 +416,7 @@ static const char *odd_file(const Case *c, bool failed, bool killed)
     return left.what[0] ? left.what : NULL;
 }
 
-// Recordings by what they hold: where in the file it lies depends on the clock.
+// Recordings are compared by content: the layout of the file depends on the clock.
 static void make_comparable(const Case *c)
 {
     bool is_recording = !strncmp(c->command, "run", 3) && has_name(c->outputs, "t.h5");
@@ -453,7 +454,7 @@ static void fault(const Case *c, const char *how, const char *format, ...)
         shell("rm -rf /tmp/tortured && cp -r '%s' /tmp/tortured", here);
 }
 
-// The file at which the failing call was aimed, as the message should name it; "" where none is known.
+// The file of the failed call, whose name the message must contain; "" if it is not known.
 static void failed_file(char *name, size_t room)
 {
     char log[1200], path[1000] = "";
@@ -468,9 +469,9 @@ static void failed_file(char *name, size_t room)
     snprintf(name, room, "%s", ends_with(path, "/said") ? "-" : slash ? slash + 1 : path);
 }
 
-static bool said_differs;    // each time, of this command
+static bool said_differs;    // the output of this command differs in each run
 
-// What came of a disturbed run. `bad`: the exit code of one that is refused; -1: any.
+// Judges a run with a failure. `bad`: the required exit code of a failed run; -1: any.
 static void judge(const Case *c, int code, int bad, bool one_message, const char *how)
 {
     cases_run++;
@@ -488,7 +489,7 @@ static void judge(const Case *c, int code, int bad, bool one_message, const char
     else if (code != 0 && bad >= 0 && code != bad &&
              !(code == 3 && (c->traits & WINDOW || strstr(said, "recording stopped") || strstr(said, "cannot be written") || strstr(said, "cannot write to"))))
         fault(c, how, "ends with %d, not %d", code, bad);
-    else if (code != 0 && (lines == 0 || (one_message && lines != 1 && !(c->traits & WINDOW))))      // the drivers have words of their own
+    else if (code != 0 && (lines == 0 || (one_message && lines != 1 && !(c->traits & WINDOW))))      // graphics drivers print messages of their own
         fault(c, how, "ends with %d and %d messages", code, lines);
     else if (code != 0 && one_message && name[0] && !strstr(said, name))
         fault(c, how, "ends with %d and does not name %s", code, name);
@@ -527,7 +528,7 @@ static void read_log(Reference *reference)
     qsort(places, (size_t)reference->places, sizeof *places, order);
 }
 
-// Twice undisturbed. False if it cannot be compared.
+// Two runs without a failure. False if they cannot be compared.
 static bool make_reference(const Case *c, Reference *reference, const char *mode)
 {
     bool watched = !strcmp(part, "heap") || !strcmp(part, "files");
@@ -564,7 +565,7 @@ static bool make_reference(const Case *c, Reference *reference, const char *mode
 
 static long wanted;     // cases of each command; 0: all
 
-// A window costs a second of the processor's: of the share in ctest a quarter.
+// A window takes a second of processor time: in ctest only a quarter of the cases.
 static long wanted_of(const Case *c, long total)
 {
     long share = c->traits & WINDOW && wanted < 100 ? (wanted + 3) / 4 : wanted;
@@ -578,7 +579,7 @@ static void judge_allocation(const Case *c, int code, long number)
     judge(c, code, 2, true, how);
 }
 
-// What one of the processes of FAIL_LIST left becomes what a run has left.
+// Takes the files of one of the processes of FAIL_LIST as those of a run.
 static void take_fork(long number, const char *place)
 {
     static const char *const name[] = {"work", "said", "complained"};
@@ -596,7 +597,7 @@ static void take_fork(long number, const char *place)
     put(in(".", "log"), text);
 }
 
-// Those that fail in processes of their own; clears their numbers.
+// The cases that fail in forked processes; clears their numbers.
 static void torture_forks(const Case *c, long *number, long count)
 {
     FILE *list = fopen(in(".", "list"), "w");
@@ -732,7 +733,7 @@ static void read_only(long value)
 static const struct Limit {
     const char *name;
     void (*set)(long value);
-    long from, to, factor;   // values from..to, each the former times factor; 0: plus one
+    long from, to, factor;   // values from..to, each the previous one times factor; 0: plus one
     bool keeps_quiet;        // standard error is closed
 } limits[] = {
     {"closed descriptors", closed, 1, 7, 0, true},      {"soft stack", soft_stack, 32 << 10, 512 << 10, 2, false},
@@ -753,7 +754,7 @@ static long torture_by_limits(const Case *c, const Reference *reference)
     for (size_t i = 0; i < sizeof limits / sizeof *limits; i++) {
         const struct Limit *limit = &limits[i];
         if (c->traits & WINDOW && limit->set == address_space)
-            continue;        // the drawing drivers need much memory and crash without it
+            continue;        // the graphics drivers need much memory and crash without it
         long values = 0, skipped;
         for (long v = limit->from; v <= limit->to; v = next_value(limit, v))
             values++;
@@ -781,7 +782,7 @@ static long torture_by_limits(const Case *c, const Reference *reference)
     return done;
 }
 
-// --- all of it ---
+// --- main ---
 
 static void begin_window(void)
 {
@@ -819,7 +820,7 @@ static void clean_up(void)
         fprintf(stderr, "torture: %s stays\n", here);
 }
 
-static void stop(int number) { exit(128 + number); }      // the folder and the display with it
+static void stop(int number) { exit(128 + number); }      // removes the folder and the display
 
 static void make_inputs(const char *const *input)
 {
@@ -850,7 +851,7 @@ int main(int argc, char **argv)
     wanted = *verb && **verb >= '0' && **verb <= '9' ? atol(*verb++) : 8;
     state = *verb && **verb >= '0' && **verb <= '9' ? strtoull(*verb++, NULL, 10) + 1 : 1;
     state *= 0x9E3779B97F4A7C15ULL;
-    // in memory where that is possible: fsync is then no wait
+    // in memory if possible, where fsync does not wait
     snprintf(here, sizeof here, "%s/seldinger-torture-XXXXXX", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
     if (!mkdtemp(here) || chmod(here, 0755) != 0 || !realpath(argv[1], program) || !realpath(argv[2], calls))
         give_up("cannot make a folder, or no such program: ", argv[1]);

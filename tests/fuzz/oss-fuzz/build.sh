@@ -1,5 +1,5 @@
 #!/bin/bash -eu
-# OSS-Fuzz: builds the targets into $OUT, each with its seeds and dictionary. Compiler, flags and engine come from outside (CC, CXX, CFLAGS, CXXFLAGS,
+# OSS-Fuzz: builds the targets into $OUT, each with its seeds and dictionary. Compiler, flags and engine are given by variables (CC, CXX, CFLAGS, CXXFLAGS,
 # LIB_FUZZING_ENGINE). Shared libraries that the machine which runs the targets may lack go to $OUT/lib.
 # Without a container, from the project's root:
 #   export CC=clang-14 CXX=clang++-14 CFLAGS="-O1 -fsanitize=address,fuzzer-no-link"
