@@ -494,11 +494,11 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
         nearest = fmin(nearest, distance);
     }
     int first = middle, end = middle;
-    for (double way = 0; first > 0 && middle - first < NODES / 2 - 1 + is_own * NODES / 2 && way < reach && vec3_is_finite(tool->node[first - 1].position);
-         first--)
-        way += vec3_distance(tool->node[first].position, tool->node[first - 1].position);
-    for (double way = 0; end < last && end - middle < NODES / 2 && way < reach && vec3_is_finite(tool->node[end + 1].position); end++)
-        way += vec3_distance(tool->node[end].position, tool->node[end + 1].position);
+    for (double distance = 0;
+         first > 0 && middle - first < NODES / 2 - 1 + is_own * NODES / 2 && distance < reach && vec3_is_finite(tool->node[first - 1].position); first--)
+        distance += vec3_distance(tool->node[first].position, tool->node[first - 1].position);
+    for (double distance = 0; end < last && end - middle < NODES / 2 && distance < reach && vec3_is_finite(tool->node[end + 1].position); end++)
+        distance += vec3_distance(tool->node[end].position, tool->node[end + 1].position);
     bool is_hollow = false;
     for (int i = first; i <= end; i++, count++) {
         point[count] = tool->node[i].position;

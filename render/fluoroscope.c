@@ -265,8 +265,8 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
 
 static bool c_arms_differ(const CArm *a, const CArm *b)
 {
-    double way = vec3_distance(a->isocentre, b->isocentre) + fabs(a->field_mm - b->field_mm);
-    return way > 1e-3 || vec3_distance(a->towards, b->towards) > 1e-5 || vec3_distance(a->up, b->up) > 1e-5;
+    double shift = vec3_distance(a->isocentre, b->isocentre) + fabs(a->field_mm - b->field_mm);
+    return shift > 1e-3 || vec3_distance(a->towards, b->towards) > 1e-5 || vec3_distance(a->up, b->up) > 1e-5;
 }
 
 // The mean attenuation in the beam, from rays between the blades, which the automatic exposure compensates.

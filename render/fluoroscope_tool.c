@@ -13,7 +13,7 @@ static const double margin = 2;          // [pixel] on each side of the shadow: 
 typedef struct RibbonPoint {
     double x, y;                         // [pixel]
     double pixel_mm;                     // [mm] size of a pixel at its depth
-    double way;                          // [pixel] distance in space from the previous point …
+    double spacing;                      // [pixel] distance in space from the previous point …
     double wall, filling;                // … and the integrals of the wall's attenuation and of the lumen's filling along that distance
     double radius, lumen;                // [mm] of the stretch before it
     bool begins;                         // first point of a stretch
@@ -96,7 +96,7 @@ static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
 static double least_length(const RibbonPoint *p) { return fmax(1, 1.5 * p->radius / p->pixel_mm); }
 static double shadow_length(const RibbonPoint *a, const RibbonPoint *b) { return hypot(b->x - a->x, b->y - a->y); }
 // True if seen at more than 60 degrees from the side.
-static bool is_foreshortened(const RibbonPoint *a, const RibbonPoint *b) { return shadow_length(a, b) < 0.5 * b->way; }
+static bool is_foreshortened(const RibbonPoint *a, const RibbonPoint *b) { return shadow_length(a, b) < 0.5 * b->spacing; }
 
 static double filling_at(const float *filling, const RibbonPlace *place)
 {
@@ -108,7 +108,7 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
 {
     int points = 0;
     bool is_broken = true;
-    double way = 0, wall = 0, filled = 0, last_filling = 0;
+    double spacing = 0, wall = 0, filled = 0, last_filling = 0;
     Vec3 before = {0, 0, 0};
     for (int i = 0; i < path->count; i++) {
         const RibbonPlace *place = &path->place[i];
@@ -119,13 +119,13 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
             continue;
         }
         double pixel_mm = c_arm->field_mm / side * distance / C_ARM_SOURCE_MM, length = is_broken ? 0 : vec3_distance(x, before);
-        way = is_broken ? 0 : way + length / pixel_mm;
+        spacing = is_broken ? 0 : spacing + length / pixel_mm;
         wall = is_broken ? 0 : wall + length * place->attenuation;
         double here = filling ? filling_at(filling, place) : 0;
         filled = is_broken ? 0 : filled + length * (last_filling + here) / 2;
         last_filling = here;
         before = x;
-        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, way, wall, filled, place->radius, place->lumen, is_broken};
+        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, spacing, wall, filled, place->radius, place->lumen, is_broken};
         // merged with the previous point: lengths and wall integrals are added, the last position is kept
         bool is_near = !is_broken && shadow_length(&out[points - 1], &point) < least_length(&point);
         bool is_joined = is_near && i + 1 < path->count && (!place->is_border || is_foreshortened(&out[points - 1], &point));
@@ -133,7 +133,7 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
         if (is_joined)
             continue;
         out[points++] = point;
-        way = wall = filled = 0;
+        spacing = wall = filled = 0;
     }
     return points;
 }

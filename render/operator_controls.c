@@ -50,9 +50,9 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
         xray->lao_deg = xray->cra_deg = 0;
     // the patient moves in the direction of the key, so the isocentre moves in the opposite direction
     CArm arm = c_arm_place(xray, patient);
-    double way = table_fields_s * (double)xray->field_mm * seconds;
-    Vec3 moved = vec3_add(vec3_scale(arm.right, way * held(actions, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT)),
-                          vec3_scale(arm.up, way * held(actions, ACTION_TABLE_DOWN, ACTION_TABLE_UP)));
+    double distance = table_fields_s * (double)xray->field_mm * seconds;
+    Vec3 moved = vec3_add(vec3_scale(arm.right, distance * held(actions, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT)),
+                          vec3_scale(arm.up, distance * held(actions, ACTION_TABLE_DOWN, ACTION_TABLE_UP)));
     for (int k = 0; k < 3; k++)
         xray->table_mm[k] += (float)(&moved.x)[k];
     double sides = blade_s * seconds * held(actions, ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN);

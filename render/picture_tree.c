@@ -112,15 +112,15 @@ static void draw_axes(PicturePage *page, const Panel *panel)
 {
     const PictureProjection *p = panel->image;
     double s = page->scale;
-    for (int way = 0; way < 2; way++) {
-        Vec3 step = way ? p->up : p->across;
-        int pixels = way ? p->height : p->width;
+    for (int direction = 0; direction < 2; direction++) {
+        Vec3 step = direction ? p->up : p->across;
+        int pixels = direction ? p->height : p->width;
         double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size, tick = tick_step(high - low, 6);
         for (double k = ceil(low / tick); k * tick <= high; k++) {
             char text[32];
             picture_page_format_tick(text, sizeof text, k * tick, tick);
             double part = (k * tick - low) / (high - low);
-            if (way) {
+            if (direction) {
                 double y = panel->y + panel->height * (1 - part), height;
                 overlay_text_size(page->overlay, TEXT_SMALL, text, NULL, &height);
                 overlay_line(page->overlay, panel->x - 4 * s, y, panel->x, y, SHEET_INK, s);

@@ -1,9 +1,10 @@
-// Translucency by a painter's sort: triangles are small compared with the vessel, so sorting them by their centroids is accurate enough, it needs one
-// pass (depth peeling: one for each layer) and works with multisampling. A counting sort on 16 bits of depth costs 1 to 2 ms for 100,000 triangles
+// Translucency by painter's sort: triangles are small compared with the vessel, so sorting them by their centroids is accurate enough; it needs one
+// pass (depth peeling needs one for each layer) and works with multisampling. A counting sort on 16 bits of depth costs 1 to 2 ms for 100,000 triangles
 // and keeps index order within a bucket, so the same scene gives the same pixels.
 //
-// With n the unit normal in eye space and c = |n_z|: opacity = face + (rim - face) (1 - c)^p, so the lumen's outline stands out and its middle
-// lets the tool be seen. For two faces of one tube that is what a thin-walled glass tube does.
+// With n the unit normal in eye space and c = |n_z|: opacity = face + (rim - face) (1 - c)^p, so the outline of the lumen stands out and the tool is visible
+// through its
+// middle. For the two faces of a tube this is the look of thin-walled glass.
 #include "render/surface_view.h"
 
 #include "render/drawable_mesh.h"
@@ -43,7 +44,7 @@ static const char *const SHELL_FRAGMENT =
     "uniform vec3 front, back, haze; uniform vec4 opacity; uniform float haze_amount; uniform vec2 fade;\n"   // opacity: front, back, rim, power
     "void main() {\n"
     "  vec3 m = normalize(n); bool outer = gl_FrontFacing;\n"
-    // at the outline the interpolated normal may point the wrong way: the face decides
+    // at the outline the interpolated normal may point to the wrong side: the facing of the triangle decides
     "  m = outer == (m.z >= 0.0) ? m : normalize(vec3(m.xy, 0.0) + vec3(0.0, 0.0, outer ? 0.001 : -0.001));\n"
     "  float edge = pow(1.0 - abs(m.z), opacity.w);\n"
     "  float a = mix(outer ? opacity.x : opacity.y, opacity.z, edge);\n"
@@ -105,7 +106,7 @@ SurfaceView *surface_view_create(char *message, size_t capacity)
 {
     SurfaceView *view = calloc(1, sizeof *view);
     if (!view) {
-        message_fail(message, capacity, "not enough memory for a picture");
+        message_fail(message, capacity, "out of memory for a picture");
         return NULL;
     }
     view->shell_program = make_program(MESH_VERTEX, SHELL_FRAGMENT, message, capacity);
@@ -171,7 +172,7 @@ bool surface_view_set_mesh(SurfaceView *view, const TriangleMesh *mesh, char *me
     view->sorted = malloc((triangles + 1) * 3 * sizeof *view->sorted);
     view->bucket = malloc((triangles + 1) * sizeof *view->bucket);
     if (!view->position || !view->triangle || !view->sorted || !view->bucket)
-        return message_fail(message, capacity, "not enough memory for a surface of %d triangles", mesh->triangle_count);
+        return message_fail(message, capacity, "out of memory for a surface of %d triangles", mesh->triangle_count);
     view->origin = middle_of(mesh);
     float *interleaved = drawable_mesh_floats(mesh, view->origin, message, capacity);
     if (!interleaved)
@@ -196,7 +197,7 @@ bool surface_view_set_mesh(SurfaceView *view, const TriangleMesh *mesh, char *me
     return true;
 }
 
-// Far triangles first, into view->sorted.
+// Sorts the triangles from far to near into view->sorted.
 static void sort_triangles(SurfaceView *view, const Camera *camera)
 {
     static _Thread_local int start[BUCKETS + 1];
@@ -249,7 +250,7 @@ void surface_view_draw_shell(SurfaceView *view, const Camera *camera, const Shel
     glUniform3fv(glGetUniformLocation(program, "haze"), 1, style->haze);
     glUniform1f(glGetUniformLocation(program, "haze_amount"), style->haze_amount);
     glUniform4f(glGetUniformLocation(program, "opacity"), style->front_opacity, style->back_opacity, style->rim, style->rim_power);
-    // in depths of the clip space, 0 near to 1 far
+    // as depth in clip space, 0 near to 1 far
     double range = camera->near_depth - camera->far_depth, from = (camera->near_depth - style->fade_from) / range;
     double to = (camera->near_depth - style->fade_to) / range;
     bool fades = style->fade_to > style->fade_from;

@@ -13,7 +13,7 @@ Timeline *timeline_create(char *message, size_t capacity)
 {
     Timeline *timeline = calloc(1, sizeof *timeline);
     if (!timeline) {
-        message_fail(message, capacity, "not enough memory for the timeline");
+        message_fail(message, capacity, "out of memory for the timeline");
         return NULL;
     }
     timeline->gui = gui_create(message, capacity);
@@ -31,7 +31,7 @@ void timeline_destroy(Timeline *timeline)
     free(timeline);
 }
 
-// Bookmarks as ticks over the slider, which fills `bar`.
+// Draws bookmarks as ticks over the slider, which fills `bar`.
 static void draw_marks(Gui *gui, const TimelineState *state, GuiRect bar, float scale)
 {
     for (int i = 0; i < state->mark_count && state->end_s > 0; i++) {
@@ -61,7 +61,7 @@ TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, cons
     gui_beside(gui, 6 * s);
     gui_slider(gui, "speed", &actions.speed, 0.1F, 8, "speed %.1f", 130 * s);
     gui_beside(gui, 6 * s);
-    actions.resume = gui_button(gui, "resume", "Go on from here", "F5", 190 * s, false).pressed;
+    actions.resume = gui_button(gui, "resume", "Continue from here", "F5", 190 * s, false).pressed;
     gui_beside(gui, 10 * s);
     gui_text(gui, GUI_NORMAL, gui_colors.dim, state->note ? state->note : "");
     char label[64];

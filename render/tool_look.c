@@ -2,13 +2,13 @@
 
 #include <stdlib.h>
 
-// Blue, sky blue, bluish green, and grey for wires; then for a kind that comes again. Chosen so that any two lie far apart without red and green, too, and on
-// their ground; orange and yellow, which Okabe and Ito have besides, are those of wall force.
+// Blue, sky blue, bluish green, and grey for wires; then colours for repeated kinds. Any two are distinguishable without red and green, and stand out from
+// their background. Orange and yellow, also from Okabe and Ito, are reserved for wall force.
 enum { COLORS = 7 };
 static const Color palette[2][COLORS] = {
     {{64, 119, 227, 255}, {97, 212, 255, 255}, {30, 155, 124, 255}, {196, 203, 214, 255}, {175, 128, 189, 255}, {68, 213, 76, 255}, {68, 131, 74, 255}},
     {{0, 68, 151, 255}, {85, 163, 224, 255}, {0, 146, 105, 255}, {74, 62, 79, 255}, {164, 80, 170, 255}, {50, 156, 42, 255}, {146, 16, 203, 255}}};
-_Static_assert((int)COLORS >= (int)TOOL_KIND_COUNT + TOOLS_MOST - 1, "four tools of one kind have colours of their own");
+_Static_assert((int)COLORS >= (int)TOOL_KIND_COUNT + TOOLS_MOST - 1, "four tools of one kind have different colours");
 
 void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color)
 {
@@ -27,7 +27,7 @@ static bool is_same_tube(const TubeStretch *a, const TubeStretch *b)
              a->attenuation > b->attenuation);
 }
 
-// Sections that look the same, as those of a rest shape do, are one.
+// Adds a stretch; sections that look the same, such as those of a rest shape, become one stretch.
 static void add_stretch(ToolLook *look, TubeStretch stretch)
 {
     TubeStretch *last = look->stretch_count > 0 ? &look->stretch[look->stretch_count - 1] : NULL;

@@ -21,34 +21,34 @@ enum { PADS = 4 };
 typedef struct Trainer {
     const TrainerOptions *options;
     Scene *scene;
-    Scene *own_scene;                // after devices were added from the tray: owned copy behind `scene`
-    int own_devices[TOOLS_MOST];     // of the caller's scene
+    Scene *own_scene;                // owned copy behind `scene` after devices were added from the tray
+    int own_devices[TOOLS_MOST];     // number of devices in the caller's scene
     OpenVessel *open;
     Window *window;
     Panel *panel;
     Views *views;
     OperatorControls controls;
-    HandPort keyboard[2], pad[PADS][MAP_HANDS];  // of the keys: for the chosen tool and its partner
+    HandPort keyboard[2], pad[PADS][MAP_HANDS];  // keyboard: for the selected tool and its partner
     bool pad_refused[PADS];
     Gamepad gamepad[PADS];
-    DeviceMap *built_in[2];          // for gamepads, for joysticks
+    DeviceMap *built_in[2];          // one for gamepads, one for joysticks
     Hands *hands;
     unsigned buttons;                // of all devices, in the last frame
     LiveSession session;
     TrainerPanel shown;
     PulseClock pulses;
     TrainerCine cine;
-    double begun_s;                  // wall clock
+    double begun_s;                  // wall clock at the start
     double frame_cpu_s;              // process CPU time at the last frame
     TrainerTray tray;
-    bool has_tray, is_tray_due;      // the tray is open; the chosen device is inserted after the next picture
+    bool has_tray, is_tray_due;      // the tray is open; the selected device is inserted after the next picture
     double progress_s;               // time of the last progress update of a resumed session
-    int fitted[TOOLS_MOST];          // as last reported, -1: not yet
+    int fitted[TOOLS_MOST];          // as last reported, -1: not reported yet
     int64_t refused;
     bool is_paused, has_told_end;
     char trainee[64];
-    char date[SESSION_DATE];         // of the session's begin
-    const char *progress;            // title of the present computation
+    char date[SESSION_DATE];         // start of the session
+    const char *progress;            // title of the current computation
     TimeHistogram frame_cpu_ns;
     TrainerFigures *figures;
 } Trainer;
@@ -65,9 +65,9 @@ __attribute__((format(printf, 3, 4))) static void say(Trainer *trainer, PanelMar
     panel_message(trainer->panel, since_begin(trainer), mark, text);
 }
 
-// --- a session's start and end ---
+// --- start and end of a session ---
 
-// Without a session: the panel with a line of text, no views.
+// Draws the panel with a line of text and no views, for use without a session.
 static void draw_panel_alone(Trainer *trainer, const WindowInput *input, const char *line)
 {
     PanelState state = trainer->shown.state;
@@ -96,7 +96,7 @@ static void show_progress(void *context, double part)
     draw_panel_alone(trainer, input, line);
 }
 
-// True: yes. The time that the window was to be open counts.
+// Asks the user a question; returns true for yes. Waiting counts towards the time limit of the window.
 static bool is_answered_yes(Trainer *trainer, PanelQuestion question)
 {
     const WindowInput *input;
@@ -112,7 +112,7 @@ static bool is_answered_yes(Trainer *trainer, PanelQuestion question)
     return actions.answer > 0;
 }
 
-// Offers to recover interrupted sessions before the first one begins.
+// Offers to recover interrupted sessions before the first session begins.
 static void offer_recovery(Trainer *trainer)
 {
     char text[300];
@@ -176,7 +176,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     return true;
 }
 
-// Names of the devices that have sent reports, for the session file.
+// Writes the names of the devices that have sent reports, for the session file.
 static void name_devices(Trainer *trainer, char out[SESSION_NAME])
 {
     char all[2048] = "keyboard";
@@ -194,7 +194,7 @@ static void name_devices(Trainer *trainer, char out[SESSION_NAME])
     snprintf(out, SESSION_NAME, "%.*s", SESSION_NAME - 1, all);
 }
 
-// The thread ends, the recording is closed, the session file is written beside it.
+// Ends the thread, closes the recording, and writes the session file into its folder.
 static bool end_session(Trainer *trainer, Faults *faults)
 {
     RealtimeFigures real;
@@ -251,14 +251,14 @@ static void drive_by_pads(Trainer *trainer)
         int vendor, product;
         if (is_there && gamepad_ids_of_guid(pad.guid, &vendor, &product) && hands_drives(trainer->hands, vendor, product)) {
             if (was_there)
-                gamepad_lost(gamepad, trainer->pad[i]);   // its HID reports are read directly: avoid counting the device twice
+                gamepad_lost(gamepad, trainer->pad[i]);   // its HID reports are read directly: otherwise the device would count twice
             gamepad->map = NULL;
             continue;
         }
         if (!is_there) {
             if (was_there) {
                 gamepad_lost(gamepad, trainer->pad[i]);
-                say(trainer, MARK_WARNING, "%s unplugged: plug it in again to go on", window_gamepad_name(trainer->window, i));
+                say(trainer, MARK_WARNING, "%s unplugged: plug it in again to continue", window_gamepad_name(trainer->window, i));
             }
             gamepad->map = NULL;
             continue;
@@ -296,23 +296,23 @@ static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActio
     char first[16], last[16];
     for (int k = count; k < TOOLS_MOST; k++)
         if (actions->pressed[ACTION_TOOL_1 + k])
-            say(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the views are on %s to %s", k + 1, count,
+            say(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the keys of the views are %s to %s", k + 1, count,
                 key_table_text(ACTION_VIEW_FLUOROSCOPY, first, sizeof first), key_table_text(ACTION_VIEW_ALL, last, sizeof last));
     if (now->chosen != before->chosen)
-        say(trainer, MARK_NONE, "tool %d in hand: %s", now->chosen + 1, tool[now->chosen].name);
+        say(trainer, MARK_NONE, "tool %d selected: %s", now->chosen + 1, tool[now->chosen].name);
     for (int k = 1; k < count; k++)
         if ((now->locked ^ before->locked) >> k & 1)
             say(trainer, MARK_NONE, now->locked >> k & 1 ? "%s and %s are locked: they move as one" : "%s and %s are unlocked", tool[k - 1].name, tool[k].name);
     if (count < 2 && actions->pressed[ACTION_LOCK])
-        say(trainer, MARK_NONE, "the scene has one tool: there is none to lock it to");
+        say(trainer, MARK_NONE, "the scene has only one tool, so it cannot be locked to another");
     for (int k = 0; k < count; k++)
         if ((now->released ^ before->released) >> k & 1)
-            say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is in hand again", tool[k].name);
+            say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is held again", tool[k].name);
 }
 
 // --- the tray ---
 
-// scenes/tools as the program lies in its build folder, build/PRESET/seldinger.
+// scenes/tools relative to the program in its build folder, build/PRESET/seldinger.
 static const char *library(const Trainer *trainer, char *text, size_t capacity)
 {
     if (trainer->options->library)
@@ -332,16 +332,16 @@ static void open_tray(Trainer *trainer, const Pose *pose)
     char text[4200];
     int in;
     if (trainer->scene->tool_count < 2) {
-        say(trainer, MARK_WARNING, "the scene has one tool: a tool is exchanged over the one within it or inside the one around it");
+        say(trainer, MARK_WARNING, "the scene has only one tool: a tool is exchanged over the one inside it or through the one around it");
         return;
     }
-    // the scene's author listed the devices, or left it open
+    // use the library only if the author of the scene has listed no devices
     const char *folder = trainer->own_devices[tool] > 1 ? NULL : library(trainer, text, sizeof text);
     trainer->has_tray = trainer_tray_open(&trainer->tray, trainer->scene, tool, folder, pose, &in);
     if (trainer->has_tray)
         panel_open_tray(trainer->panel, trainer->tray.devices.count, in);
     else
-        say(trainer, MARK_BAD, "not enough memory for the tray");
+        say(trainer, MARK_BAD, "out of memory for the tray");
 }
 
 static void close_tray(Trainer *trainer)
@@ -351,7 +351,7 @@ static void close_tray(Trainer *trainer)
     trainer->has_tray = trainer->is_tray_due = false;
 }
 
-// Continues the session with a scene that has one more device: everything is simulated again, as fast as possible, and recorded again. True if the
+// Continues the session with a scene that has one more device: everything is simulated and recorded again, as fast as possible. Returns true if the
 // session continues, in the old scene if the new one was refused.
 static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *faults)
 {
@@ -361,7 +361,7 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
     const HandGrip grip = trainer->controls.grip;
     const bool has_told_end = trainer->has_told_end;
     snprintf(path, sizeof path, "%s", trainer->session.record_path);
-    trainer->progress = "Computing the session again with the new device";
+    trainer->progress = "Simulating the session again with the new device";
     bool good = live_session_stop(&trainer->session, &real, faults);
     live_session_free(&trainer->session);
     RecordedRun *run = good && has_begun ? recorded_run_load_series(path, faults) : NULL;
@@ -376,7 +376,7 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
     trainer->has_told_end = has_told_end;
     trainer->controls.grip.locked = good ? grip.locked & ~(trainer->controls.grip.released | trainer->controls.grip.released << 1) : 0;
     if (good && path[0])
-        remove(path);            // all of it is in the new one
+        remove(path);            // the new recording contains all of it
     return good;
 }
 
@@ -391,14 +391,14 @@ static void show_new_scene(Trainer *trainer, Faults *faults)
     }
 }
 
-// Adds a new device to the scene. False ends the session.
+// Adds a new device to the scene. Returns false if the session has ended.
 static bool add_device(Trainer *trainer, bool has_begun, Faults *faults)
 {
     TrainerTray *tray = &trainer->tray;
     const TipShaping tip = trainer_tray_tip(tray);
     Scene *scene = tray_scene_with(trainer->scene, tray->devices.tool, &tray->devices.device[tray->choice.device], &tip, faults);
     if (scene)
-        scene->contact = trainer->scene->contact;    // a resumed recording may differ from its scene text
+        scene->contact = trainer->scene->contact;    // that of a resumed recording may differ from the text of the scene
     bool good = scene && open_vessel_inlet(scene, trainer->open, faults), lives = !good || go_on_in(trainer, scene, has_begun, faults);
     bool is_taken = good && lives && trainer->scene == scene;
     if (is_taken)
@@ -423,14 +423,14 @@ static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
     const char *obstacle = trainer_tray_obstacle(tray);
     bool has_begun = pose->step > 0, is_new = which < 0 || trainer_tray_tip(tray).length > 0, lives = true;
     if (!obstacle && is_new && has_begun && !trainer->session.record_path[0])
-        obstacle = "this session is not recorded: it can only use the devices that it began with";
+        obstacle = "this session is not recorded: it can only use the devices that it started with";
     if (obstacle) {
         say(trainer, MARK_WARNING, "%s", obstacle);
         trainer->is_tray_due = false;
         return true;
     }
     if (is_new && !trainer->is_tray_due) {
-        say(trainer, MARK_NONE, "computing the session again with the new device, %.0f s of it", pose->time_s);
+        say(trainer, MARK_NONE, "simulating the session (%.0f s) again with the new device", pose->time_s);
         return trainer->is_tray_due = true;
     }
     if (is_new) {
@@ -444,7 +444,7 @@ static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
     return lives;
 }
 
-// Device buttons control the tray while it is open. False ends the session.
+// Device buttons control the tray while it is open. Returns false if the session has ended.
 static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pressed, Faults *faults)
 {
     const Moment *moment = realtime_moment(trainer->session.realtime);
@@ -498,7 +498,7 @@ static void take_screenshot(Trainer *trainer, const WindowInput *input)
     if (rgb)
         gl_framebuffer_read(0, input->width, input->height, rgb);
     if (rgb && png_file_write(path, input->width, input->height, rgb, message, sizeof message))
-        say(trainer, MARK_GOOD, "picture %s", path);
+        say(trainer, MARK_GOOD, "saved picture %s", path);
     else
         say(trainer, MARK_BAD, "no picture: %s", rgb ? message : "out of memory");
     free(rgb);
@@ -506,16 +506,16 @@ static void take_screenshot(Trainer *trainer, const WindowInput *input)
 
 static void obey_cine(Trainer *trainer, const PanelActions *actions, Faults *faults)
 {
-    char told[600], stem[4096];
-    if (trainer_cine_obey(&trainer->cine, actions, told, sizeof told))
+    char remark[600], stem[4096];
+    if (trainer_cine_obey(&trainer->cine, actions, remark, sizeof remark))
         fluoroscope_forget(views_fluoroscope(trainer->views));
-    if (*told)
-        say(trainer, MARK_NONE, "%s", told);
+    if (*remark)
+        say(trainer, MARK_NONE, "%s", remark);
     if (!actions->pressed[ACTION_CINE_SAVE])
         return;
     session_file_name(trainer->options->folder, trainer->scene->path, "", stem, sizeof stem);
-    bool good = trainer_cine_save(&trainer->cine, trainer->views, stem, told, sizeof told, faults);
-    say(trainer, good ? MARK_GOOD : MARK_WARNING, "%s", told);
+    bool good = trainer_cine_save(&trainer->cine, trainer->views, stem, remark, sizeof remark, faults);
+    say(trainer, good ? MARK_GOOD : MARK_WARNING, "%s", remark);
     faults_clear(faults);
 }
 
@@ -524,7 +524,7 @@ static bool restart(Trainer *trainer, Faults *faults)
     bool whole = end_session(trainer, faults);
     panel_forget_samples(trainer->panel);
     fluoroscope_forget(views_fluoroscope(trainer->views));
-    say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "a new session; the last one is saved" : "a new session; the last one could not be saved: %s",
+    say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "new session; the last one is saved" : "new session; the last one could not be saved: %s",
         faults->text[0]);
     faults_clear(faults);
     trainer->is_paused = false;
@@ -532,7 +532,7 @@ static bool restart(Trainer *trainer, Faults *faults)
     return begin_session(trainer, NULL, faults);
 }
 
-// False ends the program.
+// Returns false if the program must end.
 static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInput *input, Faults *faults)
 {
     if (actions->trainee_set) {
@@ -551,7 +551,7 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
     }
     if (actions->pressed[ACTION_SAVE])
         say(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING,
-            trainer->session.record_path[0] ? "recorded up to now in %s" : "this session is not recorded%s", trainer->session.record_path);
+            trainer->session.record_path[0] ? "recorded so far in %s" : "this session is not recorded%s", trainer->session.record_path);
     if (actions->pressed[ACTION_FULL_SCREEN] & 1)
         window_set_full_screen(trainer->window, !window_is_full_screen(trainer->window));
     if (actions->pressed[ACTION_SCREENSHOT])
@@ -572,12 +572,12 @@ static void tell_news(Trainer *trainer, const Moment *moment)
         say(trainer, MARK_WARNING, "%s", text);
     if (!trainer->has_told_end && (tracked->score.state == SCORE_REACHED || tracked->score.state == SCORE_TIME_OUT)) {
         trainer->has_told_end = true;
-        say(trainer, tracked->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
-            tracked->score.state == SCORE_REACHED ? "target reached and held" : "the time is over", tracked->score.points);
+        say(trainer, lesson->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
+            lesson->score.state == SCORE_REACHED ? "target reached and held" : "time is up", lesson->score.points);
     }
 }
 
-// "wire, microcatheter: ", the tools that a device moves now.
+// Writes "wire, microcatheter: ", the tools that a device moves now.
 static void name_moved(const Trainer *trainer, const HandPort *port, int hand_count, char *text, size_t capacity)
 {
     size_t used = 0;
@@ -768,7 +768,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     Trainer *trainer = calloc(1, sizeof *trainer);
     int code = EXIT_BAD_INPUT;
     if (!trainer) {
-        faults_add(faults, scene->path, 0, 0, "not enough memory for a session");
+        faults_add(faults, scene->path, 0, 0, "out of memory for a session");
         return code;
     }
     *trainer = (Trainer){.options = options,
@@ -788,7 +788,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     session_date(time(NULL), trainer->date);
     if (is_open && begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {
         run_window(trainer, faults);
-        double resident = resident_mb();   // before the session is put away
+        double resident = resident_mb();   // before the memory of the session is released
         is_open = trainer->session.realtime != NULL;
         const Moment *moment = is_open ? realtime_moment(trainer->session.realtime) : NULL;
         bool diverged = moment && moment->figures.state == REALTIME_DIVERGED;

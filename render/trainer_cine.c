@@ -17,7 +17,7 @@ bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *pa
     if (!path) {
         cine->cine = cine_create(shape, LOOP_IMAGES);
         if (!cine->cine)
-            faults_add(faults, "cine", 0, 0, "not enough memory for a loop of %d images", LOOP_IMAGES);
+            faults_add(faults, "cine", 0, 0, "out of memory for a loop of %d images", LOOP_IMAGES);
         return cine->cine != NULL;
     }
     size_t length;
@@ -26,8 +26,8 @@ bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *pa
     free(bytes);
     CineShape found = cine->cine ? cine_shape(cine->cine) : *shape;
     if (cine->cine && !cine_shapes_same(&found, shape)) {
-        faults_add(faults, path, 0, 0, "is a loop of %d tools, the first of %d nodes, in a vessel of %d; this scene has %d, %d and %d", found.tool_count,
-                   found.tool_nodes[0], found.contrast_count, shape->tool_count, shape->tool_nodes[0], shape->contrast_count);
+        faults_add(faults, path, 0, 0, "is a loop with %d tools, %d nodes in the first tool and %d in the vessel; this scene has %d, %d and %d",
+                   found.tool_count, found.tool_nodes[0], found.contrast_count, shape->tool_count, shape->tool_nodes[0], shape->contrast_count);
         trainer_cine_close(cine);
     }
     return cine->cine != NULL;
@@ -39,26 +39,26 @@ void trainer_cine_close(TrainerCine *cine)
     *cine = (TrainerCine){0};
 }
 
-bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *told, size_t capacity)
+bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *remark, size_t capacity)
 {
-    *told = 0;
+    *remark = 0;
     if (actions->pressed[ACTION_CINE_RECORD] & 1) {
         bool was_shown = cine->is_shown;
         cine->is_shown = false;
         cine_lock(cine->cine, false);
         if (cine_is_recording(cine->cine)) {
             cine_stop(cine->cine);
-            snprintf(told, capacity, "cine: %d images, %.1f s; F7 shows it, F8 saves it", cine_count(cine->cine), cine_duration_s(cine->cine));
+            snprintf(remark, capacity, "cine: %d images, %.1f s; F7 shows it, F8 saves it", cine_count(cine->cine), cine_duration_s(cine->cine));
         } else {
             cine_record(cine->cine);
-            snprintf(told, capacity, "cine is recorded while the X-ray is on; the last %d images are kept", cine_capacity(cine->cine));
+            snprintf(remark, capacity, "cine is recorded while the X-ray is on; the last %d images are kept", cine_capacity(cine->cine));
         }
         return was_shown;
     }
     if (!(actions->pressed[ACTION_CINE_REPLAY] & 1))
         return false;
     if (!cine->is_shown && cine_count(cine->cine) == 0) {
-        snprintf(told, capacity, "no cine yet: F6 records while the X-ray is on");
+        snprintf(remark, capacity, "no cine yet: F6 records while the X-ray is on");
         return false;
     }
     cine->is_shown = !cine->is_shown;
@@ -108,12 +108,12 @@ static bool draw_image(void *context, const CineFrame *image, uint8_t *rgb, char
     return true;
 }
 
-bool trainer_cine_save(TrainerCine *cine, Views *views, const char *stem, char *told, size_t capacity, Faults *faults)
+bool trainer_cine_save(TrainerCine *cine, Views *views, const char *stem, char *remark, size_t capacity, Faults *faults)
 {
     char path[4096], message[256] = "";
     size_t length;
     if (cine_count(cine->cine) == 0) {
-        snprintf(told, capacity, "no cine to save: F6 records while the X-ray is on");
+        snprintf(remark, capacity, "no cine to save: F6 records while the X-ray is on");
         return false;
     }
     uint8_t *bytes = cine_pack(cine->cine, &length);
@@ -132,8 +132,8 @@ bool trainer_cine_save(TrainerCine *cine, Views *views, const char *stem, char *
     }
     gl_canvas_destroy(&drawing.canvas);
     if (good)
-        snprintf(told, capacity, film ? "cine %.200s.cine and .mp4%s" : "cine %.200s.cine; no film: %s", stem, film ? "" : message);
+        snprintf(remark, capacity, film ? "cine %.200s.cine and .mp4%s" : "cine %.200s.cine; no video: %s", stem, film ? "" : message);
     else
-        snprintf(told, capacity, "the cine could not be saved: %.200s", faults->count ? faults->text[0] : "out of memory");
+        snprintf(remark, capacity, "the cine could not be saved: %.200s", faults->count ? faults->text[0] : "out of memory");
     return good;
 }

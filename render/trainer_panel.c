@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
-// Further outside the wall than any run that can be trusted (cli/run.c).
+// Further outside the wall than in any valid run (cli/run.c).
 static const double outside_mm = 0.2;
-// Below this fraction of real time the operator notices that the tool is slow.
+// Below this fraction of real time the operator notices that the tool moves slowly.
 static const double slow_factor = 0.97;
 
 static void name_device(TrainerPanel *panel, const Scene *scene, int k, int which)
@@ -36,7 +36,7 @@ void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *tr
     }
     state->trainee = trainee;
     state->title = scene->exercise ? scene->exercise->title : "Free practice";
-    state->instructions = scene->exercise ? scene->exercise->instructions : "No exercise is set in this scene: go where you like.";
+    state->instructions = scene->exercise ? scene->exercise->instructions : "This scene has no exercise: navigate freely.";
     if (scene->exercise) {
         snprintf(panel->target, sizeof panel->target, "%s", scene->target[scene->exercise->target].name);
         state->target = panel->target;
@@ -69,7 +69,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     add_figure(panel, "Contrast", score->contrast_ml, "ml", 1, mark_of_part(scene, score, PART_CONTRAST));
     add_figure(panel, "Tip path", score->path_mm, "mm", 0, mark_of_part(scene, score, PART_PATH));
     if (scene->exercise) {
-        add_figure(panel, "Way left", score->remaining_mm, "mm", 0, MARK_NONE);
+        add_figure(panel, "Path left", score->remaining_mm, "mm", 0, MARK_NONE);
         add_figure(panel, "Efficiency", 100 * score->efficiency, "%", 0, MARK_NONE);
     }
     add_figure(panel, "Wall force, peak", score->wall_force_peak_n, "N", 2, mark_of_part(scene, score, PART_WALL_FORCE));
@@ -88,7 +88,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
         snprintf(panel->instructions, sizeof panel->instructions, "%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.",
-                 score->state == SCORE_REACHED ? "Target reached and held" : "The time is over", score->points, score->time_s, score->error_total,
+                 score->state == SCORE_REACHED ? "Target reached and held" : "Time is up", score->points, score->time_s, score->error_total,
                  score->error_total == 1 ? "" : "s");
         state->instructions = panel->instructions;
     }
@@ -106,9 +106,9 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
         state->warnings |= WARN_OUTSIDE;
     if (report->flags & STEP_NOT_CONVERGED)
         state->warnings |= WARN_NOT_CONVERGED;
-    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: nothing is left to push"
+    const char *line = report->flags & STEP_FULLY_INSERTED ? "The tool is fully inserted and cannot be pushed further"
                        : report->flags & STEP_HAND_SLIPS   ? "The hand slips along the tool: the tool needs more force than the grip holds"
-                       : report->flags & STEP_LIMITED      ? "The tool takes less than the hand feeds: it is jammed, or it snaps"
+                       : report->flags & STEP_LIMITED      ? "The tool advances less than the hand pushes: it is jammed, or it snaps"
                                                            : NULL;
     if (figures) {
         if (figures->state == REALTIME_RUNNING && figures->real_time_factor > 0 && figures->real_time_factor < slow_factor)
@@ -161,7 +161,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
     warn(panel, pose, figures);
 }
 
-// Labels of the 3D view: targets with their distance from the tip, the sheath's mouth.
+// Labels of the 3D view: targets with their distance from the tip, and the mouth of the sheath.
 static void label_scene(TrainerPanel *panel, const OperatorControls *controls, const VesselScene *scene)
 {
     PanelState *state = &panel->state;
@@ -198,7 +198,7 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
     state->has_model = controls->look.show_model;
     state->has_arrows = controls->look.show_arrows;
     state->is_pedal_latched = controls->pedal_latched;
-    const char *line = fluoroscope.is_out_of_beam ? "Part of the vessel lies beside the beam: no contrast is drawn. Move the table or the C-arm back"
+    const char *line = fluoroscope.is_out_of_beam ? "Part of the vessel lies outside the beam: no contrast is drawn. Move the table or the C-arm back"
                        : xray->mode == XRAY_DSA && fluoroscope.mask_has_moved ? "C-arm, table or field have moved since the mask was taken: M takes a new one"
                                                                               : NULL;
     if (line && !state->warning) {
@@ -210,16 +210,16 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
 
 void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray)
 {
-    const double well = 0.9;     // of what is asked for
+    const double well = 0.9;     // fraction of the requested flow
     double asked = (double)xray->contrast_ml_s;
     if (!(asked > 0) || tool < 0 || flow_ml_s >= well * asked || panel->state.warning)
         return;
-    const char *name = scene->tool[tool].name, *way = tool + 1 < scene->tool_count ? "; more once what lies in it is drawn back" : "";
+    const char *name = scene->tool[tool].name, *advice = tool + 1 < scene->tool_count ? "; more after the tool inside it is withdrawn" : "";
     if (flow_ml_s < 0.01 * asked)
-        snprintf(panel->warning, sizeof panel->warning, "Next to no contrast agent goes through %s: its lumen is full%s", name, way);
+        snprintf(panel->warning, sizeof panel->warning, "Almost no contrast agent flows through %s: its lumen is filled%s", name, advice);
     else
-        snprintf(panel->warning, sizeof panel->warning, "The injector's pressure brings %.2g of %.2g ml/s through the lumen of %s%s", flow_ml_s, asked, name,
-                 way);
+        snprintf(panel->warning, sizeof panel->warning, "At the injector's pressure only %.2g of %.2g ml/s flow through the lumen of %s%s", flow_ml_s, asked,
+                 name, advice);
     panel->state.warning = panel->warning;
 }
 

@@ -9,7 +9,7 @@ static const double per_degree = PI / 180;
 
 // --- display of a device ---
 
-// The part from a little proximal to its first bend on, at least 40 mm and at most all of it.
+// Length of the distal part shown: from slightly proximal of its first bend, at least 40 mm and at most all of it.
 static double shown_length(const WireOptions *wire)
 {
     double total = wire_length(wire), begin = 0;
@@ -27,7 +27,7 @@ static const WireSection *section_at(const WireOptions *wire, double s)
     return &wire->section[i];
 }
 
-// Its rest shape, seen square to the plane of its first bend.
+// The rest shape, seen perpendicular to the plane of its first bend.
 static void draw_rest_shape(PanelTrayDevice *shown, const WireOptions *wire)
 {
     double total = wire_length(wire), length = shown_length(wire), plane = 0;
@@ -37,7 +37,7 @@ static void draw_rest_shape(PanelTrayDevice *shown, const WireOptions *wire)
     shown->point_count = 0;
     for (int i = 0; i < TRAY_POINTS; i++) {
         memcpy(shown->point[shown->point_count++], (double[]){x.x, x.y}, sizeof shown->point[0]);
-        // a step of constant curvature, in short chords
+        // a section of constant curvature, as short chords
         enum { CHORDS = 16 };
         double step = length / (TRAY_POINTS - 1) / CHORDS;
         for (int k = 0; k < CHORDS && i + 1 < TRAY_POINTS; k++) {
@@ -68,7 +68,7 @@ static void draw_stiffness(PanelTrayDevice *shown, const WireOptions *wire)
     }
 }
 
-// "0.8" or, of one that tapers, "0.8 to 0.6".
+// Writes "0.8" or, for a tapered device, "0.8 to 0.6".
 static void print_range(char *text, size_t capacity, const WireOptions *wire, bool is_inner)
 {
     double first = is_inner ? wire->section[0].inner_diameter : wire->section[0].diameter;
@@ -92,11 +92,11 @@ static void show_device(PanelTrayDevice *shown, const TrayDevice *device, char *
         snprintf(what, capacity, "wire, %s core, %s mm thick, %.0f mm long", tool_core_name[device->tool.core], outer, wire_length(wire));
     else
         snprintf(what, capacity, "%s, outside %s mm, lumen %s mm, %.0f mm long", kind[device->tool.kind], outer, inner, wire_length(wire));
-    *shown = (PanelTrayDevice){.name = device->title,
-                               .what = what,
-                               .can_be_shaped = is_wire && device->tool.core == CORE_STEEL,
-                               .remark =
-                                   is_wire && device->tool.core == CORE_NITINOL ? "Nitinol springs back from a bend by hand: this tip cannot be shaped" : NULL};
+    *shown = (PanelTrayDevice){
+        .name = device->title,
+        .what = what,
+        .can_be_shaped = is_wire && device->tool.core == CORE_STEEL,
+        .remark = is_wire && device->tool.core == CORE_NITINOL ? "Nitinol springs back completely when bent by hand: this tip cannot be shaped" : NULL};
     draw_rest_shape(shown, wire);
     draw_stiffness(shown, wire);
 }
@@ -109,33 +109,33 @@ static double length_of(const Pose *pose, int tool)
     return it->node_count > 0 ? it->node[it->node_count - 1].s : 0;
 }
 
-// [mm] of a tool beyond the hub of the outermost one; of that itself beyond the sheath's mouth.
+// Length [mm] of a tool beyond the hub of the outermost one; for the outermost one, beyond the mouth of the sheath.
 static double beyond_hub(const Pose *pose, int tool) { return pose->tool[tool].inserted_mm + (tool > 0 ? length_of(pose, 0) - pose->tool[0].inserted_mm : 0); }
 
-// NULL if the tool is withdrawn.
+// Returns NULL if the tool is withdrawn.
 static const char *why_still_in(char *text, const Scene *scene, const Pose *pose, int tool)
 {
-    double beyond = beyond_hub(pose, tool), way = tool > 0 ? beyond - at_hub_mm : beyond;
+    double beyond = beyond_hub(pose, tool), to_withdraw = tool > 0 ? beyond - at_hub_mm : beyond;
     if (!scene->wire.has_sheath && tool == 0) {
-        snprintf(text, TRAY_WORDS, "'%s' is held by a test rig and cannot be taken out", scene->tool[tool].name);
+        snprintf(text, TRAY_WORDS, "'%s' is held by a test rig and cannot be removed", scene->tool[tool].name);
         return text;
     }
-    if (way <= 0)
+    if (to_withdraw <= 0)
         return NULL;
-    snprintf(text, TRAY_WORDS, "'%s' is still inserted: draw it back %.0f mm, to %s, then another can be inserted", scene->tool[tool].name, fmax(1, ceil(way)),
-             tool > 0 ? "the hub" : "the sheath's mouth");
+    snprintf(text, TRAY_WORDS, "'%s' is still inserted: pull it back %.0f mm, to %s; then another can be inserted", scene->tool[tool].name,
+             fmax(1, ceil(to_withdraw)), tool > 0 ? "the hub" : "the sheath's mouth");
     return text;
 }
 
-// As the solver will once the tool is out: proximal ends stay behind the hub.
+// The same condition as in the solver once the tool is withdrawn: proximal ends stay behind the hub.
 static const char *why_too_long_or_short(char *text, const Scene *scene, const Pose *pose, int tool, double length)
 {
     for (int m = tool + 1; m < scene->tool_count; m++) {
-        // over which the outermost one comes back to the mouth: from there on they are outside
+        // after the outermost tool has been withdrawn to the mouth, this length is outside
         double outside = length_of(pose, m) - (tool > 0 ? beyond_hub(pose, m) : pose->tool[m].inserted_mm);
         if (outside < length) {
             snprintf(text, TRAY_WORDS,
-                     "'%s' within is too short for it: %.0f mm of that are outside, this is %.0f mm long. An exchange over a wire takes a wire that long",
+                     "'%s' inside is too short for it: %.0f mm of that are outside, and this device is %.0f mm long. An exchange needs a wire of that length",
                      scene->tool[m].name, outside, length);
             return text;
         }
@@ -155,10 +155,10 @@ static const char *why_not(TrainerTray *tray, int index, const TrayDevice *devic
     char *text = tray->note[index];
     int tool = tray->devices.tool;
     if (!is_new && device->which == pose->tool[tool].fitted)
-        return "it is the tool that you have now";
+        return "this device is already inserted";
     if (is_new && scene_device_count(scene, tool) > EXCHANGES_MOST) {
-        snprintf(text, TRAY_WORDS, "a session has room for %d devices beside the first one of '%s'; the existing ones can be inserted again", EXCHANGES_MOST,
-                 scene->tool[tool].name);
+        snprintf(text, TRAY_WORDS, "a session has room for %d devices in addition to the first one of '%s'; the existing ones can be inserted again",
+                 EXCHANGES_MOST, scene->tool[tool].name);
         return text;
     }
     return why_too_long_or_short(text, scene, pose, tool, wire_length(&device->tool.wire));
@@ -203,7 +203,7 @@ static bool is_same_tip(const PanelTrayChoice *a, const PanelTrayChoice *b)
            fabs(a->length_mm - b->length_mm) + fabs(a->angle_deg - b->angle_deg) + fabs(a->mandrel_mm - b->mandrel_mm) < 1e-9;
 }
 
-// The chosen wire as set by the sliders; if it cannot keep that shape, unchanged, with the reason.
+// The selected wire as set by the sliders; if it cannot keep that shape, it is unchanged, with the reason.
 static void shape_chosen(TrainerTray *tray)
 {
     char *why = tray->note[TRAY_DEVICES];
@@ -215,7 +215,7 @@ static void shape_chosen(TrainerTray *tray)
     const TipShaped *how = &tray->shaped.tool.tip_shaped;
     tray->shaped_shown.note = is_kept ? NULL : why;
     tray->shaped_shown.remark = is_kept ? tray->remark : NULL;
-    snprintf(tray->remark, sizeof tray->remark, "Bent by %.0f\u00b0 round the mandrel it springs back to %.0f\u00b0, with a radius of %.1f mm",
+    snprintf(tray->remark, sizeof tray->remark, "Bent by %.0f\u00b0 around the mandrel it springs back to %.0f\u00b0, with a radius of %.1f mm",
              how->bent_angle / per_degree, tip.angle / per_degree, how->rest_radius);
 }
 
@@ -239,7 +239,7 @@ void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, 
     tray->shown.shaped = &tray->shaped_shown;
 }
 
-// The tool that is still inserted comes last: permanent obstacles are reported first.
+// A tool that is still inserted is reported last: permanent obstacles come first.
 const char *trainer_tray_obstacle(const TrainerTray *tray)
 {
     const PanelTrayChoice *choice = &tray->choice;

@@ -31,15 +31,15 @@ static void print_summary(const Report *report)
         by_kind[report->finding[i].kind]++;
     fprintf(out, "<section id=\"summary\"><h2>Summary</h2>\n<dl>\n");
     item(report, "File", report->name);
-    item(report, "Made from", report->info->source && *report->info->source ? report->info->source : "not said");
-    item(report, "Made by", report->info->created_by && *report->info->created_by ? report->info->created_by : "not said");
+    item(report, "Made from", report->info->source && *report->info->source ? report->info->source : "not given");
+    item(report, "Made by", report->info->created_by && *report->info->created_by ? report->info->created_by : "not given");
     fprintf(out, "<dt>Vessels</dt><dd>%d branches, %.0f mm of centreline, radius %.2f to %.2f mm; %d nodes, %lld points on the wall</dd>\n",
             report->branches->count, length, report->branches->count > 0 ? least : 0, largest, tree->node_count, (long long)tree->point_count);
     fprintf(out, "<dt>Candidates</dt><dd>%d narrow, %d wide, %d aneurysm%s</dd>\n", by_kind[FINDING_STENOSIS], by_kind[FINDING_DILATATION],
             by_kind[FINDING_ANEURYSM], by_kind[FINDING_ANEURYSM] == 1 ? "" : "s");
     if (vessel_tree_is_model(tree))
-        fprintf(out, "<dt>Model</dt><dd>%lld blobs, %.1f a node</dd>\n", (long long)tree->blob_count, (double)tree->blob_count / tree->node_count);
-    fprintf(out, "<dt>Units</dt><dd>lengths in millimetres, in the frame of the volume or surface it was made from</dd>\n</dl></section>\n");
+        fprintf(out, "<dt>Model</dt><dd>%lld blobs, %.1f per node</dd>\n", (long long)tree->blob_count, (double)tree->blob_count / tree->node_count);
+    fprintf(out, "<dt>Units</dt><dd>lengths in millimetres, in the coordinate system of the volume or surface from which it was made</dd>\n</dl></section>\n");
 }
 
 static void print_tree(const Report *report)
@@ -87,7 +87,7 @@ static void print_findings(const Report *report)
 {
     FILE *out = report->out;
     FindingOptions options = finding_default_options();
-    fprintf(out, "<section id=\"findings\"><h2>Candidates to look at</h2>\n");
+    fprintf(out, "<section id=\"findings\"><h2>Candidates for review</h2>\n");
     if (report->finding_count == 0) {
         fprintf(out, "<p>None found.</p>\n");
     } else {
@@ -102,10 +102,9 @@ static void print_findings(const Report *report)
     }
     fprintf(out,
             "<p>Found by rule, not by a reader. Narrow: radius below %.0f %% of the reference; wide: above %.0f %%. The reference is the mean of the median "
-            "radii on "
-            "either side (2 to 8 branch radii away); within that of a branch’s ends, and where it leaves its parent, nothing is judged. Aneurysms are the "
-            "nodes marked "
-            "as such in the tree; the neck is the narrowest section between vessel and sac, given as the width of a circle of its area.</p></section>\n",
+            "radii on either side (2 to 8 branch radii away); within that of a branch’s ends, and where it leaves its parent, nothing is judged. Aneurysms "
+            "are the nodes marked as such in the tree; the neck is the narrowest section between vessel and sac, given as the width of a circle of its "
+            "area.</p></section>\n",
             100 * options.narrow, 100 * options.wide);
 }
 
@@ -151,7 +150,7 @@ static void print_worst(const Report *report)
     FILE *out = report->out;
     const VesselTree *tree = report->tree;
     int worst[WORST], count = 0;
-    for (int i = 0; i < tree->node_count; i++) {   // insertion into a short sorted list; ties keep the lower index
+    for (int i = 0; i < tree->node_count; i++) {   // insertion into a short sorted list; equal values keep the lower index first
         int at = count;
         while (at > 0 && tree->error[i] > tree->error[worst[at - 1]])
             at--;
@@ -183,7 +182,7 @@ static void print_worst(const Report *report)
 static void print_fit(const Report *report)
 {
     FILE *out = report->out;
-    fprintf(out, "<section id=\"fit\"><h2>How well the model fits</h2>\n");
+    fprintf(out, "<section id=\"fit\"><h2>Quality of the fit</h2>\n");
     if (!vessel_tree_is_model(report->tree)) {
         fprintf(out, "<p>This tree has no fitted model yet.</p></section>\n");
         return;
@@ -191,9 +190,8 @@ static void print_fit(const Report *report)
     fprintf(out, "<figure id=\"figure-fit\">\n");
     tree_page_error_figure(report);
     fprintf(out,
-            "<figcaption>d_a of a local model is the distance to it that 90 %% of its data points keep. Classes of Kerrien et al. 2017, Table 4: C1 under half "
-            "a voxel, C2 "
-            "under one, C3 under two, C4 beyond; voxel %g mm%s.</figcaption></figure>\n",
+            "<figcaption>d_a of a local model is the distance to it that 90 %% of its data points keep. Classes of Kerrien et al. 2017, Table 4: C1 under "
+            "half a voxel, C2 under one, C3 under two, C4 beyond; voxel %g mm%s.</figcaption></figure>\n",
             report->voxel, report->voxel_is_known ? "" : " (assumed: the file does not say)");
     print_worst(report);
     fprintf(out, "</section>\n");
@@ -209,8 +207,7 @@ static void print_page(const Report *report)
     page_text(out, report->name);
     fprintf(out,
             "</title>\n<style>\n%s</style></head>\n<body><header><h1>Vessel %s report</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and "
-            "research. Not "
-            "a medical device:</strong> not for diagnosis or treatment. All values were measured automatically on a %s and have not been "
+            "research. Not a medical device:</strong> not for diagnosis or treatment. All values were measured automatically on a %s and have not been "
             "checked.</p></header>\n<main>\n",
             page_style, model ? "model" : "tree", model ? "fitted model" : "tracked tree");
     print_summary(report);
@@ -220,7 +217,7 @@ static void print_page(const Report *report)
     print_radii(report);
     print_fit(report);
     fprintf(out, "</main>\n<footer><section id=\"origin\"><h2>How it was made</h2>\n<details><summary>Parameters</summary><pre>");
-    page_text(out, report->info->parameters && *report->info->parameters ? report->info->parameters : "not said");
+    page_text(out, report->info->parameters && *report->info->parameters ? report->info->parameters : "not given");
     fprintf(out, "</pre></details>\n<p>Written by seldinger " SELDINGER_VERSION ".</p></section></footer></body></html>\n");
 }
 

@@ -9,13 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct LinePoint {     // of the line that all tools lie on
-    int node;                  // after this one …
+typedef struct LinePoint {     // a point of the line shared by all tools
+    int node;                  // after this node …
     double part;               // … at this fraction of the distance to the next
     double at;                 // both together
-    double length;             // [mm] from the line's first point
-    double half;               // [pixel] of the tool that was added last …
-    int inside;                // … and how many there are further in
+    double length;             // [mm] arc length from the first point of the line
+    double half;               // [pixel] of the tool added last …
+    int inside;                // … and the number of tools inside it
 } LinePoint;
 
 struct VesselScene {
@@ -28,7 +28,7 @@ struct VesselScene {
     bool has_entry;
     Vec3 entry, entry_direction;
     FreeCamera home;
-    Vec3 center;               // of the ball around everything …
+    Vec3 center;               // of the ball around all objects …
     double reach;              // … and its radius
     // of the last draw
     FreeCamera shown;
@@ -37,13 +37,13 @@ struct VesselScene {
     bool has_drawn;
     int still_frames;
     bool is_following, is_gliding;
-    Vec3 anchor;               // where the followed focus is
+    Vec3 anchor;               // position of the followed focus
     bool has_tip;
-    Vec3 tip;                  // the most distal one
+    Vec3 tip;                  // the most distal tip
     int tip_count;
     Vec3 tool_tip[TOOLS_MOST];
     long layer_draws;
-    // scratch for the tools' smoothed line
+    // scratch memory for the smoothed line of the tools
     int capacity;
     LinePoint *line;
     Vec3 *point;
@@ -57,7 +57,7 @@ static const double sheath_shown_mm = 12;
 
 Color vessel_scene_force_color(double force_n, double full_scale_n, Color without)
 {
-    const double least = 0.34;   // of the map: what lies below is too dark on a dark ground
+    const double least = 0.34;   // of the colour map: lower values are too dark on a dark background
     if (!(force_n > 0) || !(full_scale_n > 0))
         return without;
     return color_sequential(least + (1 - least) * fmin(force_n / full_scale_n, 1));
@@ -105,7 +105,7 @@ VesselScene *vessel_scene_create(const VesselSceneOptions *options, char *messag
 {
     VesselScene *scene = calloc(1, sizeof *scene);
     if (!scene) {
-        message_fail(message, capacity, "not enough memory for the 3D view");
+        message_fail(message, capacity, "out of memory for the 3D view");
         return NULL;
     }
     scene->tools = options->tools;
@@ -117,7 +117,7 @@ VesselScene *vessel_scene_create(const VesselSceneOptions *options, char *messag
     scene->layers = vessel_layers_create(options->vessel, options->coarse, message, capacity);
     bool good = scene->layers && strokes_create(&scene->strokes, message, capacity);
     if (good && (!frame_everything(scene, options) || !(scene->models = model_wires_create(options->tree))))
-        good = message_fail(message, capacity, "not enough memory for the 3D view");
+        good = message_fail(message, capacity, "out of memory for the 3D view");
     if (!good) {
         vessel_scene_destroy(scene);
         return NULL;
@@ -146,7 +146,7 @@ VesselSceneLook vessel_scene_default_look(const VesselScene *scene)
 
 // --- camera ---
 
-// The focus stays while the tip is in the view's middle third and glides to it once it leaves: walls are redrawn only then.
+// The focus stays while the tip is in the middle third of the view, and glides to it when the tip leaves: walls are redrawn only then.
 static void follow(VesselScene *scene, FreeCamera *camera, ViewPort port)
 {
     if (!scene->is_following)
@@ -178,7 +178,7 @@ static LayersKey key_for(VesselScene *scene, const VesselSceneLook *look, ViewPo
     return key;
 }
 
-// Changing, or not at rest long enough to hide an expensive frame.
+// True if the layers change or have not been at rest long enough for an expensive frame to go unnoticed.
 static bool is_moving(VesselScene *scene, const LayersKey *key)
 {
     const int enough = 4;
@@ -191,7 +191,7 @@ static bool is_moving(VesselScene *scene, const LayersKey *key)
     return scene->still_frames < enough;
 }
 
-// --- what moves ---
+// --- moving objects ---
 
 static bool reserve(VesselScene *scene, int count)
 {
@@ -222,7 +222,7 @@ static Vec3 between(const Pose *pose, int i, double t)
     Vec3 a = pose->position[i], b = pose->position[i + 1], chord = vec3_sub(b, a);
     double length = vec3_norm(chord);
     Vec3 u = quat_rotate(pose->quaternion[i], vec3(length, 0, 0)), v = quat_rotate(pose->quaternion[i + 1], vec3(length, 0, 0));
-    // frames that do not follow the line are useless
+    // ignore tangents of frames that do not follow the line
     double least = 0.5 * length * length;
     if (!(vec3_dot(u, chord) > least && vec3_dot(v, chord) > least))
         u = v = chord;
@@ -231,7 +231,7 @@ static Vec3 between(const Pose *pose, int i, double t)
     return vec3_add_scaled(vec3_add_scaled(x, t * s * s, u), -t * t * s, v);
 }
 
-// A node has six points of the line at most to the next, and those where tools end.
+// Number of pieces after a node: at most six points of the line to the next node; more points are added where tools end.
 static int line_pieces(const VesselScene *scene, const Pose *pose, int i)
 {
     enum { PIECES = 6 };
@@ -249,7 +249,7 @@ static void add_line_point(VesselScene *scene, const Pose *pose, int i, double t
     scene->point[(*count)++] = x;
 }
 
-// The shared centreline from a stub in the sheath on, with a point where each tool ends. Returns how many.
+// Fills the shared centreline, starting with a stub in the sheath, with a point where each tool ends. Returns the number of points.
 static int lay_line(VesselScene *scene, const Pose *pose, const double *end)
 {
     enum { MOST_PIECES = 6 };
@@ -280,7 +280,7 @@ static const TubeStretch *stretch_at(const VesselScene *scene, const Pose *pose,
     return scene->tools && tool < scene->tools->count ? tool_look_at(tool_looks_of(scene->tools, tool, pose->tool[tool].fitted), s) : &solid;
 }
 
-// [mm] by the tool's own nodes; `from` goes along.
+// Radius [mm] at s from the tool's own nodes; `from` stores the position for the next call.
 static double radius_at(const PoseTool *tool, double s, int *from)
 {
     while (*from + 2 < tool->node_count && tool->node[*from + 1].s < s)
@@ -297,8 +297,8 @@ static Color node_color(const Pose *pose, int i, bool touches_wall, Color own, d
     return i < pose->first_free_node ? SHEATH_COLOR : touches_wall ? vessel_scene_force_color(vec3_norm(pose->node[i].force), full_scale_n, own) : own;
 }
 
-// One tool along the line up to its end, coloured by wall force where it touches the wall. Where another lies in it its near wall is cut away: its
-// lumen is laid over it, and the other over that. However thin, each leaves a rim of the one around it.
+// Adds one tool along the line up to its end, coloured by wall force where it touches the wall. Where another tool lies inside, its near wall is cut away: its
+// lumen is drawn over it, and the inner tool over that. Each tool leaves a rim of the one around it visible, however thin.
 static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *end, int count, const VesselSceneLook *look, double line)
 {
     const PoseTool *tool = &pose->tool[k];
@@ -347,11 +347,11 @@ static void add_tools(VesselScene *scene, const Pose *pose, const VesselSceneLoo
         add_tool(scene, pose, k, end, count, look, line);
 }
 
-// One arrow for each stretch of the tool of about 14 pixels, counted from the tip so that stretches stay the same nodes: the sum of their forces, its
+// One arrow for each piece of the tool of about 14 pixels, counted from the tip so that the pieces keep the same nodes: the sum of their forces, with its
 // head at the tool where the wall pushes.
 static void add_arrows(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, double line)
 {
-    const double least = 0.01;   // of full scale: contacts that only rest there
+    const double least = 0.01;   // of full scale: contacts that barely touch
     const Camera *view = &scene->projection;
     double pixel = view->mm_per_pixel, stretch = 14 * line * pixel;
     double longest = fmin(52 * line, 0.10 * (view->width < view->height ? view->width : view->height)) * pixel;
@@ -377,7 +377,7 @@ static void add_arrows(VesselScene *scene, const Pose *pose, const VesselSceneLo
         if (!(weight > 0) || !(size > least * look->force_full_scale_n))
             continue;
         Vec3 direction = vec3_scale(sum, 1 / size), tip = vec3_add_scaled(vec3_scale(place, 1 / weight), -radius, direction);
-        // square root: a tenth of the force is still seen
+        // square root, so that a tenth of the force is still visible
         double long_as = longest * sqrt(fmin(size / look->force_full_scale_n, 1.5));
         strokes_arrow(&scene->strokes, vec3_add_scaled(tip, -long_as, direction), tip, 1.1 * line, ARROW_COLOR);
     }

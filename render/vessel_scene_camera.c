@@ -1,4 +1,4 @@
-// The projection's axes are the rows of the turn's matrix: right = q x q*, up = q y q*, back = q z q*.
+// The axes of the projection are the rows of the rotation matrix: right = q x q*, up = q y q*, back = q z q*.
 #include "render/vessel_scene_camera.h"
 
 #include <stddef.h>
@@ -20,13 +20,13 @@ static double mm_per_pixel(const FreeCamera *camera, int width, int height)
     return fmax(camera->width_mm / (width > 1 ? width : 1), camera->height_mm / (height > 1 ? height : 1));
 }
 
-static const double margin = 1.10;   // of what is framed
+static const double margin = 1.10;   // relative to the framed extent
 
-// The rectangle around the points as the camera is turned.
+// The rectangle around the points for the current orientation of the camera.
 static void frame_points(FreeCamera *camera, int count, const Vec3 *point)
 {
     Camera view = {.right = right_of(camera), .up = up_of(camera), .back = back_of(camera)};
-    // a view of one by one pixel, far too wide or too high, gives the other extent: both are asked for
+    // a view of one by one pixel, made far too wide or too high, gives the other extent; both are computed
     const int side = 1000000;
     camera_frame(&view, 1, side, 0, count, point, count > 0 ? 0 : 10);
     camera->width_mm = fmax(margin * view.mm_per_pixel, 1e-3);
@@ -53,7 +53,7 @@ FreeCamera free_camera_framing(int count, const Vec3 *point)
     return camera;
 }
 
-// By the left: about an axis of space.
+// Multiplies the rotation from the left: about an axis fixed in space.
 static void turn_about(FreeCamera *camera, Vec3 axis, double angle)
 {
     camera->turn = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(axis, angle)), camera->turn));
@@ -62,7 +62,7 @@ static void turn_about(FreeCamera *camera, Vec3 axis, double angle)
 void free_camera_orbit(FreeCamera *camera, double dx, double dy)
 {
     Vec3 right = right_of(camera), up = up_of(camera);
-    // the scene's turn would be about +up and +right: the camera's is the opposite
+    // the scene rotates about +up and +right, so the camera rotates in the opposite sense
     turn_about(camera, vec3_add(vec3_scale(up, dx), vec3_scale(right, dy)), -turn_per_pixel);
 }
 

@@ -1,5 +1,5 @@
-// One pass for the outer faces and one for the inner ones, each with the depth test only: the nearest surface wins, so no sorting is needed. A wall
-// seen face on is clear, edge on dense (1 - |n_z|)^p, as thin-walled glass is: outlines stand out, the middle lets the tool be seen.
+// One pass for the outer faces and one for the inner ones, each with only the depth test: the nearest surface wins, so no sorting is needed. A wall is
+// clear where it is seen face on and dense edge on, (1 - |n_z|)^p, like thin-walled glass: outlines stand out, and the tool is visible through the middle.
 #include "render/vessel_scene_layers.h"
 
 #include "render/drawable_mesh.h"
@@ -18,7 +18,7 @@ typedef struct WallBuffers {
     int index_count;
 } WallBuffers;
 
-typedef struct Layer {         // textures, and what is drawn into: itself, or multisampled
+typedef struct Layer {         // textures, and the framebuffer drawn into: their own, or a multisampled one
     unsigned framebuffer, color, depth;
 } Layer;
 
@@ -29,7 +29,7 @@ struct VesselLayers {
     double reach;              // [mm] of the furthest vertex from origin
     int width, height;
     Layer layer[LAYER_COUNT];
-    unsigned smooth_framebuffer, smooth_color, smooth_depth;   // multisampled, for both layers in turn; 0: the driver has none
+    unsigned smooth_framebuffer, smooth_color, smooth_depth;   // multisampled, for both layers in turn; 0: not supported by the driver
     unsigned base_framebuffer, base;
     LayersKey key;
     bool is_drawn;
@@ -48,13 +48,13 @@ static const char *const WALL_FRAGMENT =
     "const vec3 key = vec3(-0.36, 0.55, 0.754), fill = vec3(0.7, -0.1, 0.7), halfway = vec3(-0.192, 0.294, 0.936);\n"
     "void main() {\n"
     "  vec3 m = normalize(n); bool outer = gl_FrontFacing;\n"
-    // at the outline the interpolated normal may point the wrong way: the face decides
+    // at the outline the interpolated normal may point to the wrong side: the facing of the triangle decides
     "  m = outer == (m.z >= 0.0) ? m : normalize(vec3(m.xy, outer ? 0.001 : -0.001));\n"
     "  float z = abs(m.z), edge = pow(1.0 - z, opacity.z);\n"
     "  vec3 toward = outer ? m : -m;\n"
     "  float light = 0.34 + 0.56 * max(dot(toward, key), 0.0) + 0.16 * max(dot(toward, fill), 0.0);\n"
     "  float shiny = opacity.w * pow(max(dot(toward, halfway), 0.0), 40.0);\n"
-    // thin out at the very outline, or its pixels would stand in steps
+    // fade out at the very outline, or its pixels would form steps
     "  float a = mix(opacity.x, opacity.y, edge) * smoothstep(-0.10, 0.38, z);\n"
     "  float far = clamp((depth - range.x) / (range.y - range.x), 0.0, 1.0);\n"
     "  vec3 k = mix(color * (light + 0.34 * edge), haze, range.z * far);\n"
@@ -110,7 +110,7 @@ VesselLayers *vessel_layers_create(const TriangleMesh *fine, const TriangleMesh 
 {
     VesselLayers *layers = calloc(1, sizeof *layers);
     if (!layers) {
-        message_fail(message, capacity, "not enough memory for the 3D view");
+        message_fail(message, capacity, "out of memory for the 3D view");
         return NULL;
     }
     if (fine && fine->vertex_count > 0) {
@@ -238,7 +238,7 @@ static void set_wall_uniforms(const VesselLayers *layers, const LayersKey *key)
         glUniform4f(glGetUniformLocation(program, "plane"), 0, 0, 0, 1);
     glUniform1f(glGetUniformLocation(program, "edge_width"), key->has_section ? 1.6f : 0);
     glUniform3fv(glGetUniformLocation(program, "haze"), 1, vessel_scene_background);
-    // the vessel's own depths, in clip space's 0 near to 1 far
+    // depth range of the vessel, in clip space, 0 near to 1 far
     double deep = camera->near_depth - camera->far_depth, middle = vec3_dot(camera->back, vec3_sub(layers->origin, camera->center));
     double nearest = (camera->near_depth - middle - layers->reach) / deep, furthest = nearest + 2 * layers->reach / deep;
     glUniform3f(glGetUniformLocation(program, "range"), (float)nearest, (float)fmax(furthest, nearest + 1e-6), 0.55f);
@@ -309,7 +309,7 @@ static void join_layers(const VesselLayers *layers)
 
 bool layers_key_same(const LayersKey *a, const LayersKey *b)
 {
-    // no padding between a camera's members
+    // there is no padding between the members of a camera
     return !memcmp(&a->camera, &b->camera, sizeof a->camera) && a->has_section == b->has_section &&
            (!a->has_section || (!memcmp(&a->section_normal, &b->section_normal, sizeof(Vec3)) && a->section_offset == b->section_offset));
 }

@@ -1,4 +1,4 @@
-// A tip at the border of two power cells asks for their models in turn: the last eight are kept.
+// A tip at the border of two power cells alternates between their models, so the last eight are kept.
 #include "render/vessel_scene_model.h"
 
 #include "geom/geom.h"
@@ -62,12 +62,12 @@ void model_wires_add(ModelWires *models, int node, Strokes *strokes, double line
     if (!models->tree || node < 0 || node >= models->tree->node_count)
         return;
     const TriangleMesh *mesh = mesh_of(models, node);
-    // lines nearer to each other than a few pixels would make a white patch
+    // lines closer together than a few pixels would make a white patch
     double spacing = models->tree->radius[node] / cells_a_radius / strokes->camera.mm_per_pixel;
     double clear = fmin(fmax(spacing / (9 * line), 0.12), 1);
     for (int t = 0; mesh && t < mesh->triangle_count; t++)
         for (int k = 0; k < 3; k++) {
-            // a closed surface has each edge twice, once each way
+            // a closed surface has each edge twice, once in each direction
             int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
             if (a > b)
                 continue;

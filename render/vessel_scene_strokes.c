@@ -1,7 +1,8 @@
-// Ribbons: a polyline's points are projected, each gets two vertices across the mean direction of its two pieces in the picture (mitred), each
-// piece becomes a quad; ends get a quad more, on which the distance to the end's point makes a half disc. The fragment's distance d from the axis gives
-// its coverage, half + 1/2 - d, and its normal: d / half towards the side, the rest towards the eye across the axis.
-// Sorted by depth rather than tested against a depth buffer: smooth edges blend with what is behind them, and the target need not have one.
+// Ribbons: the points of a polyline are projected; each gets two vertices perpendicular to the mean direction of its two pieces in the picture (mitred), and
+// each
+// piece becomes a quad. Ends get one more quad, on which the distance to the end point gives a half disc. The distance d of a fragment from the axis gives
+// its coverage, half + 1/2 - d, and its normal: d / half towards the side, the rest towards the eye, perpendicular to the axis.
+// Quads are sorted by depth instead of tested against a depth buffer: smooth edges blend with what is behind them, and the target need not have a depth buffer.
 #include "render/vessel_scene_strokes.h"
 
 #include "render/gl_canvas.h"
@@ -14,7 +15,7 @@ typedef struct StrokePoint {
     Vec3 pixel;                // x right, y up, depth 0 to 1
     Vec3 eye;                  // right, up, towards the eye [mm]
     double half;
-    double side[2], stretch;   // unit normal in the picture, and how much further out the mitre's corner lies
+    double side[2], stretch;   // unit normal in the picture, and the factor by which the corner of the mitre lies further out
     Vec3 facing;
     Color color;
 } StrokePoint;
@@ -39,7 +40,7 @@ static const char *const FRAGMENT =
     "  vec3 k = c.rgb * mix(1.0, 0.52 + 0.56 * max(dot(n, key), 0.0), wide) + vec3(0.20 * wide * pow(max(dot(n, halfway), 0.0), 24.0));\n"
     "  ivec2 p = ivec2(gl_FragCoord.xy - corner);\n"
     "  float z = depth - s.z * pixel_depth;\n"
-    // behind a whole vessel, and behind a wall: never so much that what moves is lost
+    // behind a whole vessel, and behind a wall: attenuated, but never so much that a moving object becomes invisible
     "  if (z > texelFetch(back_depth, p, 0).r + 4.0 * s.z * pixel_depth) { vec4 b = 0.7 * texelFetch(back, p, 0); k = b.rgb + (1.0 - b.a) * k; }\n"
     "  if (z > texelFetch(front_depth, p, 0).r) { vec4 f = texelFetch(front, p, 0); f *= min(1.0, 0.5 / max(f.a, 0.01)); k = f.rgb + (1.0 - f.a) * k; }\n"
     "  result = vec4(k, a);\n"
@@ -134,19 +135,19 @@ static StrokePoint project(const Camera *camera, Vec3 x, double half, Color colo
 {
     Vec3 p = camera_project(camera, x);
     double depth = (camera->near_depth - p.z) / (camera->near_depth - camera->far_depth);
-    // hairlines below a pixel stay a pixel wide and grow fainter
+    // lines thinner than a pixel stay a pixel wide and become fainter
     double least = fmax(half, 0.5);
     Color faded = color_with_alpha(color, color.a / 255.0 * fmin(half / least, 1));
     return (StrokePoint){
         .pixel = {p.x, camera->height - p.y, depth}, .eye = {p.x * camera->mm_per_pixel, -p.y * camera->mm_per_pixel, p.z}, .half = least, .color = faded};
 }
 
-// Sides and facing normals from the pieces before and after each point.
+// Sets sides and facing normals from the pieces before and after each point.
 static void orient_points(StrokePoint *point, int count)
 {
     double last[2] = {0, 1};
     for (int i = 0; i < count; i++) {
-        // a piece that points at the eye has no direction in the picture: it keeps the last one
+        // a piece that points at the eye has no direction in the picture: it keeps the previous one
         double before[2] = {last[0], last[1]}, after[2] = {last[0], last[1]};
         if (i + 1 < count) {
             double dx = point[i + 1].pixel.x - point[i].pixel.x, dy = point[i + 1].pixel.y - point[i].pixel.y, length = hypot(dx, dy);
@@ -156,7 +157,7 @@ static void orient_points(StrokePoint *point, int count)
         if (i == 0)
             memcpy(before, after, sizeof before);
         double sum[2] = {before[0] + after[0], before[1] + after[1]}, length = hypot(sum[0], sum[1]);
-        // turns back on itself: no mitre
+        // the line turns back on itself: no mitre
         bool folds = length < 0.6;
         point[i].side[0] = folds ? after[0] : sum[0] / length;
         point[i].side[1] = folds ? after[1] : sum[1] / length;
@@ -197,7 +198,7 @@ static void add_quad(Strokes *strokes, const StrokePoint *a, const StrokePoint *
     v[1] = corner_of(a, -a->half - 1, 0, along);
     v[2] = corner_of(b, b->half + 1, past, along);
     v[3] = corner_of(b, -b->half - 1, past, along);
-    // positive floats sort as their bits do; far ones first, then in the order of adding
+    // positive floats sort like their bits; far ones first, then in the order in which they were added
     float key = (float)fmin(fmax(1 - (a->pixel.z + b->pixel.z) / 2, 0), 1);
     uint32_t bits;
     memcpy(&bits, &key, sizeof bits);
@@ -205,7 +206,7 @@ static void add_quad(Strokes *strokes, const StrokePoint *a, const StrokePoint *
     strokes->quad_count++;
 }
 
-// Half a disc beyond an end.
+// Adds half a disc beyond an end.
 static void add_cap(Strokes *strokes, StrokePoint end, double sign)
 {
     const double along[2] = {sign * end.side[1], -sign * end.side[0]};
@@ -278,7 +279,7 @@ void strokes_arrow(Strokes *strokes, Vec3 tail, Vec3 tip, double half_pixels, Co
     add_run(strokes, 2, point + 2, half + 2, tint + 2, false);
 }
 
-// By the upper 32 bits, which hold the depth; least significant digits first, so that equal ones stay in order.
+// Radix sort by the upper 32 bits, which contain the depth; least significant digits first, so that equal ones keep their order.
 static const uint64_t *sort_quads(Strokes *strokes)
 {
     size_t count = (size_t)strokes->quad_count;

@@ -8,17 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Triangles of the wall at rest, and while camera or C-arm turn: what llvmpipe draws in time (docs/design.md, "Fluoroscopy").
+// Triangles of the wall at rest, and while camera or C-arm turn: what llvmpipe can draw in time (docs/design.md, "Fluoroscopy").
 enum { FINE_TRIANGLES = 90000, COARSE_TRIANGLES = 25000 };
-
-// A view beside the main one is cached as a picture and redrawn in every second frame, the two in turn: users do not look at both at once.
 
 struct Views {
     ToolLooks tools;
     Fluoroscope *fluoroscope;
     VesselScene *scene;
     Angioscope *angioscope;
-    GlCanvas inset[VIEW_COUNT];      // zeroed: none yet
+    GlCanvas inset[VIEW_COUNT];      // zeroed: not yet made
     long frames;
 };
 
@@ -58,7 +56,7 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
         shown.frame_count = options->pose->node_count;
         shown.frame = options->pose->position;
     }
-    bool good = views && (tool_looks_make(&views->tools, scene) || message_fail(message, capacity, "not enough memory for the views")) &&
+    bool good = views && (tool_looks_make(&views->tools, scene) || message_fail(message, capacity, "out of memory for the views")) &&
                 (views->scene = vessel_scene_create(&shown, message, capacity)) &&
                 (views->angioscope = angioscope_create(mesh, options->vessel, options->tree, message, capacity)) &&
                 (views->fluoroscope = create_fluoroscope(views, options, mesh, message, capacity));
@@ -103,7 +101,7 @@ static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, Vie
     }
 }
 
-// A view beside the main one is cached as a picture and redrawn in every second frame, the two in turn: users do not look at both at once.
+// A secondary view is cached as a picture; the two are redrawn alternately, each in every second frame, because users do not look at both at once.
 static void draw_inset(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
 {
     GlCanvas *inset = &views->inset[view];

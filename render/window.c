@@ -1,4 +1,4 @@
-// Events are gathered by GLFW's callbacks and handed over once a frame. Joysticks are polled, because GLFW's joystick callback takes no user pointer.
+// Events are collected by GLFW's callbacks and passed on once per frame. Joysticks are polled, because GLFW's joystick callback has no user pointer.
 #include "render/window.h"
 
 #include "render/message.h"
@@ -18,17 +18,17 @@ _Static_assert(WINDOW_GAMEPADS == GLFW_JOYSTICK_LAST + 1, "one place for each of
 
 enum { SIGNALS = 3 };
 static const int end_signal[SIGNALS] = {SIGINT, SIGTERM, SIGHUP};
-static volatile sig_atomic_t ended_by_signal;   // a signal handler has no other way
+static volatile sig_atomic_t ended_by_signal;   // global, because a signal handler has no argument for it
 
 struct Window {
     GLFWwindow *window;
     GLFWwindow *previous;
     WindowInput input;
-    unsigned clicked;                // buttons that went down since the last poll
-    int key_of[GLFW_KEY_LAST + 1];   // what a physical key was sent down as, 0: it is up
+    unsigned clicked;                // buttons pressed since the last poll
+    int key_of[GLFW_KEY_LAST + 1];   // key code reported when a physical key was pressed, 0: released
     int64_t period_ns, deadline_ns;
     int64_t skipped;
-    int left, top, width, height;    // of the window while it fills the screen
+    int left, top, width, height;    // of the window before full screen
     bool is_present[WINDOW_GAMEPADS];
     char gamepad[WINDOW_GAMEPADS][128];
     struct sigaction previous_action[SIGNALS];
@@ -58,7 +58,7 @@ static void add_event(Window *w, WindowEvent event)
         input->events_lost++;
         if (!must_not_be_lost(event.kind))
             return;
-        // drops the oldest that may be lost; where all are releases, the keys are long up and focus lost says it all
+        // drops the oldest event that may be lost; if all are releases, a focus-lost event stands for all of them
         int drop = 0;
         while (drop < WINDOW_EVENTS && must_not_be_lost(input->event[drop].kind))
             drop++;
@@ -72,7 +72,7 @@ static void add_event(Window *w, WindowEvent event)
     input->event[input->event_count++] = event;
 }
 
-// Letters by the user's layout, so that W A S D are where they are printed; everything else by its place.
+// Letters follow the user's layout, so that W A S D are where they are printed; all other keys follow their position.
 static int key_named(int key, int scancode)
 {
     static const struct {
@@ -111,7 +111,7 @@ static int key_named(int key, int scancode)
         if (name[0] >= 'a' && name[0] <= 'z')
             return name[0] - 'a' + 'A';
         if (key >= 'A' && key <= 'Z' && (unsigned char)name[0] < 128)
-            return name[0];   // a sign lies there (the M of AZERTY): not the letter of a US keyboard
+            return name[0];   // another sign is at this position (the M of AZERTY): not the letter of a US keyboard
     }
     return key;
 }
@@ -132,7 +132,7 @@ static void on_key(GLFWwindow *window, int key, int scancode, int action, int bi
         w->key_of[key] = 0;
         for (int i = 0; i <= GLFW_KEY_LAST; i++)
             if (was && w->key_of[i] == was)
-                return;   // the other Shift or Ctrl is still down
+                return;   // the other Shift or Ctrl is still pressed
         if (was)
             add_event(w, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = was, .modifiers = modifiers_of(bits)});
         return;
@@ -146,7 +146,7 @@ static void on_key(GLFWwindow *window, int key, int scancode, int action, int bi
 static void on_character(GLFWwindow *window, unsigned character)
 {
     Window *w = glfwGetWindowUserPointer(window);
-    // GLFW tells the key before its character
+    // GLFW reports the key before its character
     const WindowInput *input = &w->input;
     bool is_repeat =
         input->event_count > 0 && input->event[input->event_count - 1].kind == WINDOW_KEY_DOWN_EVENT && input->event[input->event_count - 1].is_repeat;
@@ -163,7 +163,7 @@ static void on_button(GLFWwindow *window, int button, int action, int bits)
     (void)bits;
     Window *w = glfwGetWindowUserPointer(window);
     if (button < 3 && action == GLFW_PRESS)
-        w->clicked |= 1u << button;   // GLFW's order is ours: left, right, middle
+        w->clicked |= 1u << button;   // GLFW's order is the same: left, right, middle
 }
 
 static void on_focus(GLFWwindow *window, int has_focus)
@@ -204,7 +204,7 @@ static const WindowInput *window_poll(Window *w)
     int width, height;
     glfwGetWindowSize(w->window, &width, &height);
     double x, y;
-    glfwGetCursorPos(w->window, &x, &y);   // screen coordinates, which are pixels on X11 and not everywhere
+    glfwGetCursorPos(w->window, &x, &y);   // screen coordinates, which equal pixels on X11 but not everywhere
     input->mouse_x = width > 0 ? x * input->width / width : -1;
     input->mouse_y = height > 0 ? y * input->height / height : -1;
     input->has_focus = glfwGetWindowAttrib(w->window, GLFW_FOCUSED);
@@ -274,7 +274,7 @@ bool window_gamepad(Window *w, int index, WindowGamepad *out)
     const float *axis = glfwGetJoystickAxes(index, &out->axis_count);
     const unsigned char *button = glfwGetJoystickButtons(index, &out->button_count);
     if (!axis || !button)
-        return false;   // unplugged meanwhile
+        return false;   // unplugged in the meantime
     if (out->axis_count > WINDOW_AXES)
         out->axis_count = WINDOW_AXES;
     if (out->button_count > WINDOW_BUTTONS)
@@ -348,10 +348,10 @@ static GLFWwindow *open_window(const char *title, int width, int height)
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
-    glfwWindowHint(GLFW_SAMPLES, 0);   // views smooth their own edges
+    glfwWindowHint(GLFW_SAMPLES, 0);   // views do their own antialiasing
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
     glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
-    glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);   // until there is a picture to show: keys pressed before would wait for it
+    glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);   // until there is a picture to show: keys pressed before that would take effect late
     GLFWmonitor *monitor = glfwGetPrimaryMonitor();
     if (monitor) {
         int x, y, most_wide, most_high;
@@ -373,7 +373,7 @@ Window *window_create(const char *title, int width, int height, double hz, char 
         if (code == GLFW_PLATFORM_ERROR)
             message_fail(message, capacity, "no display; seldinger run works without one, or start under Xvfb");
         else
-            message_fail(message, capacity, "GLFW does not start: %s", reason ? reason : "no reason given");
+            message_fail(message, capacity, "cannot initialise GLFW: %s", reason ? reason : "no reason given");
         return NULL;
     }
     Window *w = calloc(1, sizeof *w);
@@ -382,7 +382,7 @@ Window *window_create(const char *title, int width, int height, double hz, char 
     if (!window) {
         if (w)
             glfwGetError(&reason);
-        message_fail(message, capacity, "no window with OpenGL 3.3: %s", w ? (reason ? reason : "no reason given") : "out of memory");
+        message_fail(message, capacity, "cannot open a window with OpenGL 3.3: %s", w ? (reason ? reason : "no reason given") : "out of memory");
         free(w);
         glfwTerminate();
         return NULL;
@@ -392,7 +392,7 @@ Window *window_create(const char *title, int width, int height, double hz, char 
     glfwSetWindowUserPointer(window, w);
     glfwSetWindowSizeLimits(window, 640, 400, GLFW_DONT_CARE, GLFW_DONT_CARE);
     glfwMakeContextCurrent(window);
-    glfwSwapInterval(0);   // frames are paced by our own deadlines; a swap that waits would shift them
+    glfwSwapInterval(0);   // frames are paced by their own deadlines; a swap that waits would shift them
     glfwSetKeyCallback(window, on_key);
     glfwSetCharCallback(window, on_character);
     glfwSetScrollCallback(window, on_scroll);

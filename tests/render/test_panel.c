@@ -360,7 +360,7 @@ static void every_action_has_a_button_that_works(void **unused)
 
 static PanelTrayDevice tray_device[3];
 static const PanelTray some_tray = {.tool = "wire",
-                                    .note = "'wire' is still inserted: draw it back 312 mm, to the hub, then another can be inserted",
+                                    .note = "'wire' is still inserted: pull it back 312 mm, to the hub; then another can be inserted",
                                     .device_count = 3,
                                     .device = tray_device};
 

@@ -131,13 +131,13 @@ static void what_stands_in_the_way_is_told(void **state)
     (void)state;
     Scene *scene = parse();
     Pose *pose = pose_with(scene, 60, 100);
-    assert_non_null(strstr(obstacle(scene, pose, 1, 0), "the tool that you have now"));
+    assert_non_null(strstr(obstacle(scene, pose, 1, 0), "this device is already inserted"));
     // 100 mm beyond the mouth, the tube's hub 240 mm before it
     const char *text = obstacle(scene, pose, 0, 1);
-    assert_non_null(strstr(text, "too short for it: 300 mm of that are outside, this is 380 mm long"));
+    assert_non_null(strstr(text, "too short for it: 300 mm of that are outside, and this device is 380 mm long"));
     pose->tool[1].inserted_mm = 15;      // 385 outside
     text = obstacle(scene, pose, 0, 1);
-    assert_non_null(strstr(text, "'tube' is still inserted: draw it back 60 mm, to the sheath's mouth"));
+    assert_non_null(strstr(text, "'tube' is still inserted: pull it back 60 mm, to the sheath's mouth"));
     pose->tool[0].inserted_mm = 0;
     assert_null(obstacle(scene, pose, 0, 1));
     // the inner one back at the hub
@@ -145,7 +145,7 @@ static void what_stands_in_the_way_is_told(void **state)
     assert_true(trainer_tray_open(&tray, scene, 1, LIBRARY, pose, &in));
     const PanelTrayChoice choice = {.is_open = true, .device = find("0.014 inch wire, steel core")};
     trainer_tray_show(&tray, scene, pose, &choice);
-    assert_non_null(strstr(trainer_tray_obstacle(&tray), "'thread' is still inserted: draw it back 314 mm, to the hub"));
+    assert_non_null(strstr(trainer_tray_obstacle(&tray), "'thread' is still inserted: pull it back 314 mm, to the hub"));
     pose->tool[1].inserted_mm = -299.5;
     trainer_tray_show(&tray, scene, pose, &choice);
     assert_null(trainer_tray_obstacle(&tray));
