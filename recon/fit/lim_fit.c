@@ -632,6 +632,7 @@ static int compare_sizes(const void *a, const void *b)
 // Orders nodes by the number of points around them, most first, so that the longest job, usually an aneurysm, does not run last on one core.
 static int *order_by_size(const VesselTree *tree)
 {
+    SEL_ASSERT(tree->node_count >= 0, "a number of nodes");
     int n = tree->node_count, *order = calloc((size_t)n, sizeof *order);
     Size *size = calloc((size_t)n, sizeof *size);
     for (int i = 0; i < n && order && size; i++) {
