@@ -137,6 +137,19 @@ static void printing_and_parsing_keeps_a_path(void **state)
         print_and_parse(tools);
 }
 
+// A file that an editor has saved with the line ends of another system, and with spaces behind its figures.
+static void line_ends_and_spaces_do_not_matter(void **state)
+{
+    (void)state;
+    static Faults faults;
+    static const char text[] = "# nodes: 5 \r\n# duration_s:  1.5\r\nt_s,node,x_mm,y_mm,z_mm\r\n0.05,4,1,2,3\r\n";
+    ToolPath *path = tool_path_parse(text, sizeof text - 1, "g.csv", &faults);
+    assert_non_null(path);
+    assert_true(path->tool_count == 1 && path->node_count[0] == 5 && path->duration_s == 1.5);
+    assert_true(path->row_count == 1 && path->row[0].node == 4 && path->row[0].position.z == 3);
+    tool_path_free(path);
+}
+
 static void a_comparison_names_first_time_node_and_distance(void **state)
 {
     (void)state;
@@ -229,6 +242,7 @@ int main(void)
         cmocka_unit_test(small_counts_and_the_largest_are_exact),
         cmocka_unit_test(sha256_gives_the_standards_vectors),
         cmocka_unit_test(printing_and_parsing_keeps_a_path),
+        cmocka_unit_test(line_ends_and_spaces_do_not_matter),
         cmocka_unit_test(a_comparison_names_first_time_node_and_distance),
         cmocka_unit_test(another_node_in_its_place_is_no_counterpart),
         cmocka_unit_test(a_comparison_of_several_tools_names_the_tool),

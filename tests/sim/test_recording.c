@@ -542,6 +542,14 @@ static void no_such_device(hid_t file) { write_value(file, "/exchange", H5T_NATI
 static void unknown_device(hid_t file) { write_value(file, "/exchange", H5T_NATIVE_INT, (const hsize_t[]){9, 0, 1}, 3, &(int){2}); }
 static void no_profile(hid_t file) { write_value(file, "/tools/1/s_mm", H5T_NATIVE_DOUBLE, (const hsize_t[]){1, 1}, 2, &(double){NAN}); }
 static void lose_exchange(hid_t file) { H5Ldelete(file, "/exchange", H5P_DEFAULT); }
+static void steps_of(hid_t file, double step_ms)
+{
+    hid_t attribute = H5Aopen(file, "step_ms", H5P_DEFAULT);
+    assert_true(H5Awrite(attribute, H5T_NATIVE_DOUBLE, &step_ms) >= 0);
+    H5Aclose(attribute);
+}
+static void steps_of_nothing(hid_t file) { steps_of(file, 0); }
+static void steps_too_long(hid_t file) { steps_of(file, 100.1); }
 static void no_such_carrier(hid_t file) { write_value(file, "/tools/2/carrier", H5T_NATIVE_INT, (const hsize_t[]){3, 4}, 2, &(int){7}); }
 
 // Huge and empty: a chunk that was never written uses no space in the file.
@@ -662,6 +670,8 @@ static void what_is_broken_is_refused(void **state)
     expect_refused(path, time_jumps, "/time_s holds 1e+300 s in row 604; expected rows 0.001 s apart, starting at 0.001 s");
     expect_refused(path, time_goes_back, "/time_s holds 0.004 s in row 7");
     expect_refused(path, time_stands, "/time_s holds 0.007 s in row 7");
+    expect_refused(path, steps_of_nothing, "has steps of 0 ms; expected 0.001 to 100");
+    expect_refused(path, steps_too_long, "has steps of 100.1 ms; expected 0.001 to 100");
     expect_refused(path, push_is_nan, "/command holds nan in row 7");
     expect_refused(path, turns_without_end, "/xray holds 1e+30 in row 7, column 2; expected -360 to 360");
     expect_refused(path, node_is_nowhere, "frame 3 has a node that is not a number");

@@ -345,6 +345,22 @@ static void a_missing_script_and_a_wrong_one_are_the_scenes_faults(void **state)
     assert_int_equal(faults.count, 1);
 }
 
+// Another script takes the place of the scene's; one that cannot be read leaves it.
+static void another_script_takes_its_place(void **state)
+{
+    (void)state;
+    Scene *scene = good(WHOLE);
+    assert_null(scene->script);
+    assert_true(scene_use_script(scene, SOURCE_DIR "/scenes/phantom/push.csv", &faults));
+    assert_string_equal(scene->script_path, SOURCE_DIR "/scenes/phantom/push.csv");
+    const Script *script = scene->script;
+    assert_non_null(script);
+    assert_false(scene_use_script(scene, SOURCE_DIR "/no/such.csv", &faults));
+    assert_ptr_equal(scene->script, script);
+    assert_int_equal(faults.count, 1);
+    scene_free(scene);
+}
+
 static void many_aliases_end(void **state)
 {
     (void)state;
@@ -388,6 +404,7 @@ int main(void)
         cmocka_unit_test(each_fault_has_its_line_and_column),
         cmocka_unit_test(all_faults_come_in_one_pass),
         cmocka_unit_test(a_missing_script_and_a_wrong_one_are_the_scenes_faults),
+        cmocka_unit_test(another_script_takes_its_place),
         cmocka_unit_test(many_aliases_end),
         cmocka_unit_test(deep_nesting_is_a_fault),
     };

@@ -95,6 +95,28 @@ static void what_is_written_is_read_back(void **state)
     free(again);
 }
 
+// A name too long is cut at a whole character, also one of bytes that are no beginning of any.
+static void long_names_end_with_a_whole_character(void **state)
+{
+    (void)state;
+    static Session session;
+    char name[2 * sizeof session.trainee + 1] = {0};
+    Practice *p = practice_begin(SCENE, NULL);
+    const size_t most = sizeof session.trainee - 1;
+    for (size_t shift = 0; shift < 2; shift++) {
+        memset(name, 'a', sizeof name - 1);
+        for (size_t i = shift; i + 1 < sizeof name - 1; i += 2)
+            name[i] = '\xc3', name[i + 1] = '\xa9';
+        session_begin(&session, p->scene, name, "", "1970-01-01T00:00:00Z");
+        assert_int_equal(strlen(session.trainee), most - (most - shift) % 2);
+        assert_memory_equal(session.trainee, name, strlen(session.trainee));
+    }
+    memset(name, 0x80, sizeof name - 1);
+    session_begin(&session, p->scene, name, "", "1970-01-01T00:00:00Z");
+    assert_string_equal(session.trainee, "");
+    practice_end(p);
+}
+
 static void the_score_alone_is_json_too(void **state)
 {
     (void)state;
@@ -285,13 +307,10 @@ static void long_names_are_cut_at_a_character(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_written_is_read_back),
-        cmocka_unit_test(the_score_alone_is_json_too),
-        cmocka_unit_test(several_tools_are_read_back),
-        cmocka_unit_test(an_older_session_is_read),
-        cmocka_unit_test(every_prefix_and_a_byte_more_are_refused),
-        cmocka_unit_test(each_wrong_value_is_told),
-        cmocka_unit_test(a_folder_gives_the_trainees_own_in_order),
+        cmocka_unit_test(what_is_written_is_read_back),      cmocka_unit_test(long_names_end_with_a_whole_character),
+        cmocka_unit_test(the_score_alone_is_json_too),       cmocka_unit_test(several_tools_are_read_back),
+        cmocka_unit_test(an_older_session_is_read),          cmocka_unit_test(every_prefix_and_a_byte_more_are_refused),
+        cmocka_unit_test(each_wrong_value_is_told),          cmocka_unit_test(a_folder_gives_the_trainees_own_in_order),
         cmocka_unit_test(long_names_are_cut_at_a_character),
     };
     return cmocka_run_group_tests(tests, make_one, remove_all);
