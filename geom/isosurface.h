@@ -31,6 +31,10 @@ TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm);
 // apart, however thin the wall between, where their balls' `from` lead to different nodes.
 // NULL where memory ends, a ball is not finite, or the cell is not above 0 or too small, as above.
 TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *center, const double *reach, const int *from, double cell_mm);
+// The zero of a field, > 0 inside and 1-Lipschitz, within the balls, which must cover it. Vertices lie on edges of the lattice of points cell * (i, j, k), on
+// which the field must not be 0, within 1e-11 mm; so sharp edges are cut off by a cell at most, and there may be slivers. Their node is 0, their normal that of
+// the triangles around. NULL as above.
+TriangleMesh *isosurface_of_field(double (*field)(const void *of, Vec3 x), const void *of, int count, const Vec3 *center, const double *reach, double cell_mm);
 // The same surface finer: each triangle in four, new vertices moved onto the wall from the middles of edges. NULL where memory ends or there would be more
 // than 5e8 triangles.
 TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vessel);

@@ -65,6 +65,8 @@ bool march_make_room(March *march);
 bool march_add_triangle(March *march, const int corner[3]);
 // Triangles of the block whose values are at hand. False where memory lacks.
 bool march_block(March *march, MarchBlock *b);
+// Where a vertex has no normal (0), the triangles around give it one, by area. False where memory lacks.
+bool march_mend_normals(TriangleMesh *mesh);
 // Frees what the march holds but the mesh.
 void march_end(March *march);
 
