@@ -180,6 +180,29 @@ bool march_block(March *march, MarchBlock *b)
     return true;
 }
 
+bool march_mend_normals(TriangleMesh *mesh)
+{
+    bool missing = false;
+    for (int v = 0; v < mesh->vertex_count && !missing; v++)
+        missing = vec3_norm2(mesh->normal[v]) == 0;
+    if (!missing)
+        return true;
+    Vec3 *area = calloc((size_t)mesh->vertex_count, sizeof *area);
+    if (!area)
+        return false;
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        const int *v = mesh->triangle[t];
+        Vec3 a = mesh->vertex[v[0]], n = vec3_cross(vec3_sub(mesh->vertex[v[1]], a), vec3_sub(mesh->vertex[v[2]], a));
+        for (int k = 0; k < 3; k++)
+            area[v[k]] = vec3_add(area[v[k]], n);
+    }
+    for (int v = 0; v < mesh->vertex_count; v++)
+        if (vec3_norm2(mesh->normal[v]) == 0)
+            mesh->normal[v] = vec3_unit(area[v]);
+    free(area);
+    return true;
+}
+
 void march_end(March *march)
 {
     key_map_free(&march->block_of);

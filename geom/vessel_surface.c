@@ -276,31 +276,7 @@ static void settle_all(const Vessel *vessel, TriangleMesh *mesh, int first, cons
     }
 }
 
-// Sets the normal of vertices that found no wall from the surrounding triangles. Returns false if out of memory.
-static bool mend_normals(TriangleMesh *mesh)
-{
-    bool missing = false;
-    for (int v = 0; v < mesh->vertex_count && !missing; v++)
-        missing = vec3_norm2(mesh->normal[v]) == 0;
-    if (!missing)
-        return true;
-    Vec3 *area = calloc((size_t)mesh->vertex_count, sizeof *area);
-    if (!area)
-        return false;
-    for (int t = 0; t < mesh->triangle_count; t++) {
-        const int *v = mesh->triangle[t];
-        Vec3 a = mesh->vertex[v[0]], n = vec3_cross(vec3_sub(mesh->vertex[v[1]], a), vec3_sub(mesh->vertex[v[2]], a));
-        for (int k = 0; k < 3; k++)
-            area[v[k]] = vec3_add(area[v[k]], n);
-    }
-    for (int v = 0; v < mesh->vertex_count; v++)
-        if (vec3_norm2(mesh->normal[v]) == 0)
-            mesh->normal[v] = vec3_unit(area[v]);
-    free(area);
-    return true;
-}
-
-// Queues the neighbours of block `index` across whose common face the wall continues, if they were skipped.
+// Puts the blocks beside b across whose faces the wall goes on in the queue, if they were left out.
 static void pass_on(VesselMarch *job, int index, const bool *is_plain, bool *is_queued, int *queue, int *count)
 {
     const March *march = &job->march;
@@ -447,7 +423,7 @@ TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *
     TriangleMesh *mesh = job->march.mesh;
     if (good)
         settle_all(vessel, mesh, 0, NULL, MOVE * cell_mm);
-    if (!good || !trim(job) || !mend_normals(mesh)) {
+    if (!good || !trim(job) || !march_mend_normals(mesh)) {
         triangle_mesh_free(mesh);
         mesh = NULL;
     }
@@ -513,7 +489,7 @@ TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vesse
                 memcpy(out[k], (int[3]){v[k], m[k], m[(k + 2) % 3]}, sizeof out[k]);
             memcpy(out[3], m, sizeof out[3]);
         }
-        good = mend_normals(fine);
+        good = march_mend_normals(fine);
     }
     free(middle);
     free(end);
