@@ -33,12 +33,12 @@ TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm);
 // lead to different nodes.
 // Returns NULL if out of memory, if a ball is not finite, or if the cell is not above 0 or too small, as above.
 TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *center, const double *reach, const int *from, double cell_mm);
-// The zero of a field, > 0 inside and 1-Lipschitz, within the balls, which must cover it. Vertices lie on edges of the lattice of points cell * (i, j, k), on
-// which the field must not be 0, within 1e-11 mm; so sharp edges are cut off by a cell at most, and there may be slivers. Their node is 0, their normal that of
-// the triangles around. NULL as above.
+// The zero level of a field, > 0 inside and 1-Lipschitz, within the balls, which must cover it. The field must not be 0 at the lattice points cell * (i, j, k).
+// Vertices lie on the edges of the lattice, within 1e-11 mm of the zero level: sharp edges are cut off by at most a cell, and slivers are possible. Each vertex
+// has node 0 and the normal of its triangles. Returns NULL as above.
 TriangleMesh *isosurface_of_field(double (*field)(const void *of, Vec3 x), const void *of, int count, const Vec3 *center, const double *reach, double cell_mm);
-// The same surface finer: each triangle in four, new vertices moved onto the wall from the middles of edges. NULL where memory ends or there would be more
-// than 5e8 triangles.
+// The same surface, finer: each triangle is divided into four, and the new vertices, at the middles of edges, are moved onto the wall. Returns NULL if out of
+// memory or if there would be more than 5e8 triangles.
 TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vessel);
 // Keeps the triangles t with keep[t] and the vertices that they use, in their order. Returns false, with the mesh unchanged, if out of memory.
 bool triangle_mesh_keep(TriangleMesh *mesh, const bool *keep);

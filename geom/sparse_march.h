@@ -66,9 +66,9 @@ bool march_make_room(March *march);
 bool march_add_triangle(March *march, const int corner[3]);
 // Adds the triangles of the current block. Returns false if out of memory.
 bool march_block(March *march, MarchBlock *b);
-// Where a vertex has no normal (0), the triangles around give it one, by area. False where memory lacks.
+// Sets the normal of each vertex that has none (0) from its triangles, weighted by area. Returns false if out of memory.
 bool march_mend_normals(TriangleMesh *mesh);
-// Frees what the march holds but the mesh.
+// Frees everything that the march owns except the mesh.
 void march_end(March *march);
 
 #endif

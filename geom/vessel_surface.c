@@ -276,7 +276,7 @@ static void settle_all(const Vessel *vessel, TriangleMesh *mesh, int first, cons
     }
 }
 
-// Puts the blocks beside b across whose faces the wall goes on in the queue, if they were left out.
+// Queues the neighbours of block `index` across whose common face the wall continues, if they were skipped.
 static void pass_on(VesselMarch *job, int index, const bool *is_plain, bool *is_queued, int *queue, int *count)
 {
     const March *march = &job->march;

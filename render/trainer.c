@@ -572,8 +572,8 @@ static void tell_news(Trainer *trainer, const Moment *moment)
         say(trainer, MARK_WARNING, "%s", text);
     if (!trainer->has_told_end && (tracked->score.state == SCORE_REACHED || tracked->score.state == SCORE_TIME_OUT)) {
         trainer->has_told_end = true;
-        say(trainer, lesson->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
-            lesson->score.state == SCORE_REACHED ? "target reached and held" : "time is up", lesson->score.points);
+        say(trainer, tracked->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
+            tracked->score.state == SCORE_REACHED ? "target reached and held" : "time is up", tracked->score.points);
     }
 }
 

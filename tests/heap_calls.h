@@ -16,7 +16,7 @@ static long heap_calls(void) { return 0; }
 static void heap_watch(bool on) { (void)on; }
 #else
 #define COUNTS_HEAP 1
-// volatile: the compiler takes malloc() and free() for functions that look at no variable of a program
+// volatile: the compiler assumes that malloc() and free() neither read nor write the variables of a program
 static _Thread_local volatile bool watched;
 static _Thread_local volatile long calls;
 

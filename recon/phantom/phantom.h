@@ -53,7 +53,7 @@ const ShapeBlock *shape_blocks(const Shape *shape, int *count);
 VesselTree *shape_sample(const Shape *shape, Faults *faults);
 // Does shape_create and shape_sample in one call, for a scene's `shape:`.
 VesselTree *shape_tree(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
-// The surface as a closed mesh (open ends flat), vertices on it, edges of 0.6 cells and less on the average; every node is 0.
+// Returns the surface as a closed mesh (open ends are flat). Vertices lie on the surface; edges are at most 0.6 cells long on average. Each vertex has node 0.
 TriangleMesh *shape_surface(const Shape *shape, double cell_mm, Faults *faults);
 // Options of the simulated angiogram. Vessels are 1, background 0.
 typedef struct VolumeOptions {

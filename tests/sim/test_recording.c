@@ -869,7 +869,7 @@ static void look(void *context, bool done)
     Watched *watched = context;
     hsize_t count[2] = {0, 0};
     if (access(watched->path, F_OK) != 0)
-        return;      // has no name yet
+        return;      // the file has no name yet
     if (!WHOLE_RUN && !done && watched->states % 6 > 0) {      // the same writes are made; that each leaves a whole file, the optimised build looks at
         watched->states++;
         watched->writes++;
