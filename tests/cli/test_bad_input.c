@@ -141,7 +141,7 @@ static void the_wrong_kind_of_file(void **state)
     refused("fit noise.bin -o out.h5", "noise.bin:byte 0: is not a readable HDF5 file");
     refused("fit cut.h5 -o out.h5", "cut.h5:byte 0: is not a readable HDF5 file");
     refused("export tree.h5 -o out.stl", "tree.h5: is a tree without a model");
-    refused("export noise.bin -o out.stl", "noise.bin: is no tree, model or recording");
+    refused("export noise.bin -o out.stl", "noise.bin: cannot be exported; expected a tree, model or recording");
     refused("export model.h5 -o out.xyz", "unknown extension '.xyz'");
     refused("info noise.bin", "noise.bin");
     refused("info cut.h5", "cut.h5:byte 0: is not a readable HDF5 file");

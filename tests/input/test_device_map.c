@@ -97,7 +97,7 @@ static void what_does_not_fit_together_is_said(void **state)
     expect_fault(HID "push: {source: X, mm_s: 2}\nforce: {full_scale_n: 2, max_n: 3}\n", "above");
     expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_per_count: 2}\n", "deflections");
     expect_fault(TOP "device: {gamepad: true}\npush: {source: X, mm_s: 2}\n", "left_x");
-    expect_fault(TOP "device: {gamepad: true, joystick: \"*\"}\npush: {source: axis_0, mm_s: 2}\n", "is one of");
+    expect_fault(TOP "device: {gamepad: true, joystick: \"*\"}\npush: {source: axis_0, mm_s: 2}\n", "has several of");
     expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_s: 2}\nforce: {full_scale_n: 1}\n", "needs a HID device");
     expect_fault(TOP "device: {usb: ftdi}\npush: {source: B, mm_per_count: 2}\n", "not among");
     expect_fault(TOP "device: {usb: ftdi}\npush: {source: A, mm_s: 2}\n", "gives counts");

@@ -176,7 +176,7 @@ static const Broken broken[] = {
     {"seldinger: [1\n", "2:1", "not YAML"},
     {"seldinger: 1\n\tx: 1\n", "2:1", "not YAML"},
     {"\xff\xfe\xfd", "1:1", "not YAML"},
-    {WHOLE "---\na: 1\n", "4:1", "second document"},
+    {WHOLE "---\na: 1\n", "4:1", "second YAML document"},
     {"- 1\n- 2\n", "1:1", "not a map"},
     {"hello\n", "1:1", "not a map"},
     // keys
