@@ -59,8 +59,6 @@ typedef struct CinePlayer {
 CinePlayer cine_player_start(const Cine *cine);          // plays in a loop, at its speed, from the first image
 // Advances by `dt_s` of real time. Returns the image to show. Without `loops` it stops at the last one.
 int cine_player_advance(CinePlayer *player, const Cine *cine, double dt_s);
-// Stops and moves by `images`, wrapping around at the ends.
-int cine_player_step(CinePlayer *player, const Cine *cine, int images);
 
 // --- files --- The loop as bytes, `*length` of them; free() them. NULL if out of memory.
 uint8_t *cine_pack(const Cine *cine, size_t *length);

@@ -38,11 +38,9 @@ typedef struct LimEnergy {
 // All fields zero but bounds (0, 0). False if out of memory. Points are to be set by the caller up to `count`.
 bool lim_points_create(LimPoints *points, int count);
 void lim_points_free(LimPoints *points);
-// Sets the sums to -T, then adds what blob_add adds.
-void lim_points_reset(LimPoints *points, double iso_level);
 // Adds the blob's field, gradient and Hessian to the sums (sign 1), or subtracts them (sign -1).
 void lim_points_add(LimPoints *points, const LimBlob *blob, double sign);
-// lim_points_reset and lim_points_add of all blobs, in one pass.
+// Sets the sums to -T, then lim_points_add of all blobs, in one pass.
 void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level);
 // Signed Taubin distance at each point from the sums as they are (all blobs added).
 void lim_points_taubin(const LimPoints *points, float *distance);
