@@ -220,18 +220,6 @@ int cine_player_advance(CinePlayer *player, const Cine *cine, double dt_s)
     return player->frame;
 }
 
-int cine_player_step(CinePlayer *player, const Cine *cine, int images)
-{
-    player->is_playing = false;
-    player->shown_s = 0;
-    if (cine->count == 0)
-        return player->frame = -1;
-    int64_t frame = (int64_t)(player->frame < 0 ? 0 : player->frame) + images, last = cine->count - 1;
-    if (player->loops)
-        frame = (frame % cine->count + cine->count) % cine->count;
-    return player->frame = (int)(frame < 0 ? 0 : frame < last ? frame : last);
-}
-
 // --- files ---
 
 // Reads or writes; `good` becomes false permanently if bytes are missing.

@@ -61,8 +61,6 @@ typedef struct CinePlayer {
 CinePlayer cine_player_start(const Cine *cine);          // starts at the first image, at original speed, and repeats
 // Advances by `dt_s` of real time and returns the image to show. If `loops` is false it stops at the last one.
 int cine_player_advance(CinePlayer *player, const Cine *cine, double dt_s);
-// Stops and moves by `images`, wrapping around at the ends.
-int cine_player_step(CinePlayer *player, const Cine *cine, int images);
 
 // --- files --- Returns the loop as bytes, `*length` of them; the caller frees them. NULL if out of memory.
 uint8_t *cine_pack(const Cine *cine, size_t *length);

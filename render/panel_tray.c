@@ -2,6 +2,7 @@
 #include "render/panel_tray.h"
 
 #include "render/panel_internal.h"
+#include "render/tick_step.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -36,8 +37,7 @@ static void draw_shape(Gui *gui, GuiRect at, const PanelTrayDevice *device)
                       (float)(y0 - scale * (b[1] - low[1])), gui_colors.accent, fmaxf(2, floorf(2 * s)));
     }
     // a bar of 1, 2, 5, 10 … mm, about a fifth of the box
-    double bar = pow(10, floor(log10(width / 5 / scale)));
-    bar *= width / 5 / scale >= 5 * bar ? 5 : width / 5 / scale >= 2 * bar ? 2 : 1;
+    double bar = round_length(width / 5 / scale);
     char text[32];
     float text_width, text_height, right = at.x + at.width - margin, bottom = at.y + at.height - floorf(5 * s);
     snprintf(text, sizeof text, "%g mm", bar);

@@ -156,22 +156,9 @@ void picture_page_label(PicturePage *page, double x, double y, double anchor, Te
     picture_page_text_anchored(page, x, y, anchor, size, color, text);
 }
 
-// The round number (1, 2 or 5 times a power of ten) at or below x; x itself where it is not a positive number.
-static double round_down(double x)
-{
-    if (!(x > 0) || !isfinite(x))
-        return x;
-    double power = pow(10, floor(log10(x)));
-    const double step[4] = {10, 5, 2, 1};
-    for (int i = 0; i < 3; i++)
-        if (x >= step[i] * power * (1 - 1e-9))
-            return step[i] * power;
-    return power;
-}
-
 void picture_page_scale_bar(PicturePage *page, double x, double y, double longest, double mm_per_pixel, Color color)
 {
-    double length = round_down(longest * mm_per_pixel);
+    double length = round_length(longest * mm_per_pixel);
     double pixels = length / mm_per_pixel, s = page->scale;
     overlay_fill(page->overlay, x, y - 4 * s, pixels, 4 * s, color);
     char text[64];
@@ -194,7 +181,7 @@ void picture_page_color_bar(PicturePage *page, double x, double y, double width,
     double step = tick_step(high - low, 5);
     for (double first = ceil(low / step - 1e-9), k = first; k * step <= high * (1 + 1e-9) + 1e-12; k++) {
         char text[32];
-        picture_page_format_tick(text, sizeof text, k * step, step);
+        tick_format(text, sizeof text, k * step, step);
         double at = x + width * (k * step - low) / (high - low);
         overlay_line(page->overlay, at, top + height, at, top + height + 4 * s, SHEET_INK, s);
         double text_width;
@@ -214,15 +201,4 @@ double picture_page_scale_end(double x)
         if (x <= step[i] * power * (1 + 1e-9))
             return step[i] * power;
     return 10 * power;
-}
-
-void picture_page_format_tick(char *text, size_t capacity, double value, double step)
-{
-    if (fabs(value) < 1e-9 * step)
-        value = 0;
-    int digits = step >= 1 ? 0 : (int)ceil(-log10(step) - 1e-9);
-    if (digits > 6 || fabs(value) >= 1e6)
-        snprintf(text, capacity, "%.3g", value);
-    else
-        snprintf(text, capacity, "%.*f", digits, value);
 }

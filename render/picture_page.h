@@ -62,6 +62,5 @@ bool picture_page_error_surface(PicturePage *page, const PictureOptions *options
 
 // A round number at or above x for the end of a scale: 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8.
 double picture_page_scale_end(double x);
-void picture_page_format_tick(char *text, size_t capacity, double value, double step);
 
 #endif

@@ -131,14 +131,14 @@ static void draw_grid(PicturePage *page, const Chart *chart, bool is_last)
             }
     }
     for (double k = ceil(chart->low / step - 1e-9); !chart->logarithmic && k * step <= chart->high + 1e-9 * step; k++) {
-        picture_page_format_tick(text, sizeof text, k * step, step);
+        tick_format(text, sizeof text, k * step, step);
         draw_level(page, chart, k * step, text, k == 0);
     }
     step = tick_step(chart->t1 - chart->t0, 10);
     for (double k = ceil(chart->t0 / step - 1e-9); k * step <= chart->t1 + 1e-9 * step; k++) {
         double x = chart->x + chart->width * (k * step - chart->t0) / (chart->t1 - chart->t0);
         overlay_line(page->overlay, x, chart->y, x, chart->y + chart->height, SHEET_FAINT, s);
-        picture_page_format_tick(text, sizeof text, k * step, step);
+        tick_format(text, sizeof text, k * step, step);
         if (is_last)
             picture_page_text_anchored(page, x, chart->y + chart->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
     }

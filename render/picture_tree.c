@@ -118,7 +118,7 @@ static void draw_axes(PicturePage *page, const Panel *panel)
         double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size, tick = tick_step(high - low, 6);
         for (double k = ceil(low / tick); k * tick <= high; k++) {
             char text[32];
-            picture_page_format_tick(text, sizeof text, k * tick, tick);
+            tick_format(text, sizeof text, k * tick, tick);
             double part = (k * tick - low) / (high - low);
             if (direction) {
                 double y = panel->y + panel->height * (1 - part), height;

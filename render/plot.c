@@ -51,7 +51,7 @@ static void draw_ticks(Gui *gui, GuiRect at, double low, double high, double ste
         gui_draw_fill(gui, (GuiRect){at.x, y, at.width, 1}, is_zero ? gui_colors.dim : gui_colors.line);
         char text[32];
         float width, height;
-        snprintf(text, sizeof text, "%.*f", step < 1 ? (int)ceil(-log10(step) - 1e-9) : 0, is_zero ? 0 : value);
+        tick_format(text, sizeof text, value, step);
         gui_text_extent(gui, GUI_SMALL, text, &width, &height);
         float top = fminf(fmaxf(y - height / 2, at.y - height / 3), at.y + at.height - 2 * height / 3);
         // numbers that would touch the one below, or the zero's, are left out
@@ -115,7 +115,7 @@ void plot_draw(const RunningPlot *plot, Gui *gui, const char *title, const char 
     // room for the numbers: the widest of the two ends
     float label = 0;
     for (int i = 0; i < 2; i++) {
-        snprintf(text, sizeof text, "%.*f", step < 1 ? (int)ceil(-log10(step) - 1e-9) : 0, i ? ceil(low / step) * step : floor(high / step) * step);
+        tick_format(text, sizeof text, i ? ceil(low / step) * step : floor(high / step) * step, step);
         gui_text_extent(gui, GUI_SMALL, text, &width, &text_height);
         label = fmaxf(label, width);
     }

@@ -83,18 +83,6 @@ ShellStyle shell_style_glass(void)
                         .haze_amount = 0.35f};
 }
 
-ShellStyle shell_style_solid(void)
-{
-    return (ShellStyle){.front = {0.80f, 0.80f, 0.78f},
-                        .back = {0.62f, 0.60f, 0.58f},
-                        .front_opacity = 1,
-                        .back_opacity = 1,
-                        .rim = 1,
-                        .rim_power = 2,
-                        .haze = {0.98f, 0.98f, 0.97f},
-                        .haze_amount = 0.35f};
-}
-
 static unsigned make_program(const char *vertex, const char *fragment, char *message, size_t capacity)
 {
     char text[4096];

@@ -22,7 +22,6 @@ typedef struct ShellStyle {
     float fade_from, fade_to;  // [mm] towards the eye from the camera's centre: nearer walls fade out between these; equal: no fading
 } ShellStyle;
 ShellStyle shell_style_glass(void);   // a translucent vessel on a light background
-ShellStyle shell_style_solid(void);   // an opaque surface
 
 typedef struct ViewPoint {
     float position[3];         // [mm] relative to the origin given with the list

@@ -2,6 +2,7 @@
 #include "render/vessel_scene.h"
 
 #include "render/message.h"
+#include "render/tick_step.h"
 #include "render/vessel_scene_layers.h"
 #include "render/vessel_scene_model.h"
 #include "render/vessel_scene_strokes.h"
@@ -474,8 +475,7 @@ ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels)
     double most = most_pixels * scene->projection.mm_per_pixel;
     if (!(most > 0))
         return (ScaleBar){0};
-    double power = pow(10, floor(log10(most))), part = most / power;
-    double length = (part >= 5 ? 5 : part >= 2 ? 2 : 1) * power;
+    double length = round_length(most);
     return (ScaleBar){length, length / scene->projection.mm_per_pixel};
 }
 

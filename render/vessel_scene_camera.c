@@ -66,8 +66,6 @@ void free_camera_orbit(FreeCamera *camera, double dx, double dy)
     turn_about(camera, vec3_add(vec3_scale(up, dx), vec3_scale(right, dy)), -turn_per_pixel);
 }
 
-void free_camera_roll(FreeCamera *camera, double angle) { turn_about(camera, back_of(camera), -angle); }
-
 void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int height)
 {
     double scale = mm_per_pixel(camera, width, height);
@@ -93,8 +91,7 @@ void free_camera_reset(FreeCamera *camera)
     camera->height_mm = camera->home_height_mm;
 }
 
-// Looks along any direction from the eye into the scene, with `up` (made perpendicular to it) upwards: for scenes whose frame is not the patient's.
-static void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
+void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
 {
     Camera axes = {0};
     camera_orient(&axes, view, up, 0, NULL);
@@ -103,18 +100,6 @@ static void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
     for (int k = 0; k < 8; k++)
         corner[k] = vec3(k & 1 ? camera->high.x : camera->low.x, k & 2 ? camera->high.y : camera->low.y, k & 4 ? camera->high.z : camera->low.z);
     frame_points(camera, 8, corner);
-}
-
-void free_camera_look_from(FreeCamera *camera, LookFrom from)
-{
-    static const struct {
-        Vec3 view, up;
-    } side[] = {[LOOK_FRONT] = {{0, 1, 0}, {0, 0, 1}}, [LOOK_BACK] = {{0, -1, 0}, {0, 0, 1}}, [LOOK_RIGHT] = {{1, 0, 0}, {0, 0, 1}},
-                [LOOK_LEFT] = {{-1, 0, 0}, {0, 0, 1}}, [LOOK_TOP] = {{0, 0, -1}, {0, -1, 0}}, [LOOK_BOTTOM] = {{0, 0, 1}, {0, -1, 0}}};
-    if (from == LOOK_FACE_ON)
-        free_camera_reset(camera);
-    else
-        free_camera_look_along(camera, side[from].view, side[from].up);
 }
 
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth)

@@ -16,29 +16,18 @@ typedef struct FreeCamera {
     double home_width_mm, home_height_mm;
 } FreeCamera;
 
-typedef enum {
-    LOOK_FACE_ON,              // the initial view: along the axis in which the scene is thinnest
-    LOOK_FRONT,                // from the patient's front (along +y), head up
-    LOOK_BACK,
-    LOOK_RIGHT,                // from the patient's right (along +x), head up
-    LOOK_LEFT,
-    LOOK_TOP,                  // from the head (along -z), front up
-    LOOK_BOTTOM,
-} LookFrom;
-
-// Frames the points, seen face on. Without points: a ball of 10 mm around the origin.
+// Frames the points, seen along the axis in which the scene is thinnest. Without points: a ball of 10 mm around the origin.
 FreeCamera free_camera_framing(int count, const Vec3 *point);
 // The near side of the view follows the mouse by 0.4 degrees per pixel; dx right, dy down [pixel].
 void free_camera_orbit(FreeCamera *camera, double dx, double dy);
-// Rotates the picture counter-clockwise [rad].
-void free_camera_roll(FreeCamera *camera, double angle);
 // The point under the mouse stays under it. width, height: size of the view [pixel].
 void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int height);
 // Zooms in by a factor of 1.15 for each `notch` > 0 of the wheel; the point at (x, y), from the upper left corner of the view, stays in place.
 // A view is at least 1/400 and at most 20 times as wide as the home view.
 void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int width, int height);
 void free_camera_reset(FreeCamera *camera);
-void free_camera_look_from(FreeCamera *camera, LookFrom from);   // shows the whole scene
+// Frames the whole scene, seen along `view` (from the eye into the scene), with `up`, made perpendicular to it, upwards.
+void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up);
 // The projection for a view of width x height; the depths drawn extend `depth` mm in front of and behind the focus.
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth);
 

@@ -332,13 +332,6 @@ void window_set_full_screen(Window *w, bool is_full)
     glfwSetWindowMonitor(w->window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
-const char *window_renderer(const Window *w)
-{
-    (void)w;
-    const char *name = (const char *)glGetString(GL_RENDERER);
-    return name ? name : "";
-}
-
 // ---- create and destroy
 
 static GLFWwindow *open_window(const char *title, int width, int height)

@@ -101,6 +101,5 @@ const char *window_gamepad_name(const Window *window, int index);   // also of o
 
 void window_set_full_screen(Window *window, bool is_full);
 bool window_is_full_screen(const Window *window);
-const char *window_renderer(const Window *window);     // name of the OpenGL renderer
 
 #endif

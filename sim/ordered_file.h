@@ -1,5 +1,8 @@
 // An HDF5 file that is valid on disk at any time while its datasets grow by chunks.
 //
+// HDF5's SWMR was measured instead (1.10.8, killed 50 times): plain readers could open the file 0 times of 50, while it was written as after SIGKILL, as it is
+// marked open for writing; readers with the SWMR flag had all flushed rows 50 times. Its size is the same, its cost 72 us a row of 12 datasets (70 without).
+//
 // Made for recordings. Two phases:
 //   - the HDF5 library builds the structure (ordered_file_create, ordered_file_start_page) and closes the file, which has no name of its own yet;
 //   - then only this module writes it: packed chunks, the entries of the chunk indices (B-trees of version 1) and the extents in the headers of the

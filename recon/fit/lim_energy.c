@@ -69,17 +69,6 @@ void lim_points_free(LimPoints *points)
     *points = (LimPoints){0};
 }
 
-void lim_points_reset(LimPoints *points, double iso_level)
-{
-    size_t bytes = (size_t)points->padded * sizeof(float);
-    for (int i = 0; i < points->padded; i++)
-        points->f[i] = (float)-iso_level;
-    for (int k = 0; k < 3; k++)
-        memset(points->g[k], 0, bytes);
-    for (int k = 0; k < 6; k++)
-        memset(points->h[k], 0, bytes);
-}
-
 void lim_points_add(LimPoints *points, const LimBlob *blob, double sign) { kernels()->add(points, blob, sign); }
 
 void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level) { kernels()->sum(points, blobs, count, iso_level); }

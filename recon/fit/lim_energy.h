@@ -38,11 +38,9 @@ typedef struct LimEnergy {
 // Allocates points with all fields zero and bounds (0, 0). The caller then sets the points 0 … count-1. Returns false if out of memory.
 bool lim_points_create(LimPoints *points, int count);
 void lim_points_free(LimPoints *points);
-// Sets the sums to those of no blobs, -T.
-void lim_points_reset(LimPoints *points, double iso_level);
 // Adds the blob's field, gradient and Hessian to the sums (sign 1), or subtracts them (sign -1).
 void lim_points_add(LimPoints *points, const LimBlob *blob, double sign);
-// Does lim_points_reset and lim_points_add of all blobs in one pass.
+// Sets the sums to -T and adds all blobs, in one pass.
 void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level);
 // Computes the signed Taubin distance at each point from the present sums (all blobs added).
 void lim_points_taubin(const LimPoints *points, float *distance);

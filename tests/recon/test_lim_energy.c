@@ -49,6 +49,18 @@ static void make_case(Case *c, uint64_t seed)
     }
 }
 
+// The sums without a blob: -T.
+static void lim_points_reset(LimPoints *points, double iso_level)
+{
+    size_t bytes = (size_t)points->padded * sizeof(float);
+    for (int i = 0; i < points->padded; i++)
+        points->f[i] = (float)-iso_level;
+    for (int k = 0; k < 3; k++)
+        memset(points->g[k], 0, bytes);
+    for (int k = 0; k < 6; k++)
+        memset(points->h[k], 0, bytes);
+}
+
 static void sums_without(Case *c, int moving)
 {
     lim_points_reset(&c->points, ISO_LEVEL);

@@ -195,12 +195,7 @@ static void replay_keeps_the_pulses_times(void **state)
     assert_int_equal(cine_player_advance(&player, cine, 0.5), 22);
     player.is_playing = false;
     assert_int_equal(cine_player_advance(&player, cine, 10), 22);
-    assert_int_equal(cine_player_step(&player, cine, 1), 23);
-    assert_int_equal(cine_player_step(&player, cine, 7), 0);
-    assert_int_equal(cine_player_step(&player, cine, -2), 28);
     player.loops = false;
-    assert_int_equal(cine_player_step(&player, cine, 50), 29);
-    assert_int_equal(cine_player_step(&player, cine, -500), 0);
     player.is_playing = true;
     player.speed = 1;
     assert_int_equal(cine_player_advance(&player, cine, 1e6), 29);
@@ -235,7 +230,6 @@ static void an_empty_loop_shows_nothing(void **state)
     CinePlayer player = cine_player_start(cine);
     assert_int_equal(player.frame, -1);
     assert_int_equal(cine_player_advance(&player, cine, 1), -1);
-    assert_int_equal(cine_player_step(&player, cine, 1), -1);
     assert_true(cine_duration_s(cine) == 0);
     // an image that comes while it is shown is shown
     cine_record(cine);

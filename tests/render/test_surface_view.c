@@ -12,6 +12,19 @@
 
 #include <cmocka.h>
 
+// An opaque surface.
+static ShellStyle shell_style_solid(void)
+{
+    return (ShellStyle){.front = {0.80f, 0.80f, 0.78f},
+                        .back = {0.62f, 0.60f, 0.58f},
+                        .front_opacity = 1,
+                        .back_opacity = 1,
+                        .rim = 1,
+                        .rim_power = 2,
+                        .haze = {0.98f, 0.98f, 0.97f},
+                        .haze_amount = 0.35f};
+}
+
 enum { WIDTH = 320, HEIGHT = 240 };
 
 typedef struct Stage {

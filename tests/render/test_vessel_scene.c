@@ -157,7 +157,7 @@ static void a_section_takes_away_what_lies_before_its_plane(void **state)
     VesselScene *scene = open_scene(mesh, NULL, 0, NULL), *nothing = open_scene(NULL, NULL, 0, NULL);
     VesselSceneLook look = vessel_scene_default_look(scene);
     look.full_detail = true;
-    free_camera_look_from(&look.camera, LOOK_FRONT);   // +x to the right
+    free_camera_look_along(&look.camera, vec3(0, 1, 0), vec3(0, 0, 1));   // +x to the right
     take(&stage, nothing, NULL, &look, empty);
     take(&stage, scene, NULL, &look, whole);
     const double offset[3] = {-4, 0, 5.5};
@@ -214,7 +214,7 @@ static void arrows_stand_only_where_there_is_force(void **state)
     static StagePixels with, without;
     VesselScene *scene = open_scene(NULL, NULL, 0, NULL);
     VesselSceneLook look = vessel_scene_default_look(scene);
-    free_camera_look_from(&look.camera, LOOK_FRONT);
+    free_camera_look_along(&look.camera, vec3(0, 1, 0), vec3(0, 0, 1));
     Pose *pose = straight_pose(21, vec3(-10, 0, 0), vec3(1, 0, 0), vec3(0, 1, 0), 1, 0.2);
     // what lies in the sheath has no wall to push it
     pose->first_free_node = 3;
@@ -322,8 +322,8 @@ static void a_tool_is_dimmed_by_the_walls_before_it(void **state)
     VesselScene *scene = open_scene(mesh, NULL, 0, NULL);
     VesselSceneLook look = vessel_scene_default_look(scene);
     look.full_detail = true;
-    for (int from = LOOK_FRONT; from <= LOOK_BACK; from++) {
-        free_camera_look_from(&look.camera, (LookFrom)from);
+    for (int from = 1; from >= -1; from -= 2) {
+        free_camera_look_along(&look.camera, vec3(0, from, 0), vec3(0, 0, 1));
         take(&stage, scene, NULL, &look, without);
         const double depth[3] = {5, 0, -5};   // towards the eye: before, inside, behind
         double contrast[3];
@@ -427,24 +427,18 @@ static void the_free_camera_does_what_the_mouse_does(void **state)
     for (int k = 0; k < 500; k++)
         free_camera_zoom(&camera, -5, 0, 0, width, height);
     assert_true(camera.width_mm < 20.1 * home.width_mm);
-    free_camera_look_from(&camera, LOOK_LEFT);
+    free_camera_look_along(&camera, vec3(-1, 0, 0), vec3(0, 0, 1));
     view = free_camera_projection(&camera, width, height, 100);
     assert_true(vec3_distance(view.back, vec3(1, 0, 0)) < 1e-12 && vec3_distance(view.up, vec3(0, 0, 1)) < 1e-12);
     for (int i = 0; i < 4; i++) {
         Vec3 p = camera_project(&view, point[i]);
         assert_true(p.x > 0 && p.x < width && p.y > 0 && p.y < height);
     }
-    free_camera_look_from(&camera, LOOK_TOP);
+    free_camera_look_along(&camera, vec3(0, 0, -1), vec3(0, -1, 0));
     view = free_camera_projection(&camera, width, height, 100);
     assert_true(vec3_distance(view.back, vec3(0, 0, 1)) < 1e-12 && vec3_distance(view.up, vec3(0, -1, 0)) < 1e-12);
     free_camera_reset(&camera);
     assert_memory_equal(&camera, &home, sizeof home);
-    // half a turn of the picture turns it by 180 degrees
-    free_camera_roll(&camera, PI);
-    view = free_camera_projection(&camera, width, height, 100);
-    Camera first = free_camera_projection(&home, width, height, 100);
-    Vec3 a = camera_project(&first, point[1]), b = camera_project(&view, point[1]);
-    assert_true(fabs(a.x + b.x - width) < 1e-9 && fabs(a.y + b.y - height) < 1e-9);
 }
 
 static void the_view_follows_the_tip_without_redrawing_at_each_step(void **state)
@@ -540,7 +534,7 @@ static void a_tool_is_seen_in_the_one_around_it(void **state)
     // the force on the catheter's wall colours the catheter, not the wire in it
     VesselSceneLook look = vessel_scene_default_look(scene);
     look.show_arrows = false;
-    free_camera_look_from(&look.camera, LOOK_FRONT);
+    free_camera_look_along(&look.camera, vec3(0, 1, 0), vec3(0, 0, 1));
     Pose *pose = coaxial_pose(10, 16, 0.5, 1, 0.25);
     for (int i = 8; i < 13; i++)
         pose->node[i].force = vec3(0, 0, 0.5);

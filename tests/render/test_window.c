@@ -384,7 +384,7 @@ static void print_cost(void)
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[1]);
     double ms = 1e3 * (double)(t[1].tv_sec - t[0].tv_sec) + 1e-6 * (double)(t[1].tv_nsec - t[0].tv_nsec);
     print_message("panel alone in a window of %dx%d: %.2f ms CPU a frame (%s)\n", controls.input->width, controls.input->height, ms / FRAMES,
-                  window_renderer(controls.window));
+                  (const char *)glGetString(GL_RENDERER));
 }
 
 static void draw_fresh(unsigned framebuffer, const WindowInput *input)
