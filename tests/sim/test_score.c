@@ -40,6 +40,24 @@ static void an_exercise_is_read(void **state)
     practice_end(p);
 }
 
+// A target that is passed was reached when the tip came in.
+static void a_target_keeps_its_first_time(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN, NULL);
+    const TargetReach *reach = simulator_targets(p->simulator);
+    double first_s = -1;
+    for (int i = 0; i < 2000; i++) {
+        practice_step(p, 20);
+        if (first_s < 0 && reach->reached)
+            first_s = simulator_time_s(p->simulator);
+    }
+    assert_true(reach->reached && reach->distance < 0.1);
+    assert_true(first_s > 0.1 && first_s < 1.9);
+    assert_near(reach->time_s, first_s, 0);
+    practice_end(p);
+}
+
 static void a_wrong_exercise_is_refused(void **state)
 {
     (void)state;
@@ -961,6 +979,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_exercise_is_read),
+        cmocka_unit_test(a_target_keeps_its_first_time),
         cmocka_unit_test(a_wrong_exercise_is_refused),
         cmocka_unit_test(a_volume_is_found_beside_the_scene),
         cmocka_unit_test(the_clock_runs_from_the_first_movement),
