@@ -118,6 +118,7 @@ static void a_session_goes_on_from_a_moment_of_it(void **state)
     snprintf(path, sizeof path, "%s", in_folder("first.h5"));
     snprintf(again, sizeof again, "%s", in_folder("second.h5"));
     LiveSessionOptions options = options_for(path);
+    options.trainee = "Ada", options.date = "2026-01-02T03:04:05Z";
     atomic_store(&port.push_mm_s, 20);
     LiveSession session = open_session(&options);
     assert_string_equal(session.record_path, path);
@@ -133,6 +134,8 @@ static void a_session_goes_on_from_a_moment_of_it(void **state)
     ScoreFigures score = stop(&session);
     assert_true(score.fluoroscopy_s > 0.1 && score.contrast_ml > 0.3 && score.inserted_mm > 8);
     RecordedRun *first = load("first.h5");
+    assert_string_equal(first->trainee, "Ada");
+    assert_string_equal(first->date, "2026-01-02T03:04:05Z");
     assert_replays(first, &score);
 
     // from 0.3 s on with another hand, X-rays off
