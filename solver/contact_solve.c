@@ -1,4 +1,4 @@
-// The two forms of a contact solve behind one call, and their work space.
+// Dispatches a contact solve to one of its two forms and owns their work space.
 #include "solver/contact_solve.h"
 
 #include "base/base.h"
@@ -112,7 +112,7 @@ static void take_forces(const ContactSolver *solver, int count, ContactSet *set)
     }
 }
 
-// The rows of the set: contacts with walls and pairs first, slides after them. Returns the number of the former.
+// Fills the rows of the set: wall contacts and pairs first, slides after them. Returns the number of the former.
 static int fill_rows(const ContactProblem *problem, bool by_points, int all)
 {
     ContactSolver *solver = problem->solver;
