@@ -234,7 +234,7 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
     add_coupling(k, w[0], r[0], c->mask[0], w[1], r[1], c->mask[1], s->matrix.lower + block * at, n);
 }
 
-// Subtracts from row e of a slipping contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], J^T mu p times its component along n. The law's P (n + mu p) n^T
+// Subtracts from row e of a slipping contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], J^T mu p / w times its component along n. The law's P (n + mu p) n^T
 // is thereby reduced to P n n^T, and the elimination, which has no pivoting, finds large positive pivots.
 static void straighten(const ContactRow *c, ContactLaw *law, int e, ContactSolver *s)
 {
