@@ -213,8 +213,8 @@ static void (*const assemble_on[SIMD_COUNT])(const BeamChain *, int, int, double
 
 void beam_chain_assemble(const BeamChain *beam, int first, int last, double scale, double rate, BlockChain *chain, double *b)
 {
-    SEL_ASSERT(first >= 0 && first <= last && last < chain->count && chain->size == 6, "elements are between nodes of the chain, of six unknowns each");
-    SEL_ASSERT(scale > 0 && rate >= 0, "stiffness and inertia count");
+    SEL_ASSERT(first >= 0 && first <= last && last < chain->count && chain->size == 6, "the elements lie within the chain, with six unknowns per node");
+    SEL_ASSERT(scale > 0 && rate >= 0, "the stiffness factor is positive and the mass factor is not negative");
     assemble_on[simd_level()](beam, first, last, scale, rate, chain, b);
 }
 
@@ -222,7 +222,7 @@ static void (*const damping_on[SIMD_COUNT])(const BeamChain *, const BeamPose *,
 
 void beam_chain_damp(const BeamChain *beam, const BeamPose *start, int first, int last, double rate, double *b)
 {
-    SEL_ASSERT(first >= 0 && first <= last && rate >= 0, "damping takes energy from some elements of the chain");
+    SEL_ASSERT(first >= 0 && first <= last && rate >= 0, "the damping rate is not negative and the elements lie within the chain");
     _Alignas(64) double force[9][LANES];
     memset(b + 6 * (size_t)first, 0, 6 * (size_t)(last + 1 - first) * sizeof *b);
     for (int base = first; base < last; base += LANES) {

@@ -35,7 +35,7 @@ void beam_bending_slope(double length, double bending, double shear, double *nea
 
 double beam_arc_rest(double length, double curvature, double *slope)
 {
-    SEL_ASSERT(length > 0 && curvature >= 0, "an arc has a length, and its sign lies in its plane");
+    SEL_ASSERT(length > 0 && curvature >= 0, "the arc has a positive length and a curvature that is not negative");
     // chord = 2/k sin(kL/2), bow = k^2 L^3 / 24; the remainder is k^4 L^5 / 1920 ...
     double half = 0.5 * curvature * length, q = half * half;
     if (half < 0.02) {

@@ -107,7 +107,7 @@ bool block_chain_factor(const BlockChain *chain, BlockFactor *factor)
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
-    SEL_ASSERT(b != x, "the right-hand side is read after x is written");
+    SEL_ASSERT(b != x, "b and x are different arrays");
     SEL_REQUIRE(chain->count > 0 && chain->count <= factor->capacity, "a factor has room for the nodes of its chain");
     int size = chain->size, form = block_size_index(size);
     factor->count = chain->count;
@@ -119,7 +119,7 @@ bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, cons
 
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 {
-    SEL_ASSERT(factor->count > 0 && block_size_is_known(factor->size), "a chain was factored");
+    SEL_ASSERT(factor->count > 0 && block_size_is_known(factor->size), "a chain has been factored");
     int size = factor->size, form = block_size_index(size);
     if (x != b)
         memcpy(x, b, (size_t)(factor->count * size) * sizeof *x);
@@ -207,7 +207,7 @@ void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
 
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y)
 {
-    SEL_ASSERT(block_size_is_known(chain->size) && x != y, "there are kernels for the size, and x is read after y is written");
+    SEL_ASSERT(block_size_is_known(chain->size) && x != y, "there are kernels for the size, and x and y are different arrays");
     switch (chain->size) {
     case 6: multiply(chain, x, y, 6); break;
     case 8: multiply(chain, x, y, 8); break;

@@ -12,7 +12,7 @@ BlockCondenser *block_condenser_create(int count, int size);
 void block_condenser_destroy(BlockCondenser *condenser);
 // Flags of the nodes to keep, for the caller to set. All flags are false initially and again after condensation.
 bool *block_condenser_keep(BlockCondenser *condenser);
-// Determines which unknowns of a chain have off-diagonal entries. Valid for all chains condensed until the next call; these must have no entries elsewhere.
+// Determines which unknowns of a chain do not have unit rows. Valid for all chains condensed until the next call; these must have unit rows in the same places.
 void block_condenser_survey(BlockCondenser *condenser, const BlockChain *chain);
 // Returns the chain of the flagged nodes and one more, which balances the work of both ends, with its right-hand side; NULL if A is not positive definite.
 // Valid until the next call.
@@ -20,7 +20,7 @@ const BlockChain *block_condense(BlockCondenser *condenser, const BlockChain *ch
 double *block_condenser_side(BlockCondenser *condenser);
 // Replaces the right-hand side of the chain that was condensed last by b (M, n) and updates that of the condensed chain; the next expansion uses it.
 void block_condenser_turn_to(BlockCondenser *condenser, const double *b);
-// Number of coupled unknowns of each node of the condensed chain. They are the first unknowns of the node unless they are scattered.
+// Number of unknowns without unit rows of each node of the condensed chain. They are the first unknowns of the node unless they are scattered.
 const unsigned char *block_condenser_live(const BlockCondenser *condenser);
 // Index of a kept node in the condensed chain.
 int block_condenser_place(const BlockCondenser *condenser, int node);

@@ -119,13 +119,13 @@ static void add_roll(const ContactPoint *p, double force, const unsigned mask[2]
 
 void contact_add_curvature(const ContactSet *set, BlockChain *chain, double *b)
 {
-    SEL_ASSERT(set->count >= 0 && set->count <= set->capacity, "a set holds no more contacts than it has room for");
+    SEL_ASSERT(set->count >= 0 && set->count <= set->capacity, "the number of contacts is within the set's capacity");
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
         SEL_REQUIRE(p->node >= 0 && p->node < chain->count, "a contact is at a node of the chain");
-        SEL_ASSERT(p->friction >= 0 && p->roll >= 0, "friction and roll are no less than 0");
+        SEL_ASSERT(p->friction >= 0 && p->roll >= 0, "friction and roll are not negative");
         double force = vec3_dot(p->force, p->normal);
         if (!(force > 0))
             continue;

@@ -36,7 +36,7 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
 void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
 {
     SEL_ASSERT(s->matrix.count > 0 && s->matrix.count <= s->node_count, "the solver was made for a chain of this length");
-    SEL_ASSERT(u != s->rhs, "the right-hand side stays when u is written");
+    SEL_ASSERT(u != s->rhs, "u does not overwrite the right-hand side");
     memcpy(s->rhs, b, (size_t)(s->matrix.count * s->matrix.size) * sizeof *b);
     for (int i = 0; i < count; i++)
         contact_row_push(&s->row[i], s->row[i].force, s->rhs);

@@ -69,7 +69,7 @@ static void choose_active(const ContactSolver *s, bool *active)
     int i = 0;
     while (i < count) {
         int at = wall[i];
-        SEL_ASSERT(at >= 0 && at < s->banded && !s->row[at].far && !s->row[at].slide, "walls are listed without pairs and slides");
+        SEL_ASSERT(at >= 0 && at < s->banded && !s->row[at].far && !s->row[at].slide, "the list of walls contains no pairs or slides");
         const ContactRow *c = &s->row[at];
         double v = normal_violation(c, s->motion[at]);
         if (s->law[at].state != OPEN || !(v < 0)) {
@@ -391,7 +391,7 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
 // Takes the fraction t of the step. Returns false if the result is not finite.
 static bool take_step(ContactSolver *s, int unknowns, int count, double t, double *u)
 {
-    SEL_ASSERT(t > 0 && t <= 1, "some part of the step is taken");
+    SEL_ASSERT(t > 0 && t <= 1, "the fraction of the step is in (0, 1]");
     double sum = 0;
     for (int k = 0; k < unknowns; k++) {
         u[k] += t * s->delta[k];
@@ -445,7 +445,7 @@ void contact_cut(ContactSolver *s, int count, ContactReport *report)
 
 bool contact_newton_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
 {
-    SEL_ASSERT(change != s->rhs && u != s->delta, "what the solve overwrites is not what it was given");
+    SEL_ASSERT(change != s->rhs && u != s->delta, "the arguments are not the solver's work space");
     int unknowns = chain->size * chain->count;
     memcpy(s->rhs, change, (size_t)unknowns * sizeof *s->rhs);
     bool finite = newton_step(s, chain, count, true, false) && take_step(s, unknowns, count, 1, u);
@@ -457,7 +457,7 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
                              double *u)
 {
     SEL_ASSERT(chain->count <= s->node_count && chain->size == s->matrix.size, "the solver was made for such a chain");
-    SEL_ASSERT(b != s->rhs && u != s->best_u, "what the solve overwrites is not what it was given");
+    SEL_ASSERT(b != s->rhs && u != s->best_u, "the arguments are not the solver's work space");
     ContactReport report = {0};
     s->matrix.count = chain->count;
     int unknowns = chain->size * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;

@@ -23,7 +23,7 @@ struct ContactPairs {
 
 ContactPairs *contact_pairs_create(int node_count, int size, int capacity)
 {
-    SEL_ASSERT(node_count > 0 && size > 0 && capacity >= 0, "there is a chain and room for some pairs");
+    SEL_ASSERT(node_count > 0 && size > 0 && capacity >= 0, "the chain has nodes and the capacity is not negative");
     ContactPairs *p = calloc(1, sizeof *p);
     if (!p)
         return NULL;

@@ -31,7 +31,7 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
 static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
 {
     SEL_ASSERT(c->node >= 0 && c->node < chain->count && c->slide + 1 < chain->size, "a slide has two unknowns of a node of the chain");
-    SEL_ASSERT(give > 0, "a slide gives before it slips");
+    SEL_ASSERT(give > 0, "the elastic displacement of a slide is positive");
     const size_t n = (size_t)chain->size, at = (size_t)c->slide;
     const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
     c->mask[0] = (contact_is_free(chain, c->node, c->slide) ? 1u : 0) | (c->radius > 0 && contact_is_free(chain, c->node, c->slide + 1) ? 2u : 0);

@@ -59,7 +59,7 @@ static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
 static inline Vec3 contact_end_motion(const ContactRow *c, const double *u)
 {
     SEL_ASSERT(c->node >= 0 && (c->nodes == 1 || c->nodes == 2), "a contact is at a node or between two");
-    SEL_ASSERT(c->slide == 0 || (c->slide >= 6 && c->slide + 1 < c->stride), "a slide's unknowns stand behind the first six");
+    SEL_ASSERT(c->slide == 0 || (c->slide >= 6 && c->slide + 1 < c->stride), "the unknowns of a slide follow the first six");
     const double *v = u + (size_t)c->stride * (size_t)c->node;
     if (c->slide)
         return vec3(c->mask[0] & 1 ? v[c->slide] : 0, c->mask[0] & 2 ? c->radius * v[c->slide + 1] : 0, 0);
@@ -132,7 +132,7 @@ static inline bool contact_row_is_idle(const ContactRow *c, Vec3 motion)
 // Excess of the tangential force over its limit, relative to the normal force or to the slide's bound.
 static inline double contact_row_excess(const ContactRow *c)
 {
-    SEL_ASSERT(!c->slide || c->bound > 0, "a slide that bears has a bound");
+    SEL_ASSERT(!c->slide || c->bound > 0, "a loaded slide has a positive bound");
     double fn = vec3_dot(c->force, c->normal), ft = vec3_norm(contact_tangential(c->force, c->normal));
     return c->slide ? ft / c->bound - 1 : ft / fn - c->friction;
 }

@@ -28,7 +28,7 @@ static Vec3 force_at(const ContactRow *c, Vec3 d) { return contact_project(c, ve
 // C at motion e.
 static Mat3 resistance(const ContactRow *c, Vec3 e)
 {
-    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a slide that bears has a bound, and gives before it slips");
+    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a loaded slide has a positive bound and a positive stiffness");
     Vec3 t = vec3_add_scaled(c->held, -c->spring, e), f0 = contact_project(c, c->force);
     double size = vec3_norm(t);
     if (size <= c->bound)
@@ -40,7 +40,7 @@ static Mat3 resistance(const ContactRow *c, Vec3 e)
 
 static double *slide_block(const BlockChain *chain, const ContactRow *c)
 {
-    SEL_ASSERT(c->slide >= 6 && c->slide + 1 < chain->size, "a slide's unknowns stand behind the first six");
+    SEL_ASSERT(c->slide >= 6 && c->slide + 1 < chain->size, "the unknowns of a slide follow the first six");
     const size_t n = (size_t)chain->size;
     return chain->diag + n * n * (size_t)c->node + (n + 1) * (size_t)c->slide;
 }
@@ -59,7 +59,7 @@ static void keep_own(ContactSolver *s, const BlockChain *chain, int from, int to
 // Writes the slides' laws, linearised about their motions: C to the diagonal of the chain, the forces at zero motion to the right-hand side.
 static void write_laws(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to)
 {
-    SEL_ASSERT(b != s->side, "the right-hand side without slides is kept: each round begins with it");
+    SEL_ASSERT(b != s->side, "b is not overwritten, because each iteration starts from it");
     const int n = chain->size;
     memcpy(s->side, b, (size_t)(chain->count * n) * sizeof *b);
     for (int i = from; i < to; i++) {
@@ -110,7 +110,7 @@ static bool comes_before(const ContactRow *a, const ContactRow *b)
 // active ones.
 static int put_in_order(ContactSolver *s, int before, int to)
 {
-    SEL_ASSERT(before >= 0 && before <= to, "rows that were in order stand before the others");
+    SEL_ASSERT(before >= 0 && before <= to, "sorted rows precede the others");
     ContactRow *row = s->row;
     int a = 0, b = before, count = 0, waiting = 0;
     for (int i = 0; i < to; i++) {
@@ -217,7 +217,7 @@ static void add_missing(ContactSolver *s, const BlockChain *chain, int from, int
 // Saves the forces of an iterate and the slides' motion, or restores them.
 static void keep_forces(ContactSolver *s, int walls, int from, int to, bool back)
 {
-    SEL_ASSERT(walls <= from && from <= to, "slides stand behind the contacts with walls");
+    SEL_ASSERT(walls <= from && from <= to, "slides follow the wall contacts");
     for (int i = 0; i < to; i = i + 1 == walls ? from : i + 1) {
         *(back ? &s->row[i].force : &s->best[i]) = back ? s->best[i] : s->row[i].force;
         if (i >= from)
@@ -251,7 +251,7 @@ static Errors refine(ContactSolver *s, const BlockChain *chain, int walls, int f
 
 ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
 {
-    SEL_ASSERT(from >= 0 && from < to, "there are slides, behind the contacts with walls");
+    SEL_ASSERT(from >= 0 && from < to, "there are slides, and they follow the wall contacts");
     ContactReport report = {0};
     keep_own(s, chain, from, to, false);
     ContactOptions round = *options;

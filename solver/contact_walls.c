@@ -9,7 +9,7 @@ static const double FULL_SHARE = 1.25;
 // Applies the block form to the chain condensed to the contacts' nodes. Returns false if this is not possible.
 bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
 {
-    SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs stand behind all other rows");
+    SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs follow all other rows");
     bool *keep = block_condenser_keep(s->condenser);
     int kept = 0;
     for (int i = 0; i < count; i++)
@@ -68,7 +68,7 @@ bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, i
 
 bool contact_walls_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
 {
-    SEL_ASSERT(change != s->best_u && u != s->best_u, "the kept iterate is not in use between solves");
+    SEL_ASSERT(change != s->best_u && u != s->best_u, "the arguments are not the saved iterate, which serves as work space");
     double *more = s->best_u;    // unused between solves
     if (!s->small && count > 0)
         return false;

@@ -171,7 +171,7 @@ static bool prepare(PointwiseWork *w, const BlockChain *a)
 // Motion of a contact's nodes (2 n; for a contact at a node the second half is 0) under loads g on them.
 static void respond(const PointwiseWork *w, const ContactRow *c, const double *g, double *v)
 {
-    SEL_ASSERT(!c->far, "a pair of the tool with itself is not between neighbours, and is solved apart");
+    SEL_ASSERT(!c->far, "pairs are solved separately");
     const int n = w->size;
     const size_t i = (size_t)c->node, block = (size_t)(n * n), bytes = (size_t)n * sizeof *v;
     memset(v, 0, 2 * bytes);
@@ -220,7 +220,7 @@ static double slide_excess(const double *f, double mu) { return sqrt(f[1] * f[1]
 // Signorini and Coulomb conditions of one contact with motion d + w f; d[0] includes the gap.
 static void solve_local(const Mat3 *w, const double *d, double mu, double *start, double *f)
 {
-    SEL_ASSERT(w->m[0][0] > 0, "a contact that is not inert yields along its normal");
+    SEL_ASSERT(w->m[0][0] > 0, "a contact that is not inert has a compliance along its normal");
     f[0] = f[1] = f[2] = 0;
     if (d[0] >= 0)
         return;
@@ -287,7 +287,7 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
 // have the same compliance. The elastic displacement of a slide is a spring in series.
 static void solve_slide(const ContactRow *c, const Mat3 *own, const double *motion, double *f)
 {
-    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a slide that bears has a bound, and gives before it slips");
+    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a loaded slide has a positive bound and a positive stiffness");
     const double bound = c->bound, soft = 1 / c->spring;
     const double d[3] = {0, motion[1] - soft * c->held.x, motion[2] - soft * c->held.y};
     Mat3 spring = *own, *w = &spring;

@@ -27,6 +27,6 @@ static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, co
 
 void node_turn(int count, const double *rx, const double *ry, const double *rz, Quat *q)
 {
-    SEL_ASSERT(count >= 0, "a number of nodes is turned");
+    SEL_ASSERT(count >= 0, "the number of nodes is not negative");
     turn_on[simd_level()](count, rx, ry, rz, q);
 }

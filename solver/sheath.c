@@ -117,7 +117,7 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
 
 void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent, double *length_column)
 {
-    SEL_ASSERT(element->outside > 0 && scale > 0, "some of the element is outside, and its stiffness counts");
+    SEL_ASSERT(element->outside > 0 && scale > 0, "part of the element is outside, and the stiffness factor is positive");
     BeamTangent full;
     const BeamOutput *out = &element->out;
     double ka = rest->axial[index] * scale, d[3] = {direction.x, direction.y, direction.z};

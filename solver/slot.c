@@ -28,7 +28,7 @@ static void set_shape(Slot *s, double xi, double length)
 
 Slot slot_make(int element, double length, int k, int count, double radius, double friction)
 {
-    SEL_ASSERT(k >= 0 && k < count && count <= SLOTS_MAX, "a slot is one of its element's");
+    SEL_ASSERT(k >= 0 && k < count && count <= SLOTS_MAX, "the index of a slot is within its element");
     Slot s = {.element = element, .radius = radius, .friction = friction};
     set_shape(&s, (double)(k + 1) / (count + 1), length);
     return s;

@@ -17,17 +17,17 @@ void tools_chain(Stepper *s);
 // For tool k >= 1 at node c: whether it lies inside another tool there, its material coordinate [mm], its angle [rad], and the index of its first unknown.
 static inline bool is_inside(const Stepper *s, int c, int k)
 {
-    SEL_ASSERT(c >= 0 && c < s->state.node_count && k >= 0 && k < s->tools.count, "a tool of the chain is looked for at one of its nodes");
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k >= 0 && k < s->tools.count, "the node and the tool exist");
     return k > s->tools.carrier[c] && c < s->tools.tool[k].inside;
 }
 static inline double slide_at(const Stepper *s, int c, int k)
 {
-    SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "an inner tool has its place at each node");
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "the node and the inner tool exist");
     return s->state.slide[c * s->state.inner_count + k - 1];
 }
 static inline double angle_at(const Stepper *s, int c, int k)
 {
-    SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "an inner tool has its place at each node");
+    SEL_ASSERT(c >= 0 && c < s->state.node_count && k > 0 && k <= s->state.inner_count, "the node and the inner tool exist");
     return s->state.angle[c * s->state.inner_count + k - 1];
 }
 static inline bool is_at_tip(const Stepper *s, int c) { return s->tools.carrier[c] != s->tools.carrier[c + 1]; }    // the next node has a different carrier

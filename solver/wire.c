@@ -167,7 +167,7 @@ bool wire_divide(const WireOptions *options, int *elements)
         for (int i = 1; i < sections; i++)
             if (wanted(&options->section[i], per_mm) / elements[i] > wanted(&options->section[most], per_mm) / elements[most] * (1 + 1e-12))
                 most = i;
-        SEL_ASSERT(most < sections, "an element goes to a section");
+        SEL_ASSERT(most < sections, "the section exists");
         elements[most]++;
     }
     return true;
@@ -196,7 +196,7 @@ static void fill(Wire *wire, const WireOptions *options, const int *elements)
         }
         start += section->length;
     }
-    SEL_REQUIRE(e == wire->element_count, "the sections share all elements");
+    SEL_REQUIRE(e == wire->element_count, "the sections have all elements");
     wire->total_length = start;
 }
 
