@@ -5,9 +5,8 @@
 // Forward: y = T^-1 b, and Z y is subtracted from b of the next node. Backward: x = T^-T (d^-1 y - Z^T x'), x' of the next node towards the middle.
 //
 // The computation is bound by latency (one division after another for each unknown). Both ends are therefore eliminated in one loop, interleaved pivot by
-// pivot, because their operations are independent. Columns are 8 lanes wide for blocks of 6 and 16 for larger ones; the lane after the
-// last row of the coupling holds the right-hand side, so that a factorisation with one solve (block_chain_factor_solve) gets its forward substitution
-// without extra cost.
+// pivot, because their operations are independent. Columns are 8 lanes wide for blocks of 6 and 16 for larger ones; the lane after the last row of the coupling
+// holds the right-hand side, so that a factorisation with one solve (block_chain_factor_solve) gets its forward substitution without extra cost.
 // Pivots are scalar: multiplication by explicit inverses of the 6x6 blocks is a third faster, but loses accuracy by the square root of the condition number.
 #include "solver/block_chain.h"
 

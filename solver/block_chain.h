@@ -27,8 +27,10 @@ bool block_size_is_known(int size);
 // Number of doubles in `count` blocks, including padding: rows are read in groups of 8 or 16.
 static inline size_t block_doubles(int count, int size) { return (size_t)count * (size_t)(size * size) + 8; }
 
+// Creates zeroed arrays for `count` nodes. Returns false if out of memory, count < 1 or the size is unknown.
 bool block_chain_create(BlockChain *chain, int count, int size);
 void block_chain_destroy(BlockChain *chain);
+// For chains of up to `count` nodes. Returns NULL if out of memory, count < 1 or the size is unknown. block_factor_destroy() accepts NULL.
 BlockFactor *block_factor_create(int count, int size);
 void block_factor_destroy(BlockFactor *factor);
 

@@ -8,6 +8,7 @@
 
 typedef struct BlockCondenser BlockCondenser;
 
+// For chains of up to `count` nodes. Returns NULL if out of memory, count < 1 or the size is unknown. block_condenser_destroy() accepts NULL.
 BlockCondenser *block_condenser_create(int count, int size);
 void block_condenser_destroy(BlockCondenser *condenser);
 // Flags of the nodes to keep, for the caller to set. All flags are false initially and again after condensation.

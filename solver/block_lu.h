@@ -7,6 +7,7 @@
 
 typedef struct BlockLu BlockLu;
 
+// For chains of up to `count` nodes. Returns NULL if out of memory, count < 1 or the size is unknown. block_lu_destroy() accepts NULL.
 BlockLu *block_lu_create(int count, int size);
 void block_lu_destroy(BlockLu *lu);
 // Blocks are column-major: diag[i][c][r] of A(i, i), lower[i] of A(i+1, i), upper[i] of A(i, i+1), (M, n, n), block_doubles() each. (The diag of a

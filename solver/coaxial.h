@@ -51,19 +51,14 @@ typedef struct CoaxialSpan { // one tool in one element
     double s1, s2;           // [mm] S at the nodes, s1 < s2; s2 is ignored if has_tip. Beyond the tip a tool stretches and twists but does not bend
     double phi1, phi2;       // [rad], not limited to one turn; if has_tip, coaxial_element() chooses phi2 so that the tool has no torque
     double spread;           // [mm] minimum length over which the axial strain is spread, including the tool behind S1; default 0. For an element that begins
-                             // at a
-                             // mouth or a tip and may be short: the length of the full element
+                             // at a mouth or a tip and may be short: the length of the full element
     bool spreads_twist;      // true: the twist is spread as well, and over exactly `spread`: at a mouth, where the tools' angles at node 1 are those of the
-                             // last node in
-                             // the sheath
+                             // last node in the sheath
     double soft[2];          // [mm] default 0. Over this distance to either side of node 1 and of node 2, a section border of this tool passes gradually from
-                             // this
-                             // element to the adjacent one; the tool's tip does not. Needed where the carrier's section changes or ends: the energy would
-                             // otherwise
-                             // have a kink there, and the force in a step would depend on the side. 0 for the carrier
+                             // this element to the adjacent one; the tool's tip does not. Needed where the carrier's section changes or ends: the energy would
+                             // otherwise have a kink there, and the force in a step would depend on the side. 0 for the carrier
     bool has_tip;            // the tool ends inside, at its last section's end: up to there it bends with the others and is as long as the carrier, without
-                             // relative
-                             // rotation, tension or torque. Its only unknowns are S1 and phi1. Not for the carrier
+                             // relative rotation, tension or torque. Its only unknowns are S1 and phi1. Not for the carrier
     bool is_fixed;           // its values are not unknowns: no derivatives are computed, which saves time
 } CoaxialSpan;
 
@@ -141,8 +136,7 @@ typedef struct CoaxialOutput {
     BeamOutput beam;         // the equivalent element: chord, force2 (node 1 has -force2), moment1 and moment2 are gradients
     double energy;           // [mJ]
     double gradient[COAXIAL_COLUMNS];          // [N], [N mm] of the energy with respect to the tools' unknowns; 0 where fixed. At a hub, where a hand feeds in
-                                               // the tool
-                                               // straight, -gradient of S1 of a curved tool does not include EI kappa^2 / 2; its tension does
+                                               // the tool straight, -gradient of S1 of a curved tool does not include EI kappa^2 / 2; its tension does
     double tension[COAXIAL_TOOLS_MAX];         // [N]
     double torque[COAXIAL_TOOLS_MAX];          // [N mm]
     Vec3 end_moment[2];      // [N mm] bending moments in space axes

@@ -67,6 +67,7 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
 // Work space for contacts of the tool with itself; NULL if out of memory.
 ContactPairs *contact_pairs_create(int node_count, int size, int capacity);
 void contact_pairs_destroy(ContactPairs *pairs);
+// Rows of the pairs' second ends (capacity); NULL if pairs is NULL.
 ContactRow *contact_pairs_far(ContactPairs *pairs);
 // Solves x = A^-1 b with the present matrix of the chain; b and x must be different arrays.
 typedef void (*ContactSolve)(const ContactSolver *solver, const BlockFactor *factor, double *b, double *x);

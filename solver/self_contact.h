@@ -15,8 +15,8 @@ void self_contact_detect(Stepper *s);
 // Whether the solution closes pairs that are not in the contact set. If so, the search range is increased and these pairs are added.
 bool self_contact_misses(Stepper *s);
 bool self_contact_is_near(const Stepper *s);
-// Depth of mutual penetration of strands [mm], >= 0, at the iterate or, if would_go, at the solution; strands that have passed through each other count in
-// full.
+// Depth of mutual penetration of strands [mm], >= 0, at the iterate or, if would_go, at the solution. Strands that have crossed count with the whole distance
+// back.
 double self_contact_depth(Stepper *s, bool would_go);
 // Counterpart of stepper_meet_walls() for the pairs.
 bool self_contact_meet(Stepper *s, double part);

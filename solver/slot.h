@@ -31,6 +31,7 @@ int slot_count_of(double length);
 Slot slot_make(int element, double length, int k, int count, double radius, double friction);
 // The slot moved to another place xi on its element, 0 <= xi <= 1.
 Slot slot_shifted(const Slot *slot, double length, double xi);
+// Slot on an element whose nodes have positions x1, x2 and unit tangents t1, t2.
 SlotPlace slot_place(const Slot *slot, double length, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2);
 // Slot on the element across the sheath's mouth, whose inner node is at `coordinate` <= 0 [mm] behind it (sheath.c): on the cubic of the part outside, from
 // the mouth, clamped along `direction`, to the outer node. Returns false if the slot is inside. lever[0] belongs to the clamp.

@@ -31,9 +31,9 @@ enum {
     STEP_OUT_OF_VESSEL = 32,     // a node is beyond an open end other than that of the sheath
     STEP_DETECTION_UNSURE = 64,  // a projection did not converge
     STEP_LIMITED = 128,          // the motion was limited and later steps complete it: otherwise an element would have turned by more than 0.3 rad, the tool
-                                 // would have
-                                 // passed through the wall, or the hand would have compressed it by more than 3 % of its length
-    STEP_MODEL_DISAGREES = 256,  // two parts of the vessel model contradict each other about the wall at a point
+                                 // would have passed through the wall, or the hand would have compressed it by more than 3 % of its length
+    STEP_MODEL_DISAGREES = 256,  // two parts of the vessel model contradict each other about the wall at a point; the gap is smoothed so that the tool is not
+                                 // thrown
     STEP_HAND_SLIPS = 512,       // the tool required more force than the hand can hold: the hand slipped along it
 };
 
@@ -106,6 +106,7 @@ typedef enum {
 } StepExchange;
 StepExchange stepper_exchange(Stepper *stepper, int tool, int which);
 const char *step_exchange_refusal(StepExchange outcome);   // reason and remedy, to follow "because" or a colon; "" for EXCHANGE_DONE
+// The tool in place: 0 for the first one, k for its k-th spare.
 int stepper_fitted(const Stepper *stepper, int tool);
 
 void step_detect(Stepper *stepper);
@@ -127,7 +128,9 @@ const StepReport *step_report(const Stepper *stepper);
 const WireState *stepper_state(const Stepper *stepper);
 // A checkpoint holds everything on which the next step depends (state, warm-start forces, vessel memory): a restored run repeats bit for bit.
 typedef struct Checkpoint Checkpoint;
-Checkpoint *stepper_save(const Stepper *stepper, Checkpoint *reuse);   // reuse may be NULL; returns NULL if out of memory
+// stepper_save() overwrites `reuse` if it has the right dimensions and otherwise frees it. It returns NULL if out of memory. checkpoint_free() accepts NULL.
+Checkpoint *stepper_save(const Stepper *stepper, Checkpoint *reuse);   // reuse: a checkpoint to overwrite, or NULL
+// Has no effect if the checkpoint is of a stepper of other dimensions.
 void stepper_restore(Stepper *stepper, const Checkpoint *checkpoint);
 void checkpoint_free(Checkpoint *checkpoint);
 uint64_t stepper_hash(const Stepper *stepper);            // FNV-1a (by words) of the state that a checkpoint holds

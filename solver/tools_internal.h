@@ -7,7 +7,8 @@
 
 #include <stdio.h>
 
-// Creates the tools and determines the maximum number of nodes and slots of their chain (capacity, slot_count).
+// Creates the tools and computes the maximum number of nodes and slots of their chain (tools.capacity, points.slot_count). Returns false with a message in
+// `why`, of `capacity` bytes, which is empty if out of memory.
 bool tools_create(Stepper *s, const StepperOptions *options, char *why, int capacity);
 void tools_destroy(Stepper *s);
 // Places all tools straight on the line, each with its inserted length beyond the mouth.

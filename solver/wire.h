@@ -42,8 +42,8 @@ typedef struct WireOptions {
     int elements;            // 1 to 10,000; default 200. Section borders coincide with nodes; needs elements >= section_count
     int section_count;       // sections from proximal to distal
     const WireSection *section;
-    double damping_mass;     // [1/ms]
-    double damping_stiffness; // [ms]
+    double damping_mass;     // [1/ms] mass-proportional Rayleigh damping; default 1e-4
+    double damping_stiffness; // [ms] stiffness-proportional Rayleigh damping; default 0.2
     Vec3 gravity;            // [mm/ms2]
     // initial configuration
     bool has_sheath;         // false: test rig, straight from `start` along `direction` (a rest curvature is then stressed at t = 0)
@@ -93,6 +93,7 @@ typedef struct Wire {
 
 WireOptions wire_default_options(void);          // 200 elements, Rayleigh damping 1e-4 per ms and 0.2 ms, no section, from the origin along +x
 double wire_length(const WireOptions *options);   // [mm] sum of the section lengths
+// Creates a tool, which wire_destroy() frees. Returns false, with a message in `why` (capacity >= 256), if an option is out of range or out of memory.
 bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity);
 bool wire_reserve(Wire *wire, int nodes);      // allocates for this number of nodes, discarding the contents; false if out of memory
 void wire_destroy(Wire *wire);
