@@ -1,5 +1,5 @@
-// A chain of beam elements into the blocks of its linear system, LANES elements at a time: lanes compute element by element what
-// beam_equations.h says, then the tile is transposed into blocks. Compiled once per instruction set (beam_chain.inc).
+// Assembles a chain of beam elements into the blocks of its linear system, LANES elements at a time: each lane evaluates the equations of
+// beam_equations.h for one element, then the tile is transposed into blocks. Compiled once per instruction set (beam_chain.inc).
 #include "base/base.h"
 #include "solver/beam_equations.h"
 
@@ -13,11 +13,11 @@
 
 enum { LANES = BEAM_PADDING, BLOCK_ENTRIES = 36 };
 
-// What LANES neighbouring elements and their first nodes have; a row is a quantity.
+// Data of LANES neighbouring elements and their first nodes; a row is a quantity.
 typedef struct Tile {
     _Alignas(64) double near[N_ROWS][LANES];
-    double far[F_ROWS][2 * LANES];       // from column LANES on; the column before is what the element before leaves to the first node
-    double node[F_ROWS][LANES];          // rows as F_: a node's diagonal block and right-hand side
+    double far[F_ROWS][2 * LANES];       // from column LANES on; column LANES - 1 is the contribution of the preceding element to the first node
+    double node[F_ROWS][LANES];          // rows as F_: diagonal block and right-hand side of a node
 } Tile;
 
 INLINE BeamInput input_at(const BeamRest *r, const BeamPose *p, int i)
@@ -55,7 +55,7 @@ INLINE void lane_element(const BeamChain *c, int base, int l, bool is_curved, do
     put(far + F_MOMENT * 2 * LANES, 2 * LANES, vec3_add(o.moment2, vec3_cross(turn, vec3_add_scaled(o.moment2, -taut, o.bow2))));
 }
 
-// A node has its element's first end, the second end of the one before, and its inertia.
+// A node sums the first end of its element, the second end of the preceding element, and its inertia.
 INLINE void lane_node(const BeamChain *c, int base, int l, double rate, Tile *t)
 {
     int i = base + l, before = LANES + l - 1, here = LANES + l;
@@ -83,9 +83,9 @@ INLINE void lane_node(const BeamChain *c, int base, int l, double rate, Tile *t)
     }
 }
 
-// Viscous forces of an element between two poses: rate J' C (strain - strain at the start), rows as 3 F_FORCE, 3 moment of node 1, 3 of node 2.
-// Extension and twist are numbers; bending angles of the start are turned with the chord, the short way. So a rigid motion, however large, leaves
-// nothing, nor does a spin about the tangents.
+// Viscous forces of an element between two poses: rate J' C (strain - strain at the start). Rows: 3 F_FORCE, 3 moment of node 1, 3 moment of node 2.
+// Extension and twist are scalars; the bending angles of the start are rotated with the chord by the smallest rotation. Rigid-body motions of any size and
+// spins about the tangents therefore cause no force.
 INLINE void lane_damping(const BeamChain *c, const BeamPose *start, int base, int l, double rate, double (*force)[LANES])
 {
     BeamInput in = input_at(&c->rest, &c->pose, base + l), from = input_at(&c->rest, start, base + l);
@@ -93,7 +93,7 @@ INLINE void lane_damping(const BeamChain *c, const BeamPose *start, int base, in
     element(&in, true, &o);
     element(&from, true, &was);
     Vec3 e = o.chord, t1 = o.tangent1, t2 = o.tangent2, axis = vec3_cross(was.chord, e);
-    double cosine = 1 + vec3_dot(was.chord, e), unit = 1 / sqrt(2 * cosine + 1e-12);     // turned right round there is no short way
+    double cosine = 1 + vec3_dot(was.chord, e), unit = 1 / sqrt(2 * cosine + 1e-12);     // undefined where the chord has reversed
     Quat turn = {cosine * unit, axis.x * unit, axis.y * unit, axis.z * unit};
     Vec3 angle1 = vec3_sub(o.angle1, quat_rotate(turn, was.angle1)), angle2 = vec3_sub(o.angle2, quat_rotate(turn, was.angle2));
     Vec3 m1 = vec3_scale(vec3_add(vec3_scale(angle1, in.near), vec3_scale(angle2, in.far)), rate);
@@ -110,12 +110,12 @@ INLINE void lane_damping(const BeamChain *c, const BeamPose *start, int base, in
     put(&force[6][l], LANES, vec3_add_scaled(vec3_add_scaled(moment2, tension, o.bow2), torque, o.axis));
 }
 
-// --- from rows to blocks ---
+// --- conversion of rows to blocks ---
 
 typedef double Quad __attribute__((vector_size(32)));
 typedef double LooseQuad __attribute__((vector_size(32), may_alias, aligned(8)));
 
-// Four rows of four lanes become four columns: `to` and the three places `stride` after it.
+// Transposes four rows of four lanes into four columns: `to` and the three places `stride` apart after it.
 INLINE void transpose(const double *row0, const double *row1, const double *row2, const double *row3, double *to, int stride)
 {
     Quad a = *(const LooseQuad *)row0, b = *(const LooseQuad *)row1, c = *(const LooseQuad *)row2, d = *(const LooseQuad *)row3;
@@ -127,7 +127,7 @@ INLINE void transpose(const double *row0, const double *row1, const double *row2
     *(LooseQuad *)(to + 3 * stride) = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
 }
 
-// A block's entries in rows of a tile, row-major.
+// Entries of a block as rows of a tile, row-major.
 #define BLOCK_ROWS(tt, tr, rt, rr)                                                                                                                             \
     {                                                                                                                                                          \
         tt(0, 0), tt(0, 1), tt(0, 2), tr(0, 0), tr(0, 1), tr(0, 2), tt(1, 0), tt(1, 1), tt(1, 2), tr(1, 0), tr(1, 1), tr(1, 2), tt(2, 0), tt(2, 1), tt(2, 2),  \
@@ -169,7 +169,7 @@ INLINE void scatter_lower(const Tile *t, double *block)
         transpose(row[k] + l, row[k + 1] + l, row[k + 2] + l, row[k + 3] + l, block + l * BLOCK_ENTRIES + k, BLOCK_ENTRIES);
 }
 
-// Six rows as two fours that share two.
+// Six rows, transposed as two groups of four that share two rows.
 INLINE void scatter_side(const Tile *t, double *b)
 {
     const double(*row)[LANES] = t->node + F_FORCE;
@@ -179,7 +179,7 @@ INLINE void scatter_side(const Tile *t, double *b)
     }
 }
 
-// Only the first `lanes` of them go to the chain; `lower` is NULL where no element is left.
+// Writes only the first `lanes` lanes to the chain; `lower` is NULL after the last element.
 INLINE void scatter(const Tile *t, int lanes, double *diag, double *lower, double *b)
 {
     if (lanes == LANES) {
@@ -213,8 +213,8 @@ static void (*const assemble_on[SIMD_COUNT])(const BeamChain *, int, int, double
 
 void beam_chain_assemble(const BeamChain *beam, int first, int last, double scale, double rate, BlockChain *chain, double *b)
 {
-    SEL_ASSERT(first >= 0 && first <= last && last < chain->count && chain->size == 6, "elements are between nodes of the chain, of six unknowns each");
-    SEL_ASSERT(scale > 0 && rate >= 0, "stiffness and inertia count");
+    SEL_ASSERT(first >= 0 && first <= last && last < chain->count && chain->size == 6, "the elements lie within the chain, with six unknowns per node");
+    SEL_ASSERT(scale > 0 && rate >= 0, "the stiffness factor is positive and the mass factor is not negative");
     assemble_on[simd_level()](beam, first, last, scale, rate, chain, b);
 }
 
@@ -222,7 +222,7 @@ static void (*const damping_on[SIMD_COUNT])(const BeamChain *, const BeamPose *,
 
 void beam_chain_damp(const BeamChain *beam, const BeamPose *start, int first, int last, double rate, double *b)
 {
-    SEL_ASSERT(first >= 0 && first <= last && rate >= 0, "damping takes energy from some elements of the chain");
+    SEL_ASSERT(first >= 0 && first <= last && rate >= 0, "the damping rate is not negative and the elements lie within the chain");
     _Alignas(64) double force[9][LANES];
     memset(b + 6 * (size_t)first, 0, 6 * (size_t)(last + 1 - first) * sizeof *b);
     for (int base = first; base < last; base += LANES) {

@@ -1,4 +1,4 @@
-// One element: the equations of beam_equations.h, and what the chain and the sheath take from a length.
+// A single element (equations in beam_equations.h) and the length-dependent quantities that the chain and the sheath need.
 #include "solver/beam_equations.h"
 #include "base/base.h"
 
@@ -35,8 +35,8 @@ void beam_bending_slope(double length, double bending, double shear, double *nea
 
 double beam_arc_rest(double length, double curvature, double *slope)
 {
-    SEL_ASSERT(length > 0 && curvature >= 0, "an arc has a length, and its sign lies in its plane");
-    // chord = 2/k sin(kL/2); bow = k^2 L^3 / 24: what is left is k^4 L^5 / 1920 ...
+    SEL_ASSERT(length > 0 && curvature >= 0, "the arc has a positive length and a curvature that is not negative");
+    // chord = 2/k sin(kL/2), bow = k^2 L^3 / 24; the remainder is k^4 L^5 / 1920 ...
     double half = 0.5 * curvature * length, q = half * half;
     if (half < 0.02) {
         *slope = -q * q / 24 * (1 - q / 30);

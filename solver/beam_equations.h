@@ -1,29 +1,29 @@
-// The corotational beam element: its equations, for one element and for the lanes of a chain. Internal to beam_element.c and beam_chain.c.
+// Equations of the corotational beam element, for one element and for the lanes of a chain. Internal to beam_element.c and beam_chain.c.
 //
-// Nodes 1 and 2 with positions x_i and frames R_i; chord e = (x2 - x1) / l. A circular section bends alike in all directions, so no
-// frame has to turn with the chord: all that is needed are the node's tangents.
+// Nodes 1 and 2 have positions x_i and frames R_i; the chord is e = (x2 - x1) / l. A circular section has the same bending stiffness in all directions,
+// so that no frame has to rotate with the chord: the tangents at the nodes are sufficient.
 //   t_i     = R_i c_i            c_i: direction of the rest chord in the frame of node i (e1 where the element is straight at rest)
 //   theta_i = g(e . t_i) e x t_i bending angle from chord to tangent, g = angle / sine
 //   psi     = x component of the rotation vector of F1' F2, F_i = R_i C_i: twist, exact where curvature and twist are constant
-//   bow     = L/30 (2 |b1|^2 - b1 . b2 + 2 |b2|^2)   arc less chord of the cubic shape, b_i = g(e . a_i) e x a_i, a_i = R_i e1
+//   bow     = L/30 (2 |b1|^2 - b1 . b2 + 2 |b2|^2)   arc length minus chord of the cubic shape, b_i = g(e . a_i) e x a_i, a_i = R_i e1
 //   ext     = l + bow - extend
 //   E = EA/(2L) ext^2 + c/2 (|theta1|^2 + |theta2|^2) + d theta1 . theta2 + GJ/(2L) psi^2
 //   c - d = 2 EI / L,  c + d = 6 EI / ((1 + Phi) L),  Phi = 12 EI / (kappa G A L^2)
-// Several tools on one line (coaxial.c) need no more than a c at each end, c1 and c2, rest chords that are no mirror images and a twist at rest.
-// Forces are the exact derivative of E. E does not change when the nodes are swapped with e and the frames reversed, nor in a
-// rigid motion, nor when mirrored. The bow makes the chord shorten with the square of the bending angles: without it a chain rolls up
-// to a polygon whose chords (not arcs) have the rest length, (pi/N)^2/6 too large; its second derivative is the consistent
-// geometric stiffness. g is a polynomial in z = (1 - e . t)/2 = sin^2(angle/2), cut after z^7: 3e-9 off at 0.64 rad, and smooth
-// everywhere, which acos is not.
+// Several coaxial tools (coaxial.c) additionally need only a separate c at each end, c1 and c2, rest chords that are not mirror images, and a rest twist.
+// Forces are the exact derivative of E. E is invariant under rigid motion, under reflection, and under exchange of the nodes with e and the frames reversed.
+// The bow shortens the chord with the square of the bending angles. Without it a chain rolls up to a polygon whose chords (not arcs) have the rest length,
+// (pi/N)^2/6 too large. Its second derivative is the consistent geometric stiffness. g is a polynomial in z = (1 - e . t)/2 = sin^2(angle/2), truncated
+// after z^7: its error is 3e-9 at 0.64 rad, and unlike acos it is smooth everywhere.
 //
-// Tangent: J' C J (main), positive semi-definite, and the geometric stiffness of a tension only: a compression's part would make the
+// Tangent stiffness: J' C J (main part, positive semi-definite) plus the geometric stiffness of a tension only: that of a compression would make the
 // matrix indefinite (docs/design.md, "Stability", 2). To first order in the angles
 //   d theta_i = B_i d phi_i + D_i (d x2 - d x1),   B_i = s_i I - t_i e',   D_i = -[t_i]x P / l,   s_i = e . t_i,   P = I - e e'
-// B_i, not P: B_i t_i = 0, so spinning a bent wire about its own tangent costs nothing, as it should. With P in its place the matrix held
-// EI k^2 of stiffness a length against spin and lacked as much elsewhere; eigenvalues of the true Hessian against it reached 9 in a wire coiled
-// in a capsule (above 2 a Newton step overshoots, and the coil shook until it left the vessel); with B they stay below 1.02 in equilibrium.
-// The extension's derivative is taken whole: it is the stiffest part, and sines in place of angles in it (5 % at 0.3 rad) made those eigenvalues 2.9 for
-// elements of 10 mm and 0.1 mm that turn by 0.63 rad, 13 at 0.9: steps that went to and fro for ever. Now they are 1.11 and 1.23.
+// B_i is used rather than P because B_i t_i = 0: spinning a bent wire about its own tangent then costs no energy, which is correct. With P the matrix had
+// a stiffness EI k^2 per length against spin and too little elsewhere; the eigenvalues of the true Hessian relative to it reached 9 in a wire coiled
+// in a capsule (above 2 a Newton step overshoots, and the coil oscillated until it left the vessel). With B they stay below 1.02 in equilibrium.
+// The derivative of the extension is exact, because the axial stiffness is the largest. Sines in place of angles in it (5 % off at 0.3 rad) gave
+// eigenvalues of 2.9 for elements of 10 mm length and 0.1 mm diameter that rotate by 0.63 rad and 13 at 0.9 rad, and the steps alternated without
+// converging. They are now 1.11 and 1.23.
 #ifndef SELDINGER_SOLVER_BEAM_EQUATIONS_H
 #define SELDINGER_SOLVER_BEAM_EQUATIONS_H
 
@@ -36,7 +36,7 @@
 #define UNROLL
 #endif
 
-// angle / sine and its derivative with the cosine, from z = sin^2(angle/2): sum of 4^k (k!)^2 / (2k+1)! z^k.
+// Angle / sine and its derivative with respect to the cosine, from z = sin^2(angle/2): sum of 4^k (k!)^2 / (2k+1)! z^k.
 INLINE double angle_over_sine(double z, double *slope)
 {
     const double a1 = 2.0 / 3, a2 = 8.0 / 15, a3 = 16.0 / 35, a4 = 128.0 / 315, a5 = 256.0 / 693, a6 = 1024.0 / 3003, a7 = 2048.0 / 6435;
@@ -46,9 +46,9 @@ INLINE double angle_over_sine(double z, double *slope)
 
 INLINE Vec3 first_axis(Quat q) { return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)); }
 
-typedef struct Bend {        // an angle from the chord e to a tangent t
+typedef struct Bend {        // bending angle from the chord e to a tangent t
     Vec3 t, n, angle;        // n = e x t
-    double s, g, h;          // e . t, angle / sine, its derivative with s
+    double s, g, h;          // e . t, angle / sine, derivative of g with respect to s
 } Bend;
 
 INLINE Bend bend_from(Vec3 e, Vec3 t)
@@ -62,7 +62,7 @@ INLINE Bend bend_from(Vec3 e, Vec3 t)
     return b;
 }
 
-// Given m = dE/d angle: returns dE for a rotation of t, adds dE/de to *along.
+// Given m = dE/d angle: returns the derivative of E with respect to a rotation of t and adds dE/de to *along.
 INLINE Vec3 bend_back(const Bend *b, Vec3 e, Vec3 m, Vec3 *along)
 {
     double mn = b->h * vec3_dot(m, b->n);
@@ -71,7 +71,7 @@ INLINE Vec3 bend_back(const Bend *b, Vec3 e, Vec3 m, Vec3 *along)
     return vec3_add_scaled(turn, -mn, b->n);
 }
 
-// What a mix of tools makes of an element's ends; one uniform tool has the same stiffness at both, mirrored rest chords and no twist (element()).
+// End properties of an element of several tools. A single uniform tool has the same stiffness at both ends, mirrored rest chords and no rest twist (element()).
 typedef struct BeamEnds {
     double near1, near2;     // [N mm] c of each end; d is in->far
     Quat rest1, rest2;       // from each node's frame to the rest chord, (w, 0, y, z)
@@ -95,7 +95,7 @@ INLINE void element_between(const BeamInput *in, BeamEnds ends, bool is_curved, 
         b2 = bend_from(e, first_axis(in->q2));
     }
 
-    // axial, with the bow
+    // axial strain, including the bow
     double share = in->length * (1.0 / 30);
     Vec3 bow1 = vec3_scale(vec3_sub(vec3_scale(b1.angle, 4), b2.angle), share);
     Vec3 bow2 = vec3_scale(vec3_sub(vec3_scale(b2.angle, 4), b1.angle), share);
@@ -106,10 +106,10 @@ INLINE void element_between(const BeamInput *in, BeamEnds ends, bool is_curved, 
     Vec3 m1 = vec3_add(vec3_scale(c1.angle, ends.near1), vec3_scale(c2.angle, in->far));
     Vec3 m2 = vec3_add(vec3_scale(c2.angle, ends.near2), vec3_scale(c1.angle, in->far));
     double energy = 0.5 * (tension * extension + vec3_dot(m1, c1.angle) + vec3_dot(m2, c2.angle));
-    // the second derivative of theta with a spin of the node is the rest angle back, b - c
+    // the second derivative of theta with respect to a spin of the node is minus the rest angle, b - c
     double spin1 = is_curved ? vec3_dot(m1, vec3_sub(b1.angle, c1.angle)) : 0, spin2 = is_curved ? vec3_dot(m2, vec3_sub(b2.angle, c2.angle)) : 0;
 
-    // torsion: p = (w, v) the rotation from F1 to F2, seen in F1
+    // torsion: p = (w, v) is the rotation from F1 to F2 in the frame F1
     Quat p = quat_mul(quat_conjugate(f1), f2);
     double h, g = angle_over_sine(0.5 * (1 - p.w), &h);
     double psi = 2 * g * p.x - ends.twist, torque = in->twist * psi;
@@ -156,10 +156,10 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     element_between(in, (BeamEnds){in->near, in->near, rest1, rest2, 0}, is_curved, out);
 }
 
-// The tangent of an element, its distinct entries: with A = [tt, tr; tr', rr] for the unknowns (displacement, rotation) of each node,
+// Distinct entries of the tangent of an element. With A = [tt, tr; tr', rr] for the unknowns (displacement, rotation) of each node,
 //   k11 = [-F_TT, -N_TR; ., N_RR]   k21 = [F_TT, N_TR; F_TR', N_FAR]   k22 = [-F_TT, -F_TR; ., F_RR]
-// N_ rows belong to the element's first node, F_ rows to its second: signs are those of k21. Symmetric blocks hold six entries (SYM).
-// After the tangent: the gradient of the energy.
+// N_ rows belong to the first node of the element, F_ rows to the second; signs are those of k21. Symmetric blocks have six entries (SYM).
+// The gradient of the energy follows the tangent.
 enum { N_TR = 0, N_RR = 9, N_FAR = 15, N_MOMENT = 24, N_ROWS = 27 };
 enum { F_TT = 0, F_TR = 6, F_RR = 15, F_FORCE = 21, F_MOMENT = 24, F_ROWS = 27 };
 static const int SYM[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
@@ -169,7 +169,7 @@ typedef struct Columns {
 } Columns;
 INLINE Columns columns(Vec3 v) { return (Columns){{v.x, v.y, v.z}}; }
 
-// The part of the tangent between the displacement of node 2 and the rotation of node j, T = sum over i of C_ij t_i:
+// Coupling between the displacement of node 2 and the rotation of node j, with T = sum over i of C_ij t_i:
 //   sum over i of D_i' C_ij B_j = (s_j P [T]x - P (T x t_j) e') / l,   P [T]x = [T]x - e (e x T)'
 typedef struct Coupling {
     double m[3][3];
@@ -188,7 +188,7 @@ INLINE Coupling coupling(Vec3 e, Vec3 sum, Vec3 tangent, double s, double invers
     return k;
 }
 
-// Rows of the tangent, main part times `scale`, geometric part of the tension `pull` >= 0, row k at [k * stride].
+// Rows of the tangent: the main part times `scale`, plus the geometric part of the tension `pull` >= 0. Row k is at [k * stride].
 INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near1, double near2, double far, double twist, double scale, double pull,
                          bool is_curved, double *restrict n, int n_stride, double *restrict f, int f_stride)
 {
@@ -204,7 +204,7 @@ INLINE void tangent_rows(const BeamOutput *o, double length, double axial, doubl
     Columns p1 = columns(t1), p2 = columns(t2), q1 = columns(vec3_add_scaled(t1, -s1, e)), q2 = columns(vec3_add_scaled(t2, -s2, e));
     UNROLL
     for (int i = 0; i < 3; i++) {
-        // rows of B_i' B_j and of the second-order rest of D_i' D_j
+        // rows of B_i' B_j and of the second-order remainder of D_i' D_j
         double av = a * v.v[i], x1 = i2 * (c1 * q1.v[i] + d * q2.v[i]), x2 = i2 * (c2 * q2.v[i] + d * q1.v[i]);
         double y11 = c1 * (v.v[i] - s1 * p1.v[i]), z11 = c1 * s1 * v.v[i], y22 = c2 * (v.v[i] - s2 * p2.v[i]), z22 = c2 * s2 * v.v[i];
         double y21 = d * (t12 * v.v[i] - s2 * p1.v[i]), z21 = d * s1 * v.v[i];
@@ -229,7 +229,7 @@ INLINE void tangent_rows(const BeamOutput *o, double length, double axial, doubl
     }
 }
 
-// One element's rows as blocks.
+// Converts the rows of one element to blocks.
 INLINE void blocks_from_rows(const double n[N_ROWS], const double f[F_ROWS], BeamTangent *tangent)
 {
     double *k11 = tangent->k11, *k21 = tangent->k21, *k22 = tangent->k22;

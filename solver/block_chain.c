@@ -1,14 +1,13 @@
 // A = L D L^T of a block-tridiagonal chain, eliminated from both ends towards the middle node m = M/2.
 //
 //   left  i = 0 .. m-1:     C = A(i+1, i) = L_i,     right  i = M-1 .. m+1:  C = A(i-1, i) = L_(i-1)^T
-//   D_i = T d T^T (T unit lower), Z = C T^-T d^-1, and the neighbour towards the middle loses Z d Z^T.
-// Forward: y = T^-1 b, the neighbour's b loses Z y. Backward: x = T^-T (d^-1 y - Z^T x'), x' of the neighbour towards the middle.
+//   D_i = T d T^T (T unit lower), Z = C T^-T d^-1, and Z d Z^T is subtracted from the block of the next node towards the middle.
+// Forward: y = T^-1 b, and Z y is subtracted from b of the next node. Backward: x = T^-T (d^-1 y - Z^T x'), x' of the next node towards the middle.
 //
-// The work is latency-bound (a division in a row for every unknown), so the two ends are eliminated in one loop, interleaved pivot by pivot:
-// their chains of operations do not depend on each other. Columns are 8 lanes wide for blocks of 6, 16 for larger ones; the lane behind the
-// last row of the coupling carries the right-hand side, which is how a factorisation with one solve (block_chain_factor_solve) gets its
-// forward half for nothing.
-// Pivots stay scalar: multiplying with explicit inverses of 6x6 blocks is faster by a third but loses the square root of the condition.
+// The computation is bound by latency (one division after another for each unknown). Both ends are therefore eliminated in one loop, interleaved pivot by
+// pivot, because their operations are independent. Columns are 8 lanes wide for blocks of 6 and 16 for larger ones; the lane after the last row of the coupling
+// holds the right-hand side, so that a factorisation with one solve (block_chain_factor_solve) gets its forward substitution without extra cost.
+// Pivots are scalar: multiplication by explicit inverses of the 6x6 blocks is a third faster, but loses accuracy by the square root of the condition number.
 #include "solver/block_chain.h"
 
 #include "base/base.h"
@@ -20,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Per node: T and Z by columns (size x BLOCK_COLUMN(size); z lane `size`: d^-1 y of the fused solve), and 1/d.
+// Per node: T and Z column-major (size x BLOCK_COLUMN(size); lane `size` of Z: d^-1 y of the combined solve), and 1/d.
 struct BlockFactor {
     int count, capacity, size;
     double *t, *z, *inverse;
@@ -107,7 +106,7 @@ bool block_chain_factor(const BlockChain *chain, BlockFactor *factor)
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
-    SEL_ASSERT(b != x, "the right-hand side is read after x is written");
+    SEL_ASSERT(b != x, "b and x are different arrays");
     SEL_REQUIRE(chain->count > 0 && chain->count <= factor->capacity, "a factor has room for the nodes of its chain");
     int size = chain->size, form = block_size_index(size);
     factor->count = chain->count;
@@ -119,7 +118,7 @@ bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, cons
 
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 {
-    SEL_ASSERT(factor->count > 0 && block_size_is_known(factor->size), "a chain was factored");
+    SEL_ASSERT(factor->count > 0 && block_size_is_known(factor->size), "a chain has been factored");
     int size = factor->size, form = block_size_index(size);
     if (x != b)
         memcpy(x, b, (size_t)(factor->count * size) * sizeof *x);
@@ -127,7 +126,7 @@ void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
     back_substitute_on[form][simd_level()](factor, x, x, size, 1);
 }
 
-// S_i = D_i^-1 + G^T S' G with G = Z T^-1 = C D_i^-1, S' the neighbour's towards the middle.
+// S_i = D_i^-1 + G^T S' G with G = Z T^-1 = C D_i^-1 and S' of the next node towards the middle.
 INLINE void inverse_block(const BlockFactor *f, size_t i, const double *towards, double *s, const int size)
 {
     const int column = BLOCK_COLUMN(size), panel = BLOCK_PANEL(size);
@@ -136,7 +135,7 @@ INLINE void inverse_block(const BlockFactor *f, size_t i, const double *towards,
     for (int c = 0; c < size; c++)
         for (int r = 0; r < size; r++)
             ti[c][r] = g[c][r] = sg[c][r] = 0;
-    // ti = T^-1 by columns: ti[c][r]
+    // ti = T^-1, column-major: ti[c][r]
     for (int c = 0; c < size; c++) {
         ti[c][c] = 1;
         for (int r = c + 1; r < size; r++)
@@ -193,7 +192,7 @@ INLINE void multiply(const BlockChain *chain, const double *x, double *y, const 
     }
 }
 
-// Loops over a size that is a constant are faster.
+// A constant block size makes the loops faster.
 void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
 {
     SEL_ASSERT(block_size_is_known(factor->size), "there are kernels for the size");
@@ -207,7 +206,7 @@ void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
 
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y)
 {
-    SEL_ASSERT(block_size_is_known(chain->size) && x != y, "there are kernels for the size, and x is read after y is written");
+    SEL_ASSERT(block_size_is_known(chain->size) && x != y, "there are kernels for the size, and x and y are different arrays");
     switch (chain->size) {
     case 6: multiply(chain, x, y, 6); break;
     case 8: multiply(chain, x, y, 8); break;

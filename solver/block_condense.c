@@ -1,9 +1,9 @@
-// From both ends towards a node `middle`, each end in runs of nodes between two kept ones, `origin` behind and the next kept one ahead.
+// Elimination from both ends towards a node `middle`. Each end eliminates runs of nodes between two kept ones: `origin` behind and the next kept node ahead.
 //
 //   D_i = T d T^T,  C = A(i', i) with the neighbour i' ahead,  O = A(origin, i),  Z = C T^-T d^-1,  H = O T^-T d^-1
-//   A(i', i') loses Z d Z^T,  A(origin, i') becomes -H d Z^T,  A(origin, origin) loses H d H^T
-//   y = T^-1 b,  b_i' loses Z y,  b_origin loses H y;   back:  x = T^-T (d^-1 y - Z^T x' - H^T x_origin)
-// Interleaved as in block_chain.c, and for the same reason.
+//   A(i', i') -= Z d Z^T,  A(origin, i') = -H d Z^T,  A(origin, origin) -= H d H^T
+//   y = T^-1 b,  b_i' -= Z y,  b_origin -= H y;   backward:  x = T^-T (d^-1 y - Z^T x' - H^T x_origin)
+// The ends are interleaved as in block_chain.c, and for the same reason.
 #include "solver/block_condense.h"
 
 #include "base/base.h"
@@ -16,13 +16,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Which unknowns of a node of a large block are worked on. Others, of tools that carry the node or have ended before it, have unit rows.
+// The unknowns of a node of a large block that are processed. The others, of tools that carry the node or end before it, have unit rows.
 typedef struct BlockShape {
-    unsigned char count;                 // of them; packed they are 0 to count - 1
-    unsigned char place[BLOCK_LARGEST];  // … and stand there; then the others, which have unit rows
-    unsigned char shift;                 // 0 to 5 stay where they are, the others stand so much further on …
-    bool is_scattered;                   // … or anywhere
-    unsigned coupled;                    // a bit for each that is coupled to anything
+    unsigned char count;                 // number of processed unknowns; packed indices are 0 to count - 1
+    unsigned char place[BLOCK_LARGEST];  // their indices in the node; then the others, which have unit rows
+    unsigned char shift;                 // unknowns 0 to 5 keep their index, the others are shifted by this …
+    bool is_scattered;                   // … or are at arbitrary indices
+    unsigned coupled;                    // bit mask of the unknowns that do not have unit rows
 } BlockShape;
 
 static size_t node_doubles(int size)
@@ -30,16 +30,16 @@ static size_t node_doubles(int size)
     size_t large = (size_t)((size + 7) / 8 * 8);
     return size == 6 ? (size_t)(3 * BLOCK_PANEL(6) + BLOCK_COLUMN(6)) : (3 * (size_t)size + 3) * large;
 }
-// The inverse pivots are a node's last ones.
+// The inverse pivots are the last data of a node.
 static size_t inverse_at(int size) { return node_doubles(size) - (size == 6 ? (size_t)BLOCK_COLUMN(6) : (size_t)((size + 7) / 8 * 8)); }
 
 struct BlockCondenser {
     int count, capacity, size, middle;
     bool *keep;
-    int *place;                  // (M) in the small chain, -1: eliminated …
-    unsigned char *live;         // … where so many unknowns come first, the others behind them have unit rows
-    int *origin;                 // (M) … into this one and the next ahead; -1: from an end of the chain
-    BlockShape *shape;           // (M) of large blocks
+    int *place;                  // (M) index in the condensed chain, -1: eliminated …
+    unsigned char *live;         // … number of leading coupled unknowns of each node there; the remaining ones have unit rows
+    int *origin;                 // (M) kept node behind an eliminated one, which couples to this and the next kept node ahead; -1: end of the chain
+    BlockShape *shape;           // (M) for large blocks
     double *node;
     double *side;
     BlockChain small;
@@ -92,18 +92,18 @@ int block_condenser_place(const BlockCondenser *k, int node)
     return k->place[node];
 }
 
-// One end: the node it is at, and the kept one behind it.
+// State of one end: its current node, and the last kept node behind it.
 typedef struct Walk {
     int step, at, origin;
-    bool runs;                   // the node before was eliminated
+    bool runs;                   // the preceding node was eliminated
 } Walk;
 
-// Where a packed unknown stands in a kept node of the small chain: packed too, so that unit rows are the last ones.
+// Index of a packed unknown in a kept node of the condensed chain: it is packed too, so that unit rows are last.
 static inline int spot(const BlockShape *s, int k) { return s->is_scattered ? s->place[k] : k; }
 static bool is_moved(const BlockShape *s) { return s->shift > 0 && !s->is_scattered; }
 static int unknown_at(const BlockShape *s, int k) { return is_moved(s) ? s->place[k] : k; }
 
-// A block of the chain as the small one has it, with rows and columns of these nodes.
+// Copies a block of the chain into the order of the condensed chain, for the given row and column nodes.
 static void pack_block(const double *from, const BlockShape *rows, const BlockShape *columns, int n, double *to)
 {
     if (!is_moved(rows) && !is_moved(columns)) {
@@ -131,7 +131,7 @@ static void unpack_side(const double *from, const BlockShape *s, int n, double *
 
 static double *coupling(BlockCondenser *k, int place) { return k->small.lower + (size_t)place * (size_t)(k->size * k->size); }
 
-// Goes on to the next node to eliminate; false at the middle.
+// Advances to the next node to eliminate; false at the middle.
 static bool seek(BlockCondenser *k, const BlockChain *a, Walk *w)
 {
     const size_t block = (size_t)(k->size * k->size);
@@ -145,7 +145,7 @@ static bool seek(BlockCondenser *k, const BlockChain *a, Walk *w)
     return w->at != k->middle;
 }
 
-// Was the node before i, on the way to the middle, eliminated?
+// Whether the node before i, on the way to the middle, was eliminated.
 static bool runs_into(const BlockCondenser *k, int i, int step) { return i != (step > 0 ? 0 : k->count - 1) && k->place[i - step] < 0; }
 
 static const double zeros[BLOCK_LARGEST];
@@ -158,7 +158,7 @@ static void (*const eliminate_on[BLOCK_SIZES][SIMD_COUNT])(BlockCondenser *, con
 static void (*const forward_on[BLOCK_SIZES][SIMD_COUNT])(BlockCondenser *, const double *) = BLOCK_FORMS(forward);
 static void (*const expand_on[BLOCK_SIZES][SIMD_COUNT])(const BlockCondenser *, double *) = BLOCK_FORMS(expand);
 
-// The eliminated node with as many eliminated ones before it as behind is kept.
+// Keeps the eliminated node that has equally many eliminated nodes on either side.
 static void choose_middle(BlockCondenser *k)
 {
     int left = 0, seen = 0;
@@ -175,7 +175,7 @@ static void choose_middle(BlockCondenser *k)
 
 typedef uint64_t Bits __attribute__((may_alias));
 
-// Anything but zeros, of either sign, in every `stride`th place. No branches: it nearly always looks at all of them.
+// Whether any entry at every `stride`th place is nonzero; +0 and -0 both count as zero. Without branches, because nearly always all entries are read.
 INLINE bool holds_any(const double *x, int stride, const int size)
 {
     const Bits *entry = (const Bits *)x;
@@ -231,18 +231,18 @@ INLINE void find_shapes(BlockCondenser *k, const BlockChain *a, const int size)
 
 void block_condenser_survey(BlockCondenser *k, const BlockChain *chain)
 {
-    SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser has room for the chain");
+    SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser is large enough for the chain");
     switch (k->size) {
     case 8: find_shapes(k, chain, 8); break;
     case 10: find_shapes(k, chain, 10); break;
     case 12: find_shapes(k, chain, 12); break;
-    default: break;          // of the smallest blocks the kernels take all
+    default: break;          // for the smallest blocks the kernels process all unknowns
     }
 }
 
 const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, const double *b)
 {
-    SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser has room for the chain");
+    SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser is large enough for the chain");
     const size_t n = (size_t)k->size, block = n * n;
     k->count = chain->count;
     choose_middle(k);
@@ -258,7 +258,7 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
         k->live[p] = (unsigned char)(k->size == 6 || s->is_scattered ? k->size : s->count);
         k->keep[i] = false;
     }
-    SEL_ASSERT(k->small.count > 0, "some node is kept");
+    SEL_ASSERT(k->small.count > 0, "at least one node is kept");
     eliminate_on[block_size_index(k->size)][simd_level()](k, chain, b);
     const size_t stride = node_doubles(k->size);
     const double *inverse = k->node + inverse_at(k->size);
@@ -271,7 +271,7 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
 
 void block_condenser_turn_to(BlockCondenser *k, const double *b)
 {
-    SEL_ASSERT(k->small.count > 0 && k->count <= k->capacity, "a chain was condensed");
+    SEL_ASSERT(k->small.count > 0 && k->count <= k->capacity, "a chain has been condensed");
     const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
         if (k->place[i] >= 0)
@@ -281,7 +281,7 @@ void block_condenser_turn_to(BlockCondenser *k, const double *b)
 
 void block_condenser_expand(const BlockCondenser *k, const double *kept, double *x)
 {
-    SEL_ASSERT(k->small.count > 0 && kept != x, "a chain was condensed");
+    SEL_ASSERT(k->small.count > 0 && kept != x, "a chain has been condensed");
     const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
         if (k->place[i] >= 0)

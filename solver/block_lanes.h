@@ -1,4 +1,4 @@
-// Internal to solver: which block sizes and instruction sets the chain's kernels are compiled for (block_lanes.inc has their operations).
+// Internal to solver: the block sizes and instruction sets for which the chain kernels are compiled (block_lanes.inc has the operations on columns).
 #ifndef SELDINGER_SOLVER_BLOCK_LANES_H
 #define SELDINGER_SOLVER_BLOCK_LANES_H
 
@@ -6,7 +6,7 @@
 
 #include <stddef.h>
 
-// Loops over the columns must be unrolled, or small blocks do not stay in registers.
+// Loops over the columns must be unrolled; otherwise small blocks do not stay in registers.
 #if defined(__GNUC__) && !defined(__clang__)
 #define UNROLL _Pragma("GCC unroll 16")
 #define ROLL _Pragma("GCC unroll 1")
@@ -15,11 +15,11 @@
 #define ROLL
 #endif
 
-// Columns have room for a right-hand side behind the last row and are padded to eights.
+// A column has room for a right-hand side after the last row and is padded to a multiple of eight.
 #define BLOCK_COLUMN(size) (((size) + 8) / 8 * 8)
 #define BLOCK_PANEL(size) ((size)*BLOCK_COLUMN(size))
 
-// Tables of a kernel by block_size_index() and simd_level(). Its name has the SIZE before the instruction set.
+// Tables of a kernel, indexed by block_size_index() and simd_level(). In the kernel's name SIZE precedes the instruction set.
 #define BLOCK_VARIANT(name) SIMD_JOIN(name, SIZE)
 #define BLOCK_FORMS(name)                                                                                                                                      \
     {                                                                                                                                                          \

@@ -1,8 +1,8 @@
-// A = L U, eliminated from both ends towards the middle node as in block_chain.c, which see.
+// A = L U, eliminated from both ends towards the middle node, as in block_chain.c.
 //
 //   left:  C = A(i+1, i), B = A(i, i+1);  right: C = A(i-1, i), B = A(i, i-1)
-//   D_i = T V (T unit lower, V upper), Z = C V^-1, Y = T^-1 B, and the neighbour towards the middle loses Z Y.
-// The right-hand side travels as one more column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
+//   D_i = T V (T unit lower, V upper), Z = C V^-1, Y = T^-1 B, and Z Y is subtracted from the block of the next node towards the middle.
+// The right-hand side is an additional column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the next node towards the middle.
 #include "solver/block_lu.h"
 
 #include "base/base.h"
@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A node holds T, V and Z, all by columns (of T the lanes below the diagonal count), Y and behind it the right-hand side's column, and 1/d.
+// Data of a node: T, V and Z, column-major (T is valid below the diagonal), then Y followed by the column of the right-hand side, and 1/d.
 #define T_AT 0
 #define V_AT PANEL
 #define Z_AT (2 * PANEL)
@@ -25,9 +25,9 @@ static size_t node_doubles(int size) { return (size_t)(4 * BLOCK_PANEL(size) + 2
 
 struct BlockLu {
     int count, capacity, size;
-    unsigned char *live;         // (M) unknowns of each node that come before its unit rows
+    unsigned char *live;         // (M) leading unknowns of each node, before its unit rows
     double *node;
-    double *rest, *change;       // (M, n) of the refinement
+    double *rest, *change;       // (M, n) residual and correction of the refinement
 };
 
 BlockLu *block_lu_create(int count, int size)
@@ -81,7 +81,7 @@ static bool all_positive(const BlockLu *lu)
     return ok;
 }
 
-// r -= B x of one block by columns
+// r -= B x for one column-major block.
 static void take_off(const double *block, const double *x, double *r, int size)
 {
     for (int c = 0; c < size; c++)
@@ -91,7 +91,7 @@ static void take_off(const double *block, const double *x, double *r, int size)
 
 static void refine(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
 {
-    SEL_ASSERT(lu->count > 0 && lu->count <= lu->capacity, "a chain was factored");
+    SEL_ASSERT(lu->count > 0 && lu->count <= lu->capacity, "a chain has been factored");
     const int size = lu->size;
     const size_t n = (size_t)size, block = n * n;
     memcpy(lu->rest, b, (size_t)lu->count * n * sizeof *b);
@@ -112,7 +112,7 @@ bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const dou
                            const unsigned char *live, bool *exact)
 {
     SEL_REQUIRE(count > 0 && count <= lu->capacity, "a factor has room for the nodes of its chain");
-    SEL_ASSERT(b != x, "the right-hand side is read after x is written");
+    SEL_ASSERT(b != x, "b and x are different arrays");
     lu->count = count;
     if (live)
         memcpy(lu->live, live, (size_t)count);
@@ -129,7 +129,7 @@ bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const dou
 
 void block_lu_solve(const BlockLu *lu, const double *b, double *x)
 {
-    SEL_ASSERT(lu->count > 0 && b != x, "a chain was factored");
+    SEL_ASSERT(lu->count > 0 && b != x, "a chain has been factored");
     forward_on[block_size_index(lu->size)][simd_level()](lu, b);
     back_on[block_size_index(lu->size)][simd_level()](lu, x);
 }
@@ -144,7 +144,7 @@ INLINE void transpose(int count, const double *from, double *to, const int size)
 
 void block_lu_transpose(int count, int size, const double *from, double *to)
 {
-    if (size == 6) // the usual one, as a constant
+    if (size == 6) // the usual size, as a constant
         transpose(count, from, to, 6);
     else
         transpose(count, from, to, size);

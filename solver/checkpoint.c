@@ -1,5 +1,5 @@
-// Checkpoints: everything that the next step depends on. Restored, a run repeats bit for bit.
-// The hash is FNV-1a taken word by word (8 bytes) in four lanes, with a shift that carries high bits down; bytes would cost 100 us.
+// Checkpoints hold everything on which the next step depends: a restored run repeats bit for bit.
+// The hash is FNV-1a by 8-byte words in four lanes, with a shift that mixes high bits into low ones; hashing by bytes would take 100 us.
 #include "solver/self_contact.h"
 #include "base/base.h"
 #include "solver/tools_internal.h"
@@ -133,7 +133,7 @@ uint64_t stepper_hash(const Stepper *s)
     }
     for (size_t i = 0; i < s->memory_count; i++)
         hash_double(&hash, s->memory[i]);
-    // field by field: padding holds anything
+    // field by field, because padding is indeterminate
     for (int i = 0; i < s->points.count; i++) {
         const VesselMemory *p = &s->points.place[i];
         hash_double(&hash, p->node);

@@ -1,9 +1,9 @@
-// The wall's curvature as stiffness (docs/design.md, "Stability", 1).
+// Curvature of the wall as stiffness (docs/design.md, "Stability", 1).
 //
-// Over a step the normal turns by H d (H the Hessian of the gap), so a contact force_n n does the work of a spring -force_n H. Its positive part
-// in the tangent plane goes into the matrix, or the tip oscillates; the negative part (a convex wall) would make the matrix indefinite and is left
-// to the next step's normal. The gap is a function of the axis' place alone: no arm to the touching point here, but between nodes the axis
-// follows their turns with its levers.
+// During a step the normal rotates by H d (H: Hessian of the gap), so that a contact with force force_n n acts like a spring of stiffness -force_n H. Its
+// positive part in the tangent plane is added to the matrix, because the tip oscillates without it. The negative part (convex wall) would make the matrix
+// indefinite and takes effect only through the normal of the next step. The gap depends on the position of the axis alone: the arm to the touching point does
+// not enter, but between nodes the axis follows the nodes' rotations through the levers.
 #include "solver/contact.h"
 
 #include "base/base.h"
@@ -12,7 +12,7 @@
 
 #include <stddef.h>
 
-// The positive semi-definite part of [xx xy; xy yy].
+// Replaces [xx xy; xy yy] by its positive semi-definite part.
 static void clamp_positive(double *xx, double *xy, double *yy)
 {
     double mean = (*xx + *yy) / 2, half = (*xx - *yy) / 2, radius = sqrt(half * half + *xy * *xy);
@@ -22,7 +22,7 @@ static void clamp_positive(double *xx, double *xy, double *yy)
         *xx = *xy = *yy = 0;
         return;
     }
-    // one eigenvalue of each sign: (mean + radius) times the projector on the upper eigenvector
+    // the eigenvalues have opposite signs: the result is (mean + radius) times the projector on the upper eigenvector
     double top = mean + radius, c = half / radius, s = *xy / radius;
     *xx = top * (1 + c) / 2;
     *yy = top * (1 - c) / 2;
@@ -82,7 +82,7 @@ static void add_levered(double *block, int stride, double k[3][3], double w, Vec
                 block[stride * r + c] += a[0][r] * kb[0][c] + a[1][r] * kb[1][c] + a[2][r] * kb[2][c];
 }
 
-// b += J' push, for a contact on the axis.
+// b += J' push for a contact on the axis.
 static void add_push(const ContactPoint *p, Vec3 push, const unsigned mask[2], int n, double *b)
 {
     const double weight[2] = {1 - p->xi, p->xi};
@@ -94,7 +94,7 @@ static void add_push(const ContactPoint *p, Vec3 push, const unsigned mask[2], i
     }
 }
 
-// force roll lean lean', and what it does to `leant`.
+// Adds the stiffness force roll lean lean' and its effect on `leant`.
 static void add_roll(const ContactPoint *p, double force, const unsigned mask[2], BlockChain *chain, double *b)
 {
     const int n = chain->size;
@@ -119,13 +119,13 @@ static void add_roll(const ContactPoint *p, double force, const unsigned mask[2]
 
 void contact_add_curvature(const ContactSet *set, BlockChain *chain, double *b)
 {
-    SEL_ASSERT(set->count >= 0 && set->count <= set->capacity, "a set holds no more contacts than it has room for");
+    SEL_ASSERT(set->count >= 0 && set->count <= set->capacity, "the number of contacts is within the set's capacity");
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
         SEL_REQUIRE(p->node >= 0 && p->node < chain->count, "a contact is at a node of the chain");
-        SEL_ASSERT(p->friction >= 0 && p->roll >= 0, "friction and roll are no less than 0");
+        SEL_ASSERT(p->friction >= 0 && p->roll >= 0, "friction and roll are not negative");
         double force = vec3_dot(p->force, p->normal);
         if (!(force > 0))
             continue;

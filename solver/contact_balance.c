@@ -1,17 +1,17 @@
-// How well contacts are solved.
+// Residual and balance of the contacts.
 //
-// Residual of a contact (Alart and Curnier's map), with its own stiffness k_n, k_t of the node alone in front of the violation:
+// Residual of a contact (natural map of Alart and Curnier), with the stiffness k_n, k_t of its node alone as the factor of the violation:
 //   normal      f_n - (f_n - k_n (gap + d_n))+
-//   tangential  f_t - P(f_t - k_t d_t), P onto the disc of radius mu f_n, or of a slide's bound
-// The node's own stiffness is the strictest sensible scale: the operator W between forces and motion is never smaller than 1/(4 k), so a
-// residual of 1e-6 is a force error of about 1e-6 also where a stiff straight wire carries many contacts and W is nearly singular.
+//   tangential  f_t - P(f_t - k_t d_t), P the projection onto the disc of radius mu f_n, or of a slide's bound
+// The node's own stiffness is the strictest reasonable scale: the operator W from forces to motion is never smaller than 1/(4 k), so that a residual
+// of 1e-6 means a force error of about 1e-6 even where a stiff straight wire has many contacts and W is nearly singular.
 #include "solver/contact_forms.h"
 
 #include <string.h>
 
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report)
 {
-    double worst = 0, top = LEAST_FORCE * LEAST_FORCE, cone = 0; // squares, the first two
+    double worst = 0, top = LEAST_FORCE * LEAST_FORCE, cone = 0; // the first two are squares
     int active = 0, pairs = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &row[i];
@@ -36,7 +36,7 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
 void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
 {
     SEL_ASSERT(s->matrix.count > 0 && s->matrix.count <= s->node_count, "the solver was made for a chain of this length");
-    SEL_ASSERT(u != s->rhs, "the right-hand side stays when u is written");
+    SEL_ASSERT(u != s->rhs, "u does not overwrite the right-hand side");
     memcpy(s->rhs, b, (size_t)(s->matrix.count * s->matrix.size) * sizeof *b);
     for (int i = 0; i < count; i++)
         contact_row_push(&s->row[i], s->row[i].force, s->rhs);

@@ -1,35 +1,36 @@
-// The block form: one semismooth Newton method for the normal and the friction field together.
+// The block form: one semismooth Newton method for normal and friction forces together.
 //
-// With f = sum over contacts of J^T f_k balanced by u at every iterate (A u = b + J^T f), an iteration gives each contact a law that is linear
-// in its further motion delta, f = g - C delta, and solves (A + J^T C J) du = J^T (g - f): a contact adds a 3x3 to its node's block, so that an
-// iteration is one factorisation of the chain. n normal, v = gap + d_n, d_t the sliding, k the node's own stiffness (contact_rows.h).
+// At every iterate u balances f = sum over contacts of J^T f_k (A u = b + J^T f). An iteration gives each contact a law that is linear in its further
+// motion delta, f = g - C delta, and solves (A + J^T C J) du = J^T (g - f). A contact adds a 3x3 matrix to its node's block, so that an iteration is one
+// factorisation of the chain. n is the normal, v = gap + d_n, d_t the sliding motion, k the stiffness of the node alone (contact_rows.h).
 //   open   g = 0, C = 0
-//   stick  g = f - P v n - P_t d_t, C = P n n^T + P_t (I - n n^T): v and d_t become 0 up to 1/P, and the next iteration removes that rest
+//   stick  g = f - P v n - P_t d_t, C = P n n^T + P_t (I - n n^T): v and d_t become 0 up to 1/P; the next iteration removes this remainder
 //   slip   g_n = f_n - P v, g_t = mu g_n p - q (d_t across p), C = P n n^T + mu P p n^T + q (I - n n^T - p p^T)
-// p is the direction of f_t - r d_t (Alart and Curnier 1991), q = mu f_n r / (|f_t - r d_t| - mu f_n) -> mu f_n / |d_t| the resistance against
-// turning. mu P p n^T makes the matrix unsymmetric: friction follows the normal force within the iteration. Without it (Tresca's friction
-// with the bound frozen, a fixed point over the bound) every outer round costs several factorisations and a wire in a spiral needs 5 to 20
-// rounds, as friction builds up along it like a power series of exp(mu theta). With it: 3 to 5 iterations a step, quadratic at the end.
+// p is the direction of f_t - r d_t (Alart and Curnier 1991); q = mu f_n r / (|f_t - r d_t| - mu f_n) -> mu f_n / |d_t| is the resistance against a change of
+// the sliding direction. mu P p n^T makes the matrix unsymmetric: friction follows the normal force within the iteration. Without it (Tresca friction
+// with a fixed bound and a fixed-point iteration over the bound) every outer iteration costs several factorisations, and a wire in a spiral needs 5 to 20
+// of them, because friction builds up along it like a power series of exp(mu theta). With it, a step takes 3 to 5 iterations, with quadratic convergence.
 //
-// Pairs, which touch two places of the chain, have the same laws; their C stays out of the matrix (contact_pairs.c).
+// Pairs, which join two places of the chain, have the same laws, but their C is not in the matrix (contact_pairs.c).
 //
-// What makes it robust: how states change, and a line search.
-// - A stiff wire that overlaps the wall over a stretch does so nearly everywhere at once; taking in every overlapping contact brings large
-//   tensile forces and cycles. So of each run of neighbouring overlapping contacts only the deepest is taken in at a time: active sets are a few
-//   isolated points, found in 3 to 7 iterations. The first iteration takes in none where some press already: old forces do not balance the new
-//   loads, and soft bending modes make of that an overlap of millimetres somewhere else.
-// - A sliding contact that moves against its own sense sticks first.
-// - Alart and Curnier's equations linearised at a contact that hardly slides point too far, and it flips between sticking and sliding for
-//   ever. Forces and motion are linear along a step, so their equations can be evaluated at any part of it without a solve: from the fourth
-//   iteration on the step is halved until they are better fulfilled than before. (Changing states one at a time, or minimising the convex problem
-//   of Tresca's friction in between, was tried before and cost ten times as much in the cases that need it.)
-// - The search can stall at a kink, where the states say one direction and their own boundary another. Then the rule for reversed contacts is
-//   turned off or on again, every second time r is changed too, and after three stalls in a row the whole step is taken (after two, some solves
-//   go round for ever).
+// Robustness depends on the rules for state changes and on a line search.
+// - A stiff wire that overlaps the wall over a stretch does so nearly everywhere at once; activating every overlapping contact produces large
+//   tensile forces and cycling. Therefore only the deepest contact of each run of neighbouring overlapping contacts is activated at a time: the active
+//   set is a few isolated points, found in 3 to 7 iterations. The first iteration activates none if some are loaded already: the old forces do not
+//   balance the new loads, and soft bending modes turn the difference into an overlap of millimetres elsewhere.
+// - A slipping contact whose motion has the direction of its friction force is first set to stick.
+// - The linearised equations of Alart and Curnier overestimate the step at a contact that hardly slides, which then alternates between stick and slip
+//   indefinitely. Forces and motion are linear along a step, so that the equations can be evaluated at any fraction of it without a solve: from the
+//   fourth iteration on the step is halved until their error is smaller than before. (Changing states one at a time, and minimising the convex problem
+//   of Tresca friction in between, were tried before and cost ten times as much in the cases that need it.)
+// - The line search can stall at a kink, where the step computed for the present states leads across the boundary between them. The rule for contacts
+//   with reversed motion is then switched off or on again, at every second stall r is changed as well, and after three consecutive stalls the full step
+//   is taken (after two, some solves cycle indefinitely).
 //
-// Forces leave cut to their cones, which changes them by no more than the residual. The motion is not balanced again with them: the wire's bending
-// is so soft against its stretching that a force off by 1e-8 of the largest moves it by as much as a residual of 0.1, so that iterates that
-// fulfil all laws would be refused for the rounding of a cut. Where the iterations end first, the best iterate is handed out in the same way.
+// The final forces are projected onto their cones, which changes them by no more than the residual. The motion is not recomputed with them: bending is so
+// soft compared with stretching that a force error of 1e-8 of the largest force moves the wire by as much as a residual of 0.1, so that iterates
+// that fulfil all laws would be rejected because of the rounding in the projection. If the iteration limit is reached first, the best iterate is returned in
+// the same manner.
 #include "solver/contact_forms.h"
 
 #include <float.h>
@@ -38,12 +39,12 @@
 
 enum { OPEN, STICK, SLIP };
 
-// Penalty P over k: the rest after an iteration is about 1/P; rounding of the matrix grows with it.
+// Penalty P over k: the remaining violation after an iteration is about 1/P, while rounding errors of the matrix grow with P.
 static const double penalty = 1e4;
-// r over k, in the choice of states (usual and after stalls) and in the line search: none changes the solution.
+// r over k in the choice of states (usual, and after stalls) and in the line search; the solution does not depend on them.
 static const double usual_slope = 1e-3, other_slope = 1e-2, merit_slope = 1e-2;
 enum { FIRST_SEARCH = 3, HALVINGS = 6, STALLS_IN_A_ROW = 3 };
-static const double stall = 0.05; // a step cut to less gets nowhere
+static const double stall = 0.05; // a step shortened to less than this makes no progress
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
@@ -54,21 +55,21 @@ static Vec3 slide_direction(const ContactRow *c, Vec3 motion, double slope, doub
     return *size > 0 ? vec3_scale(p, 1 / *size) : (Vec3){0, 0, 0};
 }
 
-// mu f_n; of a contact that is just taken in, from its overlap
+// mu f_n; for a newly activated contact an estimate from its overlap.
 static double friction_bound(const ContactRow *c, Vec3 motion)
 {
     double fn = vec3_dot(c->force, c->normal);
     return c->friction * (fn > 0 ? fn : fmax(0, -0.01 * c->stiffness_n * normal_violation(c, motion)));
 }
 
-// Which contacts with the wall shall be active: those that press, and the deepest of each run of neighbours that overlap.
+// Selects the active wall contacts: those with a compressive force, and the deepest of each run of overlapping neighbours.
 static void choose_active(const ContactSolver *s, bool *active)
 {
     const int count = s->wall_count, *wall = s->wall;
     int i = 0;
     while (i < count) {
         int at = wall[i];
-        SEL_ASSERT(at >= 0 && at < s->banded && !s->row[at].far && !s->row[at].slide, "walls are listed without pairs and slides");
+        SEL_ASSERT(at >= 0 && at < s->banded && !s->row[at].far && !s->row[at].slide, "the list of walls contains no pairs or slides");
         const ContactRow *c = &s->row[at];
         double v = normal_violation(c, s->motion[at]);
         if (s->law[at].state != OPEN || !(v < 0)) {
@@ -97,7 +98,7 @@ static bool are_neighbours(const ContactRow *a, const ContactRow *b)
     return abs(a->chain_node - b->chain_node) <= 1 && abs(a->far->chain_node - b->far->chain_node) <= 1;
 }
 
-// The same of pairs, which have neighbours on both strands.
+// The same for pairs, which have neighbours on both strands.
 static void choose_active_pairs(const ContactSolver *s, int count, bool *active)
 {
     for (int i = s->banded; i < count; i++) {
@@ -111,7 +112,7 @@ static void choose_active_pairs(const ContactSolver *s, int count, bool *active)
     }
 }
 
-// States for the next iteration; returns how many changed.
+// Chooses the states of the next iteration and returns the number of changes.
 static int choose_states(ContactSolver *s, int count, bool first)
 {
     int changes = 0, pressing = 0;
@@ -156,7 +157,7 @@ static Mat3 law_matrix(Vec3 n, double kn, Vec3 oblique, double across, Vec3 p)
     return c;
 }
 
-// Fills law->force (g, the force where the contact has moved by `from`) and, unless the old factor is used again, law->c.
+// Sets law->force (g, the force after a motion of `from`) and, unless the factor is reused, law->c.
 static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope, bool keep_matrix, ContactLaw *law)
 {
     Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(from, n), ft = contact_tangential(c->force, n);
@@ -191,8 +192,8 @@ static void cross_into(double x, double y, double z, Vec3 b, double out[3])
     out[2] = x * b.y - y * b.x;
 }
 
-// block += (w I, [r]x)^T K (v I, [q]x), by columns, where rows and columns are free. Rows of K [q]x are those of K times q, columns of [r]x^T K
-// those of K times r.
+// block += (w I, [r]x)^T K (v I, [q]x), column-major, in free rows and columns. Rows of K [q]x are the rows of K times q; columns of [r]x^T K are the
+// columns of K times r.
 static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double v, Vec3 q, unsigned columns, double *block, int stride)
 {
     double j[6][6], kq[3][3]; // j: [column][row]
@@ -215,7 +216,7 @@ static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double 
             block[stride * b + a] += j[b][a];
 }
 
-// The matrix += J^T C J with J = (w I, R) for each node, R = -[arm]x.
+// Adds J^T C J to the matrix, with J = (w I, R) for each node, R = -[arm]x.
 static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 {
     SEL_ASSERT(c->node >= 0 && c->node + c->nodes <= s->matrix.count, "a contact is at nodes of the matrix");
@@ -233,8 +234,8 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
     add_coupling(k, w[0], r[0], c->mask[0], w[1], r[1], c->mask[1], s->matrix.lower + block * at, n);
 }
 
-// Row e of a sliding contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], loses J^T mu p for every part of it along n: what is left of the law's
-// P (n + mu p) n^T is P n n^T, and the elimination, which does not look for pivots, finds large positive ones.
+// Subtracts from row e of a slipping contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], J^T mu p / w times its component along n. The law's P (n + mu p) n^T
+// is thereby reduced to P n n^T, and the elimination, which has no pivoting, finds large positive pivots.
 static void straighten(const ContactRow *c, ContactLaw *law, int e, ContactSolver *s)
 {
     SEL_ASSERT(!c->far && !c->slide && e < c->nodes, "rows of contacts with the wall are straightened, not those of pairs or slides");
@@ -260,7 +261,7 @@ static void straighten(const ContactRow *c, ContactLaw *law, int e, ContactSolve
         }
 }
 
-// Another right-hand side with the same matrix, which is straightened as its rows were.
+// Solves for another right-hand side with the same matrix, after applying the row operations of straighten() to it.
 static void solve_straightened(const ContactSolver *s, const BlockFactor *factor, double *b, double *x)
 {
     if (s->symmetric) {
@@ -278,7 +279,7 @@ static void solve_straightened(const ContactSolver *s, const BlockFactor *factor
     block_lu_solve(s->lu, b, x);
 }
 
-// The blocks of a contact's rows as the chain has them.
+// Restores the chain's blocks in the rows of a contact.
 static void restore(ContactSolver *s, const BlockChain *chain, const ContactRow *c)
 {
     SEL_ASSERT(c->node >= 0 && c->node + c->nodes <= chain->count, "a contact is at nodes of the chain");
@@ -291,7 +292,7 @@ static void restore(ContactSolver *s, const BlockChain *chain, const ContactRow 
     }
 }
 
-// The matrix of the present laws, and the right-hand side to it: only blocks that held or hold a contact differ from the chain's.
+// Assembles the matrix of the present laws and its right-hand side; only blocks that held or hold a contact differ from the chain's.
 static void assemble(ContactSolver *s, const BlockChain *chain, int count)
 {
     for (int i = 0; i < count; i++)
@@ -318,7 +319,7 @@ static void assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
         s->law[i].touched = false;
 }
 
-// How far the laws are from being fulfilled after part t of the step.
+// Sum of the squared errors of the laws after the fraction t of the step.
 static double merit(const ContactSolver *s, int count, double t)
 {
     double sum = 0;
@@ -346,9 +347,9 @@ static double step_length(const ContactSolver *s, int count)
     return best;
 }
 
-// The step of the present states: s->delta, and of each contact its motion and its force afterwards. s->rhs is what else the right-hand side has.
-// `whole`, in the first iterations, it is the whole motion: forces that fit badly may have moved the wire anywhere, and the rounding of that shall not stay.
-// False where the matrix cannot be factored.
+// Step for the present states: s->delta, and each contact's motion and final force. s->rhs contains the other terms of the right-hand side. If `whole`, in the
+// first iterations, the step is the whole motion rather than an increment: poor initial forces may have moved the wire far, and their rounding errors must not
+// remain. Returns false if the matrix cannot be factored.
 static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bool reuse, bool whole)
 {
     bool symmetric = true;
@@ -387,10 +388,10 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
     return true;
 }
 
-// Part t of it. False where the result is not finite.
+// Takes the fraction t of the step. Returns false if the result is not finite.
 static bool take_step(ContactSolver *s, int unknowns, int count, double t, double *u)
 {
-    SEL_ASSERT(t > 0 && t <= 1, "some part of the step is taken");
+    SEL_ASSERT(t > 0 && t <= 1, "the fraction of the step is in (0, 1]");
     double sum = 0;
     for (int k = 0; k < unknowns; k++) {
         u[k] += t * s->delta[k];
@@ -405,7 +406,7 @@ static bool take_step(ContactSolver *s, int unknowns, int count, double t, doubl
     return sum <= DBL_MAX;
 }
 
-// How far u is from balance with the forces [N, N mm].
+// Largest imbalance between u and the forces [N, N mm].
 static double imbalance(ContactSolver *s, const BlockChain *chain, const double *b, int count, const double *u)
 {
     double worst = 0;
@@ -418,7 +419,7 @@ static double imbalance(ContactSolver *s, const BlockChain *chain, const double 
     return worst;
 }
 
-// Keeps an iterate, or goes back to the one that was kept.
+// Saves the iterate, or restores the saved one.
 static void copy_iterate(ContactSolver *s, int unknowns, int count, bool keep, double *u)
 {
     memcpy(keep ? s->best_u : u, keep ? u : s->best_u, (size_t)unknowns * sizeof *u);
@@ -444,7 +445,7 @@ void contact_cut(ContactSolver *s, int count, ContactReport *report)
 
 bool contact_newton_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
 {
-    SEL_ASSERT(change != s->rhs && u != s->delta, "what the solve overwrites is not what it was given");
+    SEL_ASSERT(change != s->rhs && u != s->delta, "the arguments are not the solver's work space");
     int unknowns = chain->size * chain->count;
     memcpy(s->rhs, change, (size_t)unknowns * sizeof *s->rhs);
     bool finite = newton_step(s, chain, count, true, false) && take_step(s, unknowns, count, 1, u);
@@ -456,17 +457,17 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
                              double *u)
 {
     SEL_ASSERT(chain->count <= s->node_count && chain->size == s->matrix.size, "the solver was made for such a chain");
-    SEL_ASSERT(b != s->rhs && u != s->best_u, "what the solve overwrites is not what it was given");
+    SEL_ASSERT(b != s->rhs && u != s->best_u, "the arguments are not the solver's work space");
     ContactReport report = {0};
     s->matrix.count = chain->count;
     int unknowns = chain->size * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
     for (int i = 0; i < count; i++)
         s->law[i].state = vec3_dot(s->row[i].force, s->row[i].normal) > 0 ? SLIP : OPEN;
-    if (!s->knows_motion)    // better than what the forces give
+    if (!s->knows_motion)    // a given estimate is better than the motion that balances the forces
         contact_balance(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
-    double least = HUGE_VAL, residual = report.residual; // of the best iterate, its error in N and its residual
-    bool fresh = true, finite = true, unbalanced = false; // no factor yet
+    double least = HUGE_VAL, residual = report.residual; // of the best iterate: its error in N and its residual
+    bool fresh = true, finite = true, unbalanced = false; // fresh: no factor to reuse yet
     int in_a_row = 0;
     s->stalls = 0;
     s->inexact = false;
@@ -501,14 +502,14 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             in_a_row = 0;
         }
         report.iterations++;
-        s->knows_motion = false;         // from now on it is the iterate's
+        s->knows_motion = false;         // from now on `motion` belongs to the iterate
         finite = take_step(s, unknowns, count, t, u);
         if (!finite)
             break;
         contact_residual(s->row, count, s->motion, &report);
-        fresh = reuse && report.residual > 0.05 * before; // the old factor does not serve any more
+        fresh = reuse && report.residual > 0.05 * before; // the old factor no longer reduces the residual
         unbalanced = false;
-        if (s->inexact && report.residual <= options->tolerance) { // digits lost on the way: once more for the whole motion
+        if (s->inexact && report.residual <= options->tolerance) { // digits were lost: solve once more for the whole motion
             report.residual = fmax(report.residual, imbalance(s, chain, b, count, u) / report.largest);
             unbalanced = report.residual > options->tolerance;
             s->inexact = false;

@@ -1,7 +1,7 @@
-// Contacts of the tool with itself tie places that are far apart on the chain, and would fill its band. So their forces are unknowns beside it. With M the
-// matrix of the chain and of all other contacts, r its right-hand side, and for each pair a law f = g - C J du (contact_newton.c),
+// Contacts of the tool with itself join places that are far apart on the chain and would fill its band. Their forces are therefore separate unknowns. With M
+// the matrix of the chain with all other contacts, r its right-hand side, and a law f = g - C J du for each pair (contact_newton.c),
 //   M du = r + sum_p J_p^T (f_p - f_p0),   W_pq = J_p M^-1 J_q^T,   f - f0 + C (J du_0 + W (f - f0)) = g - f0,   M du_0 = r
-// with f0 the forces that r has already. W takes three solves of the chain a pair; then there are three equations a pair, eliminated with row pivoting.
+// where f0 are the forces already in r. W takes three solves of the chain per pair; the remaining three equations per pair are eliminated with row pivoting.
 #include "solver/contact_forms.h"
 
 #include "base/base.h"
@@ -12,18 +12,18 @@
 struct ContactPairs {
     int capacity;
     ContactRow *far;         // (capacity)
-    int count, *list;        // (capacity) the rows of those that W is made of
+    int count, *list;        // (capacity) rows of the pairs in W
     int *pivot;              // (3 capacity)
     double *w;               // (3 capacity, 3 capacity), rows of 3 count
-    double *matrix;          // (3 capacity, 3 capacity) 1 + C W, then L and U
-    double *scale;           // (3 capacity) by which its rows were multiplied
+    double *matrix;          // (3 capacity, 3 capacity) 1 + C W, then its factors L and U
+    double *scale;           // (3 capacity) scale factors of its rows
     double *force;           // (3 capacity)
     double *push, *response; // (M, n)
 };
 
 ContactPairs *contact_pairs_create(int node_count, int size, int capacity)
 {
-    SEL_ASSERT(node_count > 0 && size > 0 && capacity >= 0, "there is a chain and room for some pairs");
+    SEL_ASSERT(node_count > 0 && size > 0 && capacity >= 0, "the chain has nodes and the capacity is not negative");
     ContactPairs *p = calloc(1, sizeof *p);
     if (!p)
         return NULL;
@@ -91,7 +91,7 @@ Mat3 contact_pairs_block(const ContactPairs *p, int k, int l)
     return m;
 }
 
-// 1 + C W, its rows brought to a largest entry of 1.
+// Computes 1 + C W, each row scaled to a largest entry of 1.
 static void fill_matrix(ContactSolver *s)
 {
     ContactPairs *p = s->pairs;

@@ -1,9 +1,9 @@
-// Contacts in the order of the chain, with the stiffness of their nodes.
+// Builds the contact rows, sorted along the chain, with the stiffness of their nodes.
 #include "solver/contact_rows.h"
 
 static Sym3 block_at(const double *d, int n) { return (Sym3){d[0], d[n], d[2 * n], d[n + 1], d[2 * n + 1], d[2 * n + 2]}; }
 
-// The stiffness that a contact sees: its node's own, or of two nodes and their turns in series, each with its share.
+// Stiffness at a contact: that of its node, or that of two nodes and their rotations in series, each with its weight.
 static void own_stiffness(const BlockChain *chain, ContactRow *c)
 {
     SEL_ASSERT(c->node >= 0 && c->node + c->nodes <= chain->count, "a contact is at nodes of the chain");
@@ -27,11 +27,11 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
     c->inert = !(yields > 1e-8) || !isfinite(c->gap) || !vec3_is_finite(n);
 }
 
-// The mean over the directions in which it can move, as along a wall.
+// Mean stiffness over the free directions, as for the tangential directions at a wall.
 static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
 {
     SEL_ASSERT(c->node >= 0 && c->node < chain->count && c->slide + 1 < chain->size, "a slide has two unknowns of a node of the chain");
-    SEL_ASSERT(give > 0, "a slide gives before it slips");
+    SEL_ASSERT(give > 0, "the elastic displacement of a slide is positive");
     const size_t n = (size_t)chain->size, at = (size_t)c->slide;
     const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
     c->mask[0] = (contact_is_free(chain, c->node, c->slide) ? 1u : 0) | (c->radius > 0 && contact_is_free(chain, c->node, c->slide + 1) ? 2u : 0);
@@ -41,7 +41,7 @@ static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
     c->spring = c->inert ? 0 : c->bound / give;
 }
 
-// Both ends give way.
+// The compliances of both ends add up.
 static void pair_stiffness(const BlockChain *chain, ContactRow *c, ContactRow *far)
 {
     double give_n = 0, give_t = 0;

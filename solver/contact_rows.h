@@ -1,13 +1,14 @@
-// Internal to solver: contacts as the solvers use them, in the order of the chain.
+// Internal to solver: contacts in the form used by the solvers, sorted along the chain.
 //
 //   d = J u = sum over its one or two nodes of w u_i + theta_i x (lever_i + w a),  a = -radius * normal
-// J^T f gives a node w f and (lever + w a) x f; constrained degrees of freedom (`mask`, unit rows) get nothing, but move the contact.
-// At a node w = 1 and there is no lever.
+// J^T f loads a node with w f and (lever + w a) x f. Constrained degrees of freedom (`mask`, unit rows) receive no load, but their motion moves the contact.
+// At a node w = 1 and the lever is 0.
 //
-// Slides are rows too, in a space of their own: x is the displacement S, y is radius phi, and the normal z, along which nothing moves or presses,
-// so that what is tangential for a wall is all there is. In place of mu f_n they have their bound.
+// Slides are rows as well, in their own space: x is the displacement S, y is radius phi, and the normal is z, along which there is neither motion nor force.
+// Only the tangential part of a wall contact's law remains, with the slide's bound in place of mu f_n.
 //
-// A pair is the row of its first end, and `far` that of its second, where weights, levers and radius have the other sign: d and J^T f are the sums of both.
+// A pair is the row of its first end; `far` is the row of its second end, whose weights, levers and radius have the opposite sign. d and J^T f are the sums
+// over both ends.
 #ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
 #define SELDINGER_SOLVER_CONTACT_ROWS_H
 
@@ -20,35 +21,34 @@
 
 typedef struct ContactRow ContactRow;
 struct ContactRow {
-    int node, chain_node;        // in the chain that is solved, which may be condensed (block_condense.h), and in the caller's
-    int stride;                  // unknowns of a node
-    int slide;                   // 0: a wall; else the first of a slide's two unknowns
-    int point;                   // its place in the caller's set, among the walls, the slides or the pairs
+    int node, chain_node;        // in the chain being solved, which may be condensed (block_condense.h), and in the caller's chain
+    int stride;                  // unknowns per node
+    int slide;                   // 0: not a slide; otherwise index of the first of its two unknowns
+    int point;                   // index in the caller's array of walls, slides or pairs
     int nodes;                   // 1, or 2 where xi > 0
     double weight[2];
-    Vec3 lever[2];               // looked at only where there are two nodes
-    unsigned mask[2];            // free degrees of freedom: the first six, or a slide's two
-    bool waits;                  // left out until something goes through it (contact_slides.c)
-    bool inert;                  // the node cannot yield along the normal, or no slide can move or bear: no force
+    Vec3 lever[2];               // used only with two nodes
+    unsigned mask[2];            // free degrees of freedom: of the first six, or of a slide's two
+    bool waits;                  // excluded until the motion violates it (contact_slides.c)
+    bool inert;                  // no force: the node cannot move along the normal, or the slide can neither move nor carry load
     Vec3 normal;
     double gap, radius, friction;
     double bound;                // [N] of a slide …
-    double spring;               // [N/mm] … and bound over give …
-    Vec3 held;                   // … on the force that it began with
-    double stiffness_n, stiffness_t; // [N/mm] of the node alone, neighbours held: the scale of the residual and of penalties
-    Vec3 force;                  // on the tool
-    ContactRow *far;             // NULL: no pair
+    double spring;               // [N/mm] … bound / give …
+    Vec3 held;                   // [N] … and its force at x_n
+    double stiffness_n, stiffness_t; // [N/mm] of the node alone with its neighbours fixed: scale of the residual and of the penalties
+    Vec3 force;                  // [N] on the tool
+    ContactRow *far;             // NULL: not a pair
 };
 
-// Sorted by node, then xi, the slides of a node behind its walls (insertion sort: the caller's set comes nearly in order), pairs behind all others.
-// Returns their number, without that of the slides where these are wanted apart: they then follow in the caller's order. `far` has room for the
-// pairs' second ends.
+// Fills the rows, sorted by node, then xi, with the slides of a node after its walls and the pairs last. Insertion sort, because the caller's set is nearly
+// sorted. Returns the number of rows; with slides_apart the slides are not counted and follow in the caller's order. `far` holds the pairs' second ends.
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slides_apart, ContactRow *row, ContactRow *far);
 
-// The order of rows with one node along the chain: those at the node come before those between it and the next.
+// Sort key of rows with the same node: contacts at the node precede those between it and the next.
 static inline double contact_row_place(const ContactRow *c) { return c->nodes == 1 ? -1 : c->weight[1]; }
 
-// Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
+// Minus the arm of node e's rotation: the contact's motion is w u + negative_arm x theta.
 static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
 {
     SEL_ASSERT(e >= 0 && e < c->nodes, "a contact has the arms of its nodes");
@@ -59,7 +59,7 @@ static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
 static inline Vec3 contact_end_motion(const ContactRow *c, const double *u)
 {
     SEL_ASSERT(c->node >= 0 && (c->nodes == 1 || c->nodes == 2), "a contact is at a node or between two");
-    SEL_ASSERT(c->slide == 0 || (c->slide >= 6 && c->slide + 1 < c->stride), "a slide's unknowns stand behind the first six");
+    SEL_ASSERT(c->slide == 0 || (c->slide >= 6 && c->slide + 1 < c->stride), "the unknowns of a slide follow the first six");
     const double *v = u + (size_t)c->stride * (size_t)c->node;
     if (c->slide)
         return vec3(c->mask[0] & 1 ? v[c->slide] : 0, c->mask[0] & 2 ? c->radius * v[c->slide + 1] : 0, 0);
@@ -111,7 +111,7 @@ static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
 
 static inline Vec3 contact_tangential(Vec3 v, Vec3 normal) { return vec3_add_scaled(v, -vec3_dot(v, normal), normal); }
 
-// The nearest force in Coulomb's cone of the normal force that it has: f_n+ n, and the tangent cut to mu f_n+ (of a slide, to its bound).
+// Nearest force in the Coulomb cone at the given normal force: f_n+ n, with the tangential part limited to mu f_n+ (of a slide, to its bound).
 static inline Vec3 contact_project(const ContactRow *c, Vec3 f)
 {
     Vec3 normal = c->normal;
@@ -123,21 +123,21 @@ static inline Vec3 contact_project(const ContactRow *c, Vec3 f)
     return vec3_add_scaled(vec3_scale(t, size > bound ? bound / size : 1), fn, normal);
 }
 
-// Most candidates: no force, and none due.
+// True for most candidates: no force, and none required.
 static inline bool contact_row_is_idle(const ContactRow *c, Vec3 motion)
 {
     return !c->slide && c->force.x == 0 && c->force.y == 0 && c->force.z == 0 && c->gap + vec3_dot(motion, c->normal) >= 0;
 }
 
-// What the tangential force has more than it may, as a share of its normal force or of its bound.
+// Excess of the tangential force over its limit, relative to the normal force or to the slide's bound.
 static inline double contact_row_excess(const ContactRow *c)
 {
-    SEL_ASSERT(!c->slide || c->bound > 0, "a slide that bears has a bound");
+    SEL_ASSERT(!c->slide || c->bound > 0, "a loaded slide has a positive bound");
     double fn = vec3_dot(c->force, c->normal), ft = vec3_norm(contact_tangential(c->force, c->normal));
     return c->slide ? ft / c->bound - 1 : ft / fn - c->friction;
 }
 
-// What is wrong with force f and motion d, in N: f less the nearest force in the cone to f - slope k violation, each direction by itself.
+// Natural map in N: f minus the projection of f - slope k violation, separately in the normal and the tangential direction.
 static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slope)
 {
     if (c->slide)

@@ -1,33 +1,34 @@
-// Slides: Newton's method on their forces, which are functions of the motion, with the wall's contacts solved inside every iteration.
+// Slides: Newton's method on their forces as functions of the motion, with the wall contacts solved within every iteration.
 //
-// f(d) = P(t), t = held - k d, k = bound / give, P onto the disc of radius `bound`. About a motion e, with t there and the last iterate's force f0:
+// f(d) = P(t), t = held - k d, k = bound / give, P the projection onto the disc of radius `bound`. Linearised about a motion e, with t evaluated there and f0
+// the force of the last iterate:
 //   |t| <= bound   f = t - k (d - e)
-//   beyond         f = bound p - C (d - e),  p = t / |t|,  C = k / |t| (bound I - (f0 p^T + p f0^T) / 2)
-// The second linearises f |t| = bound t in force and motion together (Chan, Golub and Mulet 1999, for total variation). With p in place of f0 / bound a
-// slide that is pushed past its turning point is not resisted, and goes to and fro for ever; so whole steps find the answer from anywhere.
+//   otherwise      f = bound p - C (d - e),  p = t / |t|,  C = k / |t| (bound I - (f0 p^T + p f0^T) / 2)
+// The second case linearises f |t| = bound t in force and motion together (Chan, Golub and Mulet 1999, for total variation). With p in place of f0 / bound a
+// slide that is pushed past its turning point meets no resistance and the iteration alternates indefinitely; with f0, full steps converge from any start.
 //
-// C changes little between the last iterations. Then the same matrix, condensed and factored, serves once more: the right-hand side has what forces lack.
+// C changes little in the last iterations. The same condensed and factored matrix is then reused, with the missing part of the forces as right-hand side.
 //
-// C is symmetric and positive and goes to the node's diagonal block whether or not the slide slips. So an iteration leaves a symmetric chain A + J^T C J
-// on which the wall's contacts are alone, condensed to their nodes: the many slides cost one elimination, and what the wall does costs little more. Contacts
-// far from those that press wait until an iteration's motion goes through them. From the slip of the step before one or two iterations are the rule, up to ten
-// where hands turn round.
+// C is symmetric and positive semi-definite and is added to the node's diagonal block whether or not the slide slips. The result is a symmetric chain
+// A + J^T C J with wall contacts only, condensed to their nodes: the many slides cost one elimination, and the wall contacts little more. Contacts far from the
+// loaded ones are excluded until the motion of an iteration violates them. Starting from the slip of the preceding step, one or two iterations are typical,
+// and up to ten where the hands reverse.
 #include "solver/contact_forms.h"
 
 #include <limits.h>
 #include <string.h>
 
-// The same matrix is tried again from this error on, as a share of the largest force, and as long as no more than this part of an error stays.
+// The matrix is reused once the error, relative to the largest force, is below the first value, while each step leaves at most the second fraction of it.
 static const double NEAR = 1e-4, STAYS = 0.3;
-// Walls need not be solved much better than slides are meanwhile: to this share of the last round's error.
+// Tolerance of the wall contacts in intermediate iterations: this fraction of the last error of the slides, and its upper limit.
 static const double WALLS_SHARE = 0.03, WALLS_ROUGH = 1e-2;
 
 static Vec3 force_at(const ContactRow *c, Vec3 d) { return contact_project(c, vec3_add_scaled(c->held, -c->spring, d)); }
 
-// C about motion e.
+// C at motion e.
 static Mat3 resistance(const ContactRow *c, Vec3 e)
 {
-    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a slide that bears has a bound, and gives before it slips");
+    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a loaded slide has a positive bound and a positive stiffness");
     Vec3 t = vec3_add_scaled(c->held, -c->spring, e), f0 = contact_project(c, c->force);
     double size = vec3_norm(t);
     if (size <= c->bound)
@@ -39,12 +40,12 @@ static Mat3 resistance(const ContactRow *c, Vec3 e)
 
 static double *slide_block(const BlockChain *chain, const ContactRow *c)
 {
-    SEL_ASSERT(c->slide >= 6 && c->slide + 1 < chain->size, "a slide's unknowns stand behind the first six");
+    SEL_ASSERT(c->slide >= 6 && c->slide + 1 < chain->size, "the unknowns of a slide follow the first six");
     const size_t n = (size_t)chain->size;
     return chain->diag + n * n * (size_t)c->node + (n + 1) * (size_t)c->slide;
 }
 
-// What the chain has without the laws, aside, or back again.
+// Saves the chain's entries without the slides' laws, or restores them.
 static void keep_own(ContactSolver *s, const BlockChain *chain, int from, int to, bool back)
 {
     const int n = chain->size;
@@ -55,10 +56,10 @@ static void keep_own(ContactSolver *s, const BlockChain *chain, int from, int to
     }
 }
 
-// The laws about each slide's motion: into the chain's diagonal, and their forces on what does not move into the right-hand side.
+// Writes the slides' laws, linearised about their motions: C to the diagonal of the chain, the forces at zero motion to the right-hand side.
 static void write_laws(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to)
 {
-    SEL_ASSERT(b != s->side, "the right-hand side without slides is kept: each round begins with it");
+    SEL_ASSERT(b != s->side, "b is not overwritten, because each iteration starts from it");
     const int n = chain->size;
     memcpy(s->side, b, (size_t)(chain->count * n) * sizeof *b);
     for (int i = from; i < to; i++) {
@@ -78,7 +79,7 @@ static void write_laws(ContactSolver *s, const BlockChain *chain, const double *
     }
 }
 
-// Forces by the laws and motion of a solution; returns how far these forces are from those due at the motion [N]. *largest: of the forces.
+// Computes the forces by the laws, and the motion of a solution. Returns the largest error of these forces [N]; *largest: maximum including these forces.
 static double read_solution(ContactSolver *s, const double *u, int from, int to, double *largest)
 {
     double worst = 0, top = 0;
@@ -98,17 +99,18 @@ static double read_solution(ContactSolver *s, const double *u, int from, int to,
 
 static bool comes_before(const ContactRow *a, const ContactRow *b)
 {
-    if (a->far || b->far)        // pairs behind all
+    if (a->far || b->far)        // pairs are last
         return a->far && b->far ? a->point < b->point : b->far != NULL;
     if (a->chain_node != b->chain_node)
         return a->chain_node < b->chain_node;
     return contact_row_place(a) != contact_row_place(b) ? contact_row_place(a) < contact_row_place(b) : a->point < b->point;
 }
 
-// The walls' contacts and the pairs [0, to), those that wait behind the others, both in the order of the chain; they were so up to `before`. Returns how many do not wait.
+// Sorts the wall contacts and pairs [0, to) along the chain, active ones first, then excluded ones; up to `before` they were sorted. Returns the number of
+// active ones.
 static int put_in_order(ContactSolver *s, int before, int to)
 {
-    SEL_ASSERT(before >= 0 && before <= to, "rows that were in order stand before the others");
+    SEL_ASSERT(before >= 0 && before <= to, "sorted rows precede the others");
     ContactRow *row = s->row;
     int a = 0, b = before, count = 0, waiting = 0;
     for (int i = 0; i < to; i++) {
@@ -128,10 +130,10 @@ static int put_in_order(ContactSolver *s, int before, int to)
     return count;
 }
 
-// At first a contact that neither presses nor overlaps, with none that does at its node or next to it, waits.
+// Initially excludes contacts that neither carry load nor overlap and have no such neighbour at their node or an adjacent one.
 static int first_contacts(ContactSolver *s, int to)
 {
-    int last = -2;           // the last node where one presses
+    int last = -2;           // last node with a loaded contact
     for (int i = 0; i < to; i++) {
         ContactRow *c = &s->row[i];
         c->waits = false;
@@ -153,7 +155,7 @@ static int first_contacts(ContactSolver *s, int to)
     return put_in_order(s, to, to);
 }
 
-// Those of the waiting ones that the motion goes through do not wait any longer. Returns the largest error among them [N].
+// Includes the excluded contacts that the motion violates. Returns the largest error among them [N].
 static double look_at_waiting(ContactSolver *s, const double *u, int from, int to, double most)
 {
     double worst = 0;
@@ -166,8 +168,8 @@ static double look_at_waiting(ContactSolver *s, const double *u, int from, int t
     return worst;
 }
 
-// Forces of the step before do not balance the new loads, and would send contacts that slide anywhere at first: those are taken to move as in u, which is what
-// the caller expects, and then the last solution.
+// The forces of the preceding step do not balance the new loads and would move slipping contacts arbitrarily in the first iteration. The contacts' motion is
+// therefore estimated from u, which is the caller's estimate and later the last solution.
 static void expect_motion(ContactSolver *s, int walls, const double *u)
 {
     for (int i = 0; i < walls; i++) {
@@ -181,7 +183,7 @@ static void expect_motion(ContactSolver *s, int walls, const double *u)
 }
 
 typedef struct Errors {      // [N]
-    double wall, slide, passed;  // of walls, of slides, of walls that wait
+    double wall, slide, passed;  // largest errors of wall contacts, of slides, and of excluded wall contacts
     double allowed;
 } Errors;
 
@@ -197,7 +199,7 @@ static Errors look(ContactSolver *s, const double *u, int walls, int from, int t
     return e;
 }
 
-// What slides' forces lack, to s->side; their laws have it from now on.
+// Writes the part that is missing in the slides' forces to s->side and adds it to their laws.
 static void add_missing(ContactSolver *s, const BlockChain *chain, int from, int to)
 {
     memset(s->side, 0, (size_t)(chain->count * chain->size) * sizeof *s->side);
@@ -212,10 +214,10 @@ static void add_missing(ContactSolver *s, const BlockChain *chain, int from, int
     }
 }
 
-// Forces of an iterate and slides' motion, aside, or back again.
+// Saves the forces of an iterate and the slides' motion, or restores them.
 static void keep_forces(ContactSolver *s, int walls, int from, int to, bool back)
 {
-    SEL_ASSERT(walls <= from && from <= to, "slides stand behind the contacts with walls");
+    SEL_ASSERT(walls <= from && from <= to, "slides follow the wall contacts");
     for (int i = 0; i < to; i = i + 1 == walls ? from : i + 1) {
         *(back ? &s->row[i].force : &s->best[i]) = back ? s->best[i] : s->row[i].force;
         if (i >= from)
@@ -223,8 +225,8 @@ static void keep_forces(ContactSolver *s, int walls, int from, int to, bool back
     }
 }
 
-// Near the answer the matrix hardly changes any more: it serves again, for what forces still lack, as long as most of that goes each time. Where that does
-// not lead to the end everything is as before: a force between two iterations' would be a bad f0, which sends slides to and fro.
+// Near the solution the matrix hardly changes: it is reused for the missing part of the forces as long as each step removes most of it. If this does not
+// converge, the initial state is restored: a force between those of two iterations would be a poor f0 and make slides alternate.
 static Errors refine(ContactSolver *s, const BlockChain *chain, int walls, int from, int to, double tolerance, double *u, Errors e, ContactReport *report)
 {
     const ContactReport first_report = *report;
@@ -249,7 +251,7 @@ static Errors refine(ContactSolver *s, const BlockChain *chain, int walls, int f
 
 ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
 {
-    SEL_ASSERT(from >= 0 && from < to, "there are slides, behind the contacts with walls");
+    SEL_ASSERT(from >= 0 && from < to, "there are slides, and they follow the wall contacts");
     ContactReport report = {0};
     keep_own(s, chain, from, to, false);
     ContactOptions round = *options;

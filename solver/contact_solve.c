@@ -1,4 +1,4 @@
-// The two forms of a contact solve behind one call, and their work space.
+// Dispatches a contact solve to one of its two forms and owns their work space.
 #include "solver/contact_solve.h"
 
 #include "base/base.h"
@@ -49,7 +49,7 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
 
 bool contact_solver_reserve_pairs(ContactSolver *s, int pairs)
 {
-    SEL_ASSERT(pairs >= 0, "a number of pairs");
+    SEL_ASSERT(pairs >= 0, "the number of pairs is not negative");
     size_t k = (size_t)s->capacity + (size_t)pairs + 1;
     free(s->row), free(s->motion), free(s->law), free(s->best), free(s->flag), free(s->wall);
     pointwise_work_destroy(s->pointwise);
@@ -112,7 +112,7 @@ static void take_forces(const ContactSolver *solver, int count, ContactSet *set)
     }
 }
 
-// The rows of the set: contacts with walls and pairs first, slides after them. Returns the number of the former.
+// Fills the rows of the set: wall contacts and pairs first, slides after them. Returns the number of the former.
 static int fill_rows(const ContactProblem *problem, bool by_points, int all)
 {
     ContactSolver *solver = problem->solver;
@@ -138,7 +138,7 @@ ContactReport contact_solve(const ContactProblem *problem)
     const BlockChain *chain = problem->chain;
     SEL_REQUIRE(set->count + set->slide_count <= solver->capacity, "the solver has room for all contacts and slides");
     SEL_REQUIRE(chain->count <= solver->node_count && chain->size == solver->matrix.size, "the solver was made for such a chain");
-    SEL_ASSERT(problem->options->max_iterations > 0 && problem->options->tolerance > 0, "a solve may iterate");
+    SEL_ASSERT(problem->options->max_iterations > 0 && problem->options->tolerance > 0, "the iteration limit and the tolerance are positive");
     ContactReport report = {.converged = true};
     int all = set->count + set->slide_count + set->pair_count;
     if (!problem->factor)

@@ -1,15 +1,15 @@
-// The block form of the contacts with the wall, on the chain of their nodes where these are few.
+// Block form of the wall contacts, on the chain condensed to their nodes where these are few.
 #include "solver/contact_forms.h"
 
 #include <string.h>
 
-// Condensing costs about as much as two factorisations of what goes: it pays unless nearly all nodes stay.
+// Condensation costs about as much as two factorisations of the eliminated part: it pays unless nearly all nodes are kept.
 static const double FULL_SHARE = 1.25;
 
-// Does the block form on the chain of the contacts' nodes, where these are few. False where it cannot.
+// Applies the block form to the chain condensed to the contacts' nodes. Returns false if this is not possible.
 bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
 {
-    SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs stand behind all other rows");
+    SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs follow all other rows");
     bool *keep = block_condenser_keep(s->condenser);
     int kept = 0;
     for (int i = 0; i < count; i++)
@@ -39,7 +39,7 @@ bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *
     }
     for (int i = s->banded; i < count; i++)
         s->row[i].far->node = block_condenser_place(s->condenser, s->row[i].far->chain_node);
-    // an iteration costs what is left of the chain: up to twice as many are in the same bound
+    // an iteration costs only as much as the condensed chain: up to twice as many are within the same bound
     ContactOptions longer = *options;
     longer.max_iterations = (int)(options->max_iterations * fmin(2, (double)chain->count / small->count));
     s->small = small;
@@ -68,8 +68,8 @@ bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, i
 
 bool contact_walls_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
 {
-    SEL_ASSERT(change != s->best_u && u != s->best_u, "the kept iterate is not in use between solves");
-    double *more = s->best_u;    // not in use between solves
+    SEL_ASSERT(change != s->best_u && u != s->best_u, "the arguments are not the saved iterate, which serves as work space");
+    double *more = s->best_u;    // unused between solves
     if (!s->small && count > 0)
         return false;
     if (!s->small) {

@@ -1,28 +1,28 @@
-// The pointwise form: Gauss-Seidel over the contacts along the chain, forth and back (Kerrien 2017, 6.3; Duriez 2006).
+// The pointwise form: Gauss-Seidel sweeps over the contacts along the chain, forward and backward (Kerrien 2017, 6.3; Duriez 2006).
 //
-// W = J A^-1 J^T is never formed. Seen from node i the chain to its left and to its right act through two 6-vectors:
+// W = J A^-1 J^T is never formed. At node i the chain to its left and to its right enters through two vectors of n unknowns:
 //   u_i = S_i (p_i + q_i + r_i),  r_i = b_i + (J^T f)_i,  S_i = (A^-1)_ii
 //   p_(i+1) = -E_i (p_i + r_i),     E_i = L_i D_i^-1,            D_i the pivots of an elimination from the left
-//   q_(i-1) = -F_i (q_i + r_i),     F_i = L_(i-1)^T B_i^-1,      B_i of one from the right,   S_i = (D_i + B_i - A_ii)^-1
-// A pass from left to right needs p only of forces that it has set already and q of forces that it has not reached; a pass back the other way
-// round. So a pass costs one 6x6 product a node and one local problem a contact. A contact between nodes i and i+1 sees both:
+//   q_(i-1) = -F_i (q_i + r_i),     F_i = L_(i-1)^T B_i^-1,      B_i those of one from the right,   S_i = (D_i + B_i - A_ii)^-1
+// In a sweep from left to right p depends only on forces already updated and q only on forces not yet visited; the reverse holds in a sweep back.
+// A sweep therefore costs one block product per node and one local problem per contact. A contact between nodes i and i+1 depends on both:
 //   u_j = S_j (p_j + q_j + r_j),  u_i = D_i^-1 (p_i + r_i) - E_i^T u_j,  j = i+1
 //
-// The local problem, three unknowns, is solved exactly: open, stick, or slip with f_t = -(W_tt' + g)^-1 c, the scalar g > 0 such that
+// The local problem has three unknowns and is solved exactly: open, stick, or slip with f_t = -(W_tt' + g)^-1 c, the scalar g > 0 such that
 // |f_t| = mu f_n. At least one such g exists for any mu (the difference of both sides changes sign between 0 and infinity).
-// A slide has two unknowns and a bound that is given: there is exactly one g.
+// A slide has two unknowns and a given bound: g is unique.
 #include "solver/contact_forms.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-// What a pass needs of a contact.
+// Data of a contact for a sweep.
 typedef struct Local {
     Vec3 axis[3];            // normal, two tangents
-    Mat3 w;                  // own 3x3 of W on these axes
-    double response[3][2 * BLOCK_LARGEST];  // motion of its one or two nodes under a unit force along an axis
-    double g;                // of its last slip: where the next search starts
-    Vec3 offset;             // what the recursion lacks against the factor's solution, by rounding
+    Mat3 w;                  // its own 3x3 block of W on these axes
+    double response[3][2 * BLOCK_LARGEST];  // motion of its one or two nodes per unit force along an axis
+    double g;                // of its last slip: start of the next search
+    Vec3 offset;             // rounding difference between the recursion and the solution by the factor
 } Local;
 
 struct PointwiseWork {
@@ -70,7 +70,7 @@ void pointwise_work_destroy(PointwiseWork *w)
     free(w);
 }
 
-// inverse = d^-1 of a symmetric positive definite block; false where it is not.
+// inverse = d^-1 of a symmetric positive definite block; returns false if it is not positive definite.
 static bool invert(int n, const double *d, double *inverse)
 {
     SEL_ASSERT(n <= BLOCK_LARGEST, "a block fits the arrays on the stack");
@@ -121,7 +121,7 @@ static void add_product_transposed(int n, const double *a, double s, const doubl
             y[j] += s * a[n * i + j] * x[i];
 }
 
-// Eliminations from both ends: E, F, S and D^-1.
+// Eliminates from both ends to obtain E, F, S and D^-1.
 static bool prepare(PointwiseWork *w, const BlockChain *a)
 {
     SEL_ASSERT(a->count > 0 && a->size == w->size, "the work space was made for blocks of this size");
@@ -168,10 +168,10 @@ static bool prepare(PointwiseWork *w, const BlockChain *a)
     return true;
 }
 
-// Motion of a contact's nodes (2 n, the second half unused at a node) under loads g on them.
+// Motion of a contact's nodes (2 n; for a contact at a node the second half is 0) under loads g on them.
 static void respond(const PointwiseWork *w, const ContactRow *c, const double *g, double *v)
 {
-    SEL_ASSERT(!c->far, "a pair of the tool with itself is not between neighbours, and is solved apart");
+    SEL_ASSERT(!c->far, "pairs are solved separately");
     const int n = w->size;
     const size_t i = (size_t)c->node, block = (size_t)(n * n), bytes = (size_t)n * sizeof *v;
     memset(v, 0, 2 * bytes);
@@ -217,10 +217,10 @@ static void slide_force(const Mat3 *w, const double *d, const double a[3], const
 
 static double slide_excess(const double *f, double mu) { return sqrt(f[1] * f[1] + f[2] * f[2]) - mu * f[0]; }
 
-// Signorini and Coulomb of one contact: d + w f, d[0] with the gap.
+// Signorini and Coulomb conditions of one contact with motion d + w f; d[0] includes the gap.
 static void solve_local(const Mat3 *w, const double *d, double mu, double *start, double *f)
 {
-    SEL_ASSERT(w->m[0][0] > 0, "a contact that is not inert yields along its normal");
+    SEL_ASSERT(w->m[0][0] > 0, "a contact that is not inert has a compliance along its normal");
     f[0] = f[1] = f[2] = 0;
     if (d[0] >= 0)
         return;
@@ -231,7 +231,7 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
     double scale = a[0] + a[2];
     if (!(mu > 0) || !(scale > 0))
         return;
-    double low = 1e-13 * scale; // fixed tangential directions have no motion: keeps the 2x2 regular
+    double low = 1e-13 * scale; // constrained tangential directions have no compliance: keeps the 2x2 matrix regular
     slide_force(w, d, a, c, low, f);
     double h_low = slide_excess(f, mu);
     if (h_low <= 0)
@@ -246,7 +246,7 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
         }
         slide_force(w, d, a, c, high, f);
         h_high = slide_excess(f, mu);
-        if (k == 0 && h_high < 0) { // the last g lies beyond the root: look just below it first
+        if (k == 0 && h_high < 0) { // the last g is beyond the root: try just below it first
             double near = high * (1 - 1e-4);
             slide_force(w, d, a, c, near, f);
             double h = slide_excess(f, mu);
@@ -256,7 +256,7 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
             }
         }
     }
-    for (int k = 0; k < 80 && high - low > 1e-14 * high; k++) { // false position, a stuck end halved (Illinois)
+    for (int k = 0; k < 80 && high - low > 1e-14 * high; k++) { // false position, halving the value at an end that stays fixed (Illinois)
         double mid = (low * h_high - high * h_low) / (h_high - h_low);
         if (!(mid > low && mid < high))
             mid = (low + high) / 2;
@@ -283,16 +283,16 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
     }
 }
 
-// One slide: d + w f. The search is Newton's on 1/|f|, which is concave in g and meets the root from below, at once where both directions give alike.
-// What a slide gives is a spring in series.
+// One slide with motion d + w f. Newton's method on 1/|f|, which is concave in g, converges to the root from below, in one step where both directions
+// have the same compliance. The elastic displacement of a slide is a spring in series.
 static void solve_slide(const ContactRow *c, const Mat3 *own, const double *motion, double *f)
 {
-    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a slide that bears has a bound, and gives before it slips");
+    SEL_ASSERT(c->bound > 0 && c->spring > 0, "a loaded slide has a positive bound and a positive stiffness");
     const double bound = c->bound, soft = 1 / c->spring;
     const double d[3] = {0, motion[1] - soft * c->held.x, motion[2] - soft * c->held.y};
     Mat3 spring = *own, *w = &spring;
     spring.m[1][1] += soft, spring.m[2][2] += soft;
-    double scale = w->m[1][1] + w->m[2][2], g = 1e-13 * scale; // a direction that is held has no motion: keeps the 2x2 regular
+    double scale = w->m[1][1] + w->m[2][2], g = 1e-13 * scale; // a constrained direction has no compliance: keeps the 2x2 matrix regular
     f[0] = f[1] = f[2] = 0;
     for (int k = 0; k < 50 && scale > 0; k++) {
         double xx = w->m[1][1] + g, xy = w->m[1][2], yy = w->m[2][2] + g, det = xx * yy - xy * xy;
@@ -308,7 +308,7 @@ static void solve_slide(const ContactRow *c, const Mat3 *own, const double *moti
     }
 }
 
-// Motion of a place's one or two nodes under all forces.
+// Motion of the one or two nodes of a place under all forces.
 static void place_motion(const PointwiseWork *w, const ContactRow *first, double *v)
 {
     const size_t i = (size_t)first->node, n = (size_t)w->size, block = n * n;
@@ -329,7 +329,7 @@ static void place_motion(const PointwiseWork *w, const ContactRow *first, double
     add_product_transposed(size, w->left + block * i, -1, v + n, v);
 }
 
-// The contacts [from, to) at one place, in turn; their nodes' motion is found once and kept up to date.
+// Solves the contacts [from, to) at one place in turn; their nodes' motion is computed once and then updated.
 static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reverse)
 {
     SEL_ASSERT(from >= 0 && from < to, "a place has at least one contact");
@@ -363,7 +363,7 @@ static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reve
     }
 }
 
-// Contacts of one place: the same node, or all between it and the next.
+// End of the contacts at one place: at the same node, or between it and the next.
 static int place_end(const ContactRow *row, int count, int from)
 {
     int to = from + 1;
@@ -423,7 +423,7 @@ static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
     }
 }
 
-// p and q of the present forces, and what is missing in the motion that they give.
+// Recomputes p and q for the present forces, and the rounding offset of the resulting motion.
 static void refresh(ContactSolver *s, int count, int m)
 {
     PointwiseWork *w = s->pointwise;
@@ -445,7 +445,7 @@ static void solve_chain(const ContactSolver *s, const BlockFactor *factor, doubl
     block_factor_solve(factor, b, x);
 }
 
-// The pairs in turn, W being known; the contacts' motions follow only among them.
+// Solves the pairs in turn with the known W; only the motions of pairs are updated.
 static void visit_pairs(ContactSolver *s, const int *pair, int count)
 {
     for (int k = 0; k < count; k++) {
@@ -514,14 +514,14 @@ ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const
         else
             pass_back(w, s->row, banded, m);
         report.iterations++;
-        if (pairs > 0) {         // they see the whole chain
+        if (pairs > 0) {         // pairs couple through the whole chain
             contact_balance(s, factor, b, count, u);
             for (int k = 0; k < 4; k++)
                 visit_pairs(s, pair, pairs);
             contact_balance(s, factor, b, count, u);
             refresh(s, banded, m);
         }
-        // the residual costs two passes: look rarely
+        // the residual costs two sweeps: evaluate it rarely
         if (report.iterations % 16 && report.iterations < options->max_iterations)
             continue;
         contact_balance(s, factor, b, count, u);

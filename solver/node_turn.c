@@ -1,4 +1,4 @@
-// exp(r/2) = (cos(a/2), sin(a/2) r/a), a = |r|, by series in (a/2)^2: what is cut is below 1e-16 at 2.5 rad.
+// exp(r/2) = (cos(a/2), sin(a/2) r/a), a = |r|, by series in (a/2)^2; the truncation error is below 1e-16 at 2.5 rad.
 #include "solver/node_turn.h"
 
 #include "base/base.h"
@@ -16,7 +16,7 @@ INLINE Quat turned(double rx, double ry, double rz, Quat q)
     cosine = -1.0 / 2 + z * cosine, sine = -1.0 / 6 + z * sine;
     cosine = 1 + z * cosine, sine = 0.5 * (1 + z * sine);
     Quat p = quat_mul((Quat){cosine, sine * rx, sine * ry, sine * rz}, q);
-    // one Newton step towards unit length: rounding is all that is wrong
+    // one Newton step towards unit length suffices, because only rounding has changed it
     double scale = 1.5 - 0.5 * (p.w * p.w + p.x * p.x + p.y * p.y + p.z * p.z);
     return (Quat){p.w * scale, p.x * scale, p.y * scale, p.z * scale};
 }
@@ -27,6 +27,6 @@ static void (*const turn_on[SIMD_COUNT])(int, const double *, const double *, co
 
 void node_turn(int count, const double *rx, const double *ry, const double *rz, Quat *q)
 {
-    SEL_ASSERT(count >= 0, "a number of nodes is turned");
+    SEL_ASSERT(count >= 0, "the number of nodes is not negative");
     turn_on[simd_level()](count, rx, ry, rz, q);
 }

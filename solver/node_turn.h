@@ -1,4 +1,4 @@
-// Rotation vectors applied to frames, many at once: q_i = exp(r_i / 2) q_i. Internal to solver.
+// Applies rotation vectors to many frames: q_i = exp(r_i / 2) q_i. Internal to solver.
 #ifndef SELDINGER_SOLVER_NODE_TURN_H
 #define SELDINGER_SOLVER_NODE_TURN_H
 
@@ -6,7 +6,7 @@
 
 #define NODE_TURN_MAX 2.5
 
-// (count) each; r by component [rad], |r| at most NODE_TURN_MAX; unit quaternions stay unit. The same bits at every SIMD level.
+// Arrays of `count`; components of r in rad, |r| at most NODE_TURN_MAX. Unit quaternions stay unit. Identical bits at every SIMD level.
 void node_turn(int count, const double *rx, const double *ry, const double *rz, Quat *q);
 
 #endif

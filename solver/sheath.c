@@ -1,19 +1,19 @@
-// The element across the mouth. Its inner node has the axial coordinate a < 0 and a twist; at the mouth m the wire is clamped in place and
-// direction d; the part outside has the rest length l = L + a and is one beam (beam_element.c) from m to the outer node x.
+// The element across the mouth. Its inner node has the axial coordinate a < 0 and a twist. At the mouth m the wire is clamped in position and direction d;
+// the part outside has the rest length l = L + a and is a single beam (beam_element.c) from m to the outer node x.
 //   E = EA/(2L) (-a + |x - m| + bow + w(l) - L)^2 + bending(l, x, R) + GJ/(2L) psi^2 + EI k0^2/2 (L - l)
-// Axial strain and twist are spread over the whole element; bending only over what is outside; the last term is what a wire
-// with rest curvature k0 stores while it is held straight inside. As l goes to 0 the beam becomes a clamp, at l = L it is the ordinary
-// element: nothing jumps when a node passes. Because l depends on a, dE/da has the configurational part dE/dl, in the
-// frictionless case -M^2/(2 EI) of a straight wire: the push that a bend downstream gives back through a sleeve (Bigoni 2015).
+// Axial strain and twist are spread over the whole element, bending only over the part outside. The last term is the energy of a wire with rest curvature k0
+// that is held straight inside. As l tends to 0 the beam becomes a clamp; at l = L it is the ordinary element: nothing is discontinuous when a node passes.
+// Because l depends on a, dE/da has the configurational part dE/dl, which in the frictionless case of a straight wire is -M^2/(2 EI): the axial force that a
+// bend downstream exerts through a sleeve (Bigoni 2015).
 //
-// l changes by a step's advance, which near the mouth is more than l itself. The energy of constant curvature, EI/(2l) |phi - k0 l|^2 with
-// phi = turn2 - turn1, is convex in (phi, l) together; its second derivative EI/l |d phi - k dl|^2, k = phi/l, goes into the tangent
-// whole. It is taken at the length of the step's end and at the curvature of its start, because curvature is what stays.
+// In a step l changes by the advance, which near the mouth exceeds l itself. The energy of constant curvature, EI/(2l) |phi - k0 l|^2 with
+// phi = turn2 - turn1, is jointly convex in (phi, l); its full second derivative EI/l |d phi - k dl|^2, k = phi/l, is in the tangent. It is evaluated at the
+// length of the step's end and the curvature of its start, because the curvature is what persists.
 #include "solver/sheath.h"
 
 #include "base/base.h"
 
-// Unit, in the node's frame: the axis about which rest curvature turns, e3 turned about e1; half_y and half_z hold it times a sine.
+// Unit vector in the node's frame: the axis of the rest curvature, e3 rotated about e1; half_y and half_z are its components times a sine.
 static Vec3 bending_axis(const BeamRest *rest, int index)
 {
     double y = rest->half_y[index], z = rest->half_z[index], size = sqrt(y * y + z * z);
@@ -26,8 +26,8 @@ Vec3 sheath_rest_curvature(const BeamRest *rest, int index, Quat q) { return qua
 
 const double sheath_border_share = 0.02;
 
-// How much of the element behind counts at the mouth, 0 to 1, where the inner node is `past` it [mm]; *sum: over the length that is past. The border is
-// spread over as much before the node as behind it, so that no energy is made.
+// Weight at the mouth of the element behind, 0 to 1, where the inner node is `past` it [mm]; *sum: its integral over the length past the mouth. The border is
+// spread equally to both sides of the node, so that no energy is created.
 static double share_behind(const BeamRest *rest, int index, double past, double *sum)
 {
     double width = sheath_border_share * rest->length[index], from = past + 0.5 * width;
@@ -67,7 +67,7 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
         stored += less * sum;
         border = share < 1 ? fmax(0, less) / (sheath_border_share * length) : 0;
         own -= share * less;
-        // one after the other they give way like springs in series
+        // the two parts bend as springs in series
         double more = 1 / rest->bending[index - 1] - 1 / bending, flexibility = 1 / bending + more * sum / outside;
         softer = (1 - (1 / bending + more * share) / flexibility) / outside;
         bending = 1 / flexibility;
@@ -95,9 +95,9 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     by_length += 0.5 * softer *
                  (vec3_dot(out.angle1, vec3_add(vec3_scale(out.angle1, in.near), vec3_scale(out.angle2, in.far))) +
                   vec3_dot(out.angle2, vec3_add(vec3_scale(out.angle2, in.near), vec3_scale(out.angle1, in.far))));
-    // a longer arc turns the rest chord in both nodes' frames
+    // a longer arc rotates the rest chord in both nodes' frames
     by_length += 0.5 * (vec3_dot(quat_rotate(q1, rest_here), out.chord1) - vec3_dot(quat_rotate(q2, rest_here), out.chord2));
-    // what the linearisation in phi at the new length misses where the curvature stays
+    // second-order part that the linearisation in phi at the new length omits if the curvature persists
     Vec3 phi = vec3_sub(out.turn1, out.turn2);
     double change = 1 / outside - 1 / now;
     by_length += 0.5 * bending * vec3_norm2(phi) * change * change;
@@ -117,7 +117,7 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
 
 void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent, double *length_column)
 {
-    SEL_ASSERT(element->outside > 0 && scale > 0, "some of the element is outside, and its stiffness counts");
+    SEL_ASSERT(element->outside > 0 && scale > 0, "part of the element is outside, and the stiffness factor is positive");
     BeamTangent full;
     const BeamOutput *out = &element->out;
     double ka = rest->axial[index] * scale, d[3] = {direction.x, direction.y, direction.z};
@@ -134,13 +134,13 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
         }
     }
     tangent->k11[21] = twist[3] * d[0] + twist[4] * d[1] + twist[5] * d[2];
-    // the axial unknown enters through the extension: -1 there
+    // the axial unknown enters the extension with a factor of -1
     tangent->k11[0] = ka;
     tangent->k11[3] = tangent->k11[18] = -ka * vec3_dot(out->bow1, direction);
     double column[6] = {out->stretch.x, out->stretch.y, out->stretch.z, out->bow2.x, out->bow2.y, out->bow2.z};
     for (int i = 0; i < 6; i++)
         tangent->k21[i * 6] = -ka * column[i];
-    // and through l: EI/l |d theta1 - d theta2 - k dl|^2, with B and D of beam_element.c
+    // it also enters through l: EI/l |d theta1 - d theta2 - k dl|^2, with B and D of beam_equations.h
     Vec3 e = out->chord, t1 = out->tangent1, t2 = out->tangent2;
     double k = element->bending / element->outside;
     Vec3 w = vec3_scale(element->curvature, -k), across = vec3_scale(vec3_cross(vec3_sub(t1, t2), w), out->inverse);

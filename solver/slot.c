@@ -1,14 +1,14 @@
-// Slots: see slot.h.
+// Slots (slot.h).
 //
-// Between points at a distance h a wall of convex radius R cuts in by h^2 / (8 R): 0.6 mm keep that under 0.02 mm on the inner side of a bend of
-// 3 mm. Elements longer than 10 mm would want more than 15, but bend no tool round so narrow a corner anyway.
+// Between contact points a distance h apart, a convex wall of radius R intrudes by h^2 / (8 R): a spacing of 0.6 mm keeps this below 0.02 mm on the inner
+// side of a bend of 3 mm radius. Elements longer than 10 mm would need more than 15 slots, but tools with such elements do not bend that sharply.
 #include "solver/slot.h"
 
 #include "base/base.h"
 
-static const double SPACING = 0.6;       // [mm] between contact points, at most
-enum { SLOTS_MAX = 15 };                 // of an element
-// Of the part outside the sheath: nearer to its mouth than this the wire cannot leave the line by anything that matters.
+static const double SPACING = 0.6;       // [mm] largest distance between contact points
+enum { SLOTS_MAX = 15 };                 // per element
+// Share of the length outside the sheath: closer to the mouth than this, the wire deviates negligibly from the line.
 static const double MOUTH_PART = 0.1;
 
 int slot_count_of(double length)
@@ -28,7 +28,7 @@ static void set_shape(Slot *s, double xi, double length)
 
 Slot slot_make(int element, double length, int k, int count, double radius, double friction)
 {
-    SEL_ASSERT(k >= 0 && k < count && count <= SLOTS_MAX, "a slot is one of its element's");
+    SEL_ASSERT(k >= 0 && k < count && count <= SLOTS_MAX, "the index of a slot is within its element");
     Slot s = {.element = element, .radius = radius, .friction = friction};
     set_shape(&s, (double)(k + 1) / (count + 1), length);
     return s;

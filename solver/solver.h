@@ -1,5 +1,6 @@
-// solver: the tool's mechanics. Beams, the block-tridiagonal system, contact, one time step. Uses base and geom; sees no file, device, clock or OpenGL.
-// Inside: mm, g, ms, hence N, MPa, mJ; angles rad.
+// solver: mechanics of the tool (beams, block-tridiagonal system, contact, one time step). Uses base and geom; independent of files, devices, clocks and
+// OpenGL.
+// Internal units: mm, g, ms, hence N, MPa, mJ; angles in rad.
 #ifndef SELDINGER_SOLVER_SOLVER_H
 #define SELDINGER_SOLVER_SOLVER_H
 

@@ -2,9 +2,9 @@
 
 #include "solver/step_internal.h"
 
-// Small strain: a tool's own stiffness keeps an element's length to some percent. A bent element's chord is shorter than its arc.
+// The strain is small: a tool's own stiffness keeps an element's length to within a few percent. The chord of a bent element is shorter than its arc.
 static const double TORN = 1.1, CRUSHED = 0.3;
-static const double CUT = 1e-6;          // of a force: by what rounding leaves a cone
+static const double CUT = 1e-6;          // of a force: tolerance for rounding at the cone
 
 static const char *broken_state(const WireState *w)
 {
@@ -26,7 +26,7 @@ static const char *broken_state(const WireState *w)
 
 static const char *broken_elements(const Stepper *s)
 {
-    for (int i = s->first_free; s->tools.count == 1 && i + 1 < s->state.node_count; i++) {    // of several tools ends of the chain come and go
+    for (int i = s->first_free; s->tools.count == 1 && i + 1 < s->state.node_count; i++) {    // with several tools, chain ends appear and disappear
         double chord = vec3_distance(s->state.position[i], s->state.position[i + 1]), rest = s->wire.length[i];
         if (!(chord < TORN * rest && chord > CRUSHED * rest))
             return "elements are about as long as at rest";

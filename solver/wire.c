@@ -1,7 +1,7 @@
-// What the tool is made of: sections cut into elements, their stiffness, rest shape and mass.
+// Properties of the tool: division of sections into elements, their stiffness, rest shape and mass.
 //   I = pi/64 (D^4 - d^4), A = pi/4 (D^2 - d^2), J = 2 I, G = E / (2 (1 + nu))
-//   kappa: Cowper 1966 for a circular tube with m = d/D; 6 (1+nu) / (7 + 6 nu) where solid.
-// Mass is lumped: half of each element at its nodes, and the rotational inertia of its cross-section (rho I L about a diameter, twice that
+//   kappa: Cowper 1966 for a circular tube with m = d/D; 6 (1+nu) / (7 + 6 nu) for a solid section.
+// Mass is lumped: each node has half of its adjacent elements' mass and of their cross-sections' rotational inertia (rho I L about a diameter, twice that
 // about the axis), which is small but keeps the rotational blocks positive definite.
 #include "solver/wire.h"
 
@@ -13,8 +13,8 @@
 #include <stdlib.h>
 
 enum { ELEMENTS_MAX = 10000 };
-static const double REST_ANGLE_MAX = 2;          // [rad] of one element at rest
-static const double REST_ANGLE_AIM = 0.3;        // … where there are enough elements
+static const double REST_ANGLE_MAX = 2;          // [rad] largest rest angle of an element
+static const double REST_ANGLE_AIM = 0.3;        // [rad] … and the desired limit if there are enough elements
 
 WireOptions wire_default_options(void) { return (WireOptions){.elements = 200, .damping_mass = 1e-4, .damping_stiffness = 0.2, .direction = {1, 0, 0}}; }
 
@@ -89,7 +89,7 @@ static bool check_rig(const WireOptions *o, double total, char *why, int capacit
     return true;
 }
 
-// Every option in range? Else false with a message in `why` (capacity >= 256).
+// Returns whether all options are in range; otherwise writes a message to `why` (capacity >= 256).
 static bool wire_check(const WireOptions *o, char *why, int capacity)
 {
     if (o->elements < 1 || o->elements > ELEMENTS_MAX)
@@ -133,7 +133,7 @@ static bool wire_check(const WireOptions *o, char *why, int capacity)
     return check_rig(o, total, why, capacity);
 }
 
-// How many elements a section asks for: its share of the wire's length, or enough that none turns by more than REST_ANGLE_AIM at rest.
+// Weight of a section in the division: its share of the elements by length, or the number at which none turns by more than REST_ANGLE_AIM at rest.
 static double wanted(const WireSection *section, double per_mm)
 {
     return fmax(section->length * per_mm, fabs(section->rest_curvature) * section->length / REST_ANGLE_AIM);
@@ -155,10 +155,10 @@ bool wire_divide(const WireOptions *options, int *elements)
     double all = 0, per_mm = options->elements / wire_length(options);
     for (int i = 0; i < sections; i++)
         all += wanted(&options->section[i], per_mm);
-    // one for each, then again and again one to the section that lacks most: the finest division, and no tie but by index
+    // one element each, then repeatedly one to the section with the largest weight per element: the finest division; ties go to the lower index
     for (int i = 0; i < sections; i++) {
         double share = options->elements * wanted(&options->section[i], per_mm) / all;
-        int floor_count = share >= 2 ? (int)share - 1 : 0;       // safe start: never more than its share
+        int floor_count = share >= 2 ? (int)share - 1 : 0;       // safe lower bound: never more than its share
         elements[i] = 1 + (floor_count < left ? floor_count : left);
         left -= elements[i] - 1;
     }
@@ -167,7 +167,7 @@ bool wire_divide(const WireOptions *options, int *elements)
         for (int i = 1; i < sections; i++)
             if (wanted(&options->section[i], per_mm) / elements[i] > wanted(&options->section[most], per_mm) / elements[most] * (1 + 1e-12))
                 most = i;
-        SEL_ASSERT(most < sections, "an element goes to a section");
+        SEL_ASSERT(most < sections, "the section exists");
         elements[most]++;
     }
     return true;
@@ -196,7 +196,7 @@ static void fill(Wire *wire, const WireOptions *options, const int *elements)
         }
         start += section->length;
     }
-    SEL_REQUIRE(e == wire->element_count, "the sections share all elements");
+    SEL_REQUIRE(e == wire->element_count, "the sections have all elements");
     wire->total_length = start;
 }
 
@@ -262,12 +262,12 @@ void wire_rest(const Wire *wire, const WireOptions *options, BeamRest *rest)
         rest->shear[i] = stiffness.shear;
         rest->curvature[i] = curvature;
         beam_bending(length, stiffness.bending, stiffness.shear, &rest->near[i], &rest->far[i]);
-        // from the proximal tangent to the chord: half the arc's angle about e3 turned by `plane`
+        // from the proximal tangent to the chord: half the arc's angle about e3 rotated by `plane`
         double quarter = 0.25 * curvature * length;
         rest->half_w[i] = same_cos(quarter);
         rest->half_y[i] = -same_sin(quarter) * same_sin(plane);
         rest->half_z[i] = same_sin(quarter) * same_cos(plane);
-        // what the element's own formula gives at rest, so that rest is free of force to rounding
+        // evaluated by the element's own formula, so that the rest state is free of force to rounding
         double half = 2 * quarter, chord = half > 0 ? length * same_sin(half) / half : length;
         BeamInput in = {.x2 = {chord, 0, 0},
                         .q1 = {same_cos(quarter), 0, 0, -same_sin(quarter)},
