@@ -1,4 +1,4 @@
-// Unknowns whose value is given, and what holding them takes.
+// Prescribes unknowns, and computes their reactions.
 #include "solver/step_internal.h"
 
 void stepper_prescribe(Stepper *s, int node, int dof, double value)
@@ -44,7 +44,7 @@ double stepper_reaction(const Stepper *s, int dof)
 
 double stepper_wanted(const Stepper *s)
 {
-    // to where the command says, whatever has been lost to rounding before
+    // to the position that the command gives, so that rounding errors of earlier steps do not accumulate
     double coordinate = s->state.inserted + s->command.advance - s->wire.total_length;
     return coordinate - vec3_dot(vec3_sub(s->start.position[0], s->entry.mouth), s->entry.axis[0]);
 }
