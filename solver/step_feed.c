@@ -6,7 +6,7 @@
 // Elements do not describe a tool that is compressed by more than this share of its length (a real one would have yielded), so the hand stalls.
 static const double SQUEEZE_MAX = 0.03;
 static const double LET_GO_TURN = 0.1;           // [rad] a node released at the mouth is turned by at most this much
-static const double SPRUNG = 0.1;                // of an element's length past the mouth: with several tools, a released node that is further out stays on the line
+static const double SPRUNG = 0.1;                // of an element's length: with several tools, a node released further out than this stays on the line
 
 // The frame turned by the smallest rotation that aligns e1 with the line's direction.
 static Quat on_line(const Stepper *s, Quat q)
