@@ -391,7 +391,7 @@ static bool state_end(OrderedFile *file, haddr_t end)
 // The address of new space, 0 if there is none.
 static haddr_t take_space(OrderedFile *file, size_t bytes)
 {
-    SEL_ASSERT(bytes > 0 && file->end <= file->stated, "what is used lies before the end that the superblock states");
+    SEL_ASSERT(bytes > 0 && file->end <= file->stated, "the used space ends before the superblock's end");
     haddr_t address = (file->end + WORD - 1) / WORD * WORD;
     if (address + bytes > file->stated && !state_end(file, address + bytes + file->ahead) && !state_end(file, address + bytes))
         return 0;
@@ -401,7 +401,7 @@ static haddr_t take_space(OrderedFile *file, size_t bytes)
 
 static void put_key(const Set *set, unsigned char *key, uint64_t bytes, hsize_t row)
 {
-    SEL_ASSERT(bytes <= UINT32_MAX, "a chunk's size is a number of 32 bits");
+    SEL_ASSERT(bytes <= UINT32_MAX, "a chunk's size fits 32 bits");
     memset(key, 0, key_bytes(set));
     put_little_endian(key, bytes, 4);
     put_little_endian(key + WORD, row, WORD);

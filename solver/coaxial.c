@@ -1,9 +1,9 @@
-// Coaxial tools in one element. K tools share the centreline. Tool k occupies there its material interval [S1, S2], with l_k = S2 - S1; its position x in (0,
-// 1) is at S1 + l_k x, and its angle is phi_k = (1 - x) phi1 + x phi2. With q(x) = d theta / dx, the rotation rate of the line over the element, the bending
-// energy of K rods is
+// Coaxial tools in one element. K tools share the centreline. Tool k occupies there its material interval [S1, S2], with l_k = S2 - S1; its position x in
+// (0, 1) is at S1 + l_k x, and its angle is phi_k = (1 - x) phi1 + x phi2. With q(x) = d theta / dx, the rotation rate of the line over the element, the
+// bending energy of K rods is
 //   sum over k of  integral EI_k / (2 l_k) |q - l_k u_k|^2 dx,   u_k = Rot(phi_k) kappa_k
-// Here q / l_k is the curvature per unit length of tool k itself, so the carrier's length plays no part in bending. Minimised for given end angles alpha =
-// integral of m q dx, m = (-(1 - x), x), with M the end moments, it gives
+// Here q / l_k is the curvature per unit length of tool k itself, so the carrier's length plays no part in bending. Minimised for given end angles
+// alpha = integral of m q dx, m = (-(1 - x), x), with M the end moments, it gives
 //   B = sum EI_k / l_k,  c = sum EI_k u_k,  q = (m'M + c) / B
 //   U = 1/2 (alpha - alpha0)' F^-1 (alpha - alpha0) + W,   F = integral m m' / B dx + 1 / sum(kappa G A_k l_k),   alpha0 = integral m c / B dx
 //   W = integral of (1/2 sum EI_k l_k |kappa_k|^2 - |c|^2 / (2 B)) dx
@@ -801,7 +801,7 @@ static void settle_columns(const CoaxialInput *in, CoaxialTangent *tangent)
 
 void coaxial_tangent(const CoaxialInput *in, const CoaxialOutput *out, double scale, CoaxialTangent *tangent)
 {
-    SEL_ASSERT(scale > 0 && out->rest.count == in->count, "the element was computed, and its stiffness counts");
+    SEL_ASSERT(scale > 0 && out->rest.count == in->count, "coaxial_element() was called first, and the scale is positive");
     const CoaxialRest *rest = &out->rest;
     int count = in->count;
     Work w;

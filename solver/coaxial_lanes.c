@@ -191,7 +191,8 @@ static const CoaxialSection *only_section(const CoaxialTool *tool, double from, 
 bool coaxial_tile_take(CoaxialTile *tile, const CoaxialInput *in)
 {
     SEL_ASSERT(tile->lanes < LANES, "the tile has a lane for another element");
-    SEL_ASSERT(in->count > 0 && in->count <= COAXIAL_TOOLS_MAX && (tile->lanes == 0 || in->count == tile->count), "elements of a tile have as many tools");
+    SEL_ASSERT(in->count > 0 && in->count <= COAXIAL_TOOLS_MAX && (tile->lanes == 0 || in->count == tile->count),
+               "all elements of a tile have the same number of tools");
     const CoaxialSection *section[COAXIAL_TOOLS_MAX];
     for (int k = 0; k < in->count; k++) {
         const CoaxialSpan *p = &in->span[k];

@@ -317,7 +317,7 @@ static const Vec3 *lay_pieces(const Stepper *s, int e)
 // The closest points of two pieces of cubics, starting from those of their chords; xi are shares of the elements.
 static void nearest_on_pieces(const Stepper *s, const int e[2], const int piece[2], double xi[2], SlotPlace place[2])
 {
-    SEL_ASSERT(piece[0] >= 0 && piece[0] < pieces_of(s, e[0]) && piece[1] >= 0 && piece[1] < pieces_of(s, e[1]), "elements have these pieces");
+    SEL_ASSERT(piece[0] >= 0 && piece[0] < pieces_of(s, e[0]) && piece[1] >= 0 && piece[1] < pieces_of(s, e[1]), "the pieces exist in their elements");
     const SelfContact *c = s->self;
     const Vec3 *p = lay_pieces(s, e[0]) + piece[0], *q = lay_pieces(s, e[1]) + piece[1];
     nearest_on_chords(p[0], vec3_sub(p[1], p[0]), q[0], vec3_sub(q[1], q[0]), xi);
@@ -370,7 +370,7 @@ static ContactEnd end_of(const Stepper *s, int e, const SlotPlace *p)
 // Computes all data of a pair and returns the gap between the surfaces [mm].
 static double measure_pair(const Stepper *s, const int element[2], const int piece[2], Near *n)
 {
-    SEL_ASSERT(element[0] + 1 < element[1], "neighbours along the tool are no pair: bending keeps them apart");
+    SEL_ASSERT(element[0] + 1 < element[1], "adjacent elements form no pair, because bending keeps them apart");
     const SelfContact *c = s->self;
     SlotPlace place[2];
     nearest_on_pieces(s, element, piece, n->xi, place);
@@ -687,7 +687,7 @@ void self_contact_keep_forces(Stepper *s)
     if (!c)
         return;
     c->kept_count = 0;
-    SEL_ASSERT(s->system.set.pair_count <= PAIRS_MAX, "there is room to keep the forces of all pairs");
+    SEL_ASSERT(s->system.set.pair_count <= PAIRS_MAX, "the forces of all pairs fit the array");
     for (int k = 0; k < s->system.set.pair_count; k++) {
         const Near *n = &c->near[c->near_of[k]];
         if (vec3_norm2(s->system.set.pair[k].force) > 0)
@@ -750,7 +750,7 @@ void self_contact_restore(Stepper *s, const void *from)
         return;
     Saved saved;
     memcpy(&saved, from, sizeof saved);
-    SEL_REQUIRE(saved.kept_count >= 0 && saved.kept_count <= PAIRS_MAX, "a checkpoint keeps no more pairs than there is room for");
+    SEL_REQUIRE(saved.kept_count >= 0 && saved.kept_count <= PAIRS_MAX, "the pairs of a checkpoint fit the array");
     c->clearance = saved.clearance;
     c->fastest = saved.fastest;
     c->kept_count = saved.kept_count;
@@ -761,7 +761,7 @@ int self_contact_numbers(const Stepper *s) { return s->self ? 5 * s->self->kept_
 
 double self_contact_number(const Stepper *s, int k)
 {
-    SEL_ASSERT(k >= 0 && k < self_contact_numbers(s), "a number of a pair that is kept");
+    SEL_ASSERT(k >= 0 && k < self_contact_numbers(s), "the number belongs to a stored pair");
     const Kept *kept = &s->self->kept[k / 5];
     const double number[5] = {kept->feature[0], kept->feature[1], kept->force.x, kept->force.y, kept->force.z};
     return number[k % 5];

@@ -44,7 +44,7 @@ static void add_vec(double *at, Vec3 v) { at[0] += v.x, at[1] += v.y, at[2] += v
 // The elements between free nodes, with the inertia and gravity of these nodes.
 static void free_nodes(Stepper *s, double scale, double inertia)
 {
-    SEL_ASSERT(s->first_free >= 0 && s->first_free < s->state.node_count, "some node is outside the sheath");
+    SEL_ASSERT(s->first_free >= 0 && s->first_free < s->state.node_count, "at least one node is outside the sheath");
     int first = s->first_free, count = s->state.node_count;
     size_t from = row_of(s, first), to = row_of(s, count);
     load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);

@@ -1,8 +1,8 @@
 // The linear system of coaxial tools: the counterpart of step_assemble.c with coaxial elements (coaxial.c). Unknowns of a node: position and rotation, then for
 // each tool i inside, material coordinate and angle, at 6 + 2 i and 7 + 2 i. In the sheath, as for one tool, axial displacement (0) and rotation (3).
 //
-// Mass: all tools at a node move together across the tangent t. Along it each has its own velocity, t . dx/dt - dS/dt for a tool inside, and its own spin, t .
-// omega + dphi/dt. Convection, the momentum carried from node to node with S, is neglected: it is of order v^2 dm/ds.
+// Mass: all tools at a node move together across the tangent t. Along it each has its own velocity, t . dx/dt - dS/dt for a tool inside, and its own spin,
+// t . omega + dphi/dt. Convection, the momentum carried from node to node with S, is neglected: it is of order v^2 dm/ds.
 #include "solver/coaxial_lanes.h"
 #include "base/base.h"
 #include "solver/tools_internal.h"

@@ -388,7 +388,7 @@ static int answer(Stepper *s, int first, int count, int *candidate)
         double own = reach_of(s, s->query.which[k]) + radius_of(s, s->query.which[k]);
         reach = own > reach ? own : reach;
     }
-    // a query costs more with its search range; twice the reach lets most far points be skipped for a while
+    // the gap returned for a far point is a lower bound that grows with the search range: twice the reach lets most far points be skipped for a while
     if (count > first)
         vessel_query(s->vessel, count - first, s->query.point + first, 2 * reach, s->query.place + first, s->query.hit + first);
     for (int k = first; k < count; k++) {
@@ -674,7 +674,7 @@ double stepper_start_work(const Stepper *s)
     return work;
 }
 
-// Adds contacts in the order of the chain: a node, the slots behind it, the next node.
+// Adds contacts in the order of the chain: a node, the slots after it, the next node.
 static void collect(Stepper *s, const int *candidate, int node_count, int slot_count)
 {
     const int *slot = candidate + node_count, *end = slot + slot_count;

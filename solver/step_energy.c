@@ -53,7 +53,7 @@ double stepper_kinetic_energy(const Stepper *s)
 // The displacement of a node in this step, translation or rotation, in space axes.
 static Vec3 done_in_space(const Stepper *s, int node, int from)
 {
-    SEL_ASSERT(from == 0 || from == 3, "a node moves and turns");
+    SEL_ASSERT(from == 0 || from == 3, "`from` is the row of translation or rotation");
     const double *u = s->iterate.moved + row_of(s, node) + from;
     return node < s->first_free ? vec3_scale(s->entry.axis[0], u[0]) : vec3(u[0], u[1], u[2]);
 }

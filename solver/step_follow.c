@@ -58,8 +58,8 @@ static void keep_mass_centre(Stepper *s, double part)
 }
 
 // Moves the free nodes' positions by `part` of the change, chord by chord from the proximal end: a chord c that the solution turns into s = c + change becomes
-// s (c.s)/(|c||s|), the length that the linear solution assigns to it. With s itself, a turn of 0.005 rad would stretch the wire by 1e-5, which in steel is 0.1
-// N. Not used if the rig fixes the position of a later node.
+// s (c.s)/(|c||s|), the length that the linear solution assigns to it. With s itself, a turn of 0.005 rad would stretch the wire by 1e-5, which in steel is
+// 0.1 N. Not used if the rig fixes the position of a later node.
 static void swing(Stepper *s, double part)
 {
     Vec3 from = s->entry.mouth, moved = s->entry.mouth, shift = vec3(0, 0, 0);

@@ -1,5 +1,5 @@
-// The hands. Hand k moves tool k by a_k along and t_k about the line at node 0, the hub of the outermost tool. S of an inner tool therefore grows there by a_0
-// - a_k, and its angle by t_k - t_0. The system's unknowns at node 0 are transformed to those of the hands. Then the row of a hand that holds its tool is a
+// The hands. Hand k moves tool k by a_k along and t_k about the line at node 0, the hub of the outermost tool. S of an inner tool therefore grows there by
+// a_0 - a_k, and its angle by t_k - t_0. The system's unknowns at node 0 are transformed to those of the hands. Then the row of a hand that holds its tool is a
 // unit row, a hand that slips is a force in its own row, and the force that a hand feels is the reaction of its row.
 //
 // A tool that no hand holds is held by the friction of the valve that it passes through, at the hub of the tool around it or at the sheath. Its unknown is then

@@ -41,7 +41,7 @@ static double turn_at_mouth(const Stepper *s)
 
 // Where a border of the rest shape is at the mouth, the straightening force differs between its two sides, and the wire may come to rest with the border there.
 // Does the force at the solution's border position differ from the force at the assumed position? If so, it is evaluated at the solution's position, or first
-// at the border itself.
+// with the border exactly at the mouth.
 static bool misjudges_border(Stepper *s)
 {
     int i = s->first_free - 1;

@@ -88,7 +88,7 @@ void tools_slides(Stepper *s)
             last_slip(s, c, k, tangent, slip);
             double force[2] = {change * last[0], change * last[1]};
             SEL_REQUIRE(s->system.set.slide_count < s->tools.capacity * s->state.inner_count, "there is room for a slide of each inner tool at each node");
-            SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a bound, and a radius at which tools touch");
+            SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a friction bound and a contact radius");
             s->system.set.slide[s->system.set.slide_count++] = (ContactSlide){.node = c,
                                                                               .unknown = unknown_of(k),
                                                                               .radius = radius,

@@ -191,7 +191,7 @@ static int neighbour(const Stepper *s, int point, int way)
 
 static void go_over(Stepper *s, int from, int to, double offset)
 {
-    SEL_ASSERT(from != to && to >= 0 && to < s->points.count, "a contact goes over to the next point");
+    SEL_ASSERT(from != to && to >= 0 && to < s->points.count, "a contact passes to another point of the tool");
     s->points.touch[to] = offset;
     s->points.force[to] = s->points.force[from];
     s->points.place[to] = s->points.place[from];
