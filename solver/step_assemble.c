@@ -90,8 +90,8 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
     }
 }
 
-// The element between the last held node and the first free one. It is clamped at the mouth and turns little in a step, so its damping acts on the displacement
-// instead of the strain rate.
+// The element between the last held node and the first free one. It is clamped at the mouth and turns little in a step, so its damping force is
+// the tangent times the displacement, not computed from the change of strain.
 static void mouth_element(Stepper *s, double scale)
 {
     SEL_ASSERT(s->first_free > 0 && s->first_free < s->state.node_count, "an element goes through the mouth");

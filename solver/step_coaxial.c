@@ -448,7 +448,7 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
 {
     int tool[STEP_TOOLS_MAX], inner = s->state.inner_count, count = 0;
     CoaxialInput in = input_at(s, c, tool);
-    // without input_at()'s rotation of node 1 at a tip
+    // relative to node 1 as input_at() rotated it at a tip
     double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c);
     double psi = tools_twist(s, c) - (is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0);
     *energy = 0;
@@ -765,7 +765,7 @@ ToolNode tools_further(const Stepper *s, int c, double d, bool strains)
         node.position = vec3_add_scaled(node.position, ds, vec3_add_scaled(slant, 1 + stretch, tangent));
         node.orientation = quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0)));
     }
-    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;      // as input_at() rotated it
+    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;      // by which input_at() rotated node 1
     node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(-turned, 0, 0))));
     return node;
 }
