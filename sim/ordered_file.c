@@ -1,4 +1,4 @@
-#define _GNU_SOURCE   // locks of an open file, not of a process
+#define _GNU_SOURCE   // locks of an open file description, not of a process
 #include "sim/ordered_file.h"
 
 #include "base/base.h"
@@ -79,7 +79,7 @@ static bool set_length(int descriptor, haddr_t size)
     return true;
 }
 
-// Grows the file to `size` and, if the disk has space, `more` beyond.
+// Grows the file to `size`, plus `more` if the disk has space.
 static bool grow(int descriptor, haddr_t size, haddr_t more)
 {
     haddr_t now = length_of(descriptor);
@@ -100,12 +100,12 @@ static void put_little_endian(unsigned char *data, uint64_t value, int bytes)
         data[i] = (unsigned char)(value >> 8 * i);
 }
 
-// --- building: a driver that gives addresses of whole words, one after the other ---
+// --- building: a driver that allocates consecutive addresses, aligned to words ---
 
 typedef struct Build {
-    H5FD_t driver;   // the library's part, first
+    H5FD_t driver;   // the library's part must come first
     int descriptor;
-    haddr_t end;     // of what is allocated
+    haddr_t end;     // of the allocated space
 } Build;
 
 static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr_t most)
@@ -133,7 +133,7 @@ static herr_t driver_close(H5FD_t *driver)
 static herr_t driver_query(const H5FD_t *driver, unsigned long *flags)
 {
     (void)driver;
-    // no accumulator and no aggregation: headers lie where they are allocated
+    // no accumulator and no aggregation: headers stay where they are allocated
     *flags = H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
     return 0;
 }
@@ -218,7 +218,8 @@ static const H5FD_class_t driver_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
-// Kept until the program ends: a file that holds the driver last has HDF5 free it, and then call it to close the file (1.10.8, H5FD_close).
+// Registered until the program ends: if a file holds the last reference to the driver, HDF5 frees the driver and then calls it to close the file (1.10.8,
+// H5FD_close).
 static hid_t driver_id(void)
 {
     static hid_t driver = -1;
@@ -229,7 +230,7 @@ static hid_t driver_id(void)
 
 hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
 {
-    // 12 MB until the first chunks exist, for each of which a B-tree is made (H5B_create)
+    // 12 MB are needed until the first chunks exist: HDF5 makes a B-tree for each dataset (H5B_create)
     if (!heap_has_room(4 * HEAP_ROOM_OF_HDF5)) {
         errno = ENOMEM;
         return -1;
@@ -260,25 +261,25 @@ bool ordered_file_is_being_written(const char *path)
 
 // --- growing ---
 
-// A dataset and its index.
+// A dataset and its chunk index.
 typedef struct Set {
     haddr_t extent, root_field;              // addresses in its header
     int rank;
-    hsize_t chunk_rows, chunks;              // appended
-    haddr_t root, leaf;                      // nodes; of the leaves the last one
+    hsize_t chunk_rows, chunks;              // rows per chunk; chunks appended
+    haddr_t root, leaf;                      // the root node, and the last leaf
 } Set;
 
-// A page that holds extents: its content on disk and the new one.
+// A page that holds extents: its content on disk and its new content.
 typedef struct Page {
     haddr_t start;
-    unsigned char *disk, *wanted;            // page aligned: no fault in the middle of the kernel's copy
+    unsigned char *disk, *wanted;            // page-aligned, so that the kernel's copy causes no page fault midway
 } Page;
 
 struct OrderedFile {
     int descriptor;
-    size_t end_field;                        // where the superblock states the end
-    haddr_t end, stated, ahead;              // of what is used, of what the superblock says
-    int fan;                                 // children of a node at most
+    size_t end_field;                        // where the superblock stores the end
+    haddr_t end, stated, ahead;              // end of the used space; the superblock's end; bytes it is kept ahead
+    int fan;                                 // most children of a node
     int set_count, page_count;
     Set set[ORDERED_FILE_MOST_SETS];
     Page page[MOST_PAGES];
@@ -294,7 +295,7 @@ static bool refuse(OrderedFile *file, const char *why)
     return false;
 }
 
-// Of a chunk's key: its bytes and filter mask, and the offset of its first value in each dimension and within a value.
+// Bytes of a chunk's key: chunk size and filter mask, then the offset of its first value in each dimension and within a value.
 static size_t key_bytes(const Set *set) { return WORD + WORD * (size_t)(set->rank + 1); }
 static size_t node_bytes(const OrderedFile *file, const Set *set) { return NODE_HEAD + (size_t)file->fan * WORD + (size_t)(file->fan + 1) * key_bytes(set); }
 static haddr_t key_address(const Set *set, haddr_t node, uint64_t i) { return node + NODE_HEAD + i * (key_bytes(set) + WORD); }
@@ -314,8 +315,8 @@ OrderedFile *ordered_file_open(const char *path, int half_fan, hsize_t ahead)
     bool good = file->node && file->descriptor >= 0 && read_all(file->descriptor, super, sizeof super, 0) && !memcmp(super, signature, sizeof signature) &&
                 super[8] <= 1;
     if (good) {
-        (void)fcntl(file->descriptor, F_OFD_SETLK, &(struct flock){.l_type = F_WRLCK, .l_whence = SEEK_SET});   // some file systems have none
-        file->end_field = super[8] == 0 ? 40 : 44;      // behind version 0's 24 bytes of sizes, or version 1's 28, and two addresses
+        (void)fcntl(file->descriptor, F_OFD_SETLK, &(struct flock){.l_type = F_WRLCK, .l_whence = SEEK_SET});   // some file systems support no locks
+        file->end_field = super[8] == 0 ? 40 : 44;      // after two addresses and 24 bytes (version 0) or 28 (version 1)
         file->end = file->stated = little_endian(super + file->end_field, WORD);
         return file;
     }
@@ -325,7 +326,7 @@ OrderedFile *ordered_file_open(const char *path, int half_fan, hsize_t ahead)
 
 static Page *page_of(OrderedFile *file, haddr_t address)
 {
-    SEL_ASSERT(address > 0 && address != HADDR_UNDEF, "an address in the file");
+    SEL_ASSERT(address > 0 && address != HADDR_UNDEF, "the address lies in the file");
     haddr_t start = address / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE;
     for (int i = 0; i < file->page_count; i++)
         if (file->page[i].start == start)
@@ -344,8 +345,8 @@ static Page *page_of(OrderedFile *file, haddr_t address)
     return &file->page[file->page_count++];
 }
 
-// An object header of version 1: 16 bytes, then messages of a type, a size, flags and data. Sought: the first dimension of a dataspace of version 1, and the
-// address in a layout of version 3.
+// An object header of version 1: 16 bytes, then messages, each with type, size, flags and data. Needed are the address of the first dimension in a dataspace of
+// version 1, and that of the address in a layout of version 3.
 int ordered_file_add(OrderedFile *file, haddr_t header, int rank, hsize_t chunk_rows)
 {
     SEL_ASSERT(rank > 0 && chunk_rows > 0, "a dataset grows by chunks of rows");
@@ -371,7 +372,7 @@ int ordered_file_add(OrderedFile *file, haddr_t header, int rank, hsize_t chunk_
     return file->set_count++;
 }
 
-// Ensures that a reader finds the end of file behind all used bytes.
+// Ensures that a reader finds the end of file after all used bytes.
 static bool state_end(OrderedFile *file, haddr_t end)
 {
     unsigned char word[WORD];
@@ -390,7 +391,7 @@ static bool state_end(OrderedFile *file, haddr_t end)
 // The address of new space, 0 if there is none.
 static haddr_t take_space(OrderedFile *file, size_t bytes)
 {
-    SEL_ASSERT(bytes > 0 && file->end <= file->stated, "what is used lies before the end that the superblock states");
+    SEL_ASSERT(bytes > 0 && file->end <= file->stated, "the used space ends before the superblock's end");
     haddr_t address = (file->end + WORD - 1) / WORD * WORD;
     if (address + bytes > file->stated && !state_end(file, address + bytes + file->ahead) && !state_end(file, address + bytes))
         return 0;
@@ -400,7 +401,7 @@ static haddr_t take_space(OrderedFile *file, size_t bytes)
 
 static void put_key(const Set *set, unsigned char *key, uint64_t bytes, hsize_t row)
 {
-    SEL_ASSERT(bytes <= UINT32_MAX, "a chunk's size is a number of 32 bits");
+    SEL_ASSERT(bytes <= UINT32_MAX, "a chunk's size fits 32 bits");
     memset(key, 0, key_bytes(set));
     put_little_endian(key, bytes, 4);
     put_little_endian(key + WORD, row, WORD);
@@ -419,7 +420,7 @@ static void put_node_head(unsigned char *node, int level, uint64_t count)
 {
     SEL_ASSERT(count <= UINT16_MAX && level >= 0 && level < 2, "an index has two levels");
     memcpy(node, "TREE", 4);
-    node[4] = 1;      // of chunks
+    node[4] = 1;      // a node of chunks
     node[5] = (unsigned char)level;
     put_little_endian(node + 6, count, 2);
 }
@@ -438,7 +439,7 @@ static haddr_t make_node(OrderedFile *file, const Set *set, int level, haddr_t l
     return address && write_all(file->descriptor, file->node, size, address) ? address : 0;
 }
 
-// Entry `i` of a node that has as many.
+// Appends entry `i` to a node that has `i` entries.
 static bool add_entry(OrderedFile *file, const Set *set, haddr_t node, int level, uint64_t i, uint64_t bytes, hsize_t row, haddr_t child, hsize_t next_row)
 {
     SEL_REQUIRE(i > 0 && i < (uint64_t)file->fan, "a node has room for another child");
@@ -460,7 +461,7 @@ static bool write_word(OrderedFile *file, haddr_t address, uint64_t value)
     return write_all(file->descriptor, word, WORD, address);
 }
 
-// The index of a dataset without chunks: a root, a leaf, and the address in the header. For a file without readers.
+// Creates the index of a dataset without chunks: a root, a leaf, and their address in the header. Only for a file without readers.
 static bool make_index(OrderedFile *file, Set *set, size_t bytes, haddr_t chunk)
 {
     const hsize_t leaf_rows = (hsize_t)file->fan * set->chunk_rows;
@@ -513,7 +514,7 @@ void ordered_file_set_rows(OrderedFile *file, int number, hsize_t rows)
     const Set *set = &file->set[number];
     Page *page = page_of(file, set->extent);
     SEL_REQUIRE(page, "the extent's page was read when the dataset was added");
-    SEL_ASSERT(rows <= set->chunks * set->chunk_rows, "no more rows are stated than were appended");
+    SEL_ASSERT(rows <= set->chunks * set->chunk_rows, "the stated rows were appended");
     SEL_ASSERT(set->extent % ORDERED_FILE_PAGE + WORD <= ORDERED_FILE_PAGE, "an extent lies in one page");
     put_little_endian(page->wanted + set->extent % ORDERED_FILE_PAGE, rows, WORD);
 }
@@ -529,7 +530,7 @@ static bool write_page(OrderedFile *file, Page *page)
         return true;
     watch(false);
     memcpy(page->disk + first, page->wanted + first, end - first);
-    // one call if the system writes it in one piece; a partial write is completed
+    // a single call, in case the system writes it in one piece; a partial write is completed
     return write_all(file->descriptor, page->wanted + first, end - first, page->start + first);
 }
 

@@ -101,7 +101,7 @@ static int64_t thread_cpu_ns(void)
     return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-// What a step spends in each of its stages, some of which it may repeat.
+// Time spent in each stage of a step; a stage may be repeated.
 typedef struct StageClock {
     int64_t start, since, spent[STAGE_COUNT];
 } StageClock;
@@ -140,7 +140,7 @@ const EnergyBalance *simulator_energy(const Simulator *simulator) { return &simu
 
 bool simulator_gains_energy(const Simulator *simulator)
 {
-    // rounding of a state of some mJ is not a gain
+    // rounding errors of an energy of some mJ do not count as a gain
     return simulator->energy.gained > energy_gain_share * simulator->energy.work + 1e-6;
 }
 
@@ -209,7 +209,7 @@ static void exchange(Simulator *simulator, const ToolCommands *commands)
         if (asked == simulator->asked[k])
             continue;
         simulator->asked[k] = asked;
-        if (asked == stepper_fitted(simulator->stepper, k))      // after one that was refused
+        if (asked == stepper_fitted(simulator->stepper, k))      // after a refused exchange
             continue;
         double before = simulator->energy.watched ? stepper_elastic_energy(simulator->stepper) : 0;
         StepExchange outcome = stepper_exchange(simulator->stepper, k, asked);

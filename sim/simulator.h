@@ -1,6 +1,6 @@
-// The simulator: a scene and its vessel, stepped by commands. One step is the solver's stages, some of them repeated when it is linearised again,
-// each timed with the thread's CPU clock. Internal units mm, g, ms, N, rad; commands and totals have their unit in the name. A step allocates
-// nothing. One thread owns a simulator; it borrows scene and vessel, which must outlive it.
+// The simulator: a scene and its vessel, stepped by commands. A step runs the solver's stages, repeating some of them when it linearises again; each stage is
+// timed with the thread's CPU clock. Internal units are mm, g, ms, N, rad; commands and totals have their unit in the name. A step allocates nothing. One
+// thread owns a simulator; it borrows scene and vessel, which must outlive it.
 #ifndef SELDINGER_SIM_SIMULATOR_H
 #define SELDINGER_SIM_SIMULATOR_H
 
@@ -12,17 +12,17 @@
 typedef enum { STAGE_FEED, STAGE_DETECT, STAGE_ASSEMBLE, STAGE_FACTOR, STAGE_CONTACT, STAGE_JUDGE, STAGE_CORRECT, STAGE_COUNT } Stage;
 extern const char *const stage_name[STAGE_COUNT];
 
-// Of all steps so far: thread CPU time [ns], counts, depths.
+// Statistics of all steps so far: thread CPU time [ns], counts, depths.
 typedef struct StepProfile {
     TimeHistogram step;
     TimeHistogram stage[STAGE_COUNT];
     TimeHistogram iterations;        // of the contact solve, a count
     TimeHistogram candidates;        // points near enough to the wall to touch it
-    TimeHistogram contacts;          // with force
+    TimeHistogram contacts;          // contacts with force
     TimeHistogram penetration_nm;    // deepest node of the state at the step's start
 } StepProfile;
 
-// Totals over all steps so far.
+// Totals of all steps so far.
 typedef struct RunTotals {
     int64_t steps;
     unsigned flags;                  // every STEP_ flag that was seen
@@ -30,9 +30,9 @@ typedef struct RunTotals {
     int64_t further_linearisations;  // steps that took two or more Newton iterations
     int64_t disagreeing_steps;       // steps in which the vessel's model was inconsistent about the wall at a point of the tool
     int64_t limited_steps;           // steps whose motion was shortened; the next ones completed it
-    int64_t exchanges;               // of tools at the hub
-    int64_t refused_exchanges;       // exchanges refused because the tool was still in the vessel, or the new one too short …
-    StepExchange refusal;            // … and why, of the last
+    int64_t exchanges;               // exchanges of tools at the hub
+    int64_t refused_exchanges;       // exchanges refused because the tool was still inserted, or a tool was too short …
+    StepExchange refusal;            // … and the reason of the last refusal
     int64_t hand_slip_steps;         // steps in which the tool needed more force than the grip holds …
     double hand_slipped;             // [mm] … and how far the grip slid along it, in both directions
     int contacts_max;                // contacts with force
@@ -43,23 +43,24 @@ typedef struct RunTotals {
     double push_least, push_most;    // [N] at the hand
 } RunTotals;
 
-// The energy balance of a run [mJ], while it is watched (solver/step.h, StepEnergy):
+// The energy balance of a run [mJ] since watching began (solver/step.h, StepEnergy):
 //   hand + load = elastic + kinetic + friction + damping + numerical
 typedef struct EnergyBalance {
     bool watched;
     double hand, load, friction, damping;
-    double elastic, kinetic;         // more than at the start
-    double numerical;                // the remainder: dissipated by implicit Euler, less what …
-    double wall;                     // … the wall's pressure gave to points outside
-    double work;                     // done by hand and loads, without sign
-    // Sum of the gains of single steps that no force explains: more than hands, walls, friction and valves gave both by their forces at the step's end and by
-    // those at its start. In between a force's work lies between the two; a rigid wall gives where it pushes out and takes nothing.
+    double elastic, kinetic;         // increase since the start
+    double numerical;                // remainder: energy dissipated by implicit Euler, minus …
+    double wall;                     // … the work of the wall's pressure on points outside the wall
+    double work;                     // work of hand and loads, sum of absolute values
+    // Sum of the energy gains of single steps that no force explains: gains above the work of hands, walls, friction and valves, whether computed with the
+    // forces at the step's end or with those at its start. A force that varies in between does work between these two values. A rigid wall supplies energy
+    // where it pushes a point out, and absorbs none.
     double gained;
-    double gained_most;              // in one step …
-    double gained_at_s;              // … which ended then
-    // The same sum by the forces at each step's end alone, as implicit Euler has it, and by the mean of those at its start and end. The first counts a gain of
-    // -dF u / 2 when a force F falls in a step that moves by u. The second is then accurate to third order, but off by as much, either way, when the force
-    // jumps: a reversed hand, a tool that begins to touch.
+    double gained_most;              // largest gain in one step …
+    double gained_at_s;              // … and the time at which that step ended
+    // The same sum computed with the forces at each step's end alone, as in implicit Euler, and with the mean of the forces at its start and end. The first
+    // counts a gain of -dF u / 2 when a force F falls in a step that moves by u. The second is accurate to third order, but has an error of that size, of
+    // either sign, when the force jumps: the hand reverses, or the tool begins to touch.
     double gained_end, gained_mean;
 } EnergyBalance;
 // A gain of more than this share of the work needs an explanation.
@@ -97,7 +98,7 @@ const Scene *simulator_scene(const Simulator *simulator);
 Stepper *simulator_stepper(Simulator *simulator);                 // for save, restore and node reports
 // FNV-1a over time, inserted length, twist and all nodes' position, orientation, velocity and spin, word by word in four lanes.
 uint64_t simulator_hash(const Simulator *simulator);
-double simulator_fastest_mm_s(const Simulator *simulator);        // the fastest node's speed, or the surface's where the tool turns
+double simulator_fastest_mm_s(const Simulator *simulator);        // speed of the fastest node, or of the surface where the tool turns
 
 // Names of STEP_ flags, for files: "diverged", "not_converged", …, "limited", "model_disagrees", "hand_slips"; index 0 to STEP_FLAG_COUNT - 1 is the bit.
 enum { STEP_FLAG_COUNT = 10 };

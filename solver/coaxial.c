@@ -1,30 +1,35 @@
-// Coaxial tools in one element. K tools share the centreline; tool k has its material interval [S1, S2] there, l_k = S2 - S1, its place x in (0, 1) at
-// S1 + l_k x and the angle phi_k = (1 - x) phi1 + x phi2. With q(x) = d theta / dx, the turn of the line over the element, the energy of K rods is
-//   sum over k of  integral EI_k / (2 l_k) |q - l_k u_k|^2 dx,   u_k = Rot(phi_k) kappa_k     (q / l_k is the curvature of the tool's own length)
-// so the carrier's length has no part in bending. Least for given end angles alpha = integral of m q dx, m = (-(1 - x), x), with the end moments M:
+// Coaxial tools in one element. K tools share the centreline. Tool k occupies there its material interval [S1, S2], with l_k = S2 - S1; its position x in
+// (0, 1) is at S1 + l_k x, and its angle is phi_k = (1 - x) phi1 + x phi2. With q(x) = d theta / dx, the rotation rate of the line over the element, the
+// bending energy of K rods is
+//   sum over k of  integral EI_k / (2 l_k) |q - l_k u_k|^2 dx,   u_k = Rot(phi_k) kappa_k
+// Here q / l_k is the curvature per unit length of tool k itself, so the carrier's length plays no part in bending. Minimised for given end angles
+// alpha = integral of m q dx, m = (-(1 - x), x), with M the end moments, it gives
 //   B = sum EI_k / l_k,  c = sum EI_k u_k,  q = (m'M + c) / B
 //   U = 1/2 (alpha - alpha0)' F^-1 (alpha - alpha0) + W,   F = integral m m' / B dx + 1 / sum(kappa G A_k l_k),   alpha0 = integral m c / B dx
 //   W = integral of (1/2 sum EI_k l_k |kappa_k|^2 - |c|^2 / (2 B)) dx
-// B and kappa_k are constant in a piece, between the borders of all tools; a border at S_b lies at x = (S_b - S1) / l_k and moves with both. Near a node where
-// the carrier has a border too it lies in both elements, a part of its way in each (before_border()): of two borders that pass each other W would have a kink.
-// The moment is linear and F exact for any pieces: with the cubic's curvature instead a partly covered element held the inner tool in cogs.
-// Over a piece, u_k turns by a little; integrals of its first two moments are exact. In W, only |c|^2 turns, by the pairs' angle d = phi_i - phi_j:
-// the mean of cos d is taken as cos(d_mid) cos(r D), D the element's difference of d and r^2 = (width^2 + 1) / 12. r^2 = width^2 / 12 would be the
-// integral's own (sinc D/2); the 1/12 more is what the turn's curvature inside the element takes off while cos d is near 1 (h^4 there, Numerov's weights).
-// At the fold of two tubes turned against each other the error stays h^2, a quarter of the integral's.
-//   + sum EA_k / (2 l_k) (len - l_k)^2 + GJ_k / (2 l_k) (psi + phi2 - phi1)^2, EA_k / l_k standing for 1 / integral of dS / EA
-// len = chord + bow - (bow and chord of the rest arc, less its length): beam_equations.h.
-// A strain of EA / l (len - l)^2 grows without bound as l goes to 0, and Newton's method circles about it where S moves by as much as l. Where `spread` is
-// longer than l the tool behind S1 takes its part: EA / spread, a plain square in both.
+// B and kappa_k are constant in a piece, between the borders of all tools. A border at S_b lies at x = (S_b - S1) / l_k and moves with both. Near a node where
+// the carrier has a border too, a border passes gradually from one element to the other and lies partly in each (before_border()); otherwise W would have a
+// kink where two borders pass each other.
+// The moment is linear and F exact for any pieces. With the curvature of the cubic instead, a partly covered element held the inner tool in steps, as on cogs.
+// Within a piece, u_k rotates slightly; the integrals of its first two moments are exact. In W, only |c|^2 varies, through the angles d = phi_i - phi_j of
+// pairs: the mean of cos d is taken as cos(d_mid) cos(r D), where D is the element's difference of d and r^2 = (width^2 + 1) / 12. r^2 = width^2 / 12 would
+// correspond to the exact integral (sinc D/2). The additional 1/12 corrects for the second derivative of the angle inside the element while cos d is
+// near 1 (error h^4 there, Numerov's weights). At the fold of two tubes turned against each other the error remains h^2, a quarter of the integral's.
+// The energy of stretching and torsion is added:
+//   + sum EA_k / (2 l_k) (len - l_k)^2 + GJ_k / (2 l_k) (psi + phi2 - phi1)^2, where EA_k / l_k stands for 1 / integral of dS / EA
+// len = chord + bow - (bow and chord of the rest arc, minus its length): beam_equations.h.
+// The strain energy EA / l (len - l)^2 grows without bound as l goes to 0, and Newton's method oscillates where S moves by as much as l. If `spread` is longer
+// than l, the part of the tool behind S1 is included: the factor is EA / spread, and the energy is quadratic in both.
 //
-// Derivatives. U is the maximum over M of M'alpha - V(M, p), V = integral of (|m'M + c|^2 / (2 B) - 1/2 sum EI_k l_k |kappa_k|^2), p the tools'
-// unknowns. So dU/dp = -V_p, and d2U = |d alpha - V_Mp dp|^2 in F^-1, less V_pp dp dp. V_Mp = d(alpha0 + F M) is how the end angles move where
-// the moments stay; the square is convex in the pose and in every length together (EI/l |d phi - k dl|^2 for one tool), so Newton's method may move S
-// by more than a piece. Of -V_pp, positive semi-definite parts only:
+// Derivatives. U is the maximum over M of M'alpha - V(M, p), V = integral of (|m'M + c|^2 / (2 B) - 1/2 sum EI_k l_k |kappa_k|^2), where p are the tools'
+// unknowns. So dU/dp = -V_p, and d2U = |d alpha - V_Mp dp|^2 in F^-1, minus V_pp dp dp. V_Mp = d(alpha0 + F M) is the change of the end angles at constant
+// moments. The square is convex in the pose and all lengths together (EI/l |d phi - k dl|^2 for one tool), so Newton's method may move S by more than a piece.
+// Of -V_pp only positive semi-definite parts are used:
 //   lengths: |q|^2 (sum b_k y_k^2 - (sum b_k y_k)^2 / B),  b_k = EI_k / l_k,  y_k = dl_k / l_k: tools stretched differently
 //   angles: with chi_k = phi_k + the node's spin, sum of (M . u_k EI_k / B) dchi_k^2 + sum over pairs (c_i . c_j / B) (dphi_i - dphi_j)^2,
 //   exact as long as each is positive; the first is lumped at the nodes, M_i . alpha0_i, as in beam_equations.h.
-// Left out: angle with length (torques), borders' second order, negative parts. Axial and torsion likewise: (dlen - dl - T df)^2, f = integral of dS / EA.
+// Neglected: coupling of angle and length (torques), second derivatives with borders, negative parts. The axial and
+// torsional terms are treated in the same way: (dlen - dl - T df)^2, f = integral of dS / EA.
 #include "solver/coaxial.h"
 
 #include "base/base.h"
@@ -34,10 +39,10 @@
 #include <stddef.h>
 #include <string.h>
 
-static const double SOFT_MOST = 0.4;     // of an element: over which a border is spread at most
-static const double LENGTH_MIN = 1e-6;   // [mm] of a tool between two nodes: so that a wild iterate stays finite
+static const double SOFT_MOST = 0.4;     // of an element: largest distance over which a border is spread
+static const double LENGTH_MIN = 1e-6;   // [mm] least length of a tool between two nodes, so that a bad iterate stays finite
 
-typedef struct Two {         // about e2 and e3
+typedef struct Two {         // components about e2 and e3
     double y, z;
 } Two;
 INLINE Two two_scale(Two a, double s) { return (Two){a.y * s, a.z * s}; }
@@ -45,7 +50,7 @@ INLINE Two two_add(Two a, double s, Two b) { return (Two){a.y + s * b.y, a.z + s
 INLINE Two two_turned(Two a) { return (Two){-a.z, a.y}; }        // by a right angle about e1
 INLINE double two_dot(Two a, Two b) { return a.y * b.y + a.z * b.z; }
 
-// Cosine, and sine over angle, of a small angle: to rounding up to 2 rad, where libm's take over.
+// Cosine, and sine over angle, of a small angle: accurate to rounding up to 2 rad; beyond that libm's functions are used.
 INLINE double small_cosine(double angle, double *sine_over_angle)
 {
     double q = angle * angle;
@@ -71,15 +76,16 @@ INLINE void slope_add(CoaxialSlope *to, double factor, const double v[QUANTITIES
     to->waste += factor * v[WASTE];
 }
 
-static const CoaxialSection NOTHING = {0};     // past a tip
+static const CoaxialSection NOTHING = {0};     // section past a tip
 
 typedef struct Border {
-    double x;                // where it counts
-    double by[2], bends;     // slopes of x with S1 and S2; its second derivative with where it is
+    double x;                // effective place, as a share of the element
+    double by[2], bends;     // derivatives of x with S1 and S2; second derivative of x with the border's place
     int tool;
 } Border;
 
-// [mm] of an element from its node to a border p [mm] past that node: p, and over w to either side of the node a parabola from 0 to w. *slope: with p.
+// The length [mm] of an element from its node to a border p [mm] past that node: p, but within w to either side of the node a parabola from 0 to w. *slope: its
+// derivative with p.
 static double before_border(double p, double w, double *slope)
 {
     bool is_near = fabs(p) < w;
@@ -87,7 +93,7 @@ static double before_border(double p, double w, double *slope)
     return is_near ? 0.25 * (w + p) * (w + p) / w : fmax(0, p);
 }
 
-// A border at `place` [mm] past node 1 of an element that is `length` long.
+// The border at `place` [mm] past node 1 of an element of this length.
 static Border border_at(const double soft_at[2], int tool, double place, double length)
 {
     bool end = 2 * place > length;
@@ -106,7 +112,7 @@ static void put_border(Border *border, int *count, Border own)
     border[at] = own;
 }
 
-// One tool's borders inside the element, and a little further where they are spread, in among the others by place; the section at node 1.
+// Inserts one tool's borders inside the element, and slightly outside it where they are spread, into the list ordered by place; returns the section at node 1.
 static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *rest, Border *border, int *border_count)
 {
     const CoaxialSection *last = span->tool->section + span->tool->count - 1;
@@ -131,8 +137,9 @@ static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *r
     return first;
 }
 
-// One tool's compliance: of S1 to S2, and of what is behind S1 where `spread` is longer; at a mouth of `spread`, even where node 1 is past it: what lies between
-// the two is in the element behind too. What is past its tip is strained as its last section.
+// One tool's axial and torsional compliance, from S1 to S2. If `spread` is longer, the part behind S1 is included. At a mouth (spreads_twist) it is always the
+// compliance of `spread`, even if node 1 is past the mouth: the part between the two belongs to the element behind as well. Past its tip, a tool is strained
+// with the stiffness of its last section.
 static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
 {
     double length = rest->strained_length[k], end = span->s1 + length, spread = span->spreads_twist ? span->spread : fmax(span->spread, length);
@@ -167,16 +174,16 @@ CoaxialSprings coaxial_springs(const CoaxialSpan *span)
                             {rest.axial_end[0][1] - rest.axial_end[0][0], rest.torsion_end[0][1] - rest.torsion_end[0][0]}};
 }
 
-// A piece's tools: what they add to the element, and the derivatives of that.
+// The tools of a piece: their contributions to the element, and the derivatives of these.
 typedef struct Parts {
     const CoaxialSection *section[COAXIAL_TOOLS_MAX];
-    Two curve[COAXIAL_TOOLS_MAX];              // EI u at the middle
-    Two even[COAXIAL_TOOLS_MAX], odd[COAXIAL_TOOLS_MAX];   // its mean over the piece, and of (x - middle) times it
-    double cosine[COAXIAL_TOOLS_MAX], sine[COAXIAL_TOOLS_MAX];     // of half the turn between the integral's points
+    Two curve[COAXIAL_TOOLS_MAX];              // EI u at the middle of the piece
+    Two even[COAXIAL_TOOLS_MAX], odd[COAXIAL_TOOLS_MAX];   // mean of EI u over the piece, and of (x - middle) times it
+    double cosine[COAXIAL_TOOLS_MAX], sine[COAXIAL_TOOLS_MAX];     // of half the rotation between the integration points
     double turn[COAXIAL_TOOLS_MAX];            // [rad] phi2 - phi1
 } Parts;
 
-// Adds the piece [a, b] to `rest`; ends: derivative of what it adds with a and with b.
+// Adds the piece [a, b] to `rest`; ends: derivatives of its contribution with a and with b.
 static void add_piece(const CoaxialSpan *span, double a, double b, Parts *p, CoaxialRest *rest, double ends[2][QUANTITIES])
 {
     static const double ROOT = 0.28867513459481288;        // 1 / sqrt(12)
@@ -238,7 +245,7 @@ static void add_piece(const CoaxialSpan *span, double a, double b, Parts *p, Coa
             w[0] = flexible * angle.y + weight * ROOT * reach_slope.y, w[1] = flexible * angle.z + weight * ROOT * reach_slope.z;
             n[0] = weight * mid_slope.y, n[1] = weight * mid_slope.z;
         }
-        // the waste: square = half |c|^2, pair by pair
+        // W, `waste`: square = half |c|^2, pair by pair
         double r = ROOT * sqrt(width * width + 1), square_mid = 0, square_width = 0, phi_slope[COAXIAL_TOOLS_MAX] = {0}, turn_slope[COAXIAL_TOOLS_MAX] = {0};
         double h11 = m[0] * m[0] + r * r, h12 = -m[0] * m[1] - r * r, h22 = m[1] * m[1] + r * r;
         for (int g = 0; g < curved_count; g++) {
@@ -306,7 +313,7 @@ static void add_piece(const CoaxialSpan *span, double a, double b, Parts *p, Coa
     rest->waste += value[WASTE];
 }
 
-// The rest arc, its fourth-order rest: that of the constant curvature that has the same turn.
+// The shortening of the rest arc, 1 - chord / length, beyond its second-order term: that of an arc of constant curvature with the same total rotation.
 static void set_arc(CoaxialRest *rest)
 {
     double u[2] = {0.5 * (rest->angle[1][0] - rest->angle[0][0]), 0.5 * (rest->angle[1][1] - rest->angle[0][1])}, q = u[0] * u[0] + u[1] * u[1];
@@ -329,7 +336,7 @@ static CoaxialChord rest_chord(const double angle[2])
     return (CoaxialChord){.turn = {cosine, 0, 0.5 * half * y, 0.5 * half * z}, .v = {y, z}, .grow = grow, .stay = stay, .lean = 0.5 * half * half};
 }
 
-// A tool that ends inside bends as if S2 were S1 and the carrier's length.
+// A tool that ends inside bends as if its S2 were S1 plus the carrier's length.
 static void bend_with_carrier(CoaxialRest *rest, int k)
 {
     const CoaxialSlope *by_end = &rest->slope[4 * k + COAXIAL_S2];
@@ -341,7 +348,7 @@ static void bend_with_carrier(CoaxialRest *rest, int k)
     slope_add(&rest->slope[COAXIAL_S2], 1, slope);
 }
 
-// The tools of an element, carrier first, 1 <= count <= COAXIAL_TOOLS_MAX.
+// Combines the tools of an element, carrier first, 1 <= count <= COAXIAL_TOOLS_MAX.
 static void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
 {
     SEL_ASSERT(count > 0 && count <= COAXIAL_TOOLS_MAX && !span[0].has_tip, "an element has tools, the first of which carries it from end to end");
@@ -361,7 +368,7 @@ static void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
     for (int i = 0; i <= border_count; i++) {
         double to = i < border_count ? border[i].x : 1;
         add_piece(span, from, to, &parts, rest, ends);
-        if (i > 0) {         // the border that ends the piece before and starts this one
+        if (i > 0) {         // the border between the previous piece and this one
             const Border *b = &border[i - 1];
             int k = b->tool;
             for (int q = 0; q < QUANTITIES; q++)
@@ -394,21 +401,21 @@ static void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
         rest->chord[0].turn = rest->chord[1].turn = quat_identity();
 }
 
-// In the node's frame.
+// The rotation of the rest chord when its angles change by dv, in the node's frame.
 INLINE Vec3 turn_slope(const CoaxialChord *t, Two dv)
 {
     double along = t->stay * (t->v[0] * dv.y + t->v[1] * dv.z);
     return vec3(t->lean * (t->v[0] * dv.z - t->v[1] * dv.y), t->grow * dv.y + along * t->v[0], t->grow * dv.z + along * t->v[1]);
 }
-// Its transpose: x in the node's frame.
+// The transpose of turn_slope(): x in the node's frame.
 INLINE Two turn_back(const CoaxialChord *t, Vec3 x)
 {
     double along = t->stay * (t->v[0] * x.y + t->v[1] * x.z);
     return (Two){t->grow * x.y + along * t->v[0] - t->lean * t->v[1] * x.x, t->grow * x.z + along * t->v[1] + t->lean * t->v[0] * x.x};
 }
 
-// A span with a tip is as long as the carrier and keeps its angle in space: s2 = s1 + l, phi2 = phi1 less the twist of the nodes' frames. (With phi2 = phi1
-// the tool's bend would jump by half that twist as its tip passes a node.) The twist's own share goes to the moments; the tangent leaves it out.
+// A span with a tip is as long as the carrier, and its angle is constant in space: s2 = s1 + l, phi2 = phi1 minus the twist of the nodes' frames. (With phi2 =
+// phi1 the tool's curvature would jump by half that twist as its tip passes a node.) The derivative with the twist enters the moments; the tangent neglects it.
 static void fold(const CoaxialSpan *span, int count, double *row, int stride)
 {
     for (int k = 1; k < count; k++) {
@@ -431,7 +438,7 @@ static bool has_tips(const CoaxialInput *in)
     return false;
 }
 
-// Does the tool's column have to be known? A tip's length is the carrier's.
+// Is the tool's column needed? The length of a tool with a tip is the carrier's.
 static bool is_wanted(const CoaxialInput *in, int k) { return !in->span[k].is_fixed || (in->span[k].has_tip && !in->span[0].is_fixed); }
 
 INLINE Two seen_from(Quat q, Vec3 v)
@@ -440,7 +447,7 @@ INLINE Two seen_from(Quat q, Vec3 v)
     return (Two){own.y, own.z};
 }
 
-// Twist from frame 1 to frame 2 and its derivative with a turn of frame 2 against frame 1: psi of beam_equations.h, of the nodes' own frames.
+// Twist from frame 1 to frame 2, and its derivative with a rotation of frame 2 relative to frame 1: psi of beam_equations.h, for the nodes' own frames.
 static double frames_twist(const CoaxialInput *in, Vec3 *axis)
 {
     Quat p = quat_mul(quat_conjugate(in->q1), in->q2);
@@ -449,12 +456,12 @@ static double frames_twist(const CoaxialInput *in, Vec3 *axis)
     return 2 * g * p.x;
 }
 
-typedef struct Bent {        // an element's end moments: half their squares and their product; what the rest angles' change costs
+typedef struct Bent {        // an element's end moments: half their squares and their product; the energy's derivatives with the rest angles
     double square[3];
     Two by[2];
 } Bent;
 
-// [mJ] of the energy with something that changes `rest` by s.
+// [mJ] The derivative of the energy with an unknown, from `s`, the derivatives of `rest` with that unknown.
 static double energy_slope(const Bent *b, const CoaxialSlope *s)
 {
     return s->waste - (b->square[0] * s->flexibility[0] + b->square[1] * s->flexibility[1] + b->square[2] * s->flexibility[2]) + b->by[0].y * s->angle[0][0] +
@@ -557,23 +564,23 @@ void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
 
 // --- the tangent ---
 
-// How strain moves with one of the tools' unknowns.
+// The derivatives of the strains with one of the tools' unknowns.
 typedef struct Column {
     Vec3 bend1, bend2;       // end angles, from V_Mp
-    Vec3 moment1, moment2;   // their moments
-    double stretch, twist;   // of all the tools
-    double own_stretch, own_twist; // of its own tool besides
-    double pull, torque;     // what these give together
+    Vec3 moment1, moment2;   // the resulting moments
+    double stretch, twist;   // of all tools together
+    double own_stretch, own_twist; // additional, of its own tool
+    double pull, torque;     // the resulting force and torque
 } Column;
 
-typedef struct Work {        // of one tangent
+typedef struct Work {        // data of one tangent
     const CoaxialInput *in;
     const CoaxialOutput *out;
-    double scale, axial, torsion;              // of all tools
+    double scale, axial, torsion;              // sums over all tools
     double spin[2][COAXIAL_TOOLS_MAX];         // [N mm] about the nodes' tangents
     bool is_wanted[COAXIAL_TOOLS_MAX];
     Column column[COAXIAL_COLUMNS];
-    int full[COAXIAL_COLUMNS], full_count;     // columns that move the end angles and are no other's opposite
+    int full[COAXIAL_COLUMNS], full_count;     // columns that change the end angles and are not the negative of another column
 } Work;
 
 static void nodes_tangent(const Work *w, const double spin[2], BeamTangent *tangent)
@@ -603,7 +610,7 @@ static void add_pair(CoaxialTangent *t, int a, int b, double sign, const double 
     own[4 * a + COAXIAL_PHI2][4 * b + COAXIAL_PHI2] += sign * h[2];
 }
 
-// Tools stretched differently where the line is bent, piece by piece: |q|^2 (sum b y^2 - (sum b y)^2 / B).
+// The stiffness from tools that are stretched differently where the line is bent, piece by piece: |q|^2 (sum b y^2 - (sum b y)^2 / B).
 static void add_sharing(const CoaxialInput *in, const CoaxialOutput *out, CoaxialTangent *t)
 {
     const CoaxialRest *rest = &out->rest;
@@ -628,7 +635,7 @@ static void add_sharing(const CoaxialInput *in, const CoaxialOutput *out, Coaxia
         }
 }
 
-// The force on a border changes as it goes from one element to the next: with S at the node between.
+// The force on a border changes while the border passes from one element to the next, with S at the node between them.
 static void add_soft(const CoaxialRest *rest, CoaxialTangent *t)
 {
     for (int n = 0; n < rest->soft_count; n++) {
@@ -639,11 +646,12 @@ static void add_soft(const CoaxialRest *rest, CoaxialTangent *t)
 
 INLINE void put_rows(double (*row)[COAXIAL_COLUMNS], int column, Vec3 v) { row[0][column] = v.x, row[1][column] = v.y, row[2][column] = v.z; }
 
-// Angle of a chord at the node where the rest chord turns by w, and the same for a moment backwards: B of beam_equations.h and its transpose.
+// The change of a chord's angle at a node when the rest chord rotates by w, and its transpose for a moment: B of beam_equations.h.
 INLINE Vec3 by_turn(Vec3 e, Vec3 t, Vec3 w) { return vec3_add_scaled(vec3_scale(w, vec3_dot(e, t)), -vec3_dot(e, w), t); }
 INLINE Vec3 by_turn_back(Vec3 e, Vec3 t, Vec3 m) { return vec3_add_scaled(vec3_scale(m, vec3_dot(e, t)), -vec3_dot(t, m), e); }
 
-// Spin about a node's tangent, tool by tool; the last curved one has the rest, so that a single one has what beam_equations.h gives it. Positive parts.
+// The stiffness against spin about a node's tangent, tool by tool. The last curved tool receives the remainder, so that a single tool has the value of
+// beam_equations.h. Only positive parts are kept.
 static void set_spin(Work *w, double all[2])
 {
     const CoaxialOutput *out = w->out;
@@ -668,7 +676,7 @@ static void set_spin(Work *w, double all[2])
     }
 }
 
-// Only the torsion of a straight tool.
+// The column of a straight tool's angle: torsion only.
 static void add_torsion_column(Work *w, int p, CoaxialTangent *tangent)
 {
     double sign = p % 4 == COAXIAL_PHI2 ? 1 : -1, torque = sign * w->out->rest.torsion[p / 4];
@@ -678,7 +686,7 @@ static void add_torsion_column(Work *w, int p, CoaxialTangent *tangent)
     put_rows(tangent->cross + 9, p, on);
 }
 
-// How strain moves with unknown p, and with it the nodes' forces.
+// The derivatives of the strains with unknown p, and of the nodes' forces.
 static void add_column(Work *w, int p, CoaxialTangent *tangent)
 {
     const CoaxialInput *in = w->in;
@@ -739,7 +747,7 @@ static void multiply_columns(const Work *w, CoaxialTangent *tangent)
         for (int b = 0; b <= a; b++) {
             int q = w->full[b];
             const Column *d = &w->column[q];
-            // over all tools, (all + own) squared: pull and torque have their own part in them once
+            // the sum over all tools of (all + own)^2: pull and torque already contain the own part once
             double value = vec3_dot(c->moment1, d->bend1) + vec3_dot(c->moment2, d->bend2) + d->pull * c->stretch + stretch_pull * d->stretch +
                            d->torque * c->twist + twist_torque * d->twist;
             if (q / 4 == k)
@@ -770,7 +778,7 @@ static void multiply_columns(const Work *w, CoaxialTangent *tangent)
     }
 }
 
-// Tips into the unknowns that they have; nothing for what is fixed.
+// Transforms the columns of tips to the unknowns that tips have, and clears those of fixed spans.
 static void settle_columns(const CoaxialInput *in, CoaxialTangent *tangent)
 {
     int columns_count = 4 * in->count;
@@ -793,7 +801,7 @@ static void settle_columns(const CoaxialInput *in, CoaxialTangent *tangent)
 
 void coaxial_tangent(const CoaxialInput *in, const CoaxialOutput *out, double scale, CoaxialTangent *tangent)
 {
-    SEL_ASSERT(scale > 0 && out->rest.count == in->count, "the element was computed, and its stiffness counts");
+    SEL_ASSERT(scale > 0 && out->rest.count == in->count, "coaxial_element() was called first, and the scale is positive");
     const CoaxialRest *rest = &out->rest;
     int count = in->count;
     Work w;

@@ -1,5 +1,5 @@
-// The equations of coaxial.c where all tools are straight: one piece, no rest angles, no waste. With b_k = EI_k / l_k, B = sum b_k, S = sum kappa G A_k l_k:
-//   F11 = F22 = 1 / (3 B) + 1 / S,  F12 = -1 / (6 B) + 1 / S,  their slopes with l_k:  b_k / (B^2 l_k) (1/3 or -1/6) - kappa G A_k / S^2
+// The equations of coaxial.c for straight tools only: one piece, no rest angles, W = 0. With b_k = EI_k / l_k, B = sum b_k, S = sum kappa G A_k l_k:
+//   F11 = F22 = 1 / (3 B) + 1 / S,  F12 = -1 / (6 B) + 1 / S,  derivatives with l_k:  b_k / (B^2 l_k) (1/3 or -1/6) - kappa G A_k / S^2
 #include "solver/coaxial_lanes.h"
 
 #include "base/base.h"
@@ -16,7 +16,7 @@ enum { LANES = COAXIAL_LANES };
 INLINE Vec3 get3(double (*row)[LANES], int l) { return vec3(row[0][l], row[1][l], row[2][l]); }
 INLINE void put3(double (*row)[LANES], int l, Vec3 v) { row[0][l] = v.x, row[1][l] = v.y, row[2][l] = v.z; }
 
-typedef struct Mixed {       // the tools of an element together
+typedef struct Mixed {       // quantities of all tools of the element together
     double axial[COAXIAL_TOOLS_MAX], torsion[COAXIAL_TOOLS_MAX], own[COAXIAL_TOOLS_MAX];
     double all_axial, all_torsion, bending, shear, length, turn, near, far;
 } Mixed;
@@ -67,7 +67,7 @@ INLINE void put_blocks(CoaxialTile *t, int l, const double n[N_ROWS], const doub
 
 INLINE Vec3 turned_into(Quat q, Vec3 v) { return quat_rotate(quat_conjugate(q), v); }
 
-// How strain moves with S of a tool, and with it the nodes' forces: add_column() of coaxial.c.
+// The derivatives of the strains with S of a tool, and of the nodes' forces: add_column() of coaxial.c.
 typedef struct Slide {
     Vec3 bend1, bend2, moment1, moment2;
     double stretch, twist, pull, torque;
@@ -97,7 +97,7 @@ INLINE void find_lane(CoaxialTile *t, int l, const int count, double scale)
     put3(t->force + 6, l, o.force2);
     put3(t->force + 9, l, o.moment2);
 
-    // what bends the tools
+    // bending of the tools
     Vec3 m1 = vec3_add(vec3_scale(o.angle1, m.near), vec3_scale(o.angle2, m.far)), m2 = vec3_add(vec3_scale(o.angle2, m.near), vec3_scale(o.angle1, m.far));
     double stiff = 0;
     UNROLL_ALL
@@ -112,7 +112,7 @@ INLINE void find_lane(CoaxialTile *t, int l, const int count, double scale)
 
     double square1 = 0.5 * vec3_norm2(m1), square12 = vec3_dot(m1, m2), square2 = 0.5 * vec3_norm2(m2), psi = o.torque / m.all_torsion - m.turn;
     double strain = o.tension / m.all_axial + m.length, held_bending = 0, held_tension = 0;
-    // stretched differently where the line is bent: add_sharing()
+    // tools stretched differently where the line is bent: add_sharing()
     Vec3 own1 = turned_into(q1, m1), own2 = turned_into(q2, m2);
     double hy = 0.5 * (own2.y - own1.y), hz = 0.5 * (own2.z - own1.z), sy = own1.y + own2.y, sz = own1.z + own2.z;
     double square = (hy * hy + hz * hz + (sy * sy + sz * sz) * (1.0 / 12)) * m.bending * m.bending;
@@ -173,14 +173,14 @@ void coaxial_tile_find(CoaxialTile *tile, double scale)
     SEL_ASSERT(tile->lanes > 0 && tile->lanes <= LANES && tile->count > 0 && tile->count <= COAXIAL_TOOLS_MAX, "a tile holds elements of some tools");
     static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {SIMD_FORMS(find_1), SIMD_FORMS(find_2), SIMD_FORMS(find_3),
                                                                                           SIMD_FORMS(find_4)};
-    // lanes without an element compute the first one's
+    // lanes without an element repeat the first element
     for (int l = tile->lanes; l < LANES; l++)
         for (double(*row)[LANES] = tile->x1; row < tile->k11; row++)
             (*row)[l] = (*row)[0];
     find_on[tile->count - 1][simd_level()](tile, scale);
 }
 
-// The section from `from` to `to`; NULL where a border is between, or the tool's end unless it `carries`, or where it is curved.
+// The section from `from` to `to`. NULL if a border lies between them, if the section is curved, or if the tool ends there, unless it `carries`.
 static const CoaxialSection *only_section(const CoaxialTool *tool, double from, double to, bool carries)
 {
     const CoaxialSection *section = coaxial_section_at(tool, from), *last = tool->section + tool->count - 1;
@@ -191,7 +191,8 @@ static const CoaxialSection *only_section(const CoaxialTool *tool, double from, 
 bool coaxial_tile_take(CoaxialTile *tile, const CoaxialInput *in)
 {
     SEL_ASSERT(tile->lanes < LANES, "the tile has a lane for another element");
-    SEL_ASSERT(in->count > 0 && in->count <= COAXIAL_TOOLS_MAX && (tile->lanes == 0 || in->count == tile->count), "elements of a tile have as many tools");
+    SEL_ASSERT(in->count > 0 && in->count <= COAXIAL_TOOLS_MAX && (tile->lanes == 0 || in->count == tile->count),
+               "all elements of a tile have the same number of tools");
     const CoaxialSection *section[COAXIAL_TOOLS_MAX];
     for (int k = 0; k < in->count; k++) {
         const CoaxialSpan *p = &in->span[k];

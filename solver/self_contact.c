@@ -1,19 +1,20 @@
-// Which places of the chain touch each other.
+// Finds the contacts of the chain with itself.
 //
-// The curve is the elements' cubics (slot.h). Two elements i < j are a pair where the arc between them is at least 2 pi (r_i + r_j): half a turn of a circle of
-// four radii, tighter than which no wire or catheter bends without a kink (its surface would be strained by a quarter). Nearer along the tool, bending
-// keeps them apart. An arc of length a that turns by theta in all has a chord of a cos(theta/2) at least (both lie in a cone about the
-// direction half-way), so that pairs with less than a right angle between them are 3.4 (r_i + r_j) clear of each other, and need no look.
+// The curve consists of the elements' cubics (slot.h). Two elements i < j form a pair if the arc between them is at least 2 pi (r_i + r_j): half a turn of a
+// circle of four radii. No wire or catheter bends more tightly without a kink (its surface strain would be a quarter). Closer along the tool, bending keeps
+// elements apart. An arc of length a that turns by theta in total has a chord of at least a cos(theta/2) (it stays in a cone about its middle direction). Pairs
+// with less than a right angle between them are therefore 3.4 (r_i + r_j) clear of each other and need no check.
 //
-// The others are found by a tree of spheres over the chain, from leaves of eight elements: linear in their number where the tool is not wound up.
-// Where no pair is near nothing is done until something has travelled as far as what is free.
+// The others are found by a tree of spheres over the chain, with leaves of eight elements; the cost is linear in the number of elements if the tool is not
+// coiled up. While no pair is near, nothing is done until some point has travelled as far as the known clearance.
 //
-// Elements are cut into pieces at their slots, for arcs beside each other may be near at more than one place. Of two pieces the nearest points of the chords
-// say where to look; Newton's method on the cubics finds the place. Each point is a feature: an end of a piece, or its interior; neighbours that find
-// the same two features have found one contact. Both ends are pushed at the point half-way between the surfaces, so that friction makes no moment.
+// Elements are cut into pieces at their slots, because two adjacent arcs may be near at more than one place. The closest points of two pieces' chords are the
+// initial values of Newton's method on the cubics. Each closest point has a feature: an end of a piece, or its interior. If neighbouring pairs find the same
+// two features, they have found one contact. Both contact forces act at the point half-way between the surfaces, so that friction produces no net moment.
 //
-// As with walls, the pairs' planes hold for small motions: the solution's and the followed motion's places are looked at again, and strands that have
-// changed sides count as deep in each other (self_contact_depth). The sheath is no obstacle, and where it holds the tool nothing touches it.
+// As with walls, the pairs' contact planes hold for small motions only. The pairs are therefore checked again at the solution and after the motion that was
+// followed, and strands that have passed through each other count as a deep overlap (self_contact_depth). The sheath is no obstacle, and the held part of the
+// tool touches nothing.
 #include "solver/self_contact.h"
 
 #include "solver/tools_internal.h"
@@ -21,13 +22,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double ARC = 2 * PI;                // of the sum of radii: the least arc between elements that can touch
-static const double SAFE_TURN = 0.5 * PI, SAFE_CHORD = 0.70710678118654752;      // [rad], of the arc
-static const double REACH = 0.1, REACH_MAX = 5, REACH_MIN = 0.01;  // [mm] beyond what speed asks for
-static const double CLOSE = 0.03;                // [mm] pairs that may come as near as this are in the contact solve
-static const double STEP_OUT_MAX = 0.2;          // [mm] as of walls
-static const double PARALLEL = 1e-4;             // sine squared below which chords have no nearest points, but an overlap
-static const double MISSED = 1e-3;               // [mm] that a pair beside the contact solve may overlap
+static const double ARC = 2 * PI;                // of the sum of radii: least arc between elements that can touch
+static const double SAFE_TURN = 0.5 * PI, SAFE_CHORD = 0.70710678118654752;      // [rad]; share of the arc
+static const double REACH = 0.1, REACH_MAX = 5, REACH_MIN = 0.01;  // [mm] search margin beyond the motion expected from the speed
+static const double CLOSE = 0.03;                // [mm] pairs that may come closer than this enter the contact solve
+static const double STEP_OUT_MAX = 0.2;          // [mm] largest overlap removed per step, as for walls
+static const double PARALLEL = 1e-4;             // squared sine below which chords count as parallel: they have an overlap instead of closest points
+static const double MISSED = 1e-3;               // [mm] overlap tolerated for a pair outside the contact solve
 enum { LEAF = 8, LEVELS = 32, REFINE = 2 };
 enum { NEAR_MAX = 2048, TABLE = 8192, PAIRS_MAX = 160, FEATURES_ON = 2 };
 
@@ -37,8 +38,8 @@ typedef struct Sphere {
 } Sphere;
 
 typedef struct Near {
-    int element[2], piece[2], feature[2];    // of point p of the chain: 2 p, of the piece behind it: 2 p + 1
-    double xi[2];                    // of the element
+    int element[2], piece[2], feature[2];    // of point p of the chain: 2 p, of the piece from p to p + 1: 2 p + 1
+    double xi[2];                    // share of the element
     ContactEnd end[2];
     Vec3 normal, force;
     double gap;                      // [mm] at the iterate
@@ -51,24 +52,24 @@ typedef struct Kept {
 
 struct SelfContact {
     // state
-    double clearance;        // [mm] all pairs are at least so far apart
-    double fastest;          // [mm/ms] of the last motion
+    double clearance;        // [mm] lower bound of the distance of all pairs
+    double fastest;          // [mm/ms] largest speed of the last motion
     int kept_count;
     Kept kept[PAIRS_MAX];    // forces of the last solve
     // scratch
     Vec3 *x, *t;             // (M) ends of the elements and tangents there
-    double *length, *along, *turned, *radius, *bulge;    // (M) of an element; the arc and the turning up to its start
-    int first, count;        // elements looked at: first to count - 1
-    double safe;             // [mm] what turning alone keeps free
+    double *length, *along, *turned, *radius, *bulge;    // (M) per element; arc length and accumulated turn up to its start
+    int first, count;        // elements searched: first to count - 1
+    double safe;             // [mm] distance guaranteed by the turning angle alone
     int levels, start[LEVELS + 1], size[LEVELS];
     Sphere *sphere;
     Vec3 *point;             // (P) where the pieces begin, in the order of the chain …
-    bool *laid;              // (M) … of elements that were looked at
-    double reach, look, nearest;     // [mm] looked for; seen; the nearest that is no near one
+    bool *laid;              // (M) … of elements already visited
+    double reach, look, nearest;     // [mm] gap up to which pairs are stored; search range; smallest bound of the pairs not stored
     int near_count;
     Near *near;              // (NEAR_MAX)
-    int table[TABLE];        // 1 + the near pair of two features, by a hash of them
-    int near_of[PAIRS_MAX];  // of a pair in the set
+    int table[TABLE];        // 1 + index of the near pair with two features; hashed
+    int near_of[PAIRS_MAX];  // index in `near` of each pair in the set
 };
 
 bool self_contact_create(Stepper *s)
@@ -146,13 +147,13 @@ static Vec3 end_motion(const Stepper *s, const ContactEnd *end, Vec3 arm, Motion
     return d;
 }
 
-// Of the first end against the second.
+// The displacement of the first end relative to the second.
 static Vec3 pair_motion(const Stepper *s, const ContactEnd end[2], Vec3 normal, Motion motion)
 {
     return vec3_sub(end_motion(s, &end[0], vec3_scale(normal, -end[0].radius), motion), end_motion(s, &end[1], vec3_scale(normal, end[1].radius), motion));
 }
 
-// [mm] no point of the axis moves further. A cubic follows its ends' turns by 4/27 of its length at most.
+// [mm] An upper bound of the displacement of any point of the axis. A cubic responds to its ends' rotations by at most 4/27 of its length each.
 static double largest_travel(const Stepper *s, Motion motion)
 {
     double move = 0, turn = 0, longest = 0;
@@ -169,7 +170,7 @@ static double largest_travel(const Stepper *s, Motion motion)
 
 static Vec3 tangent_of(Quat q) { return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)); }
 
-// Places and tangents at the iterate, or where the solution has them.
+// Sets positions and tangents, at the iterate or at the solution.
 static void lay_curve(Stepper *s, bool would_go)
 {
     SelfContact *c = s->self;
@@ -185,7 +186,7 @@ static void lay_curve(Stepper *s, bool would_go)
         }
     }
     memset(c->laid, 0, (size_t)nodes * sizeof *c->laid);
-    if (s->first_free > 0) {         // the element across the mouth begins there
+    if (s->first_free > 0) {         // the element across the mouth begins at the mouth
         c->x[c->first] = s->entry.mouth;
         c->t[c->first] = s->entry.axis[0];
     }
@@ -265,7 +266,7 @@ static void build_tree(SelfContact *c)
 
 static double clamp(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
-// Nearest points of two chords, as shares of their lengths. Of parallel ones: half-way along what they have beside each other.
+// The closest points of two chords, as shares of their lengths; for parallel chords, the middle of their overlap.
 static void nearest_on_chords(Vec3 p, Vec3 d, Vec3 q, Vec3 e, double xi[2])
 {
     Vec3 r = vec3_sub(p, q);
@@ -296,7 +297,7 @@ static SlotPlace place_on(const SelfContact *c, int e, double xi)
 static int pieces_of(const Stepper *s, int e) { return s->points.slot_start[e + 1] - s->points.slot_start[e] + 1; }
 static int point_at(const Stepper *s, int e) { return e + s->points.slot_start[e]; }
 
-// Where the pieces of an element begin, and the last one ends.
+// The start points of an element's pieces, and the end point of the last one.
 static const Vec3 *lay_pieces(const Stepper *s, int e)
 {
     SelfContact *c = s->self;
@@ -313,10 +314,10 @@ static const Vec3 *lay_pieces(const Stepper *s, int e)
     return point;
 }
 
-// The nearest points of two pieces of cubics, from those of their chords: shares of the elements.
+// The closest points of two pieces of cubics, starting from those of their chords; xi are shares of the elements.
 static void nearest_on_pieces(const Stepper *s, const int e[2], const int piece[2], double xi[2], SlotPlace place[2])
 {
-    SEL_ASSERT(piece[0] >= 0 && piece[0] < pieces_of(s, e[0]) && piece[1] >= 0 && piece[1] < pieces_of(s, e[1]), "elements have these pieces");
+    SEL_ASSERT(piece[0] >= 0 && piece[0] < pieces_of(s, e[0]) && piece[1] >= 0 && piece[1] < pieces_of(s, e[1]), "the pieces exist in their elements");
     const SelfContact *c = s->self;
     const Vec3 *p = lay_pieces(s, e[0]) + piece[0], *q = lay_pieces(s, e[1]) + piece[1];
     nearest_on_chords(p[0], vec3_sub(p[1], p[0]), q[0], vec3_sub(q[1], q[0]), xi);
@@ -334,7 +335,7 @@ static void nearest_on_pieces(const Stepper *s, const int e[2], const int piece[
             return;
         Vec3 r = vec3_sub(place[0].position, place[1].position);
         double a = -vec3_dot(r, place[0].tangent), b = vec3_dot(r, place[1].tangent), between = vec3_dot(place[0].tangent, place[1].tangent);
-        // an end that would leave its piece stays
+        // a point at the end of its piece that would leave it is fixed there
         bool free_a = !((xi[0] <= low[0] && a <= 0) || (xi[0] >= high[0] && a >= 0)), free_b = !((xi[1] <= low[1] && b <= 0) || (xi[1] >= high[1] && b >= 0));
         double det = 1 - between * between;
         if (free_a && free_b && det > 0.01) {
@@ -366,10 +367,10 @@ static ContactEnd end_of(const Stepper *s, int e, const SlotPlace *p)
     return end;
 }
 
-// [mm] between the surfaces, and all about the pair.
+// Computes all data of a pair and returns the gap between the surfaces [mm].
 static double measure_pair(const Stepper *s, const int element[2], const int piece[2], Near *n)
 {
-    SEL_ASSERT(element[0] + 1 < element[1], "neighbours along the tool are no pair: bending keeps them apart");
+    SEL_ASSERT(element[0] + 1 < element[1], "adjacent elements form no pair, because bending keeps them apart");
     const SelfContact *c = s->self;
     SlotPlace place[2];
     nearest_on_pieces(s, element, piece, n->xi, place);
@@ -389,7 +390,7 @@ static double measure_pair(const Stepper *s, const int element[2], const int pie
 
 // --- the search ---
 
-// Is there a pair of the same features? If not, it has the place in the table that is returned.
+// Is a pair with the same features stored? If not, *slot is a free place for it in the table.
 static bool is_known(const SelfContact *c, const Near *n, int *slot)
 {
     unsigned at = ((unsigned)n->feature[0] * 40503u + (unsigned)n->feature[1] * 2654435761u) % TABLE;
@@ -414,7 +415,7 @@ static void look_at_pieces(Stepper *s, const int element[2], const int piece[2])
     }
     if (is_known(c, &n, &slot))
         return;
-    SEL_REQUIRE(c->near_count < NEAR_MAX, "a pair that finds no room is known");
+    SEL_REQUIRE(c->near_count < NEAR_MAX, "a pair is stored already if there is no room");
     c->near[c->near_count++] = n;
     c->table[slot] = c->near_count;
 }
@@ -426,7 +427,7 @@ static void look_at_elements(Stepper *s, int i, int j)
     double radii = c->radius[i] + c->radius[j];
     if (c->turned[j + 1] - c->turned[i] <= SAFE_TURN || c->along[j] - c->along[i + 1] < ARC * radii)
         return;
-    // from the middles first
+    // first, a check of the distance between the elements' middles
     Vec3 between = vec3_scale(vec3_sub(vec3_add(c->x[i], c->x[i + 1]), vec3_add(c->x[j], c->x[j + 1])), 0.5);
     double most = radii + c->bulge[i] + c->bulge[j] + 0.55 * (c->length[i] + c->length[j]), far = c->look + most;
     if (vec3_norm2(between) > far * far) {
@@ -517,7 +518,7 @@ static void look(Stepper *s, double reach)
         look_within(s, c->levels - 1, 0);
         if (c->near_count < NEAR_MAX || c->reach < REACH_MIN)
             break;
-        memset(c->table, 0, sizeof c->table);    // wound up so that there is no room for all
+        memset(c->table, 0, sizeof c->table);    // coiled up: too many pairs to store, so the search range is halved
         c->near_count = 0;
     }
     c->clearance = c->near_count > 0 ? 0 : fmin(c->nearest, c->safe);
@@ -525,7 +526,7 @@ static void look(Stepper *s, double reach)
 
 // --- the set ---
 
-// Forces of before go to the pairs with the same features, or to those nearest: strands slide along each other from piece to piece.
+// Transfers the forces of the last solve to the pairs with the same features, or otherwise the closest features: sliding strands pass from piece to piece.
 static void hand_on_forces(SelfContact *c)
 {
     for (int k = 0; k < c->near_count; k++)
@@ -553,7 +554,7 @@ static double friction_of(const Stepper *s, int e)
     return friction >= 0 ? friction : s->wall_friction;
 }
 
-// [mm] as near as a pair may come in this step.
+// [mm] An estimate of the smallest gap of a pair in this step.
 static double expected_gap(const Stepper *s, const Near *n)
 {
     double gap = n->gap;
@@ -562,7 +563,7 @@ static double expected_gap(const Stepper *s, const Near *n)
     return fmin(gap, gap + 2 * vec3_dot(pair_motion(s, n->end, n->normal, by_speed), n->normal));
 }
 
-// The pairs that may close; where there are too many of them, those that overlap most.
+// Fills the set with the pairs that may close; if there are too many, with those of the smallest expected gaps.
 static void fill_set(Stepper *s)
 {
     SelfContact *c = s->self;
@@ -638,7 +639,7 @@ bool self_contact_misses(Stepper *s)
 
 bool self_contact_is_near(const Stepper *s) { return s->self && s->self->near_count > 0; }
 
-// [mm] in each other; > both radii: one has gone through the other.
+// [mm] The overlap of a pair; more than the sum of both radii: one strand has passed through the other.
 static double depth_of(const Stepper *s, const Near *was)
 {
     Near n;
@@ -686,7 +687,7 @@ void self_contact_keep_forces(Stepper *s)
     if (!c)
         return;
     c->kept_count = 0;
-    SEL_ASSERT(s->system.set.pair_count <= PAIRS_MAX, "there is room to keep the forces of all pairs");
+    SEL_ASSERT(s->system.set.pair_count <= PAIRS_MAX, "the forces of all pairs fit the array");
     for (int k = 0; k < s->system.set.pair_count; k++) {
         const Near *n = &c->near[c->near_of[k]];
         if (vec3_norm2(s->system.set.pair[k].force) > 0)
@@ -749,7 +750,7 @@ void self_contact_restore(Stepper *s, const void *from)
         return;
     Saved saved;
     memcpy(&saved, from, sizeof saved);
-    SEL_REQUIRE(saved.kept_count >= 0 && saved.kept_count <= PAIRS_MAX, "a checkpoint keeps no more pairs than there is room for");
+    SEL_REQUIRE(saved.kept_count >= 0 && saved.kept_count <= PAIRS_MAX, "the pairs of a checkpoint fit the array");
     c->clearance = saved.clearance;
     c->fastest = saved.fastest;
     c->kept_count = saved.kept_count;
@@ -760,7 +761,7 @@ int self_contact_numbers(const Stepper *s) { return s->self ? 5 * s->self->kept_
 
 double self_contact_number(const Stepper *s, int k)
 {
-    SEL_ASSERT(k >= 0 && k < self_contact_numbers(s), "a number of a pair that is kept");
+    SEL_ASSERT(k >= 0 && k < self_contact_numbers(s), "the number belongs to a stored pair");
     const Kept *kept = &s->self->kept[k / 5];
     const double number[5] = {kept->feature[0], kept->feature[1], kept->force.x, kept->force.y, kept->force.z};
     return number[k % 5];

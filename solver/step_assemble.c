@@ -3,8 +3,8 @@
 //   A = M/h^2 + D/h + K,   D = alpha M + beta K_main,   K = K_main + positive part of the geometric stiffness + the wall's curvature
 //   A u = A u_k + r(x_k),   r = M (v/h + g) - (M/h^2 + alpha M/h) u_k + f(x_k) + f_ext - beta/h J' C (strain(x_k) - strain(x_n)),   u = x_{n+1} - x_n
 //
-// Unknowns are six a node in space axes; for nodes in the sheath they are in the line's axes, so that "stays on the line" is unit rows.
-// Reactions are read from node 0's rows as they were before its constraints.
+// Each node has six unknowns, in space axes. Nodes in the sheath use the axes of the sheath's line instead, so that the constraint to the line is a set of unit
+// rows. Reactions are computed from node 0's rows as saved before its constraints were applied.
 #include "solver/tools_internal.h"
 #include "base/base.h"
 
@@ -20,7 +20,7 @@ static void load_pose(const Vec3 *restrict position, const Quat *restrict orient
         qw[i] = orientation[i].w, qx[i] = orientation[i].x, qy[i] = orientation[i].y, qz[i] = orientation[i].z;
 }
 
-// What acts on the nodes' mass: v/h + g, less what the iterate has used up of it.
+// Accelerations that multiply the nodes' mass: v/h + g, minus `rate` times the displacement that the iterate has already made.
 static void load_inertia(Stepper *s, double rate)
 {
     const BeamInertia *m = &s->beam.inertia;
@@ -41,10 +41,10 @@ static void load_inertia(Stepper *s, double rate)
 
 static void add_vec(double *at, Vec3 v) { at[0] += v.x, at[1] += v.y, at[2] += v.z; }
 
-// The elements between free nodes, their inertia and gravity.
+// The elements between free nodes, with the inertia and gravity of these nodes.
 static void free_nodes(Stepper *s, double scale, double inertia)
 {
-    SEL_ASSERT(s->first_free >= 0 && s->first_free < s->state.node_count, "some node is outside the sheath");
+    SEL_ASSERT(s->first_free >= 0 && s->first_free < s->state.node_count, "at least one node is outside the sheath");
     int first = s->first_free, count = s->state.node_count;
     size_t from = row_of(s, first), to = row_of(s, count);
     load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
@@ -60,7 +60,7 @@ static void free_nodes(Stepper *s, double scale, double inertia)
         s->system.b[k] += s->system.product[k];
 }
 
-// Axial and torsional chain behind the mouth; lateral rows are unit rows.
+// Nodes in the sheath form a chain that is only axial and torsional; their lateral rows are unit rows.
 static void sheath_nodes(Stepper *s, double scale, double inertia)
 {
     SEL_ASSERT(s->system.chain.size == 6, "nodes of a single tool have six unknowns");
@@ -90,7 +90,8 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
     }
 }
 
-// Between the last held node and the first free one. Clamped at the mouth it turns little in a step: its damping is that of the displacement.
+// The element between the last held node and the first free one. It is clamped at the mouth and turns little in a step, so its damping force is
+// the tangent times the displacement, not computed from the change of strain.
 static void mouth_element(Stepper *s, double scale)
 {
     SEL_ASSERT(s->first_free > 0 && s->first_free < s->state.node_count, "an element goes through the mouth");
@@ -193,7 +194,8 @@ static void clear_held(Stepper *s)
         memset(s->system.chain.lower, 0, block_of(s, held - 1) * sizeof(double));
 }
 
-// Where the whole tool is held, what is past the mouth of its tip is not straightened: a constant force over this step's way.
+// The whole tool is held, and its tip may extend past the mouth. The part past the mouth is not straightened; the straightening force is applied as a constant
+// over this step, scaled by the share of the step's travel that lies past the mouth.
 static void tip_at_mouth(Stepper *s)
 {
     SEL_ASSERT(s->first_free > 1, "the whole tool is in the sheath, and it has an element");
@@ -261,7 +263,7 @@ double stepper_stiffness_damping(Stepper *s)
     }
     if (first == 0 || first > last)
         return work;
-    // the mouth's element is damped by its displacement: u' K u
+    // the element at the mouth is damped by its displacement: u' K u
     BeamTangent with, without;
     sheath_tangent(&s->beam.rest, first - 1, s->entry.axis[0], &s->system.mouth_element, 1 + rate, &with, column);
     sheath_tangent(&s->beam.rest, first - 1, s->entry.axis[0], &s->system.mouth_element, 1, &without, column);

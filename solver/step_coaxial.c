@@ -1,8 +1,8 @@
-// The linear system of coaxial tools: what step_assemble.c does for one tool, with coaxial elements (coaxial.c). Unknowns of a node: position and rotation,
-// then for each tool i inside, material coordinate and angle, at 6 + 2 i and 7 + 2 i. In the sheath, as for one tool, axial displacement (0) and turn (3).
+// The linear system of coaxial tools: the counterpart of step_assemble.c with coaxial elements (coaxial.c). Unknowns of a node: position and rotation, then for
+// each tool i inside, material coordinate and angle, at 6 + 2 i and 7 + 2 i. In the sheath, as for one tool, axial displacement (0) and rotation (3).
 //
-// Mass: all tools at a node move together across the tangent t; along it each has its own velocity, t . dx/dt - dS/dt for one that lies inside, and its
-// own spin, t . omega + dphi/dt. What S carries from node to node (convection) is left out: of order v^2 dm/ds.
+// Mass: all tools at a node move together across the tangent t. Along it each has its own velocity, t . dx/dt - dS/dt for a tool inside, and its own spin,
+// t . omega + dphi/dt. Convection, the momentum carried from node to node with S, is neglected: it is of order v^2 dm/ds.
 #include "solver/coaxial_lanes.h"
 #include "base/base.h"
 #include "solver/tools_internal.h"
@@ -10,8 +10,8 @@
 #include <string.h>
 
 enum { NODAL = 12 };
-static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
-static const double SOFT = 0.02;         // … over which, to either side, a border of one tool passes one of another. Less than where a node joins the chain
+static const double SHORTEST = 0.01;     // of an element: least length assumed outside a mouth or a tip
+static const double SOFT = 0.02;         // … over which, to either side, a border of one tool passes one of another; less than JOIN of step_tools.c
 
 // Does the section of the tool that carries node c change there, or end?
 static bool is_border(const Stepper *s, int c)
@@ -21,20 +21,20 @@ static bool is_border(const Stepper *s, int c)
     return c > 0 && !is_at_tip(s, c - 1) && s->wire.section[c - 1] != s->wire.section[c];
 }
 
-// [mm] to either side of node c over which an inner tool's borders pass the carrier's, the same in both elements. The carrier's own border stays where it is:
-// with both of them spread the two would pass each other in each element, and the kink would be there.
+// [mm] The distance to either side of node c over which an inner tool's borders pass the carrier's, the same in both elements. The carrier's own border is not
+// spread: if both were, the two would pass each other in each element, and the kink would reappear there.
 static double soft_at(const Stepper *s, int c)
 {
     double before = c > 0 ? s->wire.length[c - 1] : HUGE_VAL, after = c + 1 < s->state.node_count ? s->wire.length[c] : HUGE_VAL;
     if (!is_border(s, c))
         return 0;
-    // of the longer neighbour; at a tip that is nearly flush there is no more of it than the short one
+    // a share of the longer neighbour; at a nearly flush tip the short element limits it
     double near = fmin(before, after), far = fmax(before < HUGE_VAL ? before : 0, after < HUGE_VAL ? after : 0), soft = fmin(SOFT * far, 0.4 * near);
-    // in the sheath nothing passes: from where the node leaves its line on
+    // zero in the sheath; it grows from where the node leaves the sheath's line
     return c > s->first_free ? soft : fmax(0, fmin(soft, stepper_sheath_coordinate(s, c) - sheath_border_share * before));
 }
 
-// The tools in element c, carrier first; returns their number. tool: which they are.
+// Lists the tools in element c, carrier first, and returns their number. tool: their indices.
 static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
 {
     int count = 0, first = s->tools.carrier[c + 1];
@@ -62,7 +62,7 @@ static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
         }
         tool[count++] = k;
     }
-    // tools that come out of the tip at node c and end before node c + 1 bend there with the one that goes on
+    // tools that emerge from the tip at node c and end before node c + 1 bend there with the tool that continues
     for (int k = s->tools.carrier[c] + 1; k < first; k++)
         if (is_inside(s, c, k)) {
             span[count] = (CoaxialSpan){.tool = &s->tools.tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k), .has_tip = true};
@@ -71,7 +71,7 @@ static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
     return count;
 }
 
-// For the friction between tools: what the tools from each one inwards bear at the middle of an element.
+// For the friction between tools: stores the moment and tension at the middle of the element, each summed over a tool and all tools inside it.
 static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const CoaxialOutput *out, const int *tool)
 {
     int inner = s->state.inner_count;
@@ -102,7 +102,7 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
     }
 }
 
-// Behind a tip the frames of the two nodes belong to two tools: there node 1 is given that of the one that goes on.
+// Beyond a tip, the frames of the element's two nodes belong to two tools; node 1 is then given the frame of the tool that continues.
 static CoaxialInput input_at(const Stepper *s, int c, int *tool)
 {
     const WireState *w = &s->state;
@@ -117,7 +117,7 @@ static CoaxialInput input_at(const Stepper *s, int c, int *tool)
     return in;
 }
 
-// One tool alone, between two of its own nodes.
+// Is the element a single tool between two of its own nodes?
 static bool is_plain(const Stepper *s, int c)
 {
     if (s->tools.carrier[c] != s->tools.carrier[c + 1])
@@ -148,7 +148,7 @@ typedef struct Local {
     double gradient[2 * BLOCK_LARGEST], tangent[2 * BLOCK_LARGEST][2 * BLOCK_LARGEST];
 } Local;
 
-// Where the element's unknowns are among those of its nodes; -1: nowhere.
+// The positions of the element's unknowns among those of its nodes; -1: absent.
 static void places(const CoaxialInput *in, const int *tool, int n, int place[NODAL + COAXIAL_COLUMNS])
 {
     for (int i = 0; i < 6; i++)
@@ -171,7 +171,7 @@ static void clear(Local *local, int n)
         memset(local->tangent[r], 0, (size_t)(2 * n) * sizeof(double));
 }
 
-// What one of an element's own unknowns (12 of the nodes, 4 a tool) is in those of its two nodes, [2 n]: a sum of at most two.
+// One of an element's own unknowns (12 of the nodes, 4 per tool) as a linear combination of at most two unknowns of its two nodes, [2 n].
 typedef struct Way {
     int count;
     int at[2];
@@ -204,7 +204,7 @@ static void add_ways(const Way *way, const CoaxialTangent *t, int columns, Local
 
 static void put(double *at, Vec3 v) { at[0] = v.x, at[1] = v.y, at[2] = v.z; }
 
-// An element whose unknowns are not those of its nodes.
+// Assembles an element whose own unknowns differ from those of its nodes.
 static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, const Way *way, const int *tool, double scale, Local *local)
 {
     int columns = 4 * in->count;
@@ -226,7 +226,7 @@ static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, con
             local->gradient[way[r].at[i]] += own[r] * way[r].by[i];
 }
 
-// Node 2 is one as any: what is not its own is in how node 1 takes part.
+// Node 2 contributes as in any element; only node 1 differs.
 static void far_ways(const CoaxialInput *in, const int *tool, int n, Way way[NODAL + COAXIAL_COLUMNS])
 {
     for (int i = 0; i < 6; i++)
@@ -239,7 +239,7 @@ static void far_ways(const CoaxialInput *in, const int *tool, int n, Way way[NOD
     }
 }
 
-// At a tip node 1 has the frame of the tool that goes on: its turn about the tangent is that tool's angle too.
+// At a tip, node 1 has the frame of the tool that continues, so that tool's angle is part of the node's rotation about the tangent.
 static void tip_ways(const Stepper *s, int c, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
 {
     int on = unknown_of(tool[0]);
@@ -267,7 +267,7 @@ static void tip_element(const Stepper *s, int c, double scale, Local *local)
     element_by_ways(s, c, &in, way, tool, scale, local);
 }
 
-// The tangent of an element between two nodes of the same tool.
+// Adds the tangent of an element between two nodes of the same tool.
 static void add_tangent(const Stepper *s, int c, const CoaxialTangent *t, int columns, const int *place)
 {
     int n = s->system.chain.size;
@@ -380,7 +380,7 @@ static void add_to_chain(const Stepper *s, int c, const Local *local)
 
 static double density(const CoaxialSection *p) { return 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]); }
 
-// [mJ mm] twice integrated over S, from the hub to s, what it takes to straighten a length of a tool; past either end as at that end.
+// [mJ mm] The energy per length to straighten a tool, integrated twice over S from the hub to s; beyond either end, the value per length at that end applies.
 static double straightened_twice(const Tool *t, double s)
 {
     const CoaxialSection *p = t->section, *last = p + t->coaxial.count - 1;
@@ -394,7 +394,8 @@ static double straightened_twice(const Tool *t, double s)
     }
 }
 
-// [mJ] once integrated, and averaged over the width of a border: a border that passes the mouth changes the push over that way, and not within a step.
+// [mJ] The same energy integrated once, averaged over the width of a border: a border that passes the mouth changes the push over that distance instead of
+// within one step.
 static double straightened_before(const Tool *t, double s)
 {
     return (straightened_twice(t, s + 0.5 * t->border) - straightened_twice(t, s - 0.5 * t->border)) / t->border;
@@ -406,7 +407,7 @@ static double straightened(const Tool *t, double a, double b)
     return a < end ? straightened_before(t, end) - straightened_before(t, a) : 0;
 }
 
-// [N] what it takes to straighten a length of a tool, and *slope [N/mm] with S.
+// [N] The force to straighten a tool, and *slope [N/mm], its derivative with S.
 static double straightening(const Tool *t, double s, double *slope)
 {
     const CoaxialSection *from = coaxial_section_at(&t->coaxial, s - 0.5 * t->border), *to = coaxial_section_at(&t->coaxial, s + 0.5 * t->border);
@@ -434,20 +435,20 @@ Vec3 tools_tip_curvature(const Stepper *s)
     return quat_rotate(s->state.orientation[last], vec3(0, -p->curve[1], p->curve[0]));
 }
 
-// Between two nodes in the sheath every tool is a spring along and one about the line, between what w = side x_b - x_a is at its two nodes: x_a the node's place
-// or turn, x_b the tool's S or angle there.
+// Between two nodes in the sheath, each tool is one spring along the line and one about it. The spring acts on the difference of w = side x_b - x_a between the
+// two nodes: x_a is the node's position or rotation, x_b the tool's S or angle there.
 typedef struct Spring {
     int a, b[2];             // unknowns of the two nodes; b < 0: none
     double side, stiffness, force;   // 1 or -1, [N/mm] or [N mm], [N] or [N mm]
-    double drawn;            // [N] of the tool along S at node 1: a border of its sections inside changes the stiffness as it goes through
+    double drawn;            // [N] along S at node 1: a section border of the tool inside changes the stiffness as it moves
 } Spring;
 
-// Returns their number, at most two a tool. spring: NULL where the energy alone is wanted.
+// Returns the number of springs, at most two per tool. spring: NULL if only the energy is wanted.
 static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring, double *energy)
 {
     int tool[STEP_TOOLS_MAX], inner = s->state.inner_count, count = 0;
     CoaxialInput in = input_at(s, c, tool);
-    // input_at() has turned node 1 at a tip
+    // relative to node 1 as input_at() rotated it at a tip
     double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c);
     double psi = tools_twist(s, c) - (is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0);
     *energy = 0;
@@ -467,14 +468,14 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
         for (int k = 0; k < tool[i]; k++)
             s->tools.tension[c * inner + k] += own.axial * strain;
         double tension = own.axial * strain, torque = own.torsion * turn, drawn = -0.5 * (tension * tension * own.drawn[0] + torque * torque * own.drawn[1]);
-        int b = p->is_fixed ? -1 : at, beyond = i == 0 ? -1 : at;     // beyond a tip the tool that goes on is the node itself
+        int b = p->is_fixed ? -1 : at, beyond = i == 0 ? -1 : at;     // at node 2 the carrier's S and angle are the node's own
         spring[count++] = (Spring){0, {b, beyond}, 1, scale * own.axial, own.axial * strain, drawn};
         spring[count++] = (Spring){3, {b < 0 ? -1 : b + 1, beyond < 0 ? -1 : beyond + 1}, -1, scale * own.torsion, own.torsion * turn, 0};
     }
     return count;
 }
 
-// stiffness times the product of w's slopes at nodes `row` and `column`, 0 or 1
+// stiffness times the product of w's derivatives at nodes `row` and `column`, 0 or 1
 static void add_products(double *block, int n, const Spring *p, int row, int column, double stiffness)
 {
     int r = p->b[row], c = p->b[column];
@@ -494,7 +495,7 @@ static void add_slopes(double *x, const Spring *p, int node, double by)
         x[p->b[node]] += p->side * by;
 }
 
-// As element().
+// The same interface as element().
 static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool adds, double *gradient, const double *u, double *product)
 {
     Spring spring[2 * STEP_TOOLS_MAX];
@@ -521,7 +522,7 @@ static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool 
     }
 }
 
-// The element across the mouth: from there to the next node, with the tools' coordinates at the mouth, S at the node behind it less that node's place.
+// The element across the mouth: from the mouth to the next node. A tool's coordinate at the mouth is S at the node behind it minus that node's coordinate.
 static CoaxialInput mouth_input(const Stepper *s, int *tool)
 {
     int c = s->first_free - 1;
@@ -545,7 +546,7 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
 static void mouth_ways(const Stepper *s, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
 {
     const double d[3] = {s->entry.axis[0].x, s->entry.axis[0].y, s->entry.axis[0].z};
-    bool at_tip = is_at_tip(s, s->first_free - 1);       // then the tool that goes on has a place and an angle at that node too
+    bool at_tip = is_at_tip(s, s->first_free - 1);       // then the continuing tool has S and an angle at that node too
     int on = unknown_of(tool[0]) + 1;
     far_ways(in, tool, s->system.chain.size, way);
     for (int i = 0; i < 3; i++) {
@@ -569,7 +570,8 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
     element_by_ways(s, c, &in, way, tool, scale, local);
 }
 
-// What lies straight behind the mouth gets longer with S there. `scale` of the tangent as of elements; less of it where a border would push the tool on.
+// The straightened length of a tool behind the mouth grows with S there. The tangent is scaled as for elements; it omits a negative slope, where a border would
+// push the tool forwards.
 static void add_straightening(const Stepper *s, double scale, double *gradient)
 {
     int n = s->system.chain.size;
@@ -591,7 +593,7 @@ static void add_straightening(const Stepper *s, double scale, double *gradient)
 
 // --- mass ---
 
-// [mm] of the curve that belong to node c.
+// [mm] The length of the curve that belongs to node c.
 static double tributary(const Stepper *s, int c)
 {
     double length = 0;
@@ -613,13 +615,13 @@ static Lump lump_at(const Stepper *s, int c, int k)
         return (Lump){s->wire.mass[c], s->wire.inertia_axial[c], s->wire.inertia_lateral[c]};
     double at = slide_at(s, c, k), length = fmin(tributary(s, c), fmax(0, t->wire.total_length - at));
     int section = (int)(coaxial_section_at(&t->coaxial, at) - t->section);
-    // never nothing: rows of S and phi stay positive definite
+    // never zero, so that the rows of S and phi stay positive definite
     length = fmax(length, SHORTEST * tributary(s, c));
     return (Lump){t->line_mass[section] * length, 2 * t->line_inertia[section] * length, t->line_inertia[section] * length};
 }
 
-// Momentum of one motion of a tool at a node, `along` its tangent or about it: what the node's unknowns have of it, and the tool's own unknown `at` where it is
-// inside (0: where it is not) with the sign `own`, moves at `speed` [per ms] and is pushed by `push` [per ms2].
+// The momentum of one motion of a tool at a node, along its tangent or about it. The node's unknowns contribute from `first` on, and if the tool is inside, its
+// own unknown `at` (0: not inside) with the sign `own`. It moves at `speed` [per ms] and is driven by `push` [per ms2].
 typedef struct Motion {
     int first, at;
     double own, speed, push;
@@ -649,7 +651,7 @@ static void add_along(Stepper *s, int c, double inertia, double mass, Vec3 t, bo
     }
 }
 
-// The same of all tools together across the tangent.
+// The same for all tools together, across the tangent.
 static void add_across(Stepper *s, int c, double inertia, double mass, Vec3 t, int first, Vec3 speed, Vec3 push)
 {
     int n = s->system.chain.size;
@@ -707,7 +709,7 @@ double tools_kinetic_energy(const Stepper *s)
 
 // --- tips ---
 
-// The tools from node c on, in the element there or, at a free end, beyond it; what strains that element.
+// The tools that continue from node c, in the element there or, at a free end, beyond it; and the strains of that element.
 static CoaxialInput going_on(const Stepper *s, int c, CoaxialOutput *out)
 {
     int tool[STEP_TOOLS_MAX];
@@ -724,7 +726,7 @@ static CoaxialInput going_on(const Stepper *s, int c, CoaxialOutput *out)
     return in;
 }
 
-// The tools at a distance d [mm] from node 1 of an element, where its frame is q: their bending and shear stiffness, and the moment of their rest shapes.
+// Bending and shear stiffness of the tools at a distance d [mm] from node 1 of an element, where its frame is q; returns the moment of their rest shapes.
 static Vec3 stiffness_at(const CoaxialInput *in, double d, Quat q, double *bending, double *shear)
 {
     Vec3 sum = vec3(0, 0, 0);
@@ -763,7 +765,7 @@ ToolNode tools_further(const Stepper *s, int c, double d, bool strains)
         node.position = vec3_add_scaled(node.position, ds, vec3_add_scaled(slant, 1 + stretch, tangent));
         node.orientation = quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0)));
     }
-    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;      // input_at()
+    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;      // by which input_at() rotated node 1
     node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(-turned, 0, 0))));
     return node;
 }
@@ -777,9 +779,10 @@ double tools_strained_length(const Stepper *s, int c)
     return tools_span_length(s, c) + out.tension[0] / out.rest.axial[0];
 }
 
-// --- all of it ---
+// --- assembly ---
 
-// Gradient of element c [2 n]. Its tangent, the main stiffness times `scale`, goes to the chain where that is wanted, and times u to `product`, unless NULL.
+// Computes the gradient of element c [2 n]. Its tangent, with the main stiffness times `scale`, is added to the chain if `adds`; the tangent times u is stored
+// in `product` unless that is NULL.
 static void element(const Stepper *s, int c, double scale, bool adds, double *gradient, const double *u, double *product)
 {
     Local local;
@@ -805,7 +808,7 @@ static void element(const Stepper *s, int c, double scale, bool adds, double *gr
     memcpy(gradient, local.gradient, 2 * (size_t)s->system.chain.size * sizeof *gradient);
 }
 
-// How element c has turned as a whole in this step; at the mouth it is clamped.
+// The rotation of element c as a whole in this step; at the mouth it is clamped.
 static Quat turned_as_a_whole(const Stepper *s, int c)
 {
     if (c < s->first_free)
@@ -816,7 +819,8 @@ static Quat turned_as_a_whole(const Stepper *s, int c)
     return quat_unit((Quat){turn[0].w + same * turn[1].w, turn[0].x + same * turn[1].x, turn[0].y + same * turn[1].y, turn[0].z + same * turn[1].z});
 }
 
-// What element c's unknowns have done in this step, its turn as a whole apart: in the linearised sense what strains it, however far it has turned.
+// The displacement of element c's unknowns in this step without its rotation as a whole: this part strains the element, in the linearised sense, however far it
+// has turned.
 static void strained(const Stepper *s, int c, double *u)
 {
     int n = s->system.chain.size;
@@ -834,7 +838,7 @@ static void strained(const Stepper *s, int c, double *u)
     }
 }
 
-// The damping's force on an iterate: what the element's tangent with it has more than the elastic one.
+// The damping force at an iterate: the difference between the element's tangent with damping and its elastic one, times the displacement.
 static void add_damping(const Stepper *s, int c, double scale, double *force)
 {
     double u[2 * BLOCK_LARGEST], with[2 * BLOCK_LARGEST], without[2 * BLOCK_LARGEST], unused[2 * BLOCK_LARGEST];
@@ -847,7 +851,7 @@ static void add_damping(const Stepper *s, int c, double scale, double *force)
 
 // --- elements of straight tools ---
 
-typedef struct Batch {       // what a tile has: which elements, and which tools in them
+typedef struct Batch {       // the elements of a tile, and the tools in them
     CoaxialTile tile;
     int element[COAXIAL_LANES], tool[COAXIAL_LANES][STEP_TOOLS_MAX];
 } Batch;
@@ -895,7 +899,7 @@ static void add_lane(const Stepper *s, const Batch *batch, int l)
     }
 }
 
-// y += `sign` times the tangent times u, both [2 n].
+// y += `sign` times the tangent times u; u and y are [2 n].
 static void multiply_lane(const Batch *batch, int l, int n, double sign, const double *u, double *y)
 {
     const CoaxialTile *t = &batch->tile;
@@ -944,7 +948,7 @@ static void lane_gradient(const Batch *batch, int l, int n, double *gradient)
     }
 }
 
-// As keep_inner().
+// As keep_inner(), for one lane.
 static void keep_lane(const Stepper *s, const Batch *batch, int l)
 {
     const CoaxialTile *t = &batch->tile;
@@ -961,7 +965,7 @@ static void keep_lane(const Stepper *s, const Batch *batch, int l)
         }
 }
 
-// The elements of the tile go to the system; it is empty then.
+// Adds the elements of the tile to the system and empties the tile.
 static void add_batch(Stepper *s, Batch *batch, double scale)
 {
     CoaxialTile *t = &batch->tile;
@@ -980,7 +984,7 @@ static void add_batch(Stepper *s, Batch *batch, double scale)
             multiply_lane(batch, l, n, 1, u, force[l]);
         }
     }
-    if (damps)               // less the elastic part
+    if (damps)               // minus the elastic part
         coaxial_tile_find(t, 1);
     for (int l = 0; l < t->lanes; l++) {
         double *b = s->system.b + row_of(s, batch->element[l]);
@@ -1041,7 +1045,7 @@ void tools_assemble(Stepper *s, double scale, double inertia)
     add_batch(s, &batch, scale);
     if (!s->iterate.is_moved)
         tools_slides(s);
-    static const int lateral[4] = {1, 2, 4, 5};      // in the sheath nothing has been added to these rows and columns
+    static const int lateral[4] = {1, 2, 4, 5};      // in the sheath these rows and columns are empty
     for (int c = 0; c < s->first_free; c++)
         for (int i = 0; i < 4; i++)
             s->system.chain.diag[block_of(s, c) + (size_t)((s->system.chain.size + 1) * lateral[i])] = 1;
@@ -1051,7 +1055,7 @@ double tools_elastic_energy(const Stepper *s)
 {
     double energy = 0;
     int tool[STEP_TOOLS_MAX];
-    // behind the hub all tools lie straight in the hands
+    // behind the hub all tools are held straight by the hands
     for (int k = 1; s->first_free > 0 && k < s->tools.count; k++)
         energy += straightened(&s->tools.tool[k], 0, slide_at(s, 0, k));
     for (int c = 0; c + 1 < s->state.node_count; c++) {

@@ -1,4 +1,4 @@
-// A stepper and its arrays: all that a step will need is allocated here.
+// Creates a stepper and allocates every array that a step needs.
 #include "solver/self_contact.h"
 #include "solver/tools_internal.h"
 
@@ -60,7 +60,7 @@ static bool make_slots(Stepper *s, const WireOptions *o)
     s->points.slot_start = calloc((size_t)w->node_count, sizeof *s->points.slot_start);
     if (!s->points.slot_start)
         return false;
-    if (s->tools.count > 1) {         // room for all; which of them there are: tools_chain()
+    if (s->tools.count > 1) {         // room for all of them; tools_chain() chooses which exist
         s->points.count = w->node_count + s->points.slot_count;
         return (s->points.slot = calloc((size_t)s->points.slot_count + 1, sizeof *s->points.slot)) != NULL;
     }
@@ -101,7 +101,7 @@ static bool allocate(Stepper *s)
     s->query.which = calloc(4 * points + m, sizeof *s->query.which);
     s->points.room = calloc(4 * points + m, sizeof *s->points.room);
     s->system.set.point = calloc(2 * points, sizeof *s->system.set.point);
-    s->system.set.capacity = 2 * s->points.count;       // each with the wall across
+    s->system.set.capacity = 2 * s->points.count;       // each may have a second contact, with the opposite wall
     s->system.factor = block_factor_create(s->wire.node_count, size);
     s->system.set.slide = calloc(inner + 1, sizeof *s->system.set.slide);
     s->system.solver = contact_solver_create(s->wire.node_count, size, s->system.set.capacity + (int)inner);
@@ -138,9 +138,9 @@ static bool allocate(Stepper *s)
     return true;
 }
 
-// Nothing would tell a straight wire on the axis of a straight tube, pushed against its end, which way to buckle. So its last element is not quite
-// straight: it turns by this at rest, towards e2. Hardly more than rounding does to a wire that lies askew; 1e-7 would lift a stiff tip off a plane.
-// Without walls a wire is as straight as it says: rolled up by an end moment that keeps its direction it would leave the plane.
+// A straight wire on the axis of a straight tube, pushed against its end, has no preferred direction in which to buckle. Its last element therefore has a rest
+// rotation of this angle, towards e2. This is hardly more than the effect of rounding on a wire at an angle to the axes; 1e-7 would lift a stiff tip off a
+// plane. A wire without walls stays exactly as straight as specified: rolled up by an end moment of fixed direction, it would otherwise leave the plane.
 static const double IMPERFECTION = 1e-12;    // [rad]
 
 static void make_imperfect(const Wire *wire, BeamRest *rest)
@@ -150,7 +150,7 @@ static void make_imperfect(const Wire *wire, BeamRest *rest)
     if (rest->curvature[tip] > 0)
         return;
     rest->curvature[tip] = IMPERFECTION / wire->length[tip];
-    rest->half_w[tip] = nextafter(1, 0);      // below 1 marks an element that is curved at rest
+    rest->half_w[tip] = nextafter(1, 0);      // a value below 1 marks an element that is curved at rest
     rest->half_z[tip] = 0.25 * IMPERFECTION;
 }
 
@@ -252,7 +252,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         return NULL;
     }
     if ((o.self_contact == SELF_CONTACT_ON || (o.self_contact == SELF_CONTACT_AUTO && o.vessel)) && !self_contact_create(s)) {
-        snprintf(why, (size_t)capacity, "no memory for a tool that meets itself");
+        snprintf(why, (size_t)capacity, "no memory for a tool's contact with itself");
         stepper_destroy(s);
         return NULL;
     }

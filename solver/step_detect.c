@@ -1,33 +1,33 @@
-// Candidates at the iterate: contact points whose gap could close in this step. A contact point p is node p, or beyond the nodes slot p - M
-// (slot.h). A point that is certainly further away is not asked again before it has travelled that far (docs/design.md, "Stability", 6).
+// Contact candidates at the iterate: contact points whose gap could close in this step. Contact point p is node p, or slot p - M if p >= M (slot.h). A point
+// that is certainly further away is not queried again until it has travelled its clearance (docs/design.md, "Stability", 6).
 //
-// Nodes first. A slot between two nodes is left out as long as they keep it off the wall: from the answers at the three, gaps, slopes and bends, follows how
-// far it may go until the element could be nearer to the wall there than at its nodes (guarded_for). That holds for elements of any length. Left to what
-// the nodes see alone, a ridge between those of 1.5 mm let a stiff wire in by 0.07 mm.
+// Nodes are queried first. A slot between two nodes is left out while its nodes keep it off the wall: guarded_for() computes from the gaps, normals and
+// Hessians at the three points how far the slot may travel before the element could be nearer to the wall there than at its nodes. This holds for elements of
+// any length. When only the nodes were checked, a ridge between nodes 1.5 mm apart let a stiff wire penetrate by 0.07 mm.
 //
-// Where a lumen is hardly wider than the tool, one linearised wall sends the point through the one across, and the next sends it back, for ever. So a point
-// remembers the wall that faces the one it sees, and has both (WallMet).
+// Where a lumen is hardly wider than the tool, the linearisation of one wall sends the point through the opposite wall, the next linearisation sends it back,
+// and this repeats for ever. Each point therefore stores the wall opposite to the one it currently sees, and gets a contact with both (WallMet).
 #include "solver/self_contact.h"
 #include "solver/tools_internal.h"
 
 #include <string.h>
 
-static const double REACH = 0.2;         // [mm] candidates beyond what the nodes' speed asks for: contact forces can push neighbours about
-static const double SHARED_TRAVEL = 0.3; // [mm] at most so much of what the fastest node may travel is expected of all others
-static const double SLOT_REACH = 0.1;    // [mm] the same for slots, whose nodes are candidates long before
+static const double REACH = 0.2;         // [mm] margin of candidates beyond the nodes' own travel: contact forces can move neighbours
+static const double SHARED_TRAVEL = 0.3; // [mm] every node is assumed to move as far as the fastest one, up to this limit
+static const double SLOT_REACH = 0.1;    // [mm] the same margin for slots, whose nodes become candidates long before
 static const double REACH_MAX = 5;       // [mm]
-static const double SLEEP_MAX = 1;       // [mm] of travel: a vessel follows a wall from where it was known so far, not over any distance
-static const double STEP_OUT_MAX = 0.2;  // [mm] a deep point is brought back by this much a step, not thrown
+static const double SLEEP_MAX = 1;       // [mm] of travel: the vessel can track the wall from a known foot over this distance, not over any distance
+static const double STEP_OUT_MAX = 0.2;  // [mm] a deep point is pushed out by at most this much per step
 static const double DEEP = 0.2;          // [mm] STEP_DEEP
-static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves less is where its linearised wall is
-static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts …
-static const double DIP_MAX = 0.01;      // … and before it is asked again
-static const double GUARD_MAX = 0.3;     // [mm] of travel after which the wall between two nodes is another
-static const double LINGER = 0.9, LINGER_MAX = 0.006;     // of a gap, [mm]
-static const double MET_FAR = 0.2;       // [mm] from where it was met a wall across is remembered: as far as a plane stands for it
-static const double LACK_MAX = 0.045;    // [mm] of room between two walls that the wire may take, DEPTH_LAST of step_follow.c
-static const double TOUCH_REACH = 0.05;  // [mm] of gap: further from the wall a point may touch as it is (step_touch.c)
-static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
+static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves by less is assumed to stay where its linearised wall is valid
+static const double DIP_MIN = 0.002;     // [mm] a slot counts if the element may be nearer to the wall there than its nodes by this much …
+static const double DIP_MAX = 0.01;      // … and is queried again before that reaches this much
+static const double GUARD_MAX = 0.3;     // [mm] of travel after which the wall's shape between two nodes is no longer known
+static const double LINGER = 0.9, LINGER_MAX = 0.006;     // as a share of the gap; [mm]
+static const double MET_FAR = 0.2;       // [mm] distance over which an opposite wall is remembered: as far as a plane approximates it
+static const double LACK_MAX = 0.045;    // [mm] most by which the gaps to two opposite walls may overlap; equals DEPTH_LAST of step_follow.c
+static const double TOUCH_REACH = 0.05;  // [mm] of gap: beyond this, contact is placed at the point itself (step_touch.c)
+static const double NOTHING_KNOWN = -1;  // value of a clearance: neither place nor force is stored
 
 static Vec3 tangent_at(const Stepper *s, int node)
 {
@@ -35,7 +35,7 @@ static Vec3 tangent_at(const Stepper *s, int node)
     return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
 }
 
-// Where slot k is; false where it is in the sheath.
+// Computes the position of slot k; false if it is in the sheath.
 static bool place_slot(Stepper *s, int k)
 {
     const Slot *slot = &s->points.slot[k];
@@ -52,7 +52,7 @@ static bool place_slot(Stepper *s, int k)
     return true;
 }
 
-// What the solution moves a node by from the iterate: 0 for translation, 3 for turn.
+// Displacement of a node from the iterate to the solution; `from` is 0 for translation, 3 for rotation.
 static Vec3 change(const Stepper *s, int node, int from)
 {
     const double *u = s->system.u + row_of(s, node) + from, *k = s->iterate.moved + row_of(s, node) + from;
@@ -61,7 +61,7 @@ static Vec3 change(const Stepper *s, int node, int from)
 
 static bool at_mouth(const Stepper *s, int element) { return element + 1 == s->first_free; }
 
-// The motion of slot k from its nodes' translations and turns.
+// The displacement of slot k that results from its nodes' translations and rotations.
 static Vec3 follow(const Stepper *s, int k, const Vec3 move[2], const Vec3 turn[2])
 {
     const SlotPlace *p = &s->points.slot_place[k];
@@ -71,7 +71,7 @@ static Vec3 follow(const Stepper *s, int k, const Vec3 move[2], const Vec3 turn[
     return vec3_add(d, vec3_add(vec3_scale(move[0], 1 - p->weight), vec3_cross(turn[0], p->lever[0])));
 }
 
-// By how much the solution moves a contact point from the iterate.
+// The displacement of a contact point from the iterate to the solution.
 static Vec3 motion(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
@@ -82,7 +82,7 @@ static Vec3 motion(const Stepper *s, int point)
     return follow(s, point - nodes, move, turn);
 }
 
-// What a node has done since the wall was last asked.
+// The displacement of a node since the wall was last queried.
 static Vec3 since(const Stepper *s, int node, int from)
 {
     const double *k = s->iterate.moved + row_of(s, node) + from, *seen = s->iterate.seen + row_of(s, node) + from;
@@ -95,13 +95,13 @@ static Vec3 done(const Stepper *s, int node, int from)
     return vec3(k[0], k[1], k[2]);
 }
 
-// [mm] no slot moves further where its nodes move and turn so.
+// [mm] An upper bound of a slot's displacement for these translations and rotations of its nodes.
 static double slot_travel(const Slot *slot, Vec3 move1, Vec3 turn1, Vec3 move2, Vec3 turn2)
 {
     return sqrt(fmax(vec3_norm2(move1), vec3_norm2(move2))) + slot->near * vec3_norm(turn1) - slot->far * vec3_norm(turn2);
 }
 
-// [mm] that a point moves by, a bound where it is a slot: by the solution from the iterate, or since the wall was last asked.
+// [mm] The distance a point moves (an upper bound for a slot), by `way`: from the iterate to the solution, or since the wall was last queried.
 static double travel_of(const Stepper *s, int point, Vec3 (*way)(const Stepper *, int, int))
 {
     if (point < s->state.node_count)
@@ -126,7 +126,7 @@ static double radius_of(const Stepper *s, int point)
     return point < nodes ? s->wire.radius[point] : s->points.slot[point - nodes].radius;
 }
 
-// The first contact point that may be free: nodes from first_free on, slots from the mouth's element on.
+// The first slot that may be outside the sheath. Free contact points are the nodes from first_free on and the slots from the element at the mouth on.
 static int first_slot(const Stepper *s) { return s->state.node_count + s->points.slot_start[s->first_free > 0 ? s->first_free - 1 : 0]; }
 
 bool stepper_escapes(const Stepper *s)
@@ -142,7 +142,8 @@ bool stepper_escapes(const Stepper *s)
     return false;
 }
 
-// Asks for a point at x, where a trial has led it. One that slept may have left its part of the vessel long ago: it is looked for.
+// Adds a query for a point at its trial position x. A point that was not queried for some time may have left its stored part of the vessel, so it is located
+// again.
 static void ask_there(Stepper *s, int point, Vec3 x, int *count)
 {
     int nodes = s->state.node_count, from = s->points.place[point].node;
@@ -156,7 +157,7 @@ static void ask_there(Stepper *s, int point, Vec3 x, int *count)
     ++*count;
 }
 
-// The answers, and what was learned for the next trial.
+// Runs the queries and stores their results for the next trial.
 static void answer_there(Stepper *s, int count)
 {
     if (count > 0)
@@ -167,7 +168,7 @@ static void answer_there(Stepper *s, int count)
     }
 }
 
-// The iterate is where the last trial led.
+// The iterate is now at the last trial position, so the trials' vessel memories become current.
 static void take_trials(Stepper *s)
 {
     for (int p = 0; p < s->points.count; p++)
@@ -176,8 +177,8 @@ static void take_trials(Stepper *s)
     memset(s->points.tried, 0, (size_t)s->points.count * sizeof *s->points.tried);
 }
 
-// How deep outside the true wall [mm] the points are that have gone, or would go with the solution, beyond what is known of it there. Room that walls
-// across lack is not counted: no motion finds it.
+// The largest depth outside the true wall [mm] over the points that have moved, or would move with the solution, further than the known wall extends. Overlap
+// of two opposite walls is not counted: no motion removes it.
 static double deepest_there(Stepper *s, bool would_go)
 {
     int count = 0;
@@ -205,8 +206,8 @@ static double deepest_there(Stepper *s, bool would_go)
 double stepper_overshoot(Stepper *s) { return s->vessel ? deepest_there(s, true) : 0; }
 double stepper_depth(Stepper *s) { return s->vessel ? deepest_there(s, false) : 0; }
 
-// How far a node may go in this step, by what is known. A spring runs along the wire: what one node does others may do next. (With that, a shorter
-// reach meets fewer points that went further than was looked.)
+// Estimates from the known motion how far each node may move in this step. A disturbance runs along the wire, so what one node does its neighbours may do next.
+// (With this rule, a shorter reach leaves fewer points that travel beyond the searched range.)
 static void estimate_ranges(Stepper *s)
 {
     int first = s->first_free > 0 ? s->first_free - 1 : 0, nodes = s->state.node_count;
@@ -223,7 +224,7 @@ static void estimate_ranges(Stepper *s)
         s->query.range[i] = s->query.range[i] > shared ? s->query.range[i] : shared;
 }
 
-// How far beyond its present gap a point is looked after.
+// The gap up to which a point is a candidate.
 static double reach_of(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
@@ -265,7 +266,7 @@ void stepper_forget(Stepper *s, int node)
         forget(s, s->state.node_count + k);
 }
 
-// A node that has not been located starts from a neighbour, a slot with what a neighbour knows of the wall.
+// A node without a known location starts from a neighbouring node's; a slot starts from a neighbouring node's knowledge of the wall.
 static void locate(Stepper *s, int point)
 {
     VesselMemory *place = s->points.place;
@@ -284,7 +285,7 @@ static void locate(Stepper *s, int point)
     place[point] = (VesselMemory){.node = s->vessel->locate(s->vessel, place_of(s, point), from)};
 }
 
-// Is a point known to be too far off to touch?
+// Is a point known to be too far away to touch the wall?
 static bool sleeps(Stepper *s, int point)
 {
     s->points.room[point] = HUGE_VAL;
@@ -292,7 +293,7 @@ static bool sleeps(Stepper *s, int point)
         s->points.clearance[point] = 0;
     if (!(s->points.clearance[point] > 0))
         return false;
-    // when it went to sleep it had its reach besides
+    // its clearance was reduced by its reach when it was set
     s->points.room[point] = s->points.clearance[point] + (point < s->state.node_count ? REACH : SLOT_REACH);
     return true;
 }
@@ -308,22 +309,23 @@ static void ask(Stepper *s, int point, int *count)
     s->query.place[(*count)++] = s->points.place[point];
 }
 
-// How much two bends differ [1/mm].
+// The norm of the difference of two wall Hessians [1/mm].
 static double unlike(const Sym3 *a, const Sym3 *b)
 {
     Sym3 d = {a->xx - b->xx, a->xy - b->xy, a->xz - b->xz, a->yy - b->yy, a->yz - b->yz, a->zz - b->zz};
     return sqrt(sym3_norm2(&d));
 }
 
-// [mm] of travel that a slope and a bend take to use up what there is, at most GUARD_MAX.
+// [mm] The travel after which a difference of slopes and a difference of curvatures have used up the margin `has`, at most GUARD_MAX.
 static double until_used(double has, double slope, double bend)
 {
     double root = slope + sqrt(slope * slope + 2 * bend * has);
     return root * GUARD_MAX > 2 * has ? 2 * has / root : GUARD_MAX;
 }
 
-// [mm] that a slot may go until its element may be nearer to the wall there than its nodes are by DIP_MAX; < 0: it is by DIP_MIN, or they do not tell.
-// On the way the wall's slope against theirs takes from what it has over them, and its bend.
+// [mm] How far a slot may travel until its element may be nearer to the wall there than its nodes are, by DIP_MAX. Negative if it already is nearer by DIP_MIN,
+// or if the nodes' queries do not say. Along the travel, the margin over the nodes' gaps shrinks by the difference between the wall's slope here and at the
+// nodes, and by the difference of the curvatures.
 static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double *sleep)
 {
     const Slot *slot = &s->points.slot[k];
@@ -341,7 +343,8 @@ static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double 
     return until_used(over + DIP_MAX, slope, bend);
 }
 
-// [mm] of room that a point lacks between the wall that it sees and one across that it saw before, which is forgotten where it faces this one no more.
+// [mm] By how much the gaps of a point to the wall it sees and to the opposite wall it saw before overlap. The opposite wall is forgotten once it no longer
+// faces this one.
 static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
 {
     WallMet *met = &s->points.met[point];
@@ -353,7 +356,7 @@ static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
     }
     met->normal = hit->normal;
     met->offset = vec3_dot(hit->normal, x) - gap;
-    // a point that is behind the other wall by more than its radius has gone over an edge instead
+    // a point that is behind the other wall by more than its radius has passed over an edge instead
     double other = vec3_dot(met->across, x) - met->beyond;
     bool faces = vec3_dot(met->across, hit->normal) < 0 && other > -radius && vec3_distance(x, met->where) < MET_FAR;
     if (!faces)
@@ -361,20 +364,22 @@ static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
     return s->points.lack[point] = faces ? fmin(LACK_MAX, fmax(0, -other - gap)) : 0;
 }
 
-// A point that is no candidate is asked at its own place again, from which it may be as far as it was from where it touched.
+// A point that is no candidate is queried at its own position again. That may be nearer to the wall than the touch position by the distance between them, so
+// the clearance shrinks by it.
 static void leave_touch(Stepper *s, int point)
 {
     s->points.clearance[point] = fmax(0, s->points.clearance[point] - fabs(s->points.touch_next[point]));
     s->points.touch_next[point] = 0;
 }
 
-// Has a projection that began at a foot known from elsewhere ended at a wall much further off than that foot? The wall is no further than that.
+// Has a projection that started from a foot point known from elsewhere ended on a wall much further away than that foot point? The true wall is at most as far
+// away as the foot point.
 static bool has_strayed(const VesselMemory *before, Vec3 x, const VesselHit *hit)
 {
     return before->node >= 0 && vec3_norm2(before->foot) > 0 && fabs(hit->gap) > 2 * vec3_distance(x, before->foot) + 1;
 }
 
-// Questions first to count-1, the answers judged: what is too far goes to sleep, candidates keep their question's number.
+// Evaluates queries first to count-1: points that are too far away get a clearance and are skipped; for candidates the number of the query is stored.
 static int answer(Stepper *s, int first, int count, int *candidate)
 {
     double reach = 0;
@@ -383,7 +388,7 @@ static int answer(Stepper *s, int first, int count, int *candidate)
         double own = reach_of(s, s->query.which[k]) + radius_of(s, s->query.which[k]);
         reach = own > reach ? own : reach;
     }
-    // distances grow with what is asked for: twice the reach lets most far points sleep for a while
+    // the gap returned for a far point is a lower bound that grows with the search range: twice the reach lets most far points be skipped for a while
     if (count > first)
         vessel_query(s->vessel, count - first, s->query.point + first, 2 * reach, s->query.place + first, s->query.hit + first);
     for (int k = first; k < count; k++) {
@@ -434,7 +439,7 @@ static int ask_nodes(Stepper *s)
     return count;
 }
 
-// [mm] by which a slot is further from where it could touch than its nodes' clearances can tell; an arc is longer than its chord, 5 % are enough.
+// [mm] A lower bound, from its nodes' clearances, of how far a slot is from where it could touch. An arc is longer than its chord; 5 % cover that.
 static double clearance_by_nodes(const Stepper *s, const Slot *slot)
 {
     int i = slot->element;
@@ -452,19 +457,19 @@ static int ask_slots(Stepper *s, int count)
         double bound = clearance_by_nodes(s, &s->points.slot[k]);
         if (bound > 0) {
             s->points.room[p] = bound + REACH;
-            s->points.place[p].node = -1;      // may come far before it is asked again
+            s->points.place[p].node = -1;      // may travel far before it is queried again
         }
         if (bound <= 0 && place_slot(s, k))
             ask(s, p, &count);
         else if (s->points.clearance[p] != NOTHING_KNOWN)
-            forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
+            forget(s, p);    // its stored data become outdated; its neighbours' do not
     }
     return count;
 }
 
 // --- candidates ---
 
-// What of the motion from x_n the iterate has done already, at the touching point: unknowns are displacements from x_n.
+// The part of the motion from x_n that the iterate has already made, at the touching point. The unknowns are displacements from x_n.
 static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
 {
     int nodes = s->state.node_count;
@@ -482,8 +487,8 @@ static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
     return vec3_add(follow(s, k, move, turn), vec3_cross(spin, arm));
 }
 
-// A contact between the sheath and the first free node moves by w u + theta x (lever + w a) and the share of the advance. 1/w of that, of its
-// gap and of its curvature make it one of the node alone, whose force is w times the real one.
+// A contact between the sheath and the first free node moves by w u + theta x (lever + w a), plus its share of the advance. Dividing this motion, the gap and
+// the curvature by w turns it into a contact of the node alone, whose force is w times the real one.
 static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
 {
     const SlotPlace *p = &s->points.slot_place[k];
@@ -498,13 +503,13 @@ static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
     h->xx *= w, h->xy *= w, h->xz *= w, h->yy *= w, h->yz *= w, h->zz *= w;
 }
 
-// A wire that slides along a convex wall has gone round it by h v / R at the step's end. That curvature is not in the matrix (contact.c), and a force along the
-// normal of the step's start would drag like friction of h v / R: 50 mm/s in a bend of 15 mm took 0.5 % a quarter turn. So the wall is linearised
-// about where the sliding takes the point: normal n + H d, gap g - d'Hd / 2, d = h v along the tool alone, which is steady (ahead of what moves
-// across it a wire that settles would swing).
+// A wire that slides along a convex wall has turned round it by h v / R at the step's end. That curvature is not in the matrix (contact.c), and a force along
+// the normal of the step's start would act like friction with coefficient h v / R: 50 mm/s in a bend of 15 mm radius cost 0.5 % per quarter turn. The wall is
+// therefore linearised about the position that sliding leads to: normal n + H d, gap g - d'Hd / 2, with d = h v along the tool only, because that velocity is
+// steady (with the transverse velocity included, a settling wire would oscillate).
 static void look_ahead(double dt, Vec3 axis, Vec3 velocity, ContactPoint *c)
 {
-    static const double TURN_AHEAD = 0.1;        // [rad] further than this nobody slides along a smooth wall
+    static const double TURN_AHEAD = 0.1;        // [rad] no tool slides further round a smooth wall in a step
     Vec3 d = vec3_scale(axis, dt * vec3_dot(axis, velocity));
     d = vec3_add_scaled(d, -vec3_dot(d, c->normal), c->normal);
     Vec3 turn = sym3_mul_vec(&c->hessian, d);
@@ -515,8 +520,9 @@ static void look_ahead(double dt, Vec3 axis, Vec3 velocity, ContactPoint *c)
     c->gap -= 0.5 * rise;
 }
 
-// [mm] by which the wall of a point is taken to be nearer in this step. Where neighbouring local models hand a point over the wall steps back by some
-// um, and a wire that followed at once would kick the hand. A point that pressed in the last step goes after it by a part of the gap a step instead.
+// [mm] By how much the wall of a point is assumed to be nearer in this step. Where the query of a point passes from one local model of the wall to the next,
+// the wall may jump back by some um; a wire that followed at once would jerk the hand. A point that pressed in the last step instead follows by a part of the
+// gap per step.
 static double linger(Stepper *s, int point, double gap)
 {
     if (!s->iterate.is_moved && !s->iterate.knows_motion && stepper_presses(s, point) && gap > 0)
@@ -524,7 +530,7 @@ static double linger(Stepper *s, int point, double gap)
     return s->points.linger[point];
 }
 
-// Where the contact of a point is now.
+// The current position of a point's contact.
 static Vec3 touched(const Stepper *s, int point)
 {
     Touch touch;
@@ -576,7 +582,7 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     }
     if (vec3_norm2(met->across) == 0)
         return;
-    // between two walls: what room is lacking they give way by in equal parts
+    // between two opposite walls: both move back by half of the missing room
     ContactPoint *across = &s->system.set.point[s->system.set.count];
     s->points.candidate[s->system.set.count++] = point;
     *across = *c;
@@ -601,7 +607,7 @@ bool stepper_meet_walls(Stepper *s, double part)
         ContactPoint *c = &s->system.set.point[k];
         double radius = radius_of(s, s->points.candidate[k]), gap = s->query.hit[k].gap - radius;
         double linear = c->gap + vec3_dot(done_at(s, s->points.candidate[k], vec3_scale(c->normal, -radius)), c->normal);
-        // not where another wall is met: moving this one would drive the point into that
+        // not if a different, opposite wall was found: moving this one would push the point into that
         if ((s->query.hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !(gap < 0 && gap < linear) || vec3_dot(s->query.hit[k].normal, c->normal) < 0)
             continue;
         c->gap += fmax((gap - linear) / part, -STEP_OUT_MAX);
@@ -668,7 +674,7 @@ double stepper_start_work(const Stepper *s)
     return work;
 }
 
-// In the order of the chain: a node, the slots behind it, the next node.
+// Adds contacts in the order of the chain: a node, the slots after it, the next node.
 static void collect(Stepper *s, const int *candidate, int node_count, int slot_count)
 {
     const int *slot = candidate + node_count, *end = slot + slot_count;
@@ -685,7 +691,7 @@ static void collect(Stepper *s, const int *candidate, int node_count, int slot_c
     }
 }
 
-// What the answers say of the state at the step's start.
+// Reports what the queries say about the state at the step's start.
 static void report_wall(Stepper *s, int nodes, int count)
 {
     int next = s->first_free;
@@ -732,7 +738,7 @@ void stepper_detect(Stepper *s)
     int slot_candidates = answer(s, nodes, count, candidate + node_candidates);
     collect(s, candidate, node_candidates, slot_candidates);
     s->report.candidates = s->system.set.count;
-    if (!s->iterate.is_moved)      // an iterate may be anywhere
+    if (!s->iterate.is_moved)      // not for a moved iterate, which may be anywhere
         report_wall(s, nodes, count);
 }
 
@@ -751,7 +757,7 @@ void stepper_use_clearance(Stepper *s)
     memcpy(s->iterate.seen, s->iterate.moved, row_of(s, nodes) * sizeof *s->iterate.seen);
 }
 
-// Forces at nodes that touch beside them.
+// Distributes the forces of nodes whose contact is beside them.
 static void share_touches(const Stepper *s, NodeReport *node)
 {
     Touch t;

@@ -1,4 +1,4 @@
-// Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
+// The energies of a state, and the work of a step's motion: each force at the step's end times the motion, as in implicit Euler.
 #include "solver/self_contact.h"
 #include "base/base.h"
 #include "solver/tools_internal.h"
@@ -50,10 +50,10 @@ double stepper_kinetic_energy(const Stepper *s)
     return 0.5 * twice;
 }
 
-// What a node has done in this step, translation or turn, in space.
+// The displacement of a node in this step, translation or rotation, in space axes.
 static Vec3 done_in_space(const Stepper *s, int node, int from)
 {
-    SEL_ASSERT(from == 0 || from == 3, "a node moves and turns");
+    SEL_ASSERT(from == 0 || from == 3, "`from` is the row of translation or rotation");
     const double *u = s->iterate.moved + row_of(s, node) + from;
     return node < s->first_free ? vec3_scale(s->entry.axis[0], u[0]) : vec3(u[0], u[1], u[2]);
 }

@@ -1,13 +1,13 @@
-// Exchange at the hub: a tool that has been drawn back to its tip goes, and another takes its place around the tools within it, which stay where they are.
-// All that a step needs of the spare tools is made at the start, so that an exchange allocates nothing.
+// Exchange at the hub: a tool that has been drawn back to its tip is removed, and another takes its place around the tools inside it, which stay where they
+// are. Everything that a step needs of the spare tools is created at the start, so that an exchange allocates nothing.
 #include "solver/tools_internal.h"
 
 #include "base/base.h"
 
 #include <string.h>
 
-static const double AT_HUB = 1;          // [mm] from its hub: a tip that can be taken out …
-static const double LEAST_AHEAD = 0.01;  // … and that is put in
+static const double AT_HUB = 1;          // [mm] distance of a tip from the hub at which the tool can be removed …
+static const double LEAST_AHEAD = 0.01;  // … and at which the new tip is inserted
 
 const char *step_exchange_refusal(StepExchange outcome)
 {
@@ -28,7 +28,7 @@ static void fit(Stepper *s, int k, int which)
     Tool *t = &s->tools.tool[k];
     Tool was = *t;
     *t = *s->tools.device[k][which];
-    t->first = k == 0 ? 0 : t->wire.node_count;      // carries nothing of the chain yet
+    t->first = k == 0 ? 0 : t->wire.node_count;      // carries no node of the chain yet
     t->start = was.start;
     t->inside = was.inside;
     t->inserted = was.inserted;
@@ -49,7 +49,7 @@ void tools_refit(Stepper *s, const int *fitted)
             fit(s, k, fitted[k]);
 }
 
-// [mm] of tool m that lies behind the hub of the outermost tool.
+// [mm] The length of tool m behind the hub of the outermost tool.
 static double behind_hub(const Stepper *s, int m) { return is_inside(s, 0, m) ? slide_at(s, 0, m) : HUGE_VAL; }
 
 StepExchange stepper_exchange(Stepper *s, int k, int which)
@@ -63,12 +63,12 @@ StepExchange stepper_exchange(Stepper *s, int k, int which)
                          : is_inside(s, 0, k) && t->inside == 1 && slide_at(s, 0, k) > t->wire.total_length - AT_HUB;
     if (!is_out)
         return EXCHANGE_INSERTED;
-    // the proximal ends of the tools within stay behind the new hub
+    // the proximal ends of the tools inside must stay behind the new hub
     double tip = k == 0 ? t->wire.total_length : 0;
     for (int m = k + 1; m < s->tools.count; m++)
         if (behind_hub(s, m) + tip < next->wire.total_length)
             return EXCHANGE_TOO_SHORT;
-    for (int m = k - 1; m > 0; m--)      // nor may it be shorter than what it goes through, to its hub
+    for (int m = k - 1; m > 0; m--)      // nor may it be shorter than what a surrounding tool has behind the outermost hub
         if (next->wire.total_length < behind_hub(s, m))
             return EXCHANGE_TOO_SHORT;
     if (k == 0) {
@@ -77,7 +77,7 @@ StepExchange stepper_exchange(Stepper *s, int k, int which)
         tools_chain(s);
         for (int c = 0; c < s->tools.tool[0].wire.node_count; c++)
             stepper_forget(s, c);
-        for (int m = 1; m < s->tools.count; m++) {        // the hands hold where the new hub is
+        for (int m = 1; m < s->tools.count; m++) {        // the hands hold the tools at the new hub
             if (!is_inside(s, 0, m))
                 continue;
             s->tools.tool[m].inserted = s->tools.tool[m].wire.total_length + stepper_sheath_coordinate(s, 0) - slide_at(s, 0, m);
@@ -87,7 +87,7 @@ StepExchange stepper_exchange(Stepper *s, int k, int which)
         int i = k - 1;
         double ahead = fmax(LEAST_AHEAD, t->wire.total_length - s->state.slide[i]);
         fit(s, k, which);
-        s->state.slide[i] = t->wire.total_length - ahead;        // tip where tip was
+        s->state.slide[i] = t->wire.total_length - ahead;        // the new tip is where the old tip was
         s->state.angle[i] = s->state.slide_velocity[i] = s->state.slide_spin[i] = 0;
         memset(s->state.slide_force + 3 * i, 0, 3 * sizeof(double));
         s->tools.tool[k].inserted = (s->entry.has_sheath ? stepper_sheath_coordinate(s, 0) : 0) + ahead;

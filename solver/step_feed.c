@@ -1,23 +1,23 @@
-// What the hands do in a step, and what of the tool comes out of the sheath or goes in.
+// Applies the hands' commands of a step, and updates which nodes are in the sheath.
 #include "solver/tools_internal.h"
 
 #include <string.h>
 
-// A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
+// Elements do not describe a tool that is compressed by more than this share of its length (a real one would have yielded), so the hand stalls.
 static const double SQUEEZE_MAX = 0.03;
-static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
-static const double SPRUNG = 0.1;                // of an element's length past the mouth: a node of several tools that has sprung so far stays on the line
+static const double LET_GO_TURN = 0.1;           // [rad] a node released at the mouth is turned by at most this much
+static const double SPRUNG = 0.1;                // of an element's length: with several tools, a node released further out than this stays on the line
 
-// The frame turned the short way until e1 is the line's direction.
+// The frame turned by the smallest rotation that aligns e1 with the line's direction.
 static Quat on_line(const Stepper *s, Quat q)
 {
     Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->entry.axis[0]);
     return quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->entry.axis[0]), axis.x, axis.y, axis.z}, q));
 }
 
-// A node that comes back is put on the line. One that is let go, a fiftieth of an element from the mouth, takes the place that the short piece behind it,
-// from now on the one across the mouth, has under the moment there: with the curve of its own element, which at a section's border may be ten times as
-// soft, the piece would spring.
+// A node that returns into the sheath is placed on the line. A node that is released, a fiftieth of an element from the mouth, takes the position that the
+// short piece behind it, which becomes the element across the mouth, has under the moment there. With the curvature of its own former element, which at a
+// section's border may be ten times as soft, the piece would spring.
 void stepper_hold(Stepper *s, int node)
 {
     SEL_ASSERT(s->entry.has_sheath && node >= 0 && node < s->state.node_count, "the sheath holds a node of the chain");
@@ -54,13 +54,13 @@ static void let_go(Stepper *s, int node)
     }
     Vec3 curvature = is_tip ? stepper_tip_curvature(s) : mouth_curvature(s, node);
     double bend = vec3_norm(curvature) * along;
-    if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far
+    if (bend > LET_GO_TURN)          // it sprang out of the sheath: the curve is not known that far
         curvature = vec3_scale(curvature, LET_GO_TURN / bend);
     w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->entry.axis[0]));
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
 }
 
-// Nodes up to the mouth are held, and a little further (sheath_border_share); one that the hand brings back in this step is held from now on.
+// Nodes up to the mouth and a little beyond it (sheath_border_share) are held; a node that the hand brings back in this step is held from now on.
 int stepper_count_held(const Stepper *s, double advance)
 {
     if (!s->entry.has_sheath)
@@ -71,10 +71,10 @@ int stepper_count_held(const Stepper *s, double advance)
     return k;
 }
 
-// The share of its length by which the tool is squeezed between hand and mouth, where it slides freely.
+// The compression of the tool between hand and mouth, where it slides freely, as a share of its length.
 double stepper_squeeze(const Stepper *s, const Vec3 *position) { return 1 - vec3_distance(position[1], position[0]) / s->wire.length[0]; }
 
-// The command with what is owed from before; no advance into a tool that is squeezed too much.
+// The command plus what earlier steps still owe, without advance into a tool that is compressed too much.
 static StepCommand stalled(Stepper *s, StepCommand command)
 {
     if (!s->entry.has_sheath)
@@ -91,7 +91,7 @@ static StepCommand stalled(Stepper *s, StepCommand command)
     return command;
 }
 
-// A contact solve with coaxial tools begins with what it expects the motion to be: that of the step before.
+// With coaxial tools, a contact solve starts from the expected motion: that of the previous step.
 static void expect_last_motion(Stepper *s)
 {
     memset(s->system.u, 0, row_of(s, s->state.node_count) * sizeof *s->system.u);
@@ -103,7 +103,7 @@ static void expect_last_motion(Stepper *s)
     }
 }
 
-// The step begins at the state's pose.
+// Starts the step at the state's pose.
 void stepper_begin(Stepper *s)
 {
     size_t nodes = (size_t)s->state.node_count;

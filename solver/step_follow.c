@@ -1,4 +1,4 @@
-// From the iterate towards the solution, as far as that is good.
+// Moves the iterate towards the solution, as far as the result is admissible (a line search).
 #include "solver/node_turn.h"
 #include "solver/self_contact.h"
 #include "solver/tools_internal.h"
@@ -6,21 +6,21 @@
 #include <string.h>
 
 static const double TURN_MAX = 0.3;              // [rad]
-static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displaced and turned chords are the same
-// Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; halves at most, and
-// how often linear walls are moved before.
+static const double SWING_MOTION = 1e-5;         // [rad] below this, displaced and turned chords are the same
+// When the step length is halved: [mm] of depth that may remain, and the depth accepted as a last resort; the maximum number of halvings, and how often the
+// linear walls are moved before.
 static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
 static const double ENERGY_LEAST = 1e-9;         // [mJ] rounding
 enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
-static const double JAMMED = 0.002;              // share of its length by which a tool is squeezed that has a reason to be stuck
-static const double LOST = 0.1;                  // residual of a contact solve that says nothing
-static const double MOUTH_TRAVEL = 1;            // of an element's length that the tool springs through the mouth in a step, besides what the hand feeds
+static const double JAMMED = 0.002;              // compression, as a share of the tool's length, above which the tool may be jammed
+static const double LOST = 0.1;                  // residual above which a contact solve is meaningless
+static const double MOUTH_TRAVEL = 1;            // of an element's length: most that the tool may spring through the mouth, beyond the advance
 
-// The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
+// The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the tool's axis does not count.
 double stepper_largest_turn(const Stepper *s)
 {
     double largest = 0;
-    Vec3 before = vec3(0, 0, 0);         // what the node before moves by
+    Vec3 before = vec3(0, 0, 0);         // displacement of the node before
     for (int i = s->first_free; i < s->state.node_count; i++) {
         const double *u = s->system.u + row_of(s, i), *k = s->iterate.moved + row_of(s, i);
         Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
@@ -28,7 +28,7 @@ double stepper_largest_turn(const Stepper *s)
         Vec3 axis = vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
         double node = vec3_norm2(vec3_cross(turn, axis)), chord = 0;
         if (i > 0) {
-            // from the mouth: over the whole element, however little of it is outside
+            // at the mouth: relative to the whole element, however little of it is outside
             bool from_mouth = i == s->first_free;
             Vec3 c = vec3_sub(s->state.position[i], from_mouth ? s->entry.mouth : s->state.position[i - 1]);
             double length2 = vec3_norm2(c), over = from_mouth ? s->wire.length[i - 1] * s->wire.length[i - 1] : length2;
@@ -41,7 +41,7 @@ double stepper_largest_turn(const Stepper *s)
     return sqrt(largest);
 }
 
-// A wire that nothing holds: its mass centre goes where the linear solution, which keeps momentum, takes it.
+// A wire without supports: its mass centre moves as in the linear solution, which conserves momentum.
 static void keep_mass_centre(Stepper *s, double part)
 {
     Vec3 away = vec3(0, 0, 0);
@@ -57,9 +57,9 @@ static void keep_mass_centre(Stepper *s, double part)
         s->state.position[i] = vec3_add_scaled(s->state.position[i], 1 / mass, away);
 }
 
-// Moves the free nodes' positions by `part` of the change, chord by chord from the proximal end on: a chord c that the solution makes s = c + change
-// becomes s (c.s)/(|c||s|), as long as the linear solution thinks it is. With s itself a turn of 0.005 rad would stretch the wire by 1e-5, which in
-// steel is 0.1 N. Not where the rig holds a node further along.
+// Moves the free nodes' positions by `part` of the change, chord by chord from the proximal end: a chord c that the solution turns into s = c + change becomes
+// s (c.s)/(|c||s|), the length that the linear solution assigns to it. With s itself, a turn of 0.005 rad would stretch the wire by 1e-5, which in steel is
+// 0.1 N. Not used if the rig fixes the position of a later node.
 static void swing(Stepper *s, double part)
 {
     Vec3 from = s->entry.mouth, moved = s->entry.mouth, shift = vec3(0, 0, 0);
@@ -90,18 +90,18 @@ static void displace(Stepper *s, double part)
     }
 }
 
-// The iterate moves to `part` of the way from where it is to x_n + u, nodes in the sheath too: a tool that is held back is not fed.
+// Moves the iterate by `part` of the difference to x_n + u, nodes in the sheath included: a tool that is held back is not fed.
 static void move(Stepper *s, double part)
 {
     WireState *w = &s->state;
     int nodes = w->node_count, held = s->first_free;
-    double *rx = s->system.product, *ry = rx + nodes, *rz = ry + nodes;     // how far a node turns, an assembly's scratch
+    double *rx = s->system.product, *ry = rx + nodes, *rz = ry + nodes;     // rotation vectors of the nodes, in an assembly's scratch
     if (s->progress.turn > SWING_MOTION && s->rig.can_swing)
         swing(s, part);
     else
         displace(s, part);
     for (int i = 0; i < held; i++) {
-        // on the line exactly, whatever rounding does
+        // exactly on the line, regardless of rounding
         const double *u = s->system.u + row_of(s, i);
         double *k = s->iterate.moved + row_of(s, i), turn = part * (u[3] - k[3]);
         k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
@@ -152,7 +152,7 @@ static void copy_iterate(Stepper *s, bool back)
         memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
 }
 
-// The part of the way to a displacement `to` at which one of `from` reaches `most`.
+// The share of the motion to a displacement `to`, starting at `from`, at which the magnitude `most` is reached.
 static double part_until(double from, double to, double most)
 {
     if (fabs(to) <= most)
@@ -160,7 +160,7 @@ static double part_until(double from, double to, double most)
     return fmax(0, fmin(1, ((to > 0 ? most : -most) - from) / (to - from)));
 }
 
-// No element turns by more than TURN_MAX, and no more of the tool springs through the mouth than one element describes.
+// The largest step length at which no element turns by more than TURN_MAX and no more of the tool springs through the mouth than one element can describe.
 static double largest_part(const Stepper *s)
 {
     double part = s->progress.turn > TURN_MAX ? TURN_MAX / s->progress.turn : 1;
@@ -175,7 +175,7 @@ static double largest_part(const Stepper *s)
 
 static double elastic_at_start(Stepper *s)
 {
-    if (!s->start.knows_energy) {           // of x_n, or of an iterate beside it
+    if (!s->start.knows_energy) {           // of x_n, or of an iterate close to it
         s->start.elastic = stepper_elastic_energy(s);
         s->start.knows_energy = true;
     }
@@ -192,13 +192,14 @@ double stepper_energy_made(Stepper *s)
     stepper_wall_work(s, &wall, &friction);
     friction += hands_valve_work(s);
     copy_iterate(s, true);
-    double given = hand + load - friction + fmax(0, wall);     // a rigid wall takes nothing
+    double given = hand + load - friction + fmax(0, wall);     // a rigid wall takes no energy
     return (grown - given) / (fabs(grown) + fabs(hand) + fabs(load) + fabs(friction) + ENERGY_LEAST);
 }
 
-// The share of the solution that was followed. A quiet step goes all the way, and so does a wire without walls but for TURN_MAX. Else only as far as
-// no node is driven through the wall and the wire is not left with energy that nobody gave it. Where the wall is not where its linear form has it,
-// the form is first moved there and the contacts solved again (a second-order correction); then by halves, from places that are good.
+// Returns the share of the solution that was followed. A quiet step is followed completely, and so is a wire without walls, up to TURN_MAX. Otherwise the
+// iterate moves only so far that no node penetrates the wall and the wire gains no energy without a source. If the wall is not where its linearisation has it,
+// the linearised wall is first moved there and the contacts are solved again (a second-order correction); after that the step length is halved until the result
+// is admissible.
 double stepper_follow(Stepper *s, bool halfway)
 {
     double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
@@ -214,7 +215,7 @@ double stepper_follow(Stepper *s, bool halfway)
     double most = fmax(DEPTH_MAX, s->iterate.depth);
     int tries = stepper_squeeze(s, s->start.position) < JAMMED ? 2 * HALVES_MAX : HALVES_MAX;
     for (int k = 0; k < tries; k++) {
-        if (k == HALVES_MAX) {        // no jam: rather a little deeper than stuck for ever where neighbouring models disagree about the wall
+        if (k == HALVES_MAX) {        // not jammed: accept a little more depth rather than be stuck for ever where neighbouring models disagree about the wall
             part = largest_part(s);
             most = fmax(most, DEPTH_LAST);
         }

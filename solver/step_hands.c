@@ -1,9 +1,9 @@
-// The hands. Hand k moves tool k by a_k along and t_k about the line at node 0, the hub of the outermost tool, so S of an inner tool grows there by a_0 - a_k
-// and its angle by t_k - t_0. The system's unknowns at node 0 are turned into those of the hands: then a hand that holds its tool is a unit row, one that
-// slips a force in its own row, and what it feels is its row's reaction.
+// The hands. Hand k moves tool k by a_k along and t_k about the line at node 0, the hub of the outermost tool. S of an inner tool therefore grows there by
+// a_0 - a_k, and its angle by t_k - t_0. The system's unknowns at node 0 are transformed to those of the hands. Then the row of a hand that holds its tool is a
+// unit row, a hand that slips is a force in its own row, and the force that a hand feels is the reaction of its row.
 //
-// A tool that no hand holds is held by the friction of the valve that it goes through, at the hub of the tool around it or at the sheath: its unknown is then
-// its slip through the valve, and that hub's hand feels what the valve takes.
+// A tool that no hand holds is held by the friction of the valve that it passes through, at the hub of the tool around it or at the sheath. Its unknown is then
+// its slip through the valve, and the hand at that hub feels the friction of the valve.
 #include "solver/tools_internal.h"
 
 #include <string.h>
@@ -12,7 +12,7 @@ static bool has_hand(const Stepper *s, int k) { return k == 0 ? s->entry.has_she
 static int row_of_hand(int k, int about) { return k == 0 ? 3 * about : unknown_of(k) + about; }
 static bool rides(const Stepper *s, int k) { return k > 0 && s->hands.hand[k].is_released; }
 
-// What a hand, or a valve, holds at most [N] or [N mm].
+// The largest force or torque that a hand, or a valve, can hold [N] or [N mm].
 static double holds(const Stepper *s, int k, int about)
 {
     const Hand *hand = &s->hands.hand[k];
@@ -22,17 +22,17 @@ static double holds(const Stepper *s, int k, int about)
     return about || hand->limit == 0 ? HUGE_VAL : hand->limit;
 }
 
-// What a tool moves by at the hub, from node 0's unknowns. The hub of a rig does not move.
+// A tool's displacement at the hub, from node 0's unknowns. The hub of a rig does not move.
 static double tool_moves(const Stepper *s, int k, int about, const double *u)
 {
     double hub = s->entry.has_sheath ? u[3 * about] : 0;
     return k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
 }
 
-// [mm] by which the hub around a tool's moves; the sheath does not.
+// [mm] The displacement of the hub around a tool's hub; the sheath does not move.
 static double around_moves(const Stepper *s, int k) { return k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->system.u) : 0; }
 
-// [mm] that a tool's hub can go before it meets the hub around it, or the sheath.
+// [mm] The distance that a tool's hub can advance before it meets the hub around it, or the sheath.
 static double hub_room(const Stepper *s, int k)
 {
     if (k == 0)
@@ -41,7 +41,7 @@ static double hub_room(const Stepper *s, int k)
     return s->start.slide[k - 1] - (around > 0 ? s->start.slide[around - 1] : 0);
 }
 
-// What the hand's unknown moves by in this step where the hand holds.
+// The displacement of the hand's unknown in this step if the hand holds.
 static double wanted(const Stepper *s, int k, int about)
 {
     const Hand *hand = &s->hands.hand[k];
@@ -51,7 +51,7 @@ static double wanted(const Stepper *s, int k, int about)
         return 0;
     if (k == 0)
         return about ? s->command.twist : stepper_wanted(s);
-    // to where the commands say, whatever has been lost to rounding before
+    // to the position that the commands give, so that rounding errors of earlier steps do not accumulate
     const Tool *t = &s->tools.tool[k];
     if (about)
         return t->twist + s->hands.command[k].twist - s->state.twist - s->start.angle[k - 1];
@@ -59,7 +59,7 @@ static double wanted(const Stepper *s, int k, int about)
     return t->inserted + s->hands.command[k].advance - (t->wire.total_length + hub - s->start.slide[k - 1]);
 }
 
-// The hand's unknown.
+// The hand's unknown: the tool's displacement, or for a released inner tool its slip through the valve.
 static double hand_moves(const Stepper *s, int k, int about, const double *u)
 {
     double own = tool_moves(s, k, about, u);
@@ -68,11 +68,11 @@ static double hand_moves(const Stepper *s, int k, int about, const double *u)
 
 double hand_moved(const Stepper *s, int k, int about) { return hand_moves(s, k, about, s->iterate.moved); }
 
-// Node 0's unknowns are `basis` times the hands'.
+// Computes `basis`: node 0's unknowns are `basis` times the hands' unknowns.
 static void make_basis(Stepper *s)
 {
     int n = s->system.chain.size;
-    double motion[STEP_TOOLS_MAX][2][BLOCK_LARGEST] = {{{0}}};       // of each tool in its hand's and the others' unknowns
+    double motion[STEP_TOOLS_MAX][2][BLOCK_LARGEST] = {{{0}}};       // of each tool, in the unknowns of its hand and the others
     memset(s->hands.basis, 0, sizeof s->hands.basis);
     for (int i = 0; i < n; i++)
         s->hands.basis[n * i + i] = 1;
@@ -92,7 +92,7 @@ static void make_basis(Stepper *s)
     }
 }
 
-// rows (n, n) times the basis.
+// Multiplies rows (n, n) by the basis.
 static void columns_to_hands(const Stepper *s, double *rows)
 {
     int n = s->system.chain.size;
@@ -164,7 +164,7 @@ void hands_constrain(Stepper *s)
         }
 }
 
-// [N] or [N mm] that tool k's hand, or the valve that holds it, pushes along or turns about the line with.
+// [N] or [N mm] The force along the line, or torque about it, that tool k's hand, or the valve that holds it, applies.
 static double hand_force(const Stepper *s, int k, int about)
 {
     int n = s->system.chain.size, at = row_of_hand(k, about);
@@ -177,7 +177,8 @@ static double hand_force(const Stepper *s, int k, int about)
     return force;
 }
 
-// Does a tool that slips come to the hub around it? One that has further to go than an element does not get there in a step, whatever the linear system says.
+// Does a slipping tool reach the hub around it? If it is further away than an element's length, it does not get there in one step, whatever the linear system
+// says.
 static bool reaches_hub(const Stepper *s, int k)
 {
     double room = hub_room(s, k);
@@ -223,7 +224,7 @@ void hands_feed(Stepper *s, unsigned released)
         hand->slips[0] = hand->slips[1] = 0;
         hand->is_stopped = false;
         memcpy(hand->start, hand->force, sizeof hand->start);
-        if (hand->is_released && k > 0)  // goes where its valve goes, or nearly
+        if (hand->is_released && k > 0)  // moves with its valve, or nearly
             *command = s->hands.command[tools_around(s, 0, k)];
         else if (hand->is_released || !isfinite(command->advance) || !isfinite(command->twist))
             command->advance = command->twist = 0;
@@ -241,7 +242,7 @@ void hands_report(Stepper *s)
         r->push[k] = feels ? hand->force[0] : 0;
         r->torque[k] = feels ? hand->force[1] : 0;
     }
-    if (!s->entry.has_sheath) {        // the rig holds the hub: what it bears, less what the hands do
+    if (!s->entry.has_sheath) {        // the rig holds the hub: its reaction minus the hands' forces
         r->push[0] = r->proximal_force;
         r->torque[0] = r->proximal_torque;
         for (int k = 1; k < s->tools.count; k++)
@@ -297,7 +298,7 @@ double hands_start_work(const Stepper *s, bool valves)
     return work;
 }
 
-// Where tool k is in fact: [mm] beyond the mouth.
+// The actual insertion of tool k: [mm] beyond the mouth.
 static double actual_inserted(const Stepper *s, int k)
 {
     double hub = s->entry.has_sheath ? stepper_sheath_coordinate(s, 0) : 0;
@@ -321,7 +322,7 @@ void hands_count(Stepper *s)
         }
         if (hand->slips[0] || hand->is_released || (was_cut && k > 0))
             *inserted = actual;
-        if (was_cut && k == 0)       // what the motion has left of an advance is owed
+        if (was_cut && k == 0)       // the part of an advance that was not made is owed
             *inserted = actual + fmax(-HAND_OWED_MAX, fmin(HAND_OWED_MAX, *inserted - actual));
         if (!was_cut && !hand->is_released)
             continue;

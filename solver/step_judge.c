@@ -1,34 +1,34 @@
-// When an implicit Euler step (step.h) is solved, and its end. Kerrien 2017 section 6.1 with the additions of docs/design.md, "Stability".
+// Decides when an implicit Euler step (step.h) is solved, and ends it. Kerrien 2017, section 6.1, with the additions of docs/design.md, "Stability".
 //
-// The system is linear about x_n. A step that turns an element by more than NEWTON_MOTION is linearised again about what came out, with the
-// unknown still the whole displacement from x_n, so that inertia, damping, gaps and friction keep their meaning: Newton's method on the
-// implicit step. Inside an iteration no element may turn by more than TURN_MAX: a wire that springs back does so faster than
-// any step (10 mJ move 0.02 g at 30 m/s), and a linear displacement of that size would stretch it.
+// The system is first linearised about x_n. A step that turns an element by more than NEWTON_MOTION is linearised again about its solution. The unknown remains
+// the whole displacement from x_n, so that inertia, damping, gaps and friction keep their meaning: this is Newton's method for the implicit step. In one
+// iteration no element may turn by more than TURN_MAX: a wire that springs back moves faster than any step can follow (10 mJ move 0.02 g at 30 m/s), and a
+// linear displacement of that size would stretch it.
 //
-// Never through the wall, and never energy from nowhere: every place that a step stops at is good, because the motion to it is halved until it is
-// (step_follow.c). The whole wire is held back together, what the hand feeds included. What is not done after the last iteration is flagged
-// STEP_LIMITED and left to the next steps; so is an advance into a tool that is squeezed by more than SQUEEZE_MAX: the hand stalls.
+// No iterate penetrates the wall or gains energy without a source: the motion to it is halved until it is admissible (step_follow.c). The whole wire is held
+// back together, including the length that the hand feeds. The motion that is missing after the last iteration is flagged STEP_LIMITED and left to the next
+// steps. An advance into a tool that is compressed by more than SQUEEZE_MAX is also left to them: the hand stalls.
 #include "solver/self_contact.h"
 #include "solver/tools_internal.h"
 
 #include <string.h>
 
-// A chord turned by 0.02 rad stretches by 2e-4 in a linear step, which a free wire would keep as energy: another linearisation costs it 30 us.
+// In a linear step, a chord that turns by 0.02 rad stretches by 2e-4, which a free wire would keep as energy. Another linearisation costs 30 us.
 static const double NEWTON_MOTION = 0.005, NEWTON_MOTION_AT_MOUTH = 0.002;      // [rad]
-static const double QUIET_MOTION = 1e-3;         // [rad] less makes no energy
-static const double ENERGY_MADE = 3e-3;          // share of what is given and taken in a step
-// A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
-// twice as many of them as otherwise.
+static const double QUIET_MOTION = 1e-3;         // [rad] a smaller turn creates no energy
+static const double ENERGY_MADE = 3e-3;          // share of the energy exchanged in a step
+// A tip that snaps from one wall to another ends far from the last linearisation. [mm] of true penetration beyond which the step is linearised again there,
+// with up to twice the usual number of linearisations.
 static const double OVERSHOOT = 0.015, SELF_OVERSHOOT = 0.005;
-static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end nearer to it is held
-static const double BORDER_FORCE = 1e-3;         // of what straightening takes at the mouth: good enough
-static const double MOUTH_LENGTH = 0.1;          // share by which the length outside may end otherwise than it was taken, where the hand slips
+static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end closer to the mouth than this is held
+static const double BORDER_FORCE = 1e-3;         // tolerance, as a share of the straightening force at the mouth
+static const double MOUTH_LENGTH = 0.1;          // share by which the final outside length may differ from the assumed one when the hand slips
 enum { HAND_TRIES = 6, LOOKS_MAX = 2 };
 
-// --- after a solve: what is still wrong with it? ---
+// --- after a solve: is its solution acceptable? ---
 
-// [rad] The turn of the chord from the mouth to the first node outside: a short one stretches by as much as a long one. Where the hand holds the tool; one that
-// springs through the mouth changes that chord's length by more.
+// [rad] The turn of the chord from the mouth to the first node outside. A short chord stretches as much as a long one. Only where the hand holds the tool: a
+// tool that springs through the mouth changes that chord's length by more.
 static double turn_at_mouth(const Stepper *s)
 {
     int i = s->first_free;
@@ -39,8 +39,9 @@ static double turn_at_mouth(const Stepper *s)
     return vec3_norm(vec3_cross(moves, s->entry.axis[0])) / fmax(vec3_dot(ends, s->entry.axis[0]), sheath_border_share * s->wire.length[i - 1]);
 }
 
-// Where a border of the rest shape is at the mouth, straightening takes more on one side of it than on the other, and the wire may come to rest with the border
-// there. Is that force another one where the solution has the border than where it was taken? Then it is taken there, or first between the two.
+// Where a border of the rest shape is at the mouth, the straightening force differs between its two sides, and the wire may come to rest with the border there.
+// Does the force at the solution's border position differ from the force at the assumed position? If so, it is evaluated at the solution's position, or first
+// with the border exactly at the mouth.
 static bool misjudges_border(Stepper *s)
 {
     int i = s->first_free - 1;
@@ -49,7 +50,7 @@ static bool misjudges_border(Stepper *s)
     const BeamRest *rest = &s->beam.rest;
     double start = vec3_dot(vec3_sub(s->start.position[i], s->entry.mouth), s->entry.axis[0]), width = sheath_border_share * rest->length[i];
     double taken = start + s->iterate.mouth_ahead, ends = start + s->system.u[row_of(s, i)];
-    // the tool has not gone as the hand was told to: the element's stiffness was that of another length
+    // the tool has not moved as commanded, so the element's stiffness was that of another length
     double length = sheath_outside(rest->length[i], taken), real = sheath_outside(rest->length[i], ends);
     if (s->hands.hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
         s->iterate.mouth_ahead = ends - start;
@@ -63,8 +64,8 @@ static bool misjudges_border(Stepper *s)
     return true;
 }
 
-// Does the solution go back to where the iterate came from? Over an edge of the wall two linearisations each send a tip to the other's place for ever:
-// the answer lies between.
+// Does the solution return to where the iterate came from? At an edge of the wall, each of two linearisations may send a tip to the other's position for ever;
+// the solution lies between them.
 static bool goes_back(const Stepper *s)
 {
     const double *before = s->iterate.kept + 7 * (size_t)s->state.node_count;
@@ -78,7 +79,7 @@ static bool goes_back(const Stepper *s)
     return along < -0.5 * came;
 }
 
-// What the hand and the mouth do follows from the solution.
+// Checks the assumptions about the hand and the mouth against the solution.
 static unsigned judge_hand(Stepper *s)
 {
     if (s->progress.hand_tries >= HAND_TRIES || !(misjudges_border(s) || hands_misjudge(s)))
@@ -87,7 +88,7 @@ static unsigned judge_hand(Stepper *s)
     return STEP_NEEDS_SYSTEM | STEP_NEEDS_CONTACT;
 }
 
-// A wire that springs goes further than anybody looked: look that far, and solve again.
+// A wire that springs back moves beyond the searched range: extends the search to that range, for another solve.
 static unsigned judge_reach(Stepper *s)
 {
     if (s->progress.looks >= LOOKS_MAX || s->progress.has_failed || stepper_is_spent(s))
@@ -101,8 +102,8 @@ static unsigned judge_reach(Stepper *s)
     return (escapes ? STEP_NEEDS_WALLS : 0) | STEP_NEEDS_CONTACT;
 }
 
-// The length of the mouth's element has no sign: the first free node must not come to lie behind it. Where the solution has it there, the sheath holds it from
-// the step's start on.
+// The length of the element at the mouth has no sign, so the first free node must not end behind the mouth. If the solution places it there, the sheath holds
+// this node from the step's start on.
 static unsigned judge_mouth(Stepper *s)
 {
     if (s->tools.count > 1 && !s->progress.is_held_back && (tools_leave_back(s) || tools_come_out(s))) {
@@ -126,13 +127,13 @@ static unsigned judge_mouth(Stepper *s)
     return STEP_NEEDS_ALL;
 }
 
-// Does the solution give the tool energy that nobody pays for? Among contacts a small turn may, where the tool is stiff or its elements are short.
+// Does the solution give the tool energy that no force supplies? In contact, even a small turn may do so if the tool is stiff or its elements are short.
 static bool makes_energy(Stepper *s)
 {
     return s->entry.has_sheath && s->rig.load_count == 0 && s->progress.turn > QUIET_MOTION && stepper_energy_made(s) > ENERGY_MADE;
 }
 
-// Newton's method: the solution is the next place to linearise about, where it turns or goes further than a linear step may.
+// Newton's method: the step is linearised again about the solution if that turns or moves further than a linear step may.
 static unsigned judge_motion(Stepper *s)
 {
     if (s->progress.linearisations > 0) {
@@ -142,7 +143,7 @@ static unsigned judge_motion(Stepper *s)
     int next = ++s->progress.linearisations;
     if (next >= 2 * s->newton_max || s->progress.has_failed || stepper_is_spent(s))
         return 0;
-    bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && goes_back(s);     // before another iterate is kept
+    bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && goes_back(s);     // before the kept iterate is overwritten
     bool turns = s->progress.turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
     s->progress.makes_energy = makes_energy(s);
     s->progress.overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
@@ -174,7 +175,7 @@ unsigned step_judge(Stepper *s, const ContactReport *solved)
     if (needs == 0)
         needs = judge_motion(s);
     if (needs == 0)
-        s->progress.overshoots |= stepper_is_spent(s);        // nobody has looked
+        s->progress.overshoots |= stepper_is_spent(s);        // not checked
     return needs;
 }
 
@@ -216,7 +217,7 @@ static void set_velocities(Stepper *s)
     WireState *w = &s->state;
     double rate = 1 / s->dt;
     for (int i = 0; i < w->node_count; i++) {
-        const double *u = s->iterate.moved + row_of(s, i);      // what has been done, cut or not
+        const double *u = s->iterate.moved + row_of(s, i);      // the displacement actually made, cut or not
         if (i < s->first_free) {
             w->velocity[i] = vec3_scale(s->entry.axis[0], u[0] * rate);
             w->spin[i] = vec3_scale(s->entry.axis[0], u[3] * rate);
@@ -252,7 +253,8 @@ static void report_forces(Stepper *s)
     }
 }
 
-// A motion that was cut short has not had the forces of the whole one: the hand feels the strain that there is, and the wall has come as far as the motion.
+// A motion that was cut short has not produced the forces of the whole one: the hand feels the strain that is present, and the wall's forces are taken in
+// proportion to the motion.
 static void report_cut_forces(Stepper *s, double part)
 {
     s->report.flags |= STEP_LIMITED;
@@ -284,7 +286,7 @@ void step_correct(Stepper *s)
 const StepReport *step_report(const Stepper *s) { return &s->report; }
 const WireState *stepper_state(const Stepper *s) { return &s->state; }
 
-// --- questions ---
+// --- reports ---
 
 void stepper_node_report(Stepper *s, NodeReport *node)
 {
@@ -293,12 +295,12 @@ void stepper_node_report(Stepper *s, NodeReport *node)
         node[i] = (NodeReport){.s = s->wire.s[i], .radius = s->wire.radius[i], .gap = HUGE_VAL, .vessel_node = -1};
         if (i < held || !s->vessel)
             continue;
-        // a copy of the memory: a question must not change the next step
+        // a copy of the memory: a report must not change the next step
         VesselMemory place = s->points.place[i];
         if (place.node < 0)
             place = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[i], i > held ? node[i - 1].vessel_node : -1)};
         VesselHit hit;
-        vessel_query(s->vessel, 1, &s->state.position[i], HUGE_VAL, &place, &hit);   // no bound will do: the gap itself is asked for
+        vessel_query(s->vessel, 1, &s->state.position[i], HUGE_VAL, &place, &hit);   // without a range: the gap itself is wanted
         node[i].force = s->points.force[i];
         node[i].vessel_node = hit.node;
         if (!(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)))

@@ -1,4 +1,4 @@
-// What the iterate's pose says, and the way back to the step's start.
+// Quantities derived from the iterate's pose, and the return to the step's start.
 #include "solver/tools_internal.h"
 
 #include "base/base.h"
@@ -50,7 +50,7 @@ double tools_span_length(const Stepper *s, int c)
 double tools_twist(const Stepper *s, int c)
 {
     SEL_ASSERT(c >= 0 && c + 1 < s->state.node_count, "the element is one of the chain's");
-    // whole turns of the tool that goes on at a tip count
+    // whole turns of the tool that continues beyond a tip count
     double turned = is_at_tip(s, c) ? angle_at(s, c, s->tools.carrier[c + 1]) : 0;
     Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));
     Quat p = quat_mul(quat_conjugate(q), s->state.orientation[c + 1]);

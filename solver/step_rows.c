@@ -1,10 +1,10 @@
-// Unknowns whose value is given, and what holding them takes.
+// Prescribes unknowns, and computes their reactions.
 #include "solver/step_internal.h"
 
 void stepper_prescribe(Stepper *s, int node, int dof, double value)
 {
     SEL_ASSERT(node >= 0 && node < s->system.chain.count && dof >= 0 && dof < s->system.chain.size, "an unknown is one of the chain's");
-    SEL_ASSERT(isfinite(value), "an unknown is given a number");
+    SEL_ASSERT(isfinite(value), "the prescribed value is finite");
     int n = s->system.chain.size;
     double *d = s->system.chain.diag + block_of(s, node), *b = s->system.b + row_of(s, node);
     for (int r = 0; r < n; r++) {
@@ -31,7 +31,7 @@ void stepper_prescribe(Stepper *s, int node, int dof, double value)
 
 double stepper_reaction(const Stepper *s, int dof)
 {
-    SEL_ASSERT(dof >= 0 && dof < s->system.chain.size, "an unknown of the first node holds it");
+    SEL_ASSERT(dof >= 0 && dof < s->system.chain.size, "the unknown is one of the first node's");
     int n = s->system.chain.size;
     double sum = -s->system.grip_b[dof];
     for (int c = 0; c < n; c++) {
@@ -44,7 +44,7 @@ double stepper_reaction(const Stepper *s, int dof)
 
 double stepper_wanted(const Stepper *s)
 {
-    // to where the command says, whatever has been lost to rounding before
+    // to the position that the command gives, so that rounding errors of earlier steps do not accumulate
     double coordinate = s->state.inserted + s->command.advance - s->wire.total_length;
     return coordinate - vec3_dot(vec3_sub(s->start.position[0], s->entry.mouth), s->entry.axis[0]);
 }

@@ -1,16 +1,17 @@
 // Friction between coaxial tools.
 //
-// A node's tool k presses on the one around it with N = |dM'/ds - T kappa|, M and T of tool k and all inside it: a length h of the line takes the jump of
-// M' over it, less T times the turn. Tools with clearance do not follow a jump of curvature at once: M is averaged over l = 7.3 sqrt(c / kappa), which the two
-// rods in contact give; else a couple at the end of a bend would bear a friction that grows without bound as elements shrink.
+// At a node, tool k presses on the one around it with N = |dM'/ds - T kappa|, where M and T are the moment and tension of tool k and all tools inside it. A
+// length h of the line takes the jump of M' over it, minus T times the turn of the line. Tools with clearance do not follow a jump of curvature at once: M is
+// averaged over l = 7.3 sqrt(c / kappa), a length derived from two rods in contact. Without this average, a couple at the end of a bend would cause friction
+// that grows without bound as elements shrink.
 
 #include "base/base.h"
 #include "solver/tools_internal.h"
 
 static const double FOLLOWS = 7.3;
-static const double GIVE = 1e-4;         // [mm] by which tools that stick on each other follow a force, elastically
+static const double GIVE = 1e-4;         // [mm] elastic displacement of sticking tools under a force
 
-// M averaged over l has the slope (M(s + l/2) - M(s - l/2)) / l; M is that of the element at a place, which is looked for from element *c on.
+// M averaged over l has the slope (M(s + l/2) - M(s - l/2)) / l. M at a place is that of its element, which is searched from element *c on.
 static Vec3 moment_at(const Stepper *s, int k, double place, int *c)
 {
     int last = s->state.node_count - 2;
@@ -22,7 +23,7 @@ static Vec3 moment_at(const Stepper *s, int k, double place, int *c)
     return place > end || place < 0 ? vec3(0, 0, 0) : s->tools.moment[*c * s->state.inner_count + k - 1];
 }
 
-// `turn`: of the line at node c, before x after.
+// `turn`: that of the line at node c, the cross product of the chord directions before and after it.
 static double pressure_at(const Stepper *s, int c, int k, double window, Vec3 turn, int at[2])
 {
     SEL_ASSERT(c > 0 && c + 1 < s->state.node_count, "tools press on each other between two elements");
@@ -35,7 +36,7 @@ static double pressure_at(const Stepper *s, int c, int k, double window, Vec3 tu
     return vec3_norm(vec3_add_scaled(jump, -tension, turn));
 }
 
-// The tool that is next around tool k at node c and is an unknown there too; 0: none.
+// The next tool around tool k at node c that is an unknown there too; 0: none.
 int tools_around(const Stepper *s, int c, int k)
 {
     SEL_ASSERT(k > 0 && k < s->tools.count, "an inner tool has one around it");
@@ -44,7 +45,7 @@ int tools_around(const Stepper *s, int c, int k)
     return k;
 }
 
-// Slip of tool k in a step as the last one. t: the node's tangent.
+// Slip of tool k in this step if it continues as in the last one. t: the node's tangent.
 static void last_slip(const Stepper *s, int c, int k, Vec3 t, double slip[2])
 {
     const WireState *w = &s->state;
@@ -80,14 +81,14 @@ void tools_slides(Stepper *s)
             if (!is_inside(s, c, k) || !(t->friction > 0))
                 continue;
             const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window[k], turn, near);
-            // what slid goes on sliding: by the new bound
+            // a slide that was slipping is assumed to keep slipping, at the new bound
             bool slid = same_hypot(last[0], last[1]) > 0.999999 * last[2];
             double change = slid && last[2] > 0 ? bound / last[2] : 1;
             double slip[2], radius = t->wire.radius[0];
             last_slip(s, c, k, tangent, slip);
             double force[2] = {change * last[0], change * last[1]};
             SEL_REQUIRE(s->system.set.slide_count < s->tools.capacity * s->state.inner_count, "there is room for a slide of each inner tool at each node");
-            SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a bound, and a radius at which tools touch");
+            SEL_ASSERT(bound >= 0 && radius > 0, "a slide has a friction bound and a contact radius");
             s->system.set.slide[s->system.set.slide_count++] = (ContactSlide){.node = c,
                                                                               .unknown = unknown_of(k),
                                                                               .radius = radius,
@@ -100,7 +101,7 @@ void tools_slides(Stepper *s)
     }
 }
 
-// S of tool k is its slip plus the S of the one around it: the rows and columns of tool k are added to that one's, from the innermost outwards.
+// S of tool k is its slip plus S of the tool around it: rows and columns of tool k are added to those of that tool, from the innermost outwards.
 void tools_to_slips(Stepper *s)
 {
     int n = s->system.chain.size;

@@ -1,11 +1,11 @@
-// The linear system of a step with its contacts.
+// The linear system of a step and its contact problem.
 #include "solver/self_contact.h"
 #include "solver/tools_internal.h"
 
-static const double FIRMEST = 1e5;               // share of its stiffness by which an unknown is held to the iterate at most, where nothing less will do
-// Contact iterations after which a step looks no further, neither for walls nor for another place to linearise about: a jammed stiff tool would use hundreds a
-// step and not come further. What it then has is followed as far as it is good. Not where a tool meets itself: what nobody has looked for overlaps; nor with
-// several tools, which snap over more rounds and came to lie 1.3 mm outside.
+static const double FIRMEST = 1e5;               // largest share of its stiffness by which an unknown is held to the iterate
+// Contact iterations after which a step neither searches further for walls nor linearises again: a jammed stiff tool would use hundreds per step without
+// progress. Its solution so far is followed as far as it is admissible. The limit does not apply to a tool in contact with itself, where undetected contacts
+// would overlap, nor to several tools, which snap over more rounds and ended up to 1.3 mm outside the wall.
 enum { ITERATIONS_ENOUGH = 60 };
 
 void step_detect(Stepper *s)
@@ -16,7 +16,7 @@ void step_detect(Stepper *s)
     s->iterate.knows_motion = false;
 }
 
-// The iterate in the unknowns that are solved for: hands at node 0, slips elsewhere.
+// The iterate in the unknowns of the solve: those of the hands at node 0, slips elsewhere.
 static double solved_for(const Stepper *s, int c, int unknown)
 {
     SEL_ASSERT(unknown >= 0 && unknown < s->system.chain.size, "an unknown is one of its node's");
@@ -34,10 +34,10 @@ static bool is_unit_row(const double *row, int n, int unknown)
     return true;
 }
 
-// Holds the solution to the iterate by a share of each unknown's own stiffness.
+// Holds the solution to the iterate, with a share of each unknown's own stiffness.
 static void hold_to_iterate(Stepper *s, double share)
 {
-    SEL_ASSERT(share > 0, "what holds is stiff");
+    SEL_ASSERT(share > 0, "the added stiffness is positive");
     int n = s->system.chain.size;
     for (int c = 0; c < s->system.chain.count; c++)
         for (int i = 0; i < n; i++) {
@@ -49,7 +49,7 @@ static void hold_to_iterate(Stepper *s, double share)
         }
 }
 
-// A matrix that is not positive definite (a tool springs, and nothing holds it) is made so: by ever larger shares, from 0 on.
+// Makes a matrix positive definite that is not (a tool snaps, and nothing holds it), by ever larger shares of its diagonal, starting from 0.
 static bool firmer(Stepper *s, double *share)
 {
     *share = *share > 0 ? 10 * *share : 0.01;
@@ -106,7 +106,7 @@ bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
     self_contact_keep_forces(s);
     double sum = 0;
     for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
-        sum += s->system.u[i] * 0;          // 0, or not a number
+        sum += s->system.u[i] * 0;          // 0, or NaN
     s->progress.has_failed |= sum != 0;
     return true;
 }

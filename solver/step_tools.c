@@ -1,6 +1,6 @@
-// Coaxial tools on one chain of nodes. The chain's nodes are those of the outermost tool from its hub to its tip, then those of the next that reaches
-// further, and so on: a node belongs to its carrier. Where a tool lies inside another its place at a node is two unknowns, material coordinate and angle.
-// As tools slide, nodes come and go at the tips (where a tool leaves the one around it), and unknowns where an inner tip passes a node.
+// Coaxial tools on one chain of nodes. The chain consists of the nodes of the outermost tool from its hub to its tip, then those of the next tool that extends
+// beyond it, and so on; each node belongs to its carrier. A tool that lies inside another has two unknowns at a node, its material coordinate and its angle. As
+// tools slide, nodes are added and removed at the tips (where a tool emerges from the one around it), and unknowns where an inner tip passes a node.
 #include "solver/tools_internal.h"
 
 #include "base/base.h"
@@ -8,15 +8,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A node that has left the tip around it joins the chain at this share of its element from it, and leaves the chain nearer than that.
+// A node that has emerged from the tip around it joins the chain at this share of its element from the tip, and leaves the chain when closer than that.
 static const double JOIN = 0.05, LEAVE = 0.04;
-// … but a tool's last node leaves only here where the wall holds it, and joins from here on where it comes out far within a step: nothing else of it meets the wall.
+// Exceptions: a tool's last node that presses on the wall leaves only here, and it joins from here on if it emerges far within one step, because no other part
+// of the tool touches the wall.
 static const double LEAST_OUT = 0.01;
-// A tip that ended past its element's end would be cut there, so it passes the node this share of the element early, and on the way back late: more than
-// strain and friction keep it from where the hands would have it. What lies past its tip does not bend.
+// A tip past the end of its element would be cut off there. It is therefore assigned to the next element this share of the element early, and back to the
+// previous one that much late; this is more than strain and friction can move it from the position that the hands give. The part of a span past its tip does
+// not bend.
 static const double EARLY = 0.01;
-static const double MOUTH_BORDER = 0.1;          // of a tool's shortest element: the way over which a border of its rest shape passes the sheath's mouth
-static const double TAKE_BACK = 0.002;           // of an element's length past the tip around it: a node that would end nearer to it leaves the chain
+static const double MOUTH_BORDER = 0.1;          // of a tool's shortest element: the distance over which a border of its rest shape passes the sheath's mouth
+static const double TAKE_BACK = 0.002;           // of an element's length past the tip around it: a node that would end closer to it leaves the chain
 
 // --- creation ---
 
@@ -83,7 +85,7 @@ double tools_clearance(const Tool *around, const Tool *inner) { return fmax(0.5 
 static Tool *make_device(Stepper *s, int k, const WireOptions *options, char *why, int capacity)
 {
     WireOptions own = *options;
-    if (k > 0)       // where it stands and how it is held is the outermost's
+    if (k > 0)       // its start and supports are those of the outermost tool
         own.has_sheath = true, own.fix_count = own.load_count = 0, own.start = own.normal = vec3(0, 0, 0), own.direction = vec3(1, 0, 0);
     if (k == 0 && !own.has_sheath)
         own.inserted = wire_length(&own);
@@ -110,7 +112,7 @@ static bool make_spares(Stepper *s, const StepperOptions *o, char *why, int capa
     return true;
 }
 
-// Room for the longest chain that the tools and their spares make.
+// Computes the capacity for the longest chain that the tools and their spares can form.
 static void measure_chain(Stepper *s)
 {
     for (int k = 0; k < s->tools.count; k++) {
@@ -187,7 +189,7 @@ static void chain_node(Stepper *s, int c, int k, int j)
     w->friction[c] = t->wire.friction[j];
 }
 
-// The element before chain node c.
+// Copies the element before chain node c.
 static void chain_element(Stepper *s, int c, int k, int j)
 {
     const Tool *t = &s->tools.tool[k];
@@ -206,7 +208,7 @@ static void chain_element(Stepper *s, int c, int k, int j)
     s->points.slot_start[c + 1] = first + count;
 }
 
-// What the chain is made of, from where each tool begins to carry it.
+// Builds the chain from the nodes at which each tool begins to carry it.
 void tools_chain(Stepper *s)
 {
     int c = 0;
@@ -261,9 +263,9 @@ void tools_place(Stepper *s)
     }
 }
 
-// --- nodes that come and go ---
+// --- adding and removing nodes ---
 
-// Opens a gap of so many at a place, or closes one (< 0).
+// Inserts a gap of so many entries at a position, or removes that many (< 0).
 static void change_gap(void *base, size_t size, int count, int at, int gap)
 {
     char *p = (char *)base + (size_t)at * size;
@@ -275,7 +277,8 @@ static void change_gap(void *base, size_t size, int count, int at, int gap)
     memset(p, 0, (size_t)gap * size);
 }
 
-// The state's and the wall's arrays, by nodes and by points; those of points hold the nodes, then the slots. Makes room for so many at a place, or takes them out.
+// Inserts or removes entries in the arrays of the state and of the wall, which are indexed by nodes or by points; arrays of points hold the nodes first, then
+// the slots.
 static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
 {
     WireState *w = &s->state;
@@ -299,12 +302,12 @@ static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
     }
 }
 
-// Makes room for chain node c, or takes it out; its element is the one before it.
+// Inserts or removes chain node c with its element, which is the one before it.
 static void shift(Stepper *s, int c, int slots, bool opens) { shift_at(s, c, opens ? 1 : -1, s->points.slot_start[c - 1], opens ? slots : -slots); }
 
 // --- the outermost tool's exchange ---
 
-// `turn` [rad] of the node about the line against the hub.
+// `turn` [rad]: the rotation of the node about the line relative to the hub.
 static Inside inside_at_node(const Stepper *s, int c, double turn)
 {
     Inside at = {
@@ -319,7 +322,7 @@ static Inside inside_at_node(const Stepper *s, int c, double turn)
     return at;
 }
 
-// At x [mm]: between two nodes, or behind the hub as strained as there.
+// The state at x [mm]: interpolated between two nodes, or extrapolated behind the hub with the same strain.
 static Inside inside_between(const Inside *a, const Inside *b, double x, int inner_count)
 {
     double xi = (x - a->x) / (b->x - a->x);
@@ -399,14 +402,14 @@ static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *n
     node->carrier = c + 1 < s->first_free ? -1 : s->tools.carrier[c + 1];
 }
 
-// Node c joins the chain behind node c - 1, which is the tip around it, at a distance d [mm] along the curve there.
+// Node c joins the chain after node c - 1, which is the tip around it, at a distance d [mm] along the curve there.
 static void join(Stepper *s, int k, double d)
 {
     Tool *t = &s->tools.tool[k];
     WireState *w = &s->state;
     bool carries = tools_carries(t);
     int c = carries ? t->start : 0, j = carries ? t->first - 1 : t->wire.node_count - 1;
-    if (!carries)       // behind all that carry before it
+    if (!carries)       // after all tools that precede it in the chain
         for (c = w->node_count; c > 0 && s->tools.carrier[c - 1] > k; c--)
             ;
     int before = c - 1;
@@ -415,9 +418,9 @@ static void join(Stepper *s, int k, double d)
     ToolNode further = tools_further(s, before, d, true);
     shift(s, c, slots_of(t, j - 1), true);
     w->position[c] = further.position;
-    // whole turns too: they are the quaternion's sign, and elements see p and -p as two
+    // with whole turns: they determine the quaternion's sign, and elements distinguish p from -p
     w->orientation[c] = quat_unit(quat_mul(further.orientation, quat_from_rotation_vector(vec3(phi, 0, 0))));
-    // its material moves as it did inside
+    // its material keeps the velocity that it had inside
     int i = before * w->inner_count + k - 1;
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);
     w->spin[c] = vec3_add_scaled(w->spin[before], w->slide_spin[i] - vec3_dot(w->spin[before], tangent), tangent);
@@ -447,7 +450,7 @@ static void leave(Stepper *s, int k)
     tools_chain(s);
 }
 
-// [mm/ms] by which S of tool k grew at node c in the last step.
+// [mm/ms] The rate at which S of tool k grew at node c in the last step.
 static double slide_rate(const Stepper *s, int c, int k)
 {
     return vec3_dot(s->state.velocity[c], quat_rotate(s->state.orientation[c], vec3(1, 0, 0))) - s->state.slide_velocity[c * s->state.inner_count + k - 1];
@@ -472,7 +475,7 @@ bool tools_leave_back(Stepper *s)
     return false;
 }
 
-// The node of tool k that would come out next: the chain's node that is the tip around it (-1: the tool ends before that), and its own number.
+// The next node of tool k to emerge: returns the chain's node at the tip around it (-1: the tool ends before that tip); *own is the node's number in the tool.
 static int next_out(const Stepper *s, int k, int *own)
 {
     const Tool *t = &s->tools.tool[k];
@@ -505,7 +508,7 @@ bool tools_come_out(Stepper *s)
     return false;
 }
 
-// Tool k at the tip around it, where its material moves on by `ahead` [mm] in this step.
+// Adds or removes nodes of tool k at the tip around it, when its material advances by `ahead` [mm] in this step.
 static void pass_tip(Stepper *s, int k, double ahead)
 {
     Tool *t = &s->tools.tool[k];
@@ -515,7 +518,7 @@ static void pass_tip(Stepper *s, int k, double ahead)
             return;
         bool carries = tools_carries(t);
         bool is_held = carries && t->first + 1 == t->wire.node_count && vec3_norm2(s->points.force[t->start]) > 0;
-        // by the hands' commands or by its last motion, whichever takes it further back: friction may hold it against its hand
+        // by the hand's command or by its last motion, whichever leaves it further back: friction may hold the tool against its hand
         double out = *slide_of(s, tip, k), at = out - fmin(ahead, -slide_rate(s, tip, k) * s->dt);
         if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
@@ -526,10 +529,10 @@ static void pass_tip(Stepper *s, int k, double ahead)
     }
 }
 
-// [mm] by which a tip passes a node early.
+// [mm] How early a tip passes a node.
 static double pass_early(const Stepper *s, int last, double ahead) { return EARLY * s->wire.length[last > 0 ? last - 1 : 0] + fabs(ahead); }
 
-// The inner tip of tool k passes nodes, on the way back …
+// The inner tip of tool k passes nodes backwards …
 static bool pass_nodes_back(Stepper *s, int k, double ahead)
 {
     Tool *t = &s->tools.tool[k];
@@ -539,7 +542,7 @@ static bool pass_nodes_back(Stepper *s, int k, double ahead)
     return t->inside < before;
 }
 
-// … or forth. Not both in a step: a tool that is squeezed in its last element would come and go for ever.
+// … or forwards. Not both in one step: a tool that is compressed in its last element would alternate for ever.
 static void pass_nodes(Stepper *s, int k, double ahead)
 {
     Tool *t = &s->tools.tool[k];
@@ -551,7 +554,7 @@ static void pass_nodes(Stepper *s, int k, double ahead)
         if (next - ahead >= t->wire.total_length + pass_early(s, last, ahead))
             return;
         *slide_of(s, t->inside, k) = next;
-        // unstretched and untwisted: turned against the node by what the carrier is twisted
+        // unstretched and untwisted: rotated relative to the node by the carrier's twist
         *angle_of(s, t->inside, k) = *angle_of(s, last, k) - tools_twist(s, last);
         w->slide_velocity[t->inside * w->inner_count + k - 1] = w->slide_velocity[last * w->inner_count + k - 1];
         w->slide_spin[t->inside * w->inner_count + k - 1] = w->slide_spin[last * w->inner_count + k - 1];
@@ -570,7 +573,7 @@ static void pass(Stepper *s)
 
 void tools_feed(Stepper *s)
 {
-    // where hubs will be; a tool's proximal end stays behind that of the tool around it, its tip beyond the outermost
+    // the future positions of the hubs: a tool's proximal end stays behind that of the tool around it, and its tip beyond the outermost hub
     double outermost = s->state.inserted + s->command.advance - s->tools.tool[0].wire.total_length, around = outermost;
     for (int k = 1; k < s->tools.count; k++) {
         Tool *t = &s->tools.tool[k];
@@ -590,7 +593,7 @@ void tools_leave_out(Stepper *s)
 {
     for (int c = 0; c < s->system.chain.count; c++)
         for (int k = 1; k < s->tools.count; k++)
-            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)       // nothing has been added to these rows and columns
+            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)       // these rows and columns are empty
                 s->system.chain.diag[block_of(s, c) + (size_t)((s->system.chain.size + 1) * (unknown_of(k) + i))] = 1;
 }
 
@@ -642,7 +645,7 @@ void tools_set_velocities(Stepper *s)
     }
 }
 
-// --- questions ---
+// --- reports ---
 
 int stepper_node_capacity(const Stepper *s) { return s->tools.count > 1 ? s->tools.capacity : s->state.node_count; }
 

@@ -1,31 +1,32 @@
 // Where between its neighbours a contact point touches the wall.
 //
-// A contact point stands for the cell of the tool that is nearer to it than to its neighbours. Left where it is, it slides with the tool over every bend of the
-// wall: the normal leans along the tool, to and fro as one point after the other takes the force, and the hand feels N l / (2 R). A tool touches where its
-// line is nearest to the wall, which stays in space while it slides. With g(s) the gap along the line, t its tangent, k its curvature, n and H of the wall:
-//   g' = n.t,   g'' = t'Ht + n.k,   offset = -g' / g''   (Newton's method for the least gap, from where was asked last)
-// The normal is there perpendicular to the tool, and nothing leans. Of the energy of that least gap the second derivative is H - (dg')(dg')' / g'', dg' how
-// g' changes with the unknowns: the contact rolls back along a tool that turns, which is `roll` of contact.h, and without which it goes to and fro in steps.
-// STIFF is the bend of a weak spring that holds the offset at 0 where the wall says little about it; its energy belongs to the gap.
+// A contact point stands for its cell, the part of the tool that is nearer to it than to its neighbours. A contact that stays at the point would move with the
+// tool over every bend of the wall: its normal would tilt along the tool, back and forth as one point after the other takes over the force, and the hand would
+// feel N l / (2 R). A tool touches where its line is nearest to the wall, and that place stays fixed in space while the tool slides. With g(s) the gap along
+// the line, t its tangent, k its curvature, n and H the wall's normal and Hessian:
+//   g' = n.t,   g'' = t'Ht + n.k,   offset = -g' / g''   (Newton's method for the smallest gap, from the last queried place)
+// There the normal is perpendicular to the tool and does not tilt. The energy of that smallest gap has the second derivative H - (dg')(dg')' / g'', where dg'
+// is the change of g' with the unknowns: the contact rolls back along a tool that turns. This is `roll` of contact.h; without it the contact oscillates from
+// step to step. STIFF is the curvature of a weak spring that holds the offset at 0 where the wall hardly determines it; its energy belongs to the gap.
 //
-// All is at the step's end: the tool slides by `slides`, so the point of the tool that will be there is as much behind.
+// Everything refers to the step's end: the tool slides by `slides`, so the material point that will touch then lies that far behind.
 #include "solver/step_internal.h"
 
 #include "base/base.h"
 
 #include <string.h>
 
-static const double STIFF = 0.02;        // [1/mm] bend of the weak spring …
-static const double FIRM = 0.1;          // … which makes up to this where the gap bends less: nothing tells there where the tool touches
-static const double REACH_OUT = 1.2;     // of half a cell: as far as the offset goes
-static const double LEAVES = 1.1;        // of half a cell: further out the contact goes over to the next point
+static const double STIFF = 0.02;        // [1/mm] curvature of the weak spring …
+static const double FIRM = 0.1;          // … which adds up to this where the gap is less curved and hardly determines where the tool touches
+static const double REACH_OUT = 1.2;     // of half a cell: largest offset
+static const double LEAVES = 1.1;        // of half a cell: beyond this the contact passes to the next point
 static const double STRIDE = 5, STRIDE_LEAST = 0.02,
-                    STRIDE_MAX = 0.1; // of what the tool slides, [mm]: so far the offset goes besides; further the wall was not asked
-// Phi = 12 EI / (kappa G A L^2) above which the cubic through the nodes is not the tool's line: elements that are hardly longer than thick shear instead.
+                    STRIDE_MAX = 0.1; // times the slide, [mm]: largest change of the offset; the wall is unknown beyond
+// Phi = 12 EI / (kappa G A L^2) above which the cubic through the nodes does not describe the tool: elements hardly longer than thick shear instead of bending.
 static const double SHEARS = 2;
-static const double BLEND = 0.5;          // of half a cell
-static const double SLIDE_MAX = 0.1;     // [mm] that the tool is expected to slide at most
-static const double SLIDE_PART = 0.5;    // of half a cell: the same
+static const double BLEND = 0.5;          // of half a cell, over which the curvature is blended across a node
+static const double SLIDE_MAX = 0.1;     // [mm] largest slide assumed
+static const double SLIDE_PART = 0.5;    // of half a cell: likewise
 
 bool stepper_is_slender(const Stepper *s)
 {
@@ -40,7 +41,7 @@ double stepper_slides(const Stepper *s)
 {
     if (!s->is_slender)
         return 0;
-    // a hand that slips, or begins to move, moves no tool: as far as it went in the last step too
+    // a hand that slips or has just started does not move the tool, so the slide is limited to that of the last step
     double asked = s->command.advance, went = s->dt * vec3_dot(s->state.velocity[0], s->entry.axis[0]), least = fmin(fabs(asked), fmin(fabs(went), SLIDE_MAX));
     return asked * went > 0 ? asked > 0 ? least : -least : 0;
 }
@@ -49,7 +50,7 @@ static Vec3 own_tangent(const Stepper *s, int node) { return quat_rotate(s->stat
 
 static int points_on(const Stepper *s, int element) { return 1 + s->points.slot_start[element + 1] - s->points.slot_start[element]; }
 
-// The cubic's second derivative; `at` of its rest length.
+// The cubic's second derivative at `at`, a share of its rest length.
 static Vec3 bend_of(const Stepper *s, int e, double at)
 {
     SEL_ASSERT(e >= 0 && e + 1 < s->state.node_count, "the element is one of the chain's");
@@ -58,7 +59,7 @@ static Vec3 bend_of(const Stepper *s, int e, double at)
     return vec3_add(bend, vec3_add_scaled(vec3_scale(own_tangent(s, e), (6 * at - 4) / l), (6 * at - 2) / l, own_tangent(s, e + 1)));
 }
 
-// It jumps at nodes that bear a force, where the tool shears: near them it is mixed.
+// The curvature jumps at nodes that bear a force, because the tool shears there. It is blended near them.
 static Vec3 bend_at(const Stepper *s, const Touch *t)
 {
     int e = t->element, node = t->xi < 0.5 ? e : e + 1;
@@ -73,7 +74,7 @@ bool touch_at(const Stepper *s, int point, double offset, Touch *t)
 {
     SEL_ASSERT(point >= 0 && point < s->points.count, "the point is a node or a slot of the tool");
     int nodes = s->state.node_count, e = point < nodes ? point : s->points.slot[point - nodes].element;
-    // the mouth's element and the last one are left out: the line ends there
+    // the element at the mouth and the last one are excluded: the line ends there
     if (s->tools.count > 1 || e <= s->first_free || e + 2 >= nodes)
         return false;
     const double *length = s->wire.length;
@@ -124,7 +125,7 @@ VesselHit touch_back(const Stepper *s, int point, const VesselHit *hit)
     return own;
 }
 
-// How g' = n.t changes with the unknowns of both nodes: t' of the cubic, and the point's motion by H t.
+// The derivatives of g' = n.t with the unknowns of both nodes: from the change of the cubic's tangent, and from the point's motion through H t.
 static void lean(const Stepper *s, const Touch *t, Vec3 normal, Vec3 turns, ContactPoint *c)
 {
     double l = s->wire.length[t->element], xi = t->xi, slope = 6 * xi * (1 - xi) / l;
@@ -147,7 +148,7 @@ void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, cons
     double wish = asked->offset - (slope + stiff * asked->offset) * roll, most = REACH_OUT * asked->half;
     bool rolls = fabs(wish) < most;
     wish = rolls ? wish : wish > 0 ? most : -most;
-    // an iterate keeps the points of the tool that touch
+    // a moved iterate keeps the touching points of the tool
     double step = wish - asked->offset, stride = s->iterate.is_moved ? 0 : fmin(STRIDE_MAX, fmax(STRIDE_LEAST, STRIDE * fabs(s->iterate.slides)));
     rolls &= fabs(step) < stride;
     step = fmax(-stride, fmin(stride, step));
@@ -174,7 +175,7 @@ void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, cons
     c->leant = slides * bend;
 }
 
-// The next contact point along the tool (way 1) or the one before (-1).
+// The next contact point along the tool (way 1) or the previous one (-1).
 static int neighbour(const Stepper *s, int point, int way)
 {
     int nodes = s->state.node_count;
@@ -190,7 +191,7 @@ static int neighbour(const Stepper *s, int point, int way)
 
 static void go_over(Stepper *s, int from, int to, double offset)
 {
-    SEL_ASSERT(from != to && to >= 0 && to < s->points.count, "a contact goes over to the next point");
+    SEL_ASSERT(from != to && to >= 0 && to < s->points.count, "a contact passes to another point of the tool");
     s->points.touch[to] = offset;
     s->points.force[to] = s->points.force[from];
     s->points.place[to] = s->points.place[from];
