@@ -4,10 +4,10 @@
 // read them) and commits them about as often, so no step touches a file. The file opens in any HDF5 reader while it is written and after a kill,
 // complete up to the last flush. This is achieved as follows:
 //   - it is built under a temporary name and renamed once its first chunks are flushed, so its structure is on disk before it gets its name;
-// - after that, datasets only grow, by whole chunks, in an order of writes of which every prefix is a valid file (sim/ordered_file.h);
+//   - after that, datasets only grow, by whole chunks, in an order of writes of which every prefix is a valid file (sim/ordered_file.h);
 //   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no field depends on the bytes of another;
-// - the extents of datasets that lie in one page change in one write: for a single tool all datasets of length S together, and all of length K or P. S is
-// written first and may be one flush ahead of the others; with several tools the datasets of one length may lie in two pages and differ by a flush.
+//   - the extents of datasets that lie in one page change in one write: for a single tool all datasets of length S together, and all of length K or P. S is
+//     written first and may be one flush ahead of the others; with several tools the datasets of one length may lie in two pages and differ by a flush.
 // A reader of a file whose writer was killed or is still writing takes the least S, K and P, and only the frames whose step is below S. After a failed write
 // (full disk, full index) nothing more is written; the file stays as the last flush left it.
 //

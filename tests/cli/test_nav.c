@@ -147,10 +147,38 @@ static RecordedRun *load(const char *path)
     return recorded;
 }
 
-// Waits until the window shows a picture, then holds keys as a user does; the session is ended by Esc and Enter. A key is seen once a picture, and
-// a picture can take half a second under a sanitizer on a loaded machine: what is compared is held for longer.
+// What a session has done so far, or in all.
+typedef struct Motion {
+    double inserted;         // [mm]
+    double twisted;          // [deg] by all commands
+} Motion;
+
+static Motion motion_of(const RecordedRun *recorded)
+{
+    Motion motion = {.inserted = recorded->step_count > 0 ? recorded->inserted[recorded->step_count - 1] : 0};
+    for (int64_t i = 0; i < recorded->step_count; i++)
+        motion.twisted += recorded->command[2 * i + 1] * recorded->step_ms / 1000;
+    return motion;
+}
+
+// This program as a hand calls it, `test_nav --moved RECORDING MM DEG`: exit code 0 once the recording, which is still being written, has so much motion;
+// the name is empty until it has a first row.
+static int has_moved(char **argument)
+{
+    RecordedRun *recorded = recorded_run_load_series(argument[0], &faults);
+    if (!recorded)
+        return 1;
+    Motion motion = motion_of(recorded);
+    recorded_run_free(recorded);
+    return motion.inserted > strtod(argument[1], NULL) && motion.twisted > strtod(argument[2], NULL) ? 0 : 1;
+}
+
+// Waits until the window shows a picture, then holds keys as a user does; the session is ended by Esc and Enter. A key is seen once a picture, and a picture can
+// take seconds under a sanitizer on a loaded machine: keys that move the tool are held until it has moved.
 static const char hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
-                           "xdotool key e; sleep 0.3; xdotool keydown Up; sleep 2; xdotool keyup Up; xdotool keydown Right; sleep 0.3; xdotool keyup Right; "
+                           "moved() { $TEST_NAV --moved \"$(ls -t sessions/*.h5 2>/dev/null | head -1)\" $1 $2; }; xdotool key e; sleep 0.3; "
+                           "xdotool keydown Up; until moved 4.1 -1; do sleep 0.3; done; xdotool keyup Up; "
+                           "xdotool keydown Right; until moved 4.1 5.1; do sleep 0.3; done; xdotool keyup Right; "
                            "xdotool keydown c; sleep 0.3; xdotool keyup c; xdotool key b; sleep 0.3; "
                            "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
@@ -163,17 +191,16 @@ static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
     char path[700], json[700];
     snprintf(path, sizeof path, "%s", newest_recording());
     RecordedRun *recorded = load(path);
-    double inserted = recorded->inserted[recorded->step_count - 1], twisted = 0;
+    Motion motion = motion_of(recorded);
     bool was_on = false, flowed = false, marked = false;
     for (int64_t i = 0; i < recorded->step_count; i++) {
         was_on |= recorded->xray[i].pedal > 0;
         flowed |= recorded->xray[i].contrast_ml_s > 0;
         marked |= recorded->xray[i].bookmark > 0;
-        twisted += recorded->command[2 * i + 1] * recorded->step_ms / 1000;
     }
-    print_message("%lld steps, %.1f mm in, %.0f degrees\n", (long long)recorded->step_count, inserted, twisted);
+    print_message("%lld steps, %.1f mm in, %.0f degrees\n", (long long)recorded->step_count, motion.inserted, motion.twisted);
     assert_true(was_on && flowed && marked);
-    assert_true(inserted > 2 + 2 && twisted > 5);
+    assert_true(motion.inserted > 2 + 2 && motion.twisted > 5);
     assert_true(recorded->step_count < 55000);   // Esc and Enter ended it, not the clock
 
     snprintf(json, sizeof json, "%.*s.json", (int)strlen(path) - 3, path);
@@ -324,8 +351,16 @@ static void without_a_display_it_says_so(void **state)
     free(said);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    if (argc > 1)
+        return argc == 5 && !strcmp(argv[1], "--moved") ? has_moved(argv + 2) : 2;
+    char self[500];
+    ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    if (length <= 0)
+        return 1;
+    self[length] = 0;
+    setenv("TEST_NAV", self, 1);
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
                                        cmocka_unit_test(a_session_goes_on_from_a_moment_of_another),
                                        cmocka_unit_test(a_recording_is_shown_in_the_window),
