@@ -310,7 +310,18 @@ static void a_recording_is_shown_in_the_window(void **state)
 {
     (void)state;
     need_display();
-    RUNS(0, "exec %s replay '%s' --duration-s 3 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
+    // LeakSanitizer itself crashes at times, when it stops the program's threads while one of the GL driver's ends: that says nothing about the program
+    bool sanitizer_crashed = true;
+    for (int i = 0; i < 5 && sanitizer_crashed; i++) {
+        int ended = run("exec %s replay '%s' --duration-s 3 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
+        char *text = text_of(in_folder("out.txt"));
+        sanitizer_crashed = strstr(text, "Tracer caught signal") != NULL;
+        if (!sanitizer_crashed && ended != 0)
+            print_message("%s", text);
+        free(text);
+        assert_true(sanitizer_crashed || ended == 0);
+    }
+    assert_false(sanitizer_crashed);
 }
 
 // Killed while a key is held; the next start asks, and Enter has it scored.
