@@ -1,18 +1,18 @@
-// The zero of a field as triangles: marching cubes with vertices where the lattice's edges cross it (isosurface.h).
+// The zero level of a field as triangles: marching cubes with vertices where the edges of the lattice cross it (isosurface.h).
 #include "geom/isosurface.h"
 #include "geom/sparse_march.h"
 
 #include <stdlib.h>
 
 typedef struct FieldMarch {
-    March march;             // first: a March * to us is a FieldMarch *
+    March march;             // must be first: callbacks convert their March * to FieldMarch *
     double (*field)(const void *of, Vec3 x);
     const void *of;
 } FieldMarch;
 
-static const double LEAST_SHARE = 1e-6;      // tells an edge's direction from its vertex
+static const double LEAST_SHARE = 1e-6;      // [cell] a vertex stays this far from lattice points, so that it shows the direction of its edge
 
-// On the lattice's edge through p, which runs along the one coordinate that is no multiple of the cell: false position, the kept end halved.
+// Finds the zero on the edge of the lattice through p, along the only coordinate that is not a multiple of the cell (Illinois method).
 static void place(March *march, const MarchBlock *block, Vec3 p, int owner, Vec3 *vertex, Vec3 *normal, int *node)
 {
     const FieldMarch *job = (const FieldMarch *)march;

@@ -1,4 +1,4 @@
-// A build without pictures: what would draw says so. Verbs refuse such outputs before they begin (output_plan_picture).
+// A build without pictures: functions that would draw return this as a message. Verbs refuse such outputs before they begin (output_plan_picture).
 #include "render/film.h"
 #include "render/message.h"
 #include "render/picture.h"
