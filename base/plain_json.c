@@ -24,7 +24,7 @@ static void print_value(FILE *out, const cJSON *value)
 void plain_json_print(FILE *out, const cJSON *object, const char *without)
 {
     for (const cJSON *item = object->child; item; item = item->next) {
-        if (!strcmp(item->string, without))
+        if (!strcmp(item->string, without) || (cJSON_IsString(item) && !item->valuestring[0]))
             continue;
         fprintf(out, "%-16s ", item->string);
         print_value(out, item);

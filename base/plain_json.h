@@ -5,7 +5,7 @@
 #include <cJSON.h>
 #include <stdio.h>
 
-// One line for each member of the object except `without`: its name and its values in order.
+// One line for each member of the object except `without` and empty strings: its name and its values in order.
 void plain_json_print(FILE *out, const cJSON *object, const char *without);
 
 #endif

@@ -41,7 +41,7 @@ static const OptionTable table = {
     .does = "what a file is and its figures",
     .usage = "FILE [options]",
     .intro = "Says what FILE is (volume or folder of a DICOM series, surface, tree, model, recording, scene or script) and its figures. Lengths mm.\n"
-             "Of a model also where a tool gets to from the inlet, and what is shut and why.",
+             "Of a model also where a tool gets to from the inlet, and where it is blocked and why.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, InfoCommand),
     .set_defaults = set_defaults,
@@ -135,7 +135,7 @@ static int call(void *structure, Faults *faults)
     if (good && command->json) {
         output_write_line("-", cJSON_Print(object), faults);
     } else if (good && !command->quiet) {
-        plain_json_print(stdout, object, "reach");   // which has its own words
+        plain_json_print(stdout, object, "reach");   // which is printed as text below
         fputs(command->reach ? command->reach : "", stdout);
     }
     free(command->reach);

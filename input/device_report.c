@@ -40,8 +40,32 @@ static void print_nodes(FILE *out, const char *title, const InputNode *node, int
         fprintf(out, "%-20s %s\n", node[i].node, node[i].name);
 }
 
+static int devices_with(const DeviceList *list, const DeviceMap *map)
+{
+    int count = 0;
+    for (int i = 0; i < list->hid_count; i++)
+        count += list->hid[i].map == map;
+    for (int i = 0; i < list->usb_count; i++)
+        count += list->usb_map[i] == map;
+    return count;
+}
+
+// The maps of --map, so that the user sees that a file is valid even if its device is not connected.
+static void print_maps(FILE *out, const DeviceList *list)
+{
+    if (list->own_map_count > 0)
+        fprintf(out, "Maps given\n");
+    for (int i = 0; i < list->own_map_count; i++) {
+        int count = devices_with(list, list->map[i]);
+        fprintf(out, "%s: '%s', without faults; it fits %d connected device%s\n", list->map[i]->file, list->map[i]->name, count, count == 1 ? "" : "s");
+    }
+    if (list->own_map_count > 0)
+        fputc('\n', out);
+}
+
 void device_list_print(FILE *out, const DeviceList *list)
 {
+    print_maps(out, list);
     fprintf(out, "HID devices\n");
     for (int i = 0; i < list->hid_count; i++)
         print_hid(out, &list->hid[i]);
@@ -109,6 +133,14 @@ char *device_list_json(const DeviceList *list)
 {
     cJSON *object = cJSON_CreateObject();
     cJSON_AddBoolToObject(object, "has_hidraw", list->has_hidraw);
+    cJSON *maps = cJSON_AddArrayToObject(object, "maps");
+    for (int i = 0; i < list->own_map_count; i++) {
+        cJSON *item = cJSON_CreateObject();
+        cJSON_AddStringToObject(item, "file", list->map[i]->file);
+        cJSON_AddStringToObject(item, "name", list->map[i]->name);
+        cJSON_AddNumberToObject(item, "devices", devices_with(list, list->map[i]));
+        cJSON_AddItemToArray(maps, item);
+    }
     cJSON *hid = cJSON_AddArrayToObject(object, "hid"), *usb = cJSON_AddArrayToObject(object, "usb");
     for (int i = 0; i < list->hid_count; i++) {
         const HidListing *one = &list->hid[i];

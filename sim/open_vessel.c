@@ -9,6 +9,8 @@
 #include "sim/tube_tree.h"
 
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 enum { CELLS_ROUND_TUBE = 40 };
 
@@ -98,6 +100,19 @@ static bool open_mesh(const Scene *scene, const OpenVesselOptions *options, Open
     return out->vessel && entry_is_inside(scene, out->vessel, faults);
 }
 
+// A file that is not in the project is made by the script `prepare` in its folder. Any other missing file is left to its reader.
+static bool is_prepared(const char *path, Faults *faults)
+{
+    if (access(path, F_OK) == 0)
+        return true;
+    char *script = text_file_beside(path, "prepare");
+    bool can_be_made = script && access(script, X_OK) == 0;
+    if (can_be_made)
+        faults_add(faults, path, 0, 0, "does not exist; make it with `%s%s`", strchr(script, '/') ? "" : "./", script);
+    free(script);
+    return !can_be_made;
+}
+
 static bool open_source(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
 {
     switch (scene->source) {
@@ -143,7 +158,8 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
                    "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
                    "build again, or take another contact",
                    name);
-    return faults->count == before && open_source(scene, options, out, faults) &&
+    const char *needed = scene_needed_file(scene);
+    return faults->count == before && (!needed || is_prepared(needed, faults)) && open_source(scene, options, out, faults) &&
            (!as_surface || scene->source == SOURCE_MESH || turn_into_surface(scene, options, out, faults));
 }
 

@@ -38,7 +38,7 @@ static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
     if (reach->sac_nodes > 0)
         fprintf(out, "aneurysm nodes %d of %d are reached by a point\n", reach->sac_nodes_reached, reach->sac_nodes);
     if (reach->stop_count > 0)
-        fprintf(out, "closed         %d places, sorted by the centreline behind them:\n", reach->stop_count);
+        fprintf(out, "blocked        %d places, sorted by the centreline behind them:\n", reach->stop_count);
     for (int k = 0; k < reach->stop_count && k < STOPS_SHOWN; k++)
         print_stop(out, tree, reach, &reach->stop[k]);
     if (reach->stop_count > STOPS_SHOWN)

@@ -1,5 +1,5 @@
-// Bad input to the verbs beside `run` (test_run.c has those): exit code 2, one message with the file, the place and what would be valid, and no
-// file left, not even a part of one.
+// Bad input to all verbs except `run` (see test_run.c): exit code 2, one message with the file, the position and the valid values, and no output file, not even
+// a temporary one.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -22,7 +22,7 @@ static char folder[] = "/tmp/seldinger-bad-XXXXXX";
 #include "tests/folder.h"
 #include "tests/cli/program.h"
 
-// Outputs of these tests are called out*.
+// Outputs of these tests have names that begin with `out`.
 static void nothing_is_left(const char *arguments)
 {
     char pattern[300];
@@ -91,7 +91,7 @@ static void volumes_cut_off_or_lying(void **state)
         char arguments[200];
         snprintf(arguments, sizeof arguments, "segment %s --trace trace.yaml -o out.h5 --json out.json", files[i][0]);
         refused(arguments, files[i][1]);
-        if (strcmp(files[i][0], ".") && strcmp(files[i][0], "tree.h5")) {   // info knows a volume by the same signs
+        if (strcmp(files[i][0], ".") && strcmp(files[i][0], "tree.h5")) {   // info recognises a volume by the same rules
             snprintf(arguments, sizeof arguments, "info %s", files[i][0]);
             refused(arguments, files[i][0]);
             assert_null(strstr(output, "is of no kind that `info` can describe"));
@@ -122,6 +122,8 @@ static void traces(void **state)
                     "5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5\n");
     put("t.yaml", "branches: [{start_mm: [1, 1, 1]}]\n");
     refused("segment one.nrrd --trace t.yaml -o out.h5", "lies on background (5 in a volume of 5 to 5)");
+    assert_int_equal(run_in("", "info one.nrrd"), 0);   // a header without a frame gives no empty line
+    assert_true(strstr(output, "voxel_mm") && !strstr(output, "frame"));
 }
 
 static void the_wrong_kind_of_file(void **state)
@@ -191,7 +193,7 @@ static void words_of_the_command_line(void **state)
         {"info", "one file is needed"}};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         refused(lines[i][0], lines[i][1]);
-    // what is read is never written over, under whatever name
+    // an input is never overwritten, whatever its path looks like
     static const char *const same[] = {"query model.h5 --points ok.csv -o ok.csv",
                                        "query model.h5 --points ok.csv -o ./model.h5",
                                        "export model.h5 -o alias.stl",
@@ -270,7 +272,7 @@ static void verbs_of_the_trainer(void **state)
         refused(lines[i][0], lines[i][1]);
 }
 
-// Every verb that writes, with no more than 4 kB to a file; what was there before stays as it was.
+// Runs every verb that writes, with a file size limit of 4 kB: existing files stay unchanged.
 static void a_full_disk(void **state)
 {
     (void)state;
@@ -295,7 +297,7 @@ static void a_full_disk(void **state)
             fail_msg("`%s` on a full disk ended with %d and said: %s", lines[i], code, output);
         nothing_is_left(lines[i]);
     }
-    // /dev/full refuses what is printed, too
+    // /dev/full also fails printed output
     assert_int_equal(run_in("", "info tree.h5 --json > /dev/full"), 2);
     assert_int_equal(run_in("", "fit tree.h5 -o fitted.h5 > /dev/full"), 2);
     put("kept.h5", "before");
@@ -303,7 +305,7 @@ static void a_full_disk(void **state)
     assert_int_equal(run_in("grep -q '^before$' kept.h5 &&", "--version"), 0);
 }
 
-// Runs `seldinger ARGUMENTS`, its words to stop.txt, until `is_time` or its end; then SIGINT. Returns the wait status.
+// Runs `seldinger ARGUMENTS` with its output in stop.txt until `is_time` or its end, then sends SIGINT. Returns the wait status.
 static int stopped(const char *arguments, bool (*is_time)(double seconds), double seconds)
 {
     char command[600];
@@ -311,7 +313,7 @@ static int stopped(const char *arguments, bool (*is_time)(double seconds), doubl
     pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
-        signal(SIGINT, SIG_DFL);   // ignored where a shell runs the tests in the background
+        signal(SIGINT, SIG_DFL);   // a shell ignores SIGINT in background jobs
         execl("/bin/sh", "sh", "-c", command, (char *)NULL);
         _exit(127);
     }
@@ -332,7 +334,7 @@ static int stopped(const char *arguments, bool (*is_time)(double seconds), doubl
 
 static bool is_past(double seconds) { return seconds >= 0; }
 
-// A part lies beside the output, or the time is up.
+// True if a temporary file exists beside the output, or the time is over.
 static bool is_writing(double seconds)
 {
     char pattern[300];
@@ -346,7 +348,7 @@ static bool is_writing(double seconds)
 static void a_stop_by_the_user(void **state)
 {
     (void)state;
-    // while a file is written: it is whole, and no part of it is left
+    // while a file is written: the file is complete and no temporary file remains
     for (int trial = 0; trial < 4; trial++) {
         int status = stopped("export model.h5 -o out.stl --cell-mm 0.1 --quiet", is_writing, 20);
         assert_true((WIFEXITED(status) && WEXITSTATUS(status) == 0) || (WIFSIGNALED(status) && WTERMSIG(status) == SIGINT));
@@ -354,7 +356,7 @@ static void a_stop_by_the_user(void **state)
         assert_int_equal(run_in("rm -f out.stl;", "--version"), 0);
         nothing_is_left("export, stopped");
     }
-    // while it computes: ended by the signal and said so; the wait is doubled until the program is loaded on the busiest machine
+    // while it computes: the signal ends it with a message; the delay is doubled until the program has started, also on a busy machine
     bool said = false;
     for (double wait = 0.2; !said && wait < 30; wait *= 2) {
         int status = stopped("bench fit --table3 --threads 2", is_past, wait);
@@ -364,7 +366,7 @@ static void a_stop_by_the_user(void **state)
     assert_true(said);
 }
 
-// Renaming over a device or pipe would replace it: text is written through, HDF5 and volumes are refused.
+// Renaming would replace a device or pipe: text is written directly into it; HDF5 files and volumes are refused.
 static void pipes_and_devices_stay_what_they_are(void **state)
 {
     (void)state;

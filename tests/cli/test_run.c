@@ -1,4 +1,4 @@
-// The program as a user runs it: exit codes and messages of bad input, files of a run, determinism, golden paths, signals, a full disk.
+// `run` as a user runs it: exit codes and messages of bad input, output files, determinism, golden paths, signals, a full disk.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -21,7 +22,7 @@ static char folder[] = "/tmp/seldinger-run-XXXXXX";
 #include "tests/cli/json_file.h"
 #include "tests/cli/program.h"
 
-// A tube with a bend, a wire that is pushed through it: contact, friction, a script. 0.4 s.
+// A bent tube and a wire that is pushed through it: contact, friction, a script. 0.4 s.
 #define SCENE(modulus, radius, elements, vessel_more, script) SCENE_MU("0.1", modulus, radius, elements, vessel_more, script)
 #define SCENE_MU(friction, modulus, radius, elements, vessel_more, script)                                                                                     \
     "seldinger: 1\n"                                                                                                                                           \
@@ -50,7 +51,7 @@ static double figure(const cJSON *json, const char *group, const char *name)
 {
     const cJSON *value = cJSON_GetObjectItemCaseSensitive(group ? cJSON_GetObjectItemCaseSensitive(json, group) : json, name);
     if (!cJSON_IsNumber(value))
-        fail_msg("the summary lacks the number %s %s", group ? group : "", name);
+        fail_msg("the summary has no number %s %s", group ? group : "", name);
     return value->valuedouble;
 }
 
@@ -104,6 +105,13 @@ static void bad_input_ends_with_2_and_says_where(void **state)
                  models[i]);
         expect_bad(scene, "run bad.yaml --duration-s 1", models[i]);
     }
+    // a model that is not part of the project: the message gives the script that makes it
+    put("prepare", "#!/bin/sh\n");
+    assert_int_equal(chmod(in_folder("prepare"), 0755), 0);
+    expect_bad("seldinger: 1\nvessel: {model: nowhere.h5}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+               "sheath: {inlet: root}\n",
+               "run bad.yaml --duration-s 1", "nowhere.h5: does not exist; make it with `./prepare`");
+    assert_int_equal(unlink(in_folder("prepare")), 0);
     expect_bad(
         "seldinger: 1\nvessel: {shape: {name: banana}}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nsheath: {inlet: root}\n",
         "run bad.yaml --duration-s 1", "banana");
@@ -128,7 +136,7 @@ static void outputs_that_cannot_be_written_are_found_before_the_run(void **state
 
 // --- runs ---
 
-static void a_tool_that_touches_itself_is_told_of(void **state)
+static void a_tool_that_touches_itself_is_reported(void **state)
 {
     (void)state;
     assert_int_equal(run("run " SOURCE_DIR "/scenes/coil/sac.yaml --duration-s 0.8 --summary coil.json"), 0);
@@ -246,7 +254,7 @@ static void a_fitted_tube_answers_like_the_exact_one(void **state)
     double distance = 0;
     for (int j = 0; j < 3; j++)
         distance += (tip[1].x[j] - tip[0].x[j]) * (tip[1].x[j] - tip[0].x[j]);
-    // the fit's walls are a few hundredths of a millimetre off; the same bits would mean that no fit was made
+    // the fit's walls differ by a few hundredths of a millimetre; identical bits would mean that no fit was made
     assert_true(distance > 0 && sqrt(distance) < 0.15);
 }
 
@@ -301,7 +309,7 @@ static void a_full_disk_ends_with_3(void **state)
     (void)state;
     put("good.yaml", GOOD);
     char command[1000];
-    // 64 kB of file: not even the first rows fit, so no file is left
+    // file size limit of 64 kB: even the first rows do not fit, so no file remains
     snprintf(command, sizeof command, "cd '%s' && ulimit -f 64 && %s run good.yaml --record full.h5 > full.txt 2>&1", folder, SELDINGER_PROGRAM);
     int status = system(command);
     assert_true(WIFEXITED(status));
@@ -326,7 +334,7 @@ static void check_passes_on_identity_and_fails_on_one_per_cent(void **state)
     assert_true(exists("gold.golden.csv"));
     assert_int_equal(run("check gold.yaml"), 0);
     assert_int_equal(run("check ."), 0);
-    // one per cent of stiffness, of friction, of the lumen's radius: each parts from the path beyond the default tolerance
+    // 1 % of stiffness, of friction, or of the lumen's radius: each changes the path by more than the default tolerance
     put("gold.yaml", SCENE("80.8", "0.68", "40", "", SCRIPT));
     assert_int_equal(run("check gold.yaml"), 1);
     assert_non_null(strstr(output, "DIFFERS"));
@@ -345,7 +353,7 @@ static void check_passes_on_identity_and_fails_on_one_per_cent(void **state)
     assert_non_null(strstr(output, "45 nodes, the golden has 41"));
     put("gold.yaml", SCENE("80", "zero", "40", "", SCRIPT));
     assert_int_equal(run("check gold.yaml"), 2);
-    // a scene whose model is not there is skipped by name
+    // a scene whose model does not exist is skipped by name
     put("gold.yaml", GOOD);
     put("away.yaml", "seldinger: 1\nvessel: {model: nowhere.h5}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
                      "sheath: {inlet: root}\nscript: [[0, 10, 0], [1, 0, 0]]\n");
@@ -393,7 +401,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bad_input_ends_with_2_and_says_where),
         cmocka_unit_test(outputs_that_cannot_be_written_are_found_before_the_run),
-        cmocka_unit_test(a_tool_that_touches_itself_is_told_of),
+        cmocka_unit_test(a_tool_that_touches_itself_is_reported),
         cmocka_unit_test(a_run_leaves_its_files_and_repeats_bit_for_bit),
         cmocka_unit_test(a_script_on_the_command_line_and_a_duration_win),
         cmocka_unit_test(a_fitted_tube_answers_like_the_exact_one),

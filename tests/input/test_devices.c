@@ -1,4 +1,4 @@
-// The verb `devices` on whatever machine this is: it always ends well, says something, and tells wrong use and wrong maps.
+// The verb `devices` on any machine: exit code 0, output, and faults of wrong use and wrong maps.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-// What the program says on both outputs; its exit code.
+// Puts both outputs of the program into the buffer; returns its exit code.
 static int run(const char *arguments, char *said, size_t capacity)
 {
     char command[1024];
@@ -40,23 +40,27 @@ static void the_list_names_all_kinds(void **state)
     assert_true(strstr(said, "HID devices") && strstr(said, "USB serial encoders"));
     assert_int_equal(run("--map scenes/devices/roller.yaml --map scenes/devices/serial_encoder.yaml --quiet", said, sizeof said), 0);
     assert_string_equal(said, "");
+    assert_int_equal(run("--map scenes/devices/roller.yaml", said, sizeof said), 0);
+    assert_non_null(strstr(said, "scenes/devices/roller.yaml: '"));
     assert_int_equal(run("--watch --duration-s 0.05", said, sizeof said), 0);
 }
 
 static void the_json_is_whole(void **state)
 {
     (void)state;
-    assert_int_equal(run("--json -", said, sizeof said), 0);
+    assert_int_equal(run("--map scenes/devices/roller.yaml --json -", said, sizeof said), 0);
     cJSON *object = cJSON_Parse(said);
     assert_non_null(object);
-    static const char *const arrays[] = {"hid", "usb", "joysticks", "events"};
+    const cJSON *map = cJSON_GetArrayItem(cJSON_GetObjectItem(object, "maps"), 0);
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(map, "file")), "scenes/devices/roller.yaml");
+    static const char *const arrays[] = {"maps", "hid", "usb", "joysticks", "events"};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         assert_true(cJSON_IsArray(cJSON_GetObjectItem(object, arrays[i])));
     assert_true(cJSON_IsBool(cJSON_GetObjectItem(object, "has_hidraw")));
     cJSON_Delete(object);
 }
 
-static void wrong_use_and_wrong_maps_are_told(void **state)
+static void wrong_use_and_wrong_maps_are_reported(void **state)
 {
     (void)state;
     char path[] = "/tmp/seldinger-map-XXXXXX", arguments[64];
@@ -79,7 +83,7 @@ static void wrong_use_and_wrong_maps_are_told(void **state)
     assert_non_null(strstr(said, "--watch"));
 }
 
-// The list and --watch's words on a device that is only there in fake_hid.h.
+// The list and the output of --watch for a simulated device (fake_hid.h).
 static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **state)
 {
     (void)state;
@@ -124,7 +128,7 @@ int main(void)
         cmocka_unit_test(the_list_names_all_kinds),
         cmocka_unit_test(the_json_is_whole),
         cmocka_unit_test(watching_shows_raw_values_and_what_the_map_makes_of_them),
-        cmocka_unit_test(wrong_use_and_wrong_maps_are_told),
+        cmocka_unit_test(wrong_use_and_wrong_maps_are_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
