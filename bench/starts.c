@@ -1,5 +1,5 @@
 // A trial is a random tree with its own band, noise and click. If the trunk is visible, the correct result is a start in it with its radius, and a tree that
-// covers four fifths of its length. If noise hides the trunk, or the click is outside all vessels, the correct result is a rejection. A wrong result must come
+// covers four fifths of its length. If noise hides the trunk, or the click is outside all vessels, the correct result is a refusal. A wrong result must come
 // with a warning.
 #include "bench/starts.h"
 
@@ -15,7 +15,7 @@ typedef struct Kind {
     const char *name;
     double contrast, noise, band;            // [grey values]
     double band_radii, radius;               // thickness of the band, radius of the trunk [voxel]
-    bool is_hidden;          // a rejection is correct
+    bool is_hidden;          // a refusal is correct
     bool is_beside;          // the click lies on background
 } Kind;
 
@@ -168,7 +168,7 @@ static void run_trial(void *context, long index)
     o.seed = 1 + (uint64_t)seed;   // the same as `synth --seed`
     o.threads = 1;
     VesselTree *truth = shape ? shape_sample(shape, faults) : NULL, *tracked = NULL;
-    Volume *volume = truth ? shape_volume_with(shape, &o, faults) : NULL;
+    Volume *volume = truth ? shape_volume(shape, &o, faults) : NULL;
     TrackTruth known = {.tree = truth, .voxel_mm = 1};
     TrackScore plan;
     Random random = {77 * (uint64_t)seed + (uint64_t)(index / session->seeds)};
@@ -314,13 +314,13 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
     bool *judged = seeds >= ENOUGH ? kept : NULL;   // one or two seeds cannot estimate a rate
     if (good) {
         fprintf(out,
-                "right: the start is within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: rejected;\n"
+                "right: the start is within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused;\n"
                 "warn: tracked with a warning (except that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: distance\n"
                 "of the click from the axis found [true radii], mean and largest; radius: found over true; turn.: the root is not at the trunk's end\n"
-                "(labels of these are not counted). In the last four kinds noise hides the vessel or there is none: a rejection is correct.\n");
+                "(labels of these are not counted). In the last four kinds noise hides the vessel or there is none: a refusal is correct.\n");
         print_verdict(out, "right, of the visible [%]", percent(right, seen), 80, true, judged);
-        print_verdict(out, "rejected, of the visible [%]", percent(false_refusals, seen), 10, false, judged);
-        print_verdict(out, "not rejected, of the hidden [%]", percent(missing, hidden), 5, false, judged);
+        print_verdict(out, "refused, of the visible [%]", percent(false_refusals, seen), 10, false, judged);
+        print_verdict(out, "not refused, of the hidden [%]", percent(missing, hidden), 5, false, judged);
         print_verdict(out, "wrong without a warning, of all [%]", percent(silent, seen + hidden), 5, false, judged);
         print_verdict(out, "wrong without a warning, of all [%]", percent(silent, seen + hidden), 0, false, NULL);
     } else if (faults->count == 0) {

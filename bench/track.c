@@ -287,7 +287,7 @@ static bool run_case(const Case *c, Group *groups, bool click_only, int threads,
     const Shape *neighbour = image.shape ? shape_neighbour(image.shape) : NULL;
     VesselTree *other = neighbour ? shape_sample(neighbour, faults) : NULL;
     image.truth = image.shape ? shape_sample(image.shape, faults) : NULL;
-    image.volume = image.truth ? shape_volume_with(image.shape, &volume, faults) : NULL;
+    image.volume = image.truth ? shape_volume(image.shape, &volume, faults) : NULL;
     image.voxel_mm = image.volume ? volume_voxel_size(image.volume) : 0;
     image.known = (TrackTruth){.tree = image.truth, .neighbour = other, .voxel_mm = image.voxel_mm};
     bool good = image.volume && track_score(&image.known, NULL, &image.plan);

@@ -75,14 +75,6 @@ double blobby_hessian(const Blobby *model, Vec3 x, Vec3 *gradient, Sym3 *hessian
     return f - model->iso_level;
 }
 
-double blobby_curvature(Vec3 gradient, const Sym3 *hessian)
-{
-    double g2 = vec3_norm2(gradient);
-    if (!(g2 > 1e-280))
-        return 0;
-    return (sym3_quadratic(hessian, gradient) - g2 * sym3_trace(hessian)) / (2 * g2 * sqrt(g2));
-}
-
 double blob_radius(double width, double iso_level) { return width > iso_level ? width * sqrt(5 * (sqrt(width / iso_level) - 1)) : 0; }
 
 // With s = sqrt(rho / T): s^5 - s^4 = r^2 / (5 T^2) = c. The function is convex for s > 1, and both 1 + c and 1 + c^(1/5) lie above the root, so Newton

@@ -38,8 +38,6 @@ static inline Blobby blobby_of(const VesselTree *tree, int node)
 double blobby_field(const Blobby *model, Vec3 x);
 double blobby_gradient(const Blobby *model, Vec3 x, Vec3 *gradient);
 double blobby_hessian(const Blobby *model, Vec3 x, Vec3 *gradient, Sym3 *hessian);
-// Mean curvature by Kerrien et al. 2017, eq. (5); +1/r on a sphere with f > 0 inside.
-double blobby_curvature(Vec3 gradient, const Sym3 *hessian);
 
 // Radius of a single blob's surface, rho sqrt(5 (sqrt(rho/T) - 1)); 0 for rho <= T.
 double blob_radius(double width, double iso_level);

@@ -75,11 +75,6 @@ static inline Vec3 mat3_mul_vec(const Mat3 *a, Vec3 v)
     return (Vec3){a->m[0][0] * v.x + a->m[0][1] * v.y + a->m[0][2] * v.z, a->m[1][0] * v.x + a->m[1][1] * v.y + a->m[1][2] * v.z,
                   a->m[2][0] * v.x + a->m[2][1] * v.y + a->m[2][2] * v.z};
 }
-static inline Vec3 mat3_mul_vec_transposed(const Mat3 *a, Vec3 v)
-{
-    return (Vec3){a->m[0][0] * v.x + a->m[1][0] * v.y + a->m[2][0] * v.z, a->m[0][1] * v.x + a->m[1][1] * v.y + a->m[2][1] * v.z,
-                  a->m[0][2] * v.x + a->m[1][2] * v.y + a->m[2][2] * v.z};
-}
 static inline Mat3 mat3_mul(const Mat3 *a, const Mat3 *b)
 {
     Mat3 c;

@@ -86,20 +86,6 @@ void contrast_free(Contrast *contrast)
     free(contrast);
 }
 
-void contrast_reset(Contrast *contrast)
-{
-    const FlowNetwork *network = &contrast->network;
-    contrast->phase_s = contrast->flowed_s = contrast->pending = contrast->injected = contrast->gone = 0;
-    contrast->clear = true;
-    contrast->sweeps = 0;
-    for (int i = 0; i < network->cell_count; i++)
-        contrast->cell[i] = 0;
-    for (int i = 0; i < network->sac_count; i++)
-        contrast->sac[i] = 0;
-    for (int i = 0; i < network->node_count; i++)
-        contrast->node[i] = 0;
-}
-
 void contrast_copy(Contrast *to, const Contrast *from)
 {
     Contrast own = *to;

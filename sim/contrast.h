@@ -22,8 +22,6 @@ typedef struct Contrast Contrast;
 // NULL if out of memory.
 Contrast *contrast_create(const VesselTree *tree, const ContrastOptions *options);
 void contrast_free(Contrast *contrast);
-// No contrast anywhere, time 0, nothing injected.
-void contrast_reset(Contrast *contrast);
 // Both made of the same tree with the same options.
 void contrast_copy(Contrast *to, const Contrast *from);
 

@@ -458,10 +458,3 @@ const ScoreEvent *score_events(const Score *score, int *count)
     *count = score->event_count;
     return score->event;
 }
-
-void score_copy(Score *to, const Score *from)
-{
-    ScorePath path = to->path;
-    *to = *from;
-    to->path = path;
-}

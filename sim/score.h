@@ -53,9 +53,6 @@ void score_free(Score *score);
 void score_step(Score *score, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 ScoreFigures score_figures(const Score *score);
 const ScoreEvent *score_events(const Score *score, int *count);
-// Copies the state, to continue from an earlier moment; both belong to the same scene.
-void score_copy(Score *to, const Score *from);
-
 // The figures as a JSON object {"state": …, "points": …, …}; the caller frees. NULL if out of memory. `scene` holds the exercise.
 char *score_json(const ScoreFigures *figures, const Scene *scene);
 

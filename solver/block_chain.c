@@ -127,52 +127,6 @@ void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 }
 
 // S_i = D_i^-1 + G^T S' G with G = Z T^-1 = C D_i^-1 and S' of the next node towards the middle.
-INLINE void inverse_block(const BlockFactor *f, size_t i, const double *towards, double *s, const int size)
-{
-    const int column = BLOCK_COLUMN(size), panel = BLOCK_PANEL(size);
-    const double *t = f->t + i * (size_t)panel, *z = f->z + i * (size_t)panel, *inverse = f->inverse + i * (size_t)column;
-    double ti[BLOCK_LARGEST][BLOCK_LARGEST], g[BLOCK_LARGEST][BLOCK_LARGEST], sg[BLOCK_LARGEST][BLOCK_LARGEST];
-    for (int c = 0; c < size; c++)
-        for (int r = 0; r < size; r++)
-            ti[c][r] = g[c][r] = sg[c][r] = 0;
-    // ti = T^-1, column-major: ti[c][r]
-    for (int c = 0; c < size; c++) {
-        ti[c][c] = 1;
-        for (int r = c + 1; r < size; r++)
-            for (int k = c; k < r; k++)
-                ti[c][r] -= t[column * k + r] * ti[c][k];
-    }
-    if (towards) {
-        for (int c = 0; c < size; c++)
-            for (int k = c; k < size; k++)
-                for (int r = 0; r < size; r++)
-                    g[c][r] += z[column * k + r] * ti[c][k];
-        for (int c = 0; c < size; c++)
-            for (int k = 0; k < size; k++)
-                for (int r = 0; r < size; r++)
-                    sg[c][r] += towards[size * k + r] * g[c][k];
-    }
-    for (int r = 0; r < size; r++)
-        for (int c = 0; c <= r; c++) {
-            double sum = 0;
-            for (int k = r; k < size; k++)
-                sum += ti[r][k] * inverse[k] * ti[c][k];
-            for (int k = 0; k < size; k++)
-                sum += g[r][k] * sg[c][k];
-            s[size * r + c] = s[size * c + r] = sum;
-        }
-}
-
-INLINE void inverse_diagonal(const BlockFactor *factor, double *inverse, const int size)
-{
-    size_t count = (size_t)factor->count, m = count / 2, block = (size_t)(size * size);
-    inverse_block(factor, m, NULL, inverse + m * block, size);
-    for (size_t i = m; i-- > 0;)
-        inverse_block(factor, i, inverse + (i + 1) * block, inverse + i * block, size);
-    for (size_t i = m + 1; i < count; i++)
-        inverse_block(factor, i, inverse + (i - 1) * block, inverse + i * block, size);
-}
-
 INLINE void multiply(const BlockChain *chain, const double *x, double *y, const int size)
 {
     const size_t block = (size_t)(size * size);
@@ -193,17 +147,6 @@ INLINE void multiply(const BlockChain *chain, const double *x, double *y, const 
 }
 
 // A constant block size makes the loops faster.
-void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
-{
-    SEL_ASSERT(block_size_is_known(factor->size), "there are kernels for the size");
-    switch (factor->size) {
-    case 6: inverse_diagonal(factor, inverse, 6); break;
-    case 8: inverse_diagonal(factor, inverse, 8); break;
-    case 10: inverse_diagonal(factor, inverse, 10); break;
-    default: inverse_diagonal(factor, inverse, 12); break;
-    }
-}
-
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y)
 {
     SEL_ASSERT(block_size_is_known(chain->size) && x != y, "there are kernels for the size, and x and y are different arrays");

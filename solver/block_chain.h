@@ -41,8 +41,6 @@ bool block_chain_factor(const BlockChain *chain, BlockFactor *factor);
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x);
 // Factorisation and solution in one pass, for a single right-hand side: its forward substitution costs nothing. b and x must be different.
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x);
-// Diagonal blocks of A^-1 (M, n, n) by Takahashi's recursion.
-void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse);
 // y = A x, for residuals and tests.
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y);
 

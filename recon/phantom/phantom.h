@@ -73,8 +73,6 @@ typedef struct VolumeOptions {
 } VolumeOptions;
 VolumeOptions volume_default_options(void);
 // Computes the fraction of each voxel inside the vessel (partial voxels from the field), then applies blur, noise and clipping. Returns NULL with a fault.
-Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faults *faults);
-// The same with cubic voxels and default options otherwise.
-Volume *shape_volume(const Shape *shape, double voxel_mm, double psf_mm, double noise, uint64_t seed, Faults *faults);
+Volume *shape_volume(const Shape *shape, const VolumeOptions *options, Faults *faults);
 
 #endif

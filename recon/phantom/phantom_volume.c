@@ -321,7 +321,7 @@ static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *fau
     return volume;
 }
 
-Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faults *faults)
+Volume *shape_volume(const Shape *shape, const VolumeOptions *options, Faults *faults)
 {
     Volume *volume = make_grid(shape, options, faults);
     if (!volume)
@@ -356,15 +356,4 @@ Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faul
     faults_add(faults, shape->name, 0, 0, "not enough memory for the volume");
     volume_free(volume);
     return NULL;
-}
-
-Volume *shape_volume(const Shape *shape, double voxel_mm, double psf_mm, double noise, uint64_t seed, Faults *faults)
-{
-    VolumeOptions options = volume_default_options();
-    for (int k = 0; k < 3; k++)
-        options.voxel_mm[k] = voxel_mm;
-    options.psf_mm = psf_mm;
-    options.noise = noise;
-    options.seed = seed;
-    return shape_volume_with(shape, &options, faults);
 }

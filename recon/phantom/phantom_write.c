@@ -105,7 +105,7 @@ static bool write_volume(const PhantomFiles *files, const Shape *shape, const ch
 {
     VolumeOptions options = files->volume;
     options.seed = shape->seed + 1;
-    Volume *volume = shape_volume_with(shape, &options, faults);
+    Volume *volume = shape_volume(shape, &options, faults);
     bool good = volume && volume_save_nrrd(volume, path, options.contrast_grey > 0 ? "uint8" : "float", faults);
     if (good && out)
         fprintf(out, "%d x %d x %d voxels of %g x %g x %g mm\n", volume->size[0], volume->size[1], volume->size[2], options.voxel_mm[0], options.voxel_mm[1],

@@ -14,7 +14,7 @@ typedef struct GrowingPart { // a part of the shape while it grows
 
 typedef struct Segment {     // a vessel segment from bifurcation to bifurcation
     int part, first, last;   // its part, and the range of its knots
-    int parent, sister;      // -1: none
+    int parent, sibling;     // -1: none
     double radius, length;
     Vec3 direction;          // direction at its end
     bool is_tip;
@@ -87,17 +87,17 @@ static bool collides(const Bead *a, const Bead *b, double clearance)
     return vec3_norm2(vec3_sub(a->center, b->center)) < least * least;
 }
 
-// Returns true if the draft, which grows from segment `parent`, keeps clear of everything except what it must touch: itself, its parent, and `sister` near
+// Returns true if the draft, which grows from segment `parent`, keeps clear of everything except what it must touch: itself, its parent, and `sibling` near
 // the bifurcation.
-static bool fits(const Growth *g, const Draft *draft, int parent, double zone, const Draft *sister)
+static bool fits(const Growth *g, const Draft *draft, int parent, double zone, const Draft *sibling)
 {
     for (int i = 0; i < draft->count; i++) {
         const Bead *bead = &draft->bead[i];
         for (int k = 0; k < i; k++)
             if (bead->arc - draft->bead[k].arc > 6 * draft->radius && collides(bead, &draft->bead[k], g->clearance))
                 return false;
-        for (int k = 0; sister && k < sister->count; k++)
-            if (!(bead->arc < zone && sister->bead[k].arc < zone) && collides(bead, &sister->bead[k], g->clearance))
+        for (int k = 0; sibling && k < sibling->count; k++)
+            if (!(bead->arc < zone && sibling->bead[k].arc < zone) && collides(bead, &sibling->bead[k], g->clearance))
                 return false;
         for (int k = 0; k < g->bead_count; k++) {
             const Bead *other = &g->bead[k];
@@ -124,7 +124,7 @@ static bool take(Growth *g, const Draft *draft, int part, int parent)
     *s = (Segment){.part = part,
                    .first = w->count,
                    .parent = parent,
-                   .sister = -1,
+                   .sibling = -1,
                    .radius = draft->radius,
                    .length = draft->length,
                    .direction = draft->direction,

@@ -60,7 +60,7 @@ static void wall_of_a_tracked_helix(void **state)
     for (int k = 0; k < 4; k++) {
         VolumeOptions options = volume_default_options();
         options.psf_mm = psf[k];
-        Volume *v = shape_volume_with(shape, &options, &faults);
+        Volume *v = shape_volume(shape, &options, &faults);
         RbtParameters p = rbt_default_parameters();
         RbtSeed seed = {.start = truth->center[2], .toward = truth->center[4], .has_toward = true, .radius = truth->radius[2]};
         VesselTree *tree = rbt_track(v, &p, &seed, 1, NULL, 0, 0, NULL, NULL, "test", &faults);

@@ -14,6 +14,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/geom/mean_curvature.h"
+
 enum { BLOBS = 5, POINTS = 137 };
 
 static const double ISO_LEVEL = 0.1;
@@ -84,7 +86,7 @@ static void plain_energy(const Case *c, double *distance, double *bend)
         Vec3 g;
         Sym3 h;
         double f = blobby_hessian(&model, vec3((double)c->points.x[i], (double)c->points.y[i], (double)c->points.z[i]), &g, &h);
-        double kappa = blobby_curvature(g, &h), e = f - fmin(fmax(f, (double)c->points.low[i]), (double)c->points.high[i]);
+        double kappa = mean_curvature(g, &h), e = f - fmin(fmax(f, (double)c->points.low[i]), (double)c->points.high[i]);
         *distance += (double)c->points.weight[i] * e * e;
         *bend += (double)c->points.bend[i] * kappa * kappa;
     }

@@ -16,6 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cubic_volume.h"
+
 static Faults faults;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -59,7 +61,7 @@ static Case make_case(const Kind *kind, int seed, double noise, bool track)
     snprintf(option[3][1], sizeof option[3][1], "%d", seed);
     c.shape = shape_create(kind->name, 4, (const char(*)[2][64])option, "test", &faults);
     c.truth = c.shape ? shape_sample(c.shape, &faults) : NULL;
-    c.volume = c.shape ? shape_volume(c.shape, 0.25, 0.2, noise, (uint64_t)seed, &faults) : NULL;
+    c.volume = c.shape ? cubic_volume(c.shape, 0.25, 0.2, noise, (uint64_t)seed, &faults) : NULL;
     assert_true(c.truth && c.volume);
     RbtParameters p = rbt_default_parameters();
     p.automatic = 1;

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cubic_volume.h"
 #include "tests/geom/near.h"
 #include "tests/geom/random_numbers.h"
 
@@ -254,7 +255,7 @@ static void volume_holds_the_shape(void **state)
 {
     (void)state;
     Shape *shape = make("capsule", NULL, NULL);
-    Volume *volume = shape_volume(shape, 0.2, 0.3, 0, 1, &faults), *noisy = shape_volume(shape, 0.2, 0.3, 0.05, 1, &faults);
+    Volume *volume = cubic_volume(shape, 0.2, 0.3, 0, 1, &faults), *noisy = cubic_volume(shape, 0.2, 0.3, 0.05, 1, &faults);
     assert_non_null(volume);
     size_t count = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2];
     double sum = 0, square = 0;

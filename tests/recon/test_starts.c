@@ -48,7 +48,7 @@ static Angiogram make(int seed, double radius, double contrast, double noise, do
     Angiogram a = {.shape = shape_create("tree", 4, (const char(*)[2][64])option, "test", &faults)};
     assert_non_null(a.shape);
     a.truth = shape_sample(a.shape, &faults);
-    a.volume = shape_volume_with(a.shape, &o, &faults);
+    a.volume = shape_volume(a.shape, &o, &faults);
     assert_true(a.truth && a.volume);
     return a;
 }

@@ -272,7 +272,7 @@ static void voxels_hold_their_share(void **state)
         o.psf_mm = o.noise = 0;
         if (k)
             o.voxel_mm[1] = 0.3, o.voxel_mm[2] = 0.4, o.rotate_deg = 40;
-        Volume *v = shape_volume_with(shape, &o, &faults);
+        Volume *v = shape_volume(shape, &o, &faults);
         double sum = 0, square = 0, widest = 0;
         int seen = 0;
         for (size_t i = 0; i < voxels_of(v); i += 7) {
@@ -312,7 +312,7 @@ static void blur_is_gaussian(void **state)
         o.noise = 0;
         o.psf_mm = 0.2 + 0.1 * k;
         o.voxel_mm[0] = k == 1 ? 0.3 : 0.1, o.voxel_mm[1] = o.voxel_mm[2] = 0.1;
-        Volume *v = shape_volume_with(shape, &o, &faults);
+        Volume *v = shape_volume(shape, &o, &faults);
         double most = 0;
         for (size_t i = 0; i < voxels_of(v); i++) {
             Vec3 x = place_of(v, i);
@@ -337,11 +337,11 @@ static void noise_is_white(void **state)
     Shape *shape = make("capsule", "length_mm 10");
     VolumeOptions o = volume_default_options();
     o.noise = 0;
-    Volume *clean = shape_volume_with(shape, &o, &faults);
+    Volume *clean = shape_volume(shape, &o, &faults);
     o.noise = 0.2;
-    Volume *noisy = shape_volume_with(shape, &o, &faults);
+    Volume *noisy = shape_volume(shape, &o, &faults);
     o.seed++;
-    Volume *other = shape_volume_with(shape, &o, &faults);
+    Volume *other = shape_volume(shape, &o, &faults);
     size_t count = voxels_of(clean), strides[3] = {1, (size_t)clean->size[0], (size_t)clean->size[0] * (size_t)clean->size[1]};
     double mean = 0, square = 0, fourth = 0, along[3] = {0}, between = 0, n = (double)count;
     for (size_t i = 0; i < count; i++) {
@@ -374,9 +374,9 @@ static void threads_change_no_bit(void **state)
     VolumeOptions o = volume_default_options();
     o.voxel_mm[0] = 0.4, o.voxel_mm[1] = 0.3, o.voxel_mm[2] = 0.5, o.rotate_deg = 20, o.fade = 0.3, o.clip = 0, o.saturate = 0.9;
     o.threads = 1;
-    Volume *one = shape_volume_with(shape, &o, &faults);
+    Volume *one = shape_volume(shape, &o, &faults);
     for (o.threads = 2; o.threads < 5; o.threads++) {
-        Volume *more = shape_volume_with(shape, &o, &faults);
+        Volume *more = shape_volume(shape, &o, &faults);
         assert_memory_equal(one->value, more->value, voxels_of(one) * sizeof(float));
         assert_true(one->minimum == more->minimum && one->maximum == more->maximum);
         volume_free(more);
@@ -412,7 +412,7 @@ static void brightness_is_where_it_should_be(void **state)
         o.fade = k == 2 ? 0.5 : 0;
         Shape *shape = make("bone", "blocks 4");
         VesselTree *tree = shape_sample(shape, &faults);
-        Volume *v = shape_volume_with(shape, &o, &faults);
+        Volume *v = shape_volume(shape, &o, &faults);
         int count, seen = 0;
         const ShapeBlock *block = shape_blocks(shape, &count);
         for (int b = 0; b < count; b++)
@@ -437,7 +437,7 @@ static void brightness_is_where_it_should_be(void **state)
         shape_free(shape);
     }
     Shape *shape = make("kissing", "");
-    Volume *v = shape_volume_with(shape, &o, &faults);
+    Volume *v = shape_volume(shape, &o, &faults);
     o.fade = 0;
     assert_true(value_at(v, vec3(0, 2.2, 0)) > 0.7 && value_at(v, vec3(0, -2.2, 0)) < 0.01);
     volume_free(v);
@@ -455,7 +455,7 @@ static void bad_options_are_faults(void **state)
     VolumeOptions o = volume_default_options();
     o.voxel_mm[0] = o.voxel_mm[1] = o.voxel_mm[2] = 0.001;
     Shape *shape = make("y", "");
-    assert_null(shape_volume_with(shape, &o, &faults));
+    assert_null(shape_volume(shape, &o, &faults));
     assert_int_equal(faults.count, 1);
     shape_free(shape);
 }
@@ -478,7 +478,7 @@ static void grey_values_and_a_band(void **state)
         long level[256] = {0}, whole = 0;
         o.seed = seed;
         o.threads = seed % 2 ? 1 : 3;
-        Volume *v = shape_volume_with(shape, &o, &faults);
+        Volume *v = shape_volume(shape, &o, &faults);
         assert_non_null(v);
         long voxels = (long)v->size[0] * v->size[1] * v->size[2];
         for (long i = 0; i < voxels; i++) {
@@ -500,7 +500,7 @@ static void grey_values_and_a_band(void **state)
     }
     o.band = 0;
     o.noise = 11.0 / 13;
-    Volume *v = shape_volume_with(shape, &o, &faults);
+    Volume *v = shape_volume(shape, &o, &faults);
     double sum = 0, square = 0;
     long n = 0;
     for (int k = 0; k < 4; k++)   // the margin is background

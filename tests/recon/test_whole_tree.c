@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cubic_volume.h"
 #include "tests/short_run.h"
 #include "tube_volume.h"
 
@@ -142,7 +143,7 @@ static void dense_and_near_neighbours_are_refused(void **state)
         Shape *shape = shape_create(shapes[k].name, 3, shapes[k].option, "test", &faults);
         assert_non_null(shape);
         VesselTree *truth = shape_sample(shape, &faults);
-        Volume *v = shape_volume_with(shape, &options, &faults);
+        Volume *v = shape_volume(shape, &options, &faults);
         assert_true(truth && v);
         RbtParameters p = automatic();
         RbtSeed seed = {.start = truth->center[2], .toward = vec3_add(truth->center[2], truth->direction[2]), .has_toward = true, .radius = truth->radius[2]};
@@ -245,7 +246,7 @@ static void a_click_anywhere(void **state)
     Shape *shape = shape_create("tree", 3, option, "test", &faults);
     assert_non_null(shape);
     VesselTree *truth = shape_sample(shape, &faults);
-    Volume *v = shape_volume(shape, 0.25, 0.2, 0.05, 3, &faults);
+    Volume *v = cubic_volume(shape, 0.25, 0.2, 0.05, 3, &faults);
     assert_true(truth && v);
     for (int k = 0; k < WHOLE_OR_SHORT(3, 1); k++) {
         int node = truth->node_count * (2 * k + 1) / 8;

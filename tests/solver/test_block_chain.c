@@ -169,36 +169,6 @@ static void solves_as_dense(void **state)
         }
 }
 
-static void inverse_diagonal_as_dense(void **state)
-{
-    (void)state;
-    for (size_t t = 0; t + 1 < sizeof counts / sizeof *counts; t++)
-        for (int hard = 0; hard < 2; hard++) {
-            int m = counts[t];
-            size_t n = (size_t)m * N;
-            BlockChain a;
-            assert_true(block_chain_create(&a, m, N));
-            BlockFactor *f = block_factor_create(m, N);
-            random_chain(&a, 3.0 * hard);
-            double *d = dense(&a), *s = malloc(n * N * sizeof *s), *e = malloc(n * sizeof *e);
-            assert_true(dense_cholesky(d, n));
-            assert_true(block_chain_factor(&a, f));
-            block_factor_inverse_diagonal(f, s);
-            for (size_t j = 0; j < n; j++) {
-                memset(e, 0, n * sizeof *e);
-                e[j] = 1;
-                dense_solve(d, n, e);
-                for (size_t r = 0; r < N; r++)
-                    assert_true(fabs(e[j / N * N + r] - s[j / N * N * N + N * r + j % N]) < 1e-8 * fabs(e[j]));
-            }
-            free(d);
-            free(s);
-            free(e);
-            block_factor_destroy(f);
-            block_chain_destroy(&a);
-        }
-}
-
 // Unsymmetric blocks: a symmetric positive definite chain plus a skew part and different upper blocks, checked by the residual.
 static void lu_solves_unsymmetric(void **state)
 {
@@ -598,14 +568,14 @@ static void prints_timings(void **state)
         assert_true(block_chain_create(&a, m, N));
         BlockFactor *f = block_factor_create(m, N);
         random_chain(&a, 4);
-        double *b = malloc((size_t)m * N * sizeof *b), *x = malloc((size_t)m * N * sizeof *b), *s = malloc((size_t)m * N * N * sizeof *b);
+        double *b = malloc((size_t)m * N * sizeof *b), *x = malloc((size_t)m * N * sizeof *b);
         for (int i = 0; i < N * m; i++)
             b[i] = uniform();
         BlockLu *lu = block_lu_create(m, N);
         double *lower = calloc((size_t)m * N * N + 8, sizeof *lower);
         block_lu_transpose(m, N, a.lower, lower);
         BlockCondenser *condenser = block_condenser_create(m, N);
-        static double condense[RUNS], factor[RUNS], solve[RUNS], fused[RUNS], diagonal[RUNS], unsymmetric[RUNS];
+        static double condense[RUNS], factor[RUNS], solve[RUNS], fused[RUNS], unsymmetric[RUNS];
         for (int i = 0; i < RUNS; i++) {
             double t0 = now();
             assert_true(block_chain_factor(&a, f));
@@ -614,34 +584,29 @@ static void prints_timings(void **state)
             double t2 = now();
             assert_true(block_chain_factor_solve(&a, f, b, x));
             double t3 = now();
-            block_factor_inverse_diagonal(f, s);
-            double t4 = now();
             assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, x, NULL, &exact));
-            unsymmetric[i] = now() - t4;
+            unsymmetric[i] = now() - t3;
             for (int j = 5; j < m; j += 10)
                 block_condenser_keep(condenser)[j] = true;
             block_condenser_survey(condenser, &a);
             double t5 = now();
             assert_non_null(block_condense(condenser, &a, b));
             condense[i] = now() - t5;
-            factor[i] = t1 - t0, solve[i] = t2 - t1, fused[i] = t3 - t2, diagonal[i] = t4 - t3;
+            factor[i] = t1 - t0, solve[i] = t2 - t1, fused[i] = t3 - t2;
         }
         qsort(factor, RUNS, sizeof *factor, by_value);
         qsort(solve, RUNS, sizeof *solve, by_value);
         qsort(fused, RUNS, sizeof *fused, by_value);
         qsort(condense, RUNS, sizeof *condense, by_value);
-        qsort(diagonal, RUNS, sizeof *diagonal, by_value);
         qsort(unsymmetric, RUNS, sizeof *unsymmetric, by_value);
-        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, unsymmetric %6.2f us, condense to a tenth %6.2f us, "
-                      "diagonal of the inverse %6.2f us "
+        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, unsymmetric %6.2f us, condense to a tenth %6.2f us "
                       "(medians)\n",
-                      m, factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], unsymmetric[RUNS / 2], condense[RUNS / 2], diagonal[RUNS / 2]);
+                      m, factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], unsymmetric[RUNS / 2], condense[RUNS / 2]);
         block_condenser_destroy(condenser);
         block_lu_destroy(lu);
         free(lower);
         free(b);
         free(x);
-        free(s);
         block_factor_destroy(f);
         block_chain_destroy(&a);
     }
@@ -653,7 +618,6 @@ int main(void)
     level_given = simd_level();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solves_as_dense),
-        cmocka_unit_test(inverse_diagonal_as_dense),
         cmocka_unit_test(refuses_indefinite),
         cmocka_unit_test(lu_solves_unsymmetric),
         cmocka_unit_test(unit_rows_are_exact),
