@@ -370,7 +370,7 @@ static void read_map(YamlReader *reader, DeviceMap *map)
                    {"choose_outer", HAND_CHOOSE_OUTER},
                    {"choose_inner", HAND_CHOOSE_INNER},
                    {"lock", HAND_LOCK},
-                   {"let_go", HAND_LET_GO},
+                   {"let_go", HAND_RELEASE},
                    {"exchange", HAND_EXCHANGE}};
     YamlValue root = yaml_root(reader);
     if (!yaml_is_map(root))

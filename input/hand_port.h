@@ -24,7 +24,7 @@ enum {
     HAND_CHOOSE_OUTER = 16,
     HAND_CHOOSE_INNER = 32,
     HAND_LOCK = 64,
-    HAND_LET_GO = 128,
+    HAND_RELEASE = 128,
     HAND_EXCHANGE = 256
 };
 

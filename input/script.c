@@ -52,6 +52,14 @@ bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolN
     return faults->count == already;
 }
 
+bool script_check_end(const Script *script, const char *file, int line, int column, Faults *faults)
+{
+    if (script_duration_s(script) > 0)
+        return true;
+    faults_add(faults, file, line, column, "the script ends at 0 s, the time of its last row; expected another row with a later time");
+    return false;
+}
+
 static bool is_word(const char *text, size_t length, const char *word) { return length == strlen(word) && !memcmp(text, word, length); }
 
 static int find_word(const char *text, size_t length, const char *const *words)
@@ -166,7 +174,7 @@ static void put_value(ScriptRow *row, int tool, int which, double value)
         *(which == TWIST ? &command->twist_deg_s : &command->push_mm_s) = value;
 }
 
-Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults)
+Script *script_parse(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults)
 {
     Columns columns;
     NumberTable *table = find_columns(text, length, file, tools, &columns, faults) ? number_table_parse(text, length, file, columns.header, faults) : NULL;
@@ -196,6 +204,8 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
             script_check_row(row, i ? row - 1 : NULL, tools, file, table->line[i], 1, faults);
             script->count = i + 1;
         }
+    if (faults->count == faults_before)
+        script_check_end(script, file, table->line[script->count - 1], 1, faults);
     number_table_free(table);
     if (faults->count > faults_before) {
         script_free(script);
@@ -204,20 +214,16 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
     return script;
 }
 
-Script *script_parse(const char *text, size_t length, const char *file, Faults *faults) { return script_parse_tools(text, length, file, NULL, faults); }
-
-Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults)
+Script *script_load(const char *path, const ToolNames *tools, Faults *faults)
 {
     size_t length;
     char *text = text_file_read(path, &length, faults);
     if (!text)
         return NULL;
-    Script *script = script_parse_tools(text, length, path, tools, faults);
+    Script *script = script_parse(text, length, path, tools, faults);
     free(text);
     return script;
 }
-
-Script *script_load(const char *path, Faults *faults) { return script_load_tools(path, NULL, faults); }
 
 // Collects the names before the dots of a header. Surplus names are skipped here; parsing reports them.
 static void find_names(const char *text, size_t length, ScriptTools *tools)
@@ -245,7 +251,7 @@ Script *script_load_any(const char *path, ScriptTools *tools, Faults *faults)
     if (!text)
         return NULL;
     find_names(text, length, tools);
-    Script *script = script_parse_tools(text, length, path, &tools->names, faults);
+    Script *script = script_parse(text, length, path, &tools->names, faults);
     free(text);
     return script;
 }

@@ -30,17 +30,14 @@ typedef struct Script {      // each row applies from its time until the next ro
 
 enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400, SCRIPT_MOST_ML_S = 50 };
 
-// Parses a script: CSV with the header t_s,push_mm_s,twist_deg_s and `#` comments. Returns NULL with faults: wrong header, not a number, times that
-// decrease, negative first time, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row. A fourth column, released, is 1 while the tool is released
-// and 0 (default) while it is held.
-Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
-// As script_parse(), for the tools of a scene: the header above, which is that of the first tool, or t_s and, for any of them and in any order, NAME.push_mm_s
-// with
-// NAME.twist_deg_s, NAME.released, NAME.exchange and NAME.contrast_ml_s (contrast agent through that tool, 0 to 50 ml/s, one tool at a time).
-Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
+// Parses a script: CSV with the header t_s,push_mm_s,twist_deg_s and `#` comments. A fourth column, released, is 1 while the tool is released and 0 (default)
+// while it is held. Returns NULL with faults: wrong header, not a number, times that decrease, negative first time, |push| > 1000 mm/s,
+// |twist| > 36,000 deg/s, no row. `tools`: the tools of a scene, NULL for one without a name. The header above is that of the first tool; others have t_s and,
+// for any of the tools and in any order, NAME.push_mm_s with NAME.twist_deg_s, NAME.released, NAME.exchange and NAME.contrast_ml_s (contrast agent through that
+// tool, 0 to 50 ml/s, one tool at a time).
+Script *script_parse(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
-Script *script_load(const char *path, Faults *faults);
-Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults);
+Script *script_load(const char *path, const ToolNames *tools, Faults *faults);
 // For use without a scene: the tools are those in the header, in its order, or a single unnamed one if the header has no names.
 typedef struct ScriptTools {
     ToolNames names;         // pointing into `text`
@@ -51,6 +48,8 @@ void script_free(Script *script);
 Command *script_row_command(ScriptRow *row, int tool);
 // Checks one row, including rows from elsewhere (a scene's inline script). `before`: the previous row or NULL; `tools`: NULL if there is only one tool.
 bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults);
+// Checks that the script ends after time 0; a fault stands at the last row. `script` has a row.
+bool script_check_end(const Script *script, const char *file, int line, int column, Faults *faults);
 double script_duration_s(const Script *script);
 // Commands at simulated time t_s: zero before the first row and after the end, except `fitted`, which keeps its value. `cursor` stores the row between calls;
 // start with 0.

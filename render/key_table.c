@@ -29,7 +29,7 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "select the third tool"},
     {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "select the fourth tool"},
     {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock", "lock the pair (tool and next one inside or around it): they move as one"},
-    {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Release", "release the tool: only its valve holds it; again: hold it"},
+    {ACTION_RELEASE, GROUP_TOOL, ACTION_PRESS, K('G'), "Release", "release the tool: only its valve holds it; again: hold it"},
     {ACTION_EXCHANGE, GROUP_TOOL, ACTION_PRESS, K('X'), "Exchange", "open the tray: another device for the tool, a tip to shape; again: close"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; the last image stays on release"},

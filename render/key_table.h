@@ -27,7 +27,7 @@ typedef enum ActionId {
     ACTION_TOOL_3,
     ACTION_TOOL_4,
     ACTION_LOCK,
-    ACTION_LET_GO,
+    ACTION_RELEASE,
     ACTION_EXCHANGE,
     // X-ray
     ACTION_PEDAL,

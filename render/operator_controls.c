@@ -145,7 +145,7 @@ static void obey_grip(OperatorControls *controls, const PanelActions *actions)
             hand_grip_choose(&controls->grip, controls->tool_count, k);
     if (actions->pressed[ACTION_LOCK] & 1)
         hand_grip_lock(&controls->grip, controls->tool_count);
-    if (actions->pressed[ACTION_LET_GO] & 1)
+    if (actions->pressed[ACTION_RELEASE] & 1)
         hand_grip_release(&controls->grip);
 }
 

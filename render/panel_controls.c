@@ -15,7 +15,7 @@ static const ButtonRow panel_button_row[] = {
     {TAB_TOOL, 2, {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT}, false},
     {TAB_TOOL, 1, {ACTION_PULL}, false},
     {TAB_TOOL, 2, {ACTION_FAST, ACTION_SLOW}, false},
-    {TAB_TOOL, 3, {ACTION_STOP, ACTION_LET_GO, ACTION_EXCHANGE}, false},
+    {TAB_TOOL, 3, {ACTION_STOP, ACTION_RELEASE, ACTION_EXCHANGE}, false},
     {TAB_TOOL, 5, {ACTION_TOOL_1, ACTION_TOOL_2, ACTION_TOOL_3, ACTION_TOOL_4, ACTION_LOCK}, true},
     {TAB_TOOL, 2, {ACTION_OTHER_PUSH, ACTION_OTHER_PULL}, true},
     {TAB_TOOL, 2, {ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT}, true},
@@ -69,7 +69,7 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_TOOL_3:
     case ACTION_TOOL_4: return state->chosen_tool == (int)(id - ACTION_TOOL_1);
     case ACTION_LOCK: return state->is_pair_locked;
-    case ACTION_LET_GO: return state->is_let_go;
+    case ACTION_RELEASE: return state->is_released;
     case ACTION_EXCHANGE: return panel->dialogue == DIALOGUE_TRAY;
     case ACTION_PAUSE: return state->is_paused;
     case ACTION_HINTS: return panel->has_hints;

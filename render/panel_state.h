@@ -88,7 +88,7 @@ typedef struct PanelState {
     // tools
     int tool_count, chosen_tool;   // outermost first; the one shown with all its figures
     PanelTool tool[PANEL_TOOLS];
-    bool is_pair_locked, is_let_go;  // the selected tool and its partner; the selected tool
+    bool is_pair_locked, is_released; // the selected tool and its partner; the selected tool
     const PanelTray *tray;         // NULL: closed, or not known yet
     double wall_max_n, wall_sum_n; // over all tools
     // X-ray

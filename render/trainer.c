@@ -45,7 +45,7 @@ typedef struct Trainer {
     double progress_s;               // time of the last progress update of a resumed session
     int fitted[TOOLS_MOST];          // as last reported, -1: not reported yet
     int64_t refused;
-    bool is_paused, has_told_end;
+    bool is_paused, has_reported_end;
     char trainee[64];
     char date[SESSION_DATE];         // start of the session
     const char *progress;            // title of the current computation
@@ -55,7 +55,7 @@ typedef struct Trainer {
 
 static double since_begin(const Trainer *trainer) { return clock_s(CLOCK_MONOTONIC) - trainer->begun_s; }
 
-__attribute__((format(printf, 3, 4))) static void say(Trainer *trainer, PanelMark mark, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static void show_message(Trainer *trainer, PanelMark mark, const char *format, ...)
 {
     char text[4600];
     va_list arguments;
@@ -129,9 +129,9 @@ static void offer_recovery(Trainer *trainer)
         for (int i = 0; wanted && i < found.count; i++) {
             faults_clear(faults);
             if (recover_session(found.path[i], &(OpenVesselOptions){.note = trainer->options->note}, show_progress, trainer, faults))
-                say(trainer, MARK_GOOD, "recovered; seldinger report %s", found.path[i]);
+                show_message(trainer, MARK_GOOD, "recovered; seldinger report %s", found.path[i]);
             else
-                say(trainer, MARK_BAD, "%s", faults->text[0]);
+                show_message(trainer, MARK_BAD, "%s", faults->text[0]);
         }
     }
     free(faults);
@@ -169,7 +169,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     trainer->controls.grip.released = trainer->session.resumed_released;
     memcpy(trainer->controls.grip.fitted, trainer->session.resumed_fitted, sizeof trainer->controls.grip.fitted);
     trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
-    trainer->has_told_end = false;
+    trainer->has_reported_end = false;
     for (int k = 0; k < TOOLS_MOST; k++)
         trainer->fitted[k] = -1;
     trainer_panel_begin(&trainer->shown, trainer->scene, trainer->trainee);
@@ -258,7 +258,7 @@ static void drive_by_pads(Trainer *trainer)
         if (!is_there) {
             if (was_there) {
                 gamepad_lost(gamepad, trainer->pad[i]);
-                say(trainer, MARK_WARNING, "%s unplugged: plug it in again to continue", window_gamepad_name(trainer->window, i));
+                show_message(trainer, MARK_WARNING, "%s unplugged: plug it in again to continue", window_gamepad_name(trainer->window, i));
             }
             gamepad->map = NULL;
             continue;
@@ -269,7 +269,7 @@ static void drive_by_pads(Trainer *trainer)
             faults_clear(&faults);
             bool is_bound = gamepad_bind(gamepad, map, pad.axis_count, pad.button_count, pad.name, &faults);
             trainer->pad_refused[i] = !is_bound;
-            say(trainer, is_bound ? MARK_GOOD : MARK_BAD, "%s: %s", pad.name, is_bound ? map->name : faults.text[0]);
+            show_message(trainer, is_bound ? MARK_GOOD : MARK_BAD, "%s: %s", pad.name, is_bound ? map->name : faults.text[0]);
         }
         if (gamepad->map)
             gamepad_update(gamepad, pad.axis, pad.axis_count, pad.button, pad.button_count, trainer->pad[i]);
@@ -288,7 +288,7 @@ static unsigned buttons_of_hands(const Trainer *trainer)
 
 // --- actions ---
 
-static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActions *actions)
+static void show_grip(Trainer *trainer, const HandGrip *before, const PanelActions *actions)
 {
     const HandGrip *now = &trainer->controls.grip;
     const SceneTool *tool = trainer->scene->tool;
@@ -296,18 +296,19 @@ static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActio
     char first[16], last[16];
     for (int k = count; k < TOOLS_MOST; k++)
         if (actions->pressed[ACTION_TOOL_1 + k])
-            say(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the keys of the views are %s to %s", k + 1, count,
-                key_table_text(ACTION_VIEW_FLUOROSCOPY, first, sizeof first), key_table_text(ACTION_VIEW_ALL, last, sizeof last));
+            show_message(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the keys of the views are %s to %s", k + 1, count,
+                         key_table_text(ACTION_VIEW_FLUOROSCOPY, first, sizeof first), key_table_text(ACTION_VIEW_ALL, last, sizeof last));
     if (now->chosen != before->chosen)
-        say(trainer, MARK_NONE, "tool %d selected: %s", now->chosen + 1, tool[now->chosen].name);
+        show_message(trainer, MARK_NONE, "tool %d selected: %s", now->chosen + 1, tool[now->chosen].name);
     for (int k = 1; k < count; k++)
         if ((now->locked ^ before->locked) >> k & 1)
-            say(trainer, MARK_NONE, now->locked >> k & 1 ? "%s and %s are locked: they move as one" : "%s and %s are unlocked", tool[k - 1].name, tool[k].name);
+            show_message(trainer, MARK_NONE, now->locked >> k & 1 ? "%s and %s are locked: they move as one" : "%s and %s are unlocked", tool[k - 1].name,
+                         tool[k].name);
     if (count < 2 && actions->pressed[ACTION_LOCK])
-        say(trainer, MARK_NONE, "the scene has only one tool, so it cannot be locked to another");
+        show_message(trainer, MARK_NONE, "the scene has only one tool, so it cannot be locked to another");
     for (int k = 0; k < count; k++)
         if ((now->released ^ before->released) >> k & 1)
-            say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is held again", tool[k].name);
+            show_message(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is held again", tool[k].name);
 }
 
 // --- the tray ---
@@ -332,7 +333,7 @@ static void open_tray(Trainer *trainer, const Pose *pose)
     char text[4200];
     int in;
     if (trainer->scene->tool_count < 2) {
-        say(trainer, MARK_WARNING, "the scene has only one tool: a tool is exchanged over the one inside it or through the one around it");
+        show_message(trainer, MARK_WARNING, "the scene has only one tool: a tool is exchanged over the one inside it or through the one around it");
         return;
     }
     // use the library only if the author of the scene has listed no devices
@@ -341,7 +342,7 @@ static void open_tray(Trainer *trainer, const Pose *pose)
     if (trainer->has_tray)
         panel_open_tray(trainer->panel, trainer->tray.devices.count, in);
     else
-        say(trainer, MARK_BAD, "out of memory for the tray");
+        show_message(trainer, MARK_BAD, "out of memory for the tray");
 }
 
 static void close_tray(Trainer *trainer)
@@ -359,7 +360,7 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
     RealtimeFigures real;
     Scene *before = trainer->scene;
     const HandGrip grip = trainer->controls.grip;
-    const bool has_told_end = trainer->has_told_end;
+    const bool has_reported_end = trainer->has_reported_end;
     snprintf(path, sizeof path, "%s", trainer->session.record_path);
     trainer->progress = "Simulating the session again with the new device";
     bool good = live_session_stop(&trainer->session, &real, faults);
@@ -373,7 +374,7 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
         good = good && begin_session(trainer, run, faults);
     }
     recorded_run_free(run);
-    trainer->has_told_end = has_told_end;
+    trainer->has_reported_end = has_reported_end;
     trainer->controls.grip.locked = good ? grip.locked & ~(trainer->controls.grip.released | trainer->controls.grip.released << 1) : 0;
     if (good && path[0])
         remove(path);            // the new recording contains all of it
@@ -404,7 +405,7 @@ static bool add_device(Trainer *trainer, bool has_begun, Faults *faults)
     if (is_taken)
         show_new_scene(trainer, faults);
     if (faults->count > 0)
-        say(trainer, MARK_BAD, "%s", faults->text[0]);
+        show_message(trainer, MARK_BAD, "%s", faults->text[0]);
     if (lives)
         faults_clear(faults);
     if (is_taken) {
@@ -425,12 +426,12 @@ static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
     if (!obstacle && is_new && has_begun && !trainer->session.record_path[0])
         obstacle = "this session is not recorded: it can only use the devices that it started with";
     if (obstacle) {
-        say(trainer, MARK_WARNING, "%s", obstacle);
+        show_message(trainer, MARK_WARNING, "%s", obstacle);
         trainer->is_tray_due = false;
         return true;
     }
     if (is_new && !trainer->is_tray_due) {
-        say(trainer, MARK_NONE, "simulating the session (%.0f s) again with the new device", pose->time_s);
+        show_message(trainer, MARK_NONE, "simulating the session (%.0f s) again with the new device", pose->time_s);
         return trainer->is_tray_due = true;
     }
     if (is_new) {
@@ -462,7 +463,7 @@ static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pr
     }
     if (!trainer->is_tray_due)
         trainer_tray_show(&trainer->tray, trainer->scene, moment->pose, &actions->tray);
-    if (pressed & HAND_LET_GO)
+    if (pressed & HAND_RELEASE)
         close_tray(trainer);
     else if (actions->tray.is_taken || (pressed & HAND_EXCHANGE) || trainer->is_tray_due)
         return take_from_tray(trainer, moment->pose, faults);
@@ -470,19 +471,19 @@ static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pr
 }
 
 // Reports the outcome of an exchange and requests the inserted device from now on.
-static void tell_exchanges(Trainer *trainer, const Pose *pose)
+static void show_exchanges(Trainer *trainer, const Pose *pose)
 {
     HandGrip *grip = &trainer->controls.grip;
     bool is_refused = pose->refused_exchanges > trainer->refused;
     for (int k = 0; k < pose->tool_count; k++) {
         const SceneTool *device = scene_device(trainer->scene, k, pose->tool[k].fitted);
         if (trainer->fitted[k] >= 0 && pose->tool[k].fitted != trainer->fitted[k])
-            say(trainer, MARK_GOOD, "%s is now: %s", trainer->scene->tool[k].name,
-                device && device->title[0] ? device->title
-                : pose->tool[k].fitted     ? "the spare one"
-                                           : "the first one");
+            show_message(trainer, MARK_GOOD, "%s is now: %s", trainer->scene->tool[k].name,
+                         device && device->title[0] ? device->title
+                         : pose->tool[k].fitted     ? "the spare one"
+                                                    : "the first one");
         if (trainer->fitted[k] >= 0 && is_refused && grip->fitted[k] != pose->tool[k].fitted) {
-            say(trainer, MARK_WARNING, "%s was not exchanged: %s", trainer->scene->tool[k].name, step_exchange_refusal(pose->refusal));
+            show_message(trainer, MARK_WARNING, "%s was not exchanged: %s", trainer->scene->tool[k].name, step_exchange_refusal(pose->refusal));
             grip->fitted[k] = pose->tool[k].fitted;
         }
         trainer->fitted[k] = pose->tool[k].fitted;
@@ -498,9 +499,9 @@ static void take_screenshot(Trainer *trainer, const WindowInput *input)
     if (rgb)
         gl_framebuffer_read(0, input->width, input->height, rgb);
     if (rgb && png_file_write(path, input->width, input->height, rgb, message, sizeof message))
-        say(trainer, MARK_GOOD, "saved picture %s", path);
+        show_message(trainer, MARK_GOOD, "saved picture %s", path);
     else
-        say(trainer, MARK_BAD, "no picture: %s", rgb ? message : "out of memory");
+        show_message(trainer, MARK_BAD, "no picture: %s", rgb ? message : "out of memory");
     free(rgb);
 }
 
@@ -510,12 +511,12 @@ static void obey_cine(Trainer *trainer, const PanelActions *actions, Faults *fau
     if (trainer_cine_obey(&trainer->cine, actions, remark, sizeof remark))
         fluoroscope_forget(views_fluoroscope(trainer->views));
     if (*remark)
-        say(trainer, MARK_NONE, "%s", remark);
+        show_message(trainer, MARK_NONE, "%s", remark);
     if (!actions->pressed[ACTION_CINE_SAVE])
         return;
     session_file_name(trainer->options->folder, trainer->scene->path, "", stem, sizeof stem);
     bool good = trainer_cine_save(&trainer->cine, trainer->views, stem, remark, sizeof remark, faults);
-    say(trainer, good ? MARK_GOOD : MARK_WARNING, "%s", remark);
+    show_message(trainer, good ? MARK_GOOD : MARK_WARNING, "%s", remark);
     faults_clear(faults);
 }
 
@@ -524,8 +525,8 @@ static bool restart(Trainer *trainer, Faults *faults)
     bool whole = end_session(trainer, faults);
     panel_forget_samples(trainer->panel);
     fluoroscope_forget(views_fluoroscope(trainer->views));
-    say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "new session; the last one is saved" : "new session; the last one could not be saved: %s",
-        faults->text[0]);
+    show_message(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "new session; the last one is saved" : "new session; the last one could not be saved: %s",
+                 faults->text[0]);
     faults_clear(faults);
     trainer->is_paused = false;
     session_date(time(NULL), trainer->date);
@@ -537,7 +538,7 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
 {
     if (actions->trainee_set) {
         snprintf(trainer->trainee, sizeof trainer->trainee, "%s", actions->trainee);
-        say(trainer, MARK_NONE, "trainee: %s", trainer->trainee);
+        show_message(trainer, MARK_NONE, "trainee: %s", trainer->trainee);
     }
     if (actions->pressed[ACTION_PAUSE] & 1) {
         trainer->is_paused = !trainer->is_paused;
@@ -547,11 +548,11 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
     }
     if (actions->pressed[ACTION_BOOKMARK]) {
         trainer->controls.xray.bookmark++;
-        say(trainer, MARK_GOOD, "bookmark %.0f", (double)trainer->controls.xray.bookmark);
+        show_message(trainer, MARK_GOOD, "bookmark %.0f", (double)trainer->controls.xray.bookmark);
     }
     if (actions->pressed[ACTION_SAVE])
-        say(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING,
-            trainer->session.record_path[0] ? "recorded so far in %s" : "this session is not recorded%s", trainer->session.record_path);
+        show_message(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING,
+                     trainer->session.record_path[0] ? "recorded so far in %s" : "this session is not recorded%s", trainer->session.record_path);
     if (actions->pressed[ACTION_FULL_SCREEN] & 1)
         window_set_full_screen(trainer->window, !window_is_full_screen(trainer->window));
     if (actions->pressed[ACTION_SCREENSHOT])
@@ -564,16 +565,16 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
 
 // --- display ---
 
-static void tell_news(Trainer *trainer, const Moment *moment)
+static void show_events(Trainer *trainer, const Moment *moment)
 {
     char text[HAND_MESSAGE_LENGTH];
     const TrackerView *tracked = moment->extra;
     while (trainer->hands && hands_message(trainer->hands, text, sizeof text))
-        say(trainer, MARK_WARNING, "%s", text);
-    if (!trainer->has_told_end && (tracked->score.state == SCORE_REACHED || tracked->score.state == SCORE_TIME_OUT)) {
-        trainer->has_told_end = true;
-        say(trainer, tracked->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
-            tracked->score.state == SCORE_REACHED ? "target reached and held" : "time is up", tracked->score.points);
+        show_message(trainer, MARK_WARNING, "%s", text);
+    if (!trainer->has_reported_end && (tracked->score.state == SCORE_REACHED || tracked->score.state == SCORE_TIME_OUT)) {
+        trainer->has_reported_end = true;
+        show_message(trainer, tracked->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
+                     tracked->score.state == SCORE_REACHED ? "target reached and held" : "time is up", tracked->score.points);
     }
 }
 
@@ -636,9 +637,9 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
         state->xray = *frame.xray;
     }
     state->tray = trainer->has_tray ? &trainer->tray.shown : NULL;
-    tell_exchanges(trainer, pose);
+    show_exchanges(trainer, pose);
     state->frame_ms = 1000 * histogram_quantile(&trainer->frame_cpu_ns, 0.5) * 1e-9;
-    tell_news(trainer, moment);
+    show_events(trainer, moment);
     show_devices(trainer);
     panel_draw(trainer->panel, input, state, 0);
 }
@@ -670,7 +671,7 @@ static void run_window(Trainer *trainer, Faults *faults)
     const WindowInput *input;
     PanelActions actions = {0};
     double last = since_begin(trainer), drawn = last;
-    for (bool goes_on = true; goes_on;) {
+    for (bool is_running = true; is_running;) {
         bool visible = window_next_frame(trainer->window, &input);
         double now = since_begin(trainer);
         panel_take_input(trainer->panel, input, &actions);
@@ -683,15 +684,15 @@ static void run_window(Trainer *trainer, Faults *faults)
         if (trainer->has_tray)
             trainer->buttons = buttons;
         hand_grip_obey(&trainer->controls.grip, trainer->controls.tool_count, buttons, &trainer->buttons);
-        tell_grip(trainer, &grip, &actions);
+        show_grip(trainer, &grip, &actions);
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);
         XrayControl xray = controls_xray(&trainer->controls, &actions, buttons_of_hands(trainer));
         realtime_set_xray(trainer->session.realtime, &xray);
-        goes_on = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) &&
-                  !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
-        if (!goes_on || !visible)
+        is_running = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) &&
+                     !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
+        if (!is_running || !visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, trainer->controls.view, panel_has_panels(trainer->panel));
         draw(trainer, input, &layout, &xray, now - drawn);
@@ -709,7 +710,7 @@ static bool open_views(Trainer *trainer, Faults *faults)
     trainer->views = scene_views_create(trainer->scene, trainer->open, &trainer->controls, note, sizeof note, faults);
     trainer->controls.view = trainer->options->view;
     if (*note)
-        say(trainer, MARK_WARNING, "%s", note);
+        show_message(trainer, MARK_WARNING, "%s", note);
     return trainer->views != NULL;
 }
 
@@ -725,7 +726,7 @@ static bool open_hands(Trainer *trainer, Faults *faults)
     char text[HAND_MESSAGE_LENGTH];
     for (int k = 0; k < tools.count; k++)
         if (device_maps_share(hands.map, hands.map_count, &tools, k, text, sizeof text))
-            say(trainer, MARK_WARNING, "%s", text);
+            show_message(trainer, MARK_WARNING, "%s", text);
     if (options->has_built_in_maps) {
         trainer->built_in[0] = device_map_built_in(trainer->scene->tool_count > 1 ? BUILT_IN_GAMEPAD_PAIR : BUILT_IN_GAMEPAD);
         trainer->built_in[1] = device_map_built_in(BUILT_IN_JOYSTICK);

@@ -143,7 +143,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         tool->force_n = from->push_n;
         tool->torque_n_mm = from->torque_n_mm;
         bool is_in = from->node_count > 0 && from->inserted_mm >= from->node[from->node_count - 1].s - 1e-6;
-        tool->note = from->is_let_go ? "released" : is_in && scene->wire.has_sheath ? "fully inserted" : NULL;
+        tool->note = from->is_released ? "released" : is_in && scene->wire.has_sheath ? "fully inserted" : NULL;
         tool->mark = tool->note ? MARK_WARNING : MARK_NONE;
     }
     state->wall_max_n = pose->report.wall_force_max;
@@ -211,15 +211,15 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
 void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray)
 {
     const double well = 0.9;     // fraction of the requested flow
-    double asked = (double)xray->contrast_ml_s;
-    if (!(asked > 0) || tool < 0 || flow_ml_s >= well * asked || panel->state.warning)
+    double requested = (double)xray->contrast_ml_s;
+    if (!(requested > 0) || tool < 0 || flow_ml_s >= well * requested || panel->state.warning)
         return;
     const char *name = scene->tool[tool].name, *advice = tool + 1 < scene->tool_count ? "; more after the tool inside it is withdrawn" : "";
-    if (flow_ml_s < 0.01 * asked)
+    if (flow_ml_s < 0.01 * requested)
         snprintf(panel->warning, sizeof panel->warning, "Almost no contrast agent flows through %s: its lumen is filled%s", name, advice);
     else
-        snprintf(panel->warning, sizeof panel->warning, "At the injector's pressure only %.2g of %.2g ml/s flow through the lumen of %s%s", flow_ml_s, asked,
-                 name, advice);
+        snprintf(panel->warning, sizeof panel->warning, "At the injector's pressure only %.2g of %.2g ml/s flow through the lumen of %s%s", flow_ml_s,
+                 requested, name, advice);
     panel->state.warning = panel->warning;
 }
 
@@ -241,5 +241,5 @@ void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip)
         state->tool[k].torque_n_mm = hand_grip_sum(grip, state->tool_count, k, torque);
     }
     state->is_pair_locked = hand_grip_pair_is_locked(grip, state->tool_count);
-    state->is_let_go = grip->released >> grip->chosen & 1;
+    state->is_released = grip->released >> grip->chosen & 1;
 }

@@ -70,7 +70,7 @@ void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *
         hand_grip_choose(grip, tool_count, grip->chosen + 1);
     if (pressed & HAND_LOCK)
         hand_grip_lock(grip, tool_count);
-    if (pressed & HAND_LET_GO)
+    if (pressed & HAND_RELEASE)
         hand_grip_release(grip);
 }
 

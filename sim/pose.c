@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes)
+Pose *pose_create(int node_capacity, int tool_count, const int *tool_nodes)
 {
     Pose *pose = calloc(1, sizeof *pose);
     if (!pose)
@@ -26,15 +26,13 @@ Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes
     return NULL;
 }
 
-Pose *pose_create(int node_count) { return pose_create_tools(node_count, 1, &node_count); }
-
 Pose *pose_create_for(Simulator *simulator)
 {
     const Stepper *stepper = simulator_stepper(simulator);
     int nodes[STEP_TOOLS_MAX], count = stepper_tool_count(stepper);
     for (int k = 0; k < count; k++)
         nodes[k] = scene_most_nodes(simulator_scene(simulator), k);
-    return pose_create_tools(stepper_node_capacity(stepper), count, nodes);
+    return pose_create(stepper_node_capacity(stepper), count, nodes);
 }
 
 Pose *pose_create_for_run(const RecordedRun *run)
@@ -42,7 +40,7 @@ Pose *pose_create_for_run(const RecordedRun *run)
     int nodes[STEP_TOOLS_MAX] = {run->node_count};
     for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++)
         nodes[k] = run->tool[k].node_count;
-    return pose_create_tools(run->node_count, run->tool_count, nodes);
+    return pose_create(run->node_count, run->tool_count, nodes);
 }
 
 void pose_free(Pose *pose)
@@ -106,7 +104,7 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
         tool->command = commands->tool[k];
         tool->inserted_mm = stepper_tool_inserted(stepper, k);
         tool->turned_deg = stepper_tool_turned(stepper, k) * 180 / PI;
-        tool->is_let_go = commands->released >> k & 1;
+        tool->is_released = commands->released >> k & 1;
         tool->fitted = stepper_fitted(stepper, k);
         tool->push_n = pose->report.push[k];
         tool->torque_n_mm = pose->report.torque[k];
@@ -196,7 +194,7 @@ void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)
     for (int k = 0; k < pose->tool_count; k++) {
         PoseTool *tool = &pose->tool[k];
         tool->command = commands.tool[k];
-        tool->is_let_go = commands.released >> k & 1;
+        tool->is_released = commands.released >> k & 1;
         tool->push_n = pose->report.push[k] = run->tool[k].proximal[2 * step];
         tool->torque_n_mm = pose->report.torque[k] = run->tool[k].proximal[2 * step + 1];
     }

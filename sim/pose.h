@@ -11,7 +11,7 @@ typedef struct PoseTool {
     double inserted_mm;      // beyond the mouth
     double turned_deg;       // twist applied since the start
     double push_n, torque_n_mm;      // reaction felt by the operator
-    bool is_let_go;          // released
+    bool is_released;        // released
     int fitted;              // which of its devices is inserted: 0 the scene's, 1, 2, … those under its `exchange:`
     int node_capacity;       // at most, does not change during a run
     int node_count;          // of the inserted device
@@ -38,9 +38,8 @@ typedef struct Pose {
     NodeReport *node;        // (M) radius, wall force, gap, vessel node
 } Pose;
 
-Pose *pose_create(int node_count);   // for one tool with `node_count` nodes; NULL if out of memory
-// For at most `tool_nodes[k]` nodes of each tool, which is also the initial number.
-Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes);
+// For at most `tool_nodes[k]` nodes of each tool, which is also the initial number. NULL if out of memory.
+Pose *pose_create(int node_capacity, int tool_count, const int *tool_nodes);
 Pose *pose_create_for(Simulator *simulator);
 void pose_free(Pose *pose);
 void pose_copy(Pose *to, const Pose *from);   // made for the same tools

@@ -94,7 +94,7 @@ int scene_most_nodes(const Scene *scene, int tool)
 bool scene_use_script(Scene *scene, const char *path, Faults *faults)
 {
     ToolNames tools = scene ? scene_tool_names(scene) : (ToolNames){0};
-    Script *script = script_load_tools(path, scene ? &tools : NULL, faults);
+    Script *script = script_load(path, scene ? &tools : NULL, faults);
     if (!scene || !script) {
         script_free(script);
         return false;
@@ -133,4 +133,3 @@ double scene_device_attenuation(const Scene *scene, int tool, int which, double 
 }
 
 double scene_tool_attenuation(const Scene *scene, int tool, double s) { return scene_device_attenuation(scene, tool, 0, s); }
-double scene_attenuation(const Scene *scene, double s) { return scene_tool_attenuation(scene, 0, s); }

@@ -113,8 +113,7 @@ int scene_most_nodes(const Scene *scene, int tool);        // of the device with
 ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene
 // Replaces its script by a file's. NULL: the file is only checked. False with faults.
 bool scene_use_script(Scene *scene, const char *path, Faults *faults);
-// [1/mm] X-ray attenuation of the first tool, or of any tool or device, at arc length s from its proximal end.
-double scene_attenuation(const Scene *scene, double s);
+// [1/mm] X-ray attenuation of a tool or device at arc length s from its proximal end.
 double scene_tool_attenuation(const Scene *scene, int tool, double s);
 double scene_device_attenuation(const Scene *scene, int tool, int which, double s);
 double scene_device_marker(const Scene *scene, int tool, int which);       // [mm] length of its marker, 0: none

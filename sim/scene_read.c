@@ -371,7 +371,7 @@ static void read_script(Reading *reading, YamlValue value)
         return;
     if (!yaml_is_list(value)) {
         if (yaml_text(value, &name) && (scene->script_path = scene_resolved(reading, name)))
-            scene->script = script_load_tools(scene->script_path, &tools, reading->faults);
+            scene->script = script_load(scene->script_path, &tools, reading->faults);
         return;
     }
     int count = yaml_count(value, 1, MOST_ROWS);
@@ -382,15 +382,17 @@ static void read_script(Reading *reading, YamlValue value)
     scene->script = script;
     script->row = scene_zeroed(reading, count, sizeof *script->row);
     list_row_keys(&tools, &keys);
+    int line = 0, column = 0, before = reading->faults->count;
     for (int i = 0; script->row && i < count; i++) {
         YamlValue item = yaml_item(value, i);
         ScriptRow *row = &script->row[i];
-        int line, column;
         yaml_place(item, &line, &column);
         if (read_row(item, &keys, tools.count, row))
             script_check_row(row, i ? row - 1 : NULL, &tools, reading->path, line, column, reading->faults);
         script->count = i + 1;
     }
+    if (script->row && reading->faults->count == before)
+        script_check_end(script, reading->path, line, column, reading->faults);
 }
 
 static void read_targets(Reading *reading, YamlValue value)

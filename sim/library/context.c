@@ -60,7 +60,7 @@ SelContext *context_held(SelContext *context)
     return context;
 }
 
-void context_let_go(SelContext *context)
+void context_release(SelContext *context)
 {
     if (context && atomic_fetch_sub(&context->holders, 1) == 1)
         free(context);
@@ -81,7 +81,7 @@ SelStatus sel_context_create(const SelContextOptions *options, SelContext **out)
     return SEL_OK;
 }
 
-void sel_context_destroy(SelContext *context) { context_let_go(context); }
+void sel_context_destroy(SelContext *context) { context_release(context); }
 
 int sel_fault_count(const SelContext *context)
 {
@@ -157,24 +157,24 @@ static bool context_begin(SelContext *context)
     return context != NULL;
 }
 
-SelStatus context_refuse(SelContext *context, SelStatus status, const char *function, const char *words)
+SelStatus context_refuse(SelContext *context, SelStatus status, const char *function, const char *text)
 {
     if (context_begin(context))
-        faults_add(&context->faults, function, 0, 0, "%s", words);
+        faults_add(&context->faults, function, 0, 0, "%s", text);
     return status;
 }
 
 // --- messages ---
 
-static void tell_progress(void *argument, long done, long total)
+static void pass_progress(void *argument, long done, long total)
 {
     const SelContext *context = argument;
     context->options.progress(context->options.user, done, total);
 }
 
-Progress context_progress(SelContext *context) { return context->options.progress ? (Progress){.call = tell_progress, .context = context} : (Progress){0}; }
+Progress context_progress(SelContext *context) { return context->options.progress ? (Progress){.call = pass_progress, .context = context} : (Progress){0}; }
 
-void context_say(SelContext *context, SelMessageLevel level, const char *path, const char *text)
+void context_message(SelContext *context, SelMessageLevel level, const char *path, const char *text)
 {
     char line[FAULT_LENGTH];
     while (context && context->options.message && *text) {
@@ -185,7 +185,7 @@ void context_say(SelContext *context, SelMessageLevel level, const char *path, c
     }
 }
 
-void context_note(const char *path, const char *text) { context_say(current, SEL_NOTE, path, text); }
+void context_note(const char *path, const char *text) { context_message(current, SEL_NOTE, path, text); }
 
 // --- hands ---
 

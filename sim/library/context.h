@@ -28,9 +28,9 @@ struct SelRecording {
 };
 
 SelContext *context_held(SelContext *context);
-void context_let_go(SelContext *context);
+void context_release(SelContext *context);
 const SelScene *scene_held(const SelScene *scene);
-void scene_let_go(const SelScene *scene);
+void scene_release(const SelScene *scene);
 // Takes ownership of the parsed scene and opens its vessel. Returns false with faults, after freeing everything.
 bool scene_open_parsed(SelContext *context, Scene *scene, const SelOpenOptions *options, SelScene **out);
 
@@ -39,13 +39,13 @@ bool scene_open_parsed(SelContext *context, Scene *scene, const SelOpenOptions *
 typedef bool (*Work)(SelContext *context, void *what);
 SelStatus context_call(SelContext *context, Work work, void *what, SelStatus otherwise);
 // Adds `FUNCTION: words` and returns `status`. The context may be NULL.
-SelStatus context_refuse(SelContext *context, SelStatus status, const char *function, const char *words);
+SelStatus context_refuse(SelContext *context, SelStatus status, const char *function, const char *text);
 
 // Reports the progress of a call to the host; `call` is NULL if the host has no callback.
 Progress context_progress(SelContext *context);
 // Passes notes to the host of the call in which this thread is; a NoteFunction.
 void context_note(const char *path, const char *text);
-void context_say(SelContext *context, SelMessageLevel level, const char *path, const char *text);
+void context_message(SelContext *context, SelMessageLevel level, const char *path, const char *text);
 
 // Copies the given options over the defaults in `own`. Returns false if their `size` is invalid.
 bool options_take(void *own, size_t own_size, const void *given);

@@ -70,7 +70,7 @@ static bool segment(SelContext *context, void *what)
     if (tree)
         segmenting->tree = tree_handle(tree, info_of(segmenting, trace, &report, tree));
     for (int i = 0; tree && i < report.check.warning_count; i++)
-        context_say(context, SEL_WARNING, segmenting->volume->path, report.check.warning[i].text);
+        context_message(context, SEL_WARNING, segmenting->volume->path, report.check.warning[i].text);
     rbt_report_free(&report);
     trace_free(trace);
     return tree != NULL;

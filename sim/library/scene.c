@@ -28,14 +28,14 @@ static void free_scene(SelScene *scene)
     free(scene);
 }
 
-void scene_let_go(const SelScene *scene)
+void scene_release(const SelScene *scene)
 {
     SelScene *held = (SelScene *)(size_t)scene;
     if (held && atomic_fetch_sub(&held->holders, 1) == 1)
         free_scene(held);
 }
 
-void sel_scene_destroy(SelScene *scene) { scene_let_go(scene); }
+void sel_scene_destroy(SelScene *scene) { scene_release(scene); }
 
 // --- opening ---
 
@@ -53,7 +53,7 @@ static void take_contact(Scene *scene, const char *name, Faults *faults)
 static void take_script(Scene *scene, const char *path, Faults *faults)
 {
     ToolNames tools = scene_tool_names(scene);
-    Script *script = script_load_tools(path, &tools, faults);
+    Script *script = script_load(path, &tools, faults);
     if (!script)
         return;
     script_free(scene->script);

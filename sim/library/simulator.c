@@ -48,8 +48,8 @@ static void free_simulator(SelSimulator *s)
     simulator_destroy(s->simulator);
     free(s->node);
     free(s->own);
-    scene_let_go(s->scene);
-    context_let_go(s->context);
+    scene_release(s->scene);
+    context_release(s->context);
     free(s);
 }
 

@@ -12,7 +12,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static Faults faults;
     faults_clear(&faults);
     const ToolNames tools = {.count = 3, .name = {"guide", "micro", "wire"}};
-    Script *script = script_parse_tools((const char *)data, size, "script", &tools, &faults);
+    Script *script = script_parse((const char *)data, size, "script", &tools, &faults);
     if (!script != (faults.count > 0))
         abort();
     if (script) {

@@ -1,4 +1,4 @@
-// Device maps: what is read, every fault in one pass with its place, and the laws of axes and counters.
+// Device maps: valid maps, all faults in one pass with their positions, and the laws of axes and counters.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -77,7 +77,7 @@ static void expect_fault(const char *text, const char *words)
     fail_msg("<<%s>> gave '%s'; expected %s", text, faults.text[0], words);
 }
 
-static void what_does_not_fit_together_is_said(void **state)
+static void what_does_not_fit_together_is_reported(void **state)
 {
     (void)state;
     expect_fault("", "empty");
@@ -121,7 +121,7 @@ static void what_does_not_fit_together_is_said(void **state)
 
 static const ToolNames three = {.count = 3, .name = {"guide", "micro", "thread"}, .kind = {"catheter", "catheter", "wire"}};
 
-// Which tool each way of naming one comes to.
+// The tool that each way of naming it selects.
 static void tools_are_found_in_the_scene(void **state)
 {
     (void)state;
@@ -155,7 +155,7 @@ static void tools_are_found_in_the_scene(void **state)
             fail_msg("said: %s", faults.text[0]);
         free(map);
     }
-    // of one tool the ends are that one, and so are outer and inner
+    // with one tool, both ends and outer and inner are that tool
     const ToolNames one = {.count = 1, .name = {"wire"}, .kind = {"wire"}};
     DeviceMap *map = must_parse(HID "tool: innermost\npush: {source: X, mm_s: 2}\n");
     faults_clear(&faults);
@@ -163,7 +163,7 @@ static void tools_are_found_in_the_scene(void **state)
     free(map);
 }
 
-// One device, several tools: each has its own rates and ways; the buttons are the first one's.
+// One device, several tools: each has its own rates and travel; the buttons belong to the first.
 static void a_device_moves_several_tools(void **state)
 {
     (void)state;
@@ -182,7 +182,7 @@ static void a_device_moves_several_tools(void **state)
     assert_true(port[1].drives == DRIVES_TOOL + 2 && near(port[1].advanced_mm, -1) && port[1].turned_deg == 0);
     assert_true(port[2].drives == DRIVES_CHOSEN && port[2].advanced_mm == 0);
 
-    // two maps that name one tool are told of, one that names it twice is not
+    // two maps that name the same tool are reported, one map that names it twice is not
     char text[400] = "";
     DeviceMap *other = must_parse(HID "tool: innermost\npush: {source: X, mm_s: 2}\ntwist: {source: Y, deg_s: 2, tool: thread}\n");
     assert_true(device_map_find_tools(other, &three, &faults));
@@ -203,8 +203,8 @@ static void a_gamepad_has_a_tool_in_each_stick(void **state)
     HandPort port[MAP_HANDS] = {0};
     faults_clear(&faults);
     assert_true(gamepad_bind(&pad, map, 6, 15, "pad", &faults));
-    const float axes[6] = {1, -1, -1, 1, -1, -1};      // left stick away and to the right, right one back and to the left
-    const unsigned char buttons[15] = {[1] = 1, [11] = 1};     // B, and up on the cross
+    const float axes[6] = {1, -1, -1, 1, -1, -1};      // left stick forwards and to the right, right stick backwards and to the left
+    const unsigned char buttons[15] = {[1] = 1, [11] = 1};     // B, and up on the hat
     gamepad_update(&pad, axes, 6, buttons, 15, port);
     for (int h = 0; h < map->hand_count; h++) {
         int drives = port[h].drives;
@@ -213,7 +213,7 @@ static void a_gamepad_has_a_tool_in_each_stick(void **state)
     }
     assert_int_equal(map->hand_count, 3);
     assert_int_equal(port[0].buttons, HAND_STOP);
-    static const unsigned bits[][2] = {{4, HAND_CHOOSE_OUTER}, {5, HAND_CHOOSE_INNER}, {6, HAND_LET_GO}, {7, HAND_LOCK}, {9, HAND_EXCHANGE}};
+    static const unsigned bits[][2] = {{4, HAND_CHOOSE_OUTER}, {5, HAND_CHOOSE_INNER}, {6, HAND_RELEASE}, {7, HAND_LOCK}, {9, HAND_EXCHANGE}};
     for (size_t i = 0; i < sizeof bits / sizeof *bits; i++) {
         unsigned char held[15] = {0};
         held[bits[i][0]] = 1;
@@ -277,7 +277,7 @@ static void deflections_are_odd_monotone_and_continuous(void **state)
 static void calibration_puts_ends_and_centre_where_it_says(void **state)
 {
     (void)state;
-    // a centre off the middle: both sides reach full deflection
+    // a centre outside the middle: both sides reach full deflection
     assert_true(near(map_deflection(100, 100, 300, 1000), -1) && map_deflection(300, 100, 300, 1000) == 0 && near(map_deflection(1000, 100, 300, 1000), 1));
     assert_true(near(map_deflection(650, 100, 300, 1000), 0.5) && near(map_deflection(200, 100, 300, 1000), -0.5));
     assert_true(near(map_deflection(5000, 100, 300, 1000), 1) && near(map_deflection(-5000, 100, 300, 1000), -1));
@@ -292,7 +292,7 @@ static void counters_go_on_over_their_wrap(void **state)
     assert_true(map_counter_step(65530, 4, 65536) == 10 && map_counter_step(4, 65530, 65536) == -10);
     assert_true(map_counter_step(-32760, 32760, 65536) == -16 && map_counter_step(1000, 1000, 65536) == 0);
     assert_true(map_counter_step(10, 250, 0) == 240);
-    // a whole walk at any step below half a turn adds up, wherever it wraps
+    // a rotation at any step below half a turn adds up, wherever the counter wraps
     uint64_t random = 7;
     int64_t position = 0, counted = 0;
     for (int i = 0; i < 20000; i++) {
@@ -305,7 +305,7 @@ static void counters_go_on_over_their_wrap(void **state)
     assert_int_equal(counted, position);
 }
 
-// The same way of a roller, reported at once, each count alone, or in between: the same port.
+// The same rotation of a roller, reported at once, count by count, or in between: the port is the same.
 static void ways_do_not_depend_on_how_often_is_reported(void **state)
 {
     (void)state;
@@ -345,7 +345,7 @@ static void real_reports_become_rates(void **state)
     map_publish(map, &device, &port);
     assert_true(near(port.push_mm_s, 40 + 2) && near(port.twist_deg_s, -240 + 20));
     assert_int_equal(port.buttons, HAND_CONTRAST);
-    // hat released (8, outside its range), X and Y as near the middle as they come
+    // hat released (8, outside its range), X and Y as near to the middle as possible
     assert_true(map_take_report(map, wheel, (const uint8_t[]){0xff, 0x1f, 0, 0x80, 127, 0, 0, 0}, 8, &device));
     map_publish(map, &device, &port);
     assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0 && port.buttons == 0);
@@ -356,12 +356,12 @@ static void real_reports_become_rates(void **state)
     map_publish(map, &device, &port);
     assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0 && port.buttons == 0);
     free(map);
-    // buttons that push, an axis that is a pedal, a pedal that is open at rest
+    // buttons that push, an axis as a pedal, a pedal that is open at rest
     map = must_parse(TOP "device: {usage: joystick}\npush: [{source: button_5, mm_s: 3}, {source: button_6, mm_s: 3, invert: true}]\n"
                          "pedal: {source: Y, above: 0.5}\ncontrast: {source: button_1, invert: true}\n");
     assert_true(map_bind_hid(map, wheel, "wheel", &device, &faults));
     map_publish(map, &device, &port);
-    assert_int_equal(port.buttons, 0);    // before the first report nothing is held, inverted or not
+    assert_int_equal(port.buttons, 0);    // before the first report nothing is pressed, inverted or not
     assert_true(map_take_report(map, wheel, (const uint8_t[]){0, 0, 0x04, 0x80, 192, 0, 0, 0}, 8, &device));
     map_publish(map, &device, &port);
     assert_true(near(port.push_mm_s, 3) && port.buttons == (HAND_PEDAL | HAND_CONTRAST));
@@ -379,11 +379,11 @@ static void a_map_that_a_device_cannot_fill_is_refused(void **state)
     MapState device;
     DeviceMap *map = must_parse(TOP "device: {usage: mouse}\npush: {source: Rz, mm_s: 1}\ntwist: {source: X, deg_s: 5}\npedal: {source: button_9}\n");
     assert_false(map_bind_hid(map, mouse, "mouse", &device, &faults));
-    assert_int_equal(faults.count, 3);    // no Rz, X is relative, no button 9: all at once, each with its place
+    assert_int_equal(faults.count, 3);    // no Rz, X is relative, no button 9: all faults at once, each with its position
     assert_non_null(strstr(faults.text[0], "m.yaml:3:"));
     assert_non_null(strstr(faults.text[1], "deg_per_count"));
     free(map);
-    // a space mouse calls its deflections relative; the map says what they are
+    // a SpaceMouse describes its deflections as relative; the map corrects that
     map = must_parse(TOP "device: {usage: multi_axis}\npush: {source: Y, mm_s: 35, dead_zone: 0, kind: deflection}\n");
     HandPort port = {0};
     assert_true(map_bind_hid(map, space, "space mouse", &device, &faults));
@@ -414,7 +414,7 @@ static void gamepads_are_plain_arrays(void **state)
     gamepad_update(&pad, axes, 6, buttons, 15, &port);
     assert_true(port.push_mm_s == 0 && near(port.twist_deg_s, -240));
     assert_int_equal(port.buttons, HAND_PEDAL | HAND_STOP);
-    axes[2] = NAN;        // a driver's nonsense changes nothing
+    axes[2] = NAN;        // invalid values of a driver change nothing
     gamepad_update(&pad, axes, 6, buttons, 15, &port);
     assert_true(near(port.twist_deg_s, -240));
     gamepad_lost(&pad, &port);
@@ -435,7 +435,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_fault_comes_in_one_pass),
-        cmocka_unit_test(what_does_not_fit_together_is_said),
+        cmocka_unit_test(what_does_not_fit_together_is_reported),
         cmocka_unit_test(tools_are_found_in_the_scene),
         cmocka_unit_test(a_device_moves_several_tools),
         cmocka_unit_test(a_gamepad_has_a_tool_in_each_stick),

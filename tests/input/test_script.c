@@ -1,4 +1,4 @@
-// Scripts: parsing, sampling, and what is wrong with broken ones, each fault at its place.
+// Scripts: parsing, sampling, and the faults of broken ones with their positions.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 
-// cmocka's own compares in single precision
+// cmocka's own function compares in single precision
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
 
 static Faults faults;
@@ -21,7 +21,7 @@ static Faults faults;
 static Script *parse(const char *text)
 {
     faults_clear(&faults);
-    return script_parse(text, strlen(text), "s.csv", &faults);
+    return script_parse(text, strlen(text), "s.csv", NULL, &faults);
 }
 
 static void rows_hold_until_the_next(void **state)
@@ -43,7 +43,7 @@ static void rows_hold_until_the_next(void **state)
 static void every_millisecond_finds_its_row(void **state)
 {
     (void)state;
-    // a row at each millisecond: sampling on step times n/1000 must meet each of them exactly
+    // a row at each millisecond: sampling at the times of steps, n/1000, must find each of them exactly
     static char text[200000];
     size_t used = (size_t)sprintf(text, "t_s,push_mm_s,twist_deg_s\n");
     for (int i = 0; i <= 5000; i++)
@@ -87,6 +87,7 @@ static void each_fault_has_its_place(void **state)
     expect_fault(HEADER "0,1001,0\n1,0,0\n", "2:1", "push_mm_s");
     expect_fault(HEADER "0,1,-36001\n1,0,0\n", "2:1", "twist_deg_s");
     expect_fault(HEADER "0,1,0\n1e6,0,0\n", "3:1", "too late");
+    expect_fault(HEADER "0,1,0\n", "2:1", "expected another row with a later time");
 }
 
 static void all_faults_come_in_one_pass(void **state)
@@ -98,13 +99,13 @@ static void all_faults_come_in_one_pass(void **state)
     assert_int_equal(faults.count, 4);
 }
 
-static void a_file_that_is_none_is_said(void **state)
+static void a_file_that_is_none_is_reported(void **state)
 {
     (void)state;
     faults_clear(&faults);
-    assert_null(script_load("/nowhere/s.csv", &faults));
-    assert_null(script_load("/dev/zero", &faults));
-    assert_null(script_load("/", &faults));
+    assert_null(script_load("/nowhere/s.csv", NULL, &faults));
+    assert_null(script_load("/dev/zero", NULL, &faults));
+    assert_null(script_load("/", NULL, &faults));
     assert_int_equal(faults.count, 3);
     assert_non_null(strstr(faults.text[0], "/nowhere/s.csv"));
 }
@@ -133,15 +134,15 @@ static void a_hand_lets_go(void **state)
     script_free(script);
     const ToolNames tools = {.count = 3, .name = {"guide", "micro", "wire"}};
     static const char named[] = "t_s,wire.released,guide.push_mm_s,guide.twist_deg_s,guide.released\n0,1,2,3,0\n1,0,0,0,1\n2,0,0,0,0\n";
-    script = script_parse_tools(named, strlen(named), "s.csv", &tools, &faults);
+    script = script_parse(named, strlen(named), "s.csv", &tools, &faults);
     assert_non_null(script);
     ToolCommands commands = script_tools_at(script, 0.5, &cursor);
     assert_true(commands.released == 4 && commands.tool[0].push_mm_s == 2 && commands.tool[2].push_mm_s == 0);
     assert_int_equal(script_tools_at(script, 1.5, &cursor).released, 1);
     script_free(script);
-    // what was exchanged stays in when the script is over
+    // an exchanged device stays in after the script's end
     static const char exchange[] = "t_s,wire.push_mm_s,wire.twist_deg_s,wire.exchange\n0.5,5,0,0\n1,5,0,2\n2,5,0,1\n";
-    script = script_parse_tools(exchange, strlen(exchange), "s.csv", &tools, &faults);
+    script = script_parse(exchange, strlen(exchange), "s.csv", &tools, &faults);
     assert_non_null(script);
     assert_int_equal(script_tools_at(script, 0.2, &cursor).fitted[2], 0);
     assert_int_equal(script_tools_at(script, 1.5, &cursor).fitted[2], 2);
@@ -160,7 +161,7 @@ static void one_injector_goes_through_one_tool(void **state)
     static const char named[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,0\n1,0,0.5\n2,0,0\n3,1,0\n",
                       both[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,1\n1,51,0\n2,-1,0\n";
     int cursor = 0;
-    Script *script = script_parse_tools(named, strlen(named), "s.csv", &tools, &faults);
+    Script *script = script_parse(named, strlen(named), "s.csv", &tools, &faults);
     assert_non_null(script);
     const double at[] = {0.5, 1.5, 2.5, 3.5}, rate[] = {3, 0.5, 0, 0};
     const int tool[] = {1, 2, 0, 0};
@@ -170,7 +171,7 @@ static void one_injector_goes_through_one_tool(void **state)
     }
     script_free(script);
     faults_clear(&faults);
-    assert_null(script_parse_tools(both, strlen(both), "s.csv", &tools, &faults));
+    assert_null(script_parse(both, strlen(both), "s.csv", &tools, &faults));
     assert_int_equal(faults.count, 3);
     assert_non_null(strstr(faults.text[0], "2 tools at once"));
     assert_non_null(strstr(faults.text[1], "contrast_ml_s 51 is out of range; expected 0 to 50"));
@@ -184,7 +185,7 @@ int main(void)
         cmocka_unit_test(every_millisecond_finds_its_row),
         cmocka_unit_test(each_fault_has_its_place),
         cmocka_unit_test(all_faults_come_in_one_pass),
-        cmocka_unit_test(a_file_that_is_none_is_said),
+        cmocka_unit_test(a_file_that_is_none_is_reported),
         cmocka_unit_test(numbers_are_decimal_and_finite),
         cmocka_unit_test(a_hand_lets_go),
         cmocka_unit_test(one_injector_goes_through_one_tool),

@@ -1,4 +1,4 @@
-// Prints what fluoroscopy costs: median process CPU time of a frame [ms]. Not a test: clocks are noisy. LP_NUM_THREADS=1 measure_fluoroscope
+// Measures fluoroscopy: median process CPU time of a frame [ms]. Not a test, because clocks are noisy. LP_NUM_THREADS=1 measure_fluoroscope
 //
 // The vessel is a coil of 93,000 triangles and 400 nodes in a plain head, the tool a wire of 200 nodes along it.
 #include <setjmp.h>
@@ -93,7 +93,7 @@ int main(void)
     static float contrast[NODES];
     TriangleMesh mesh = coil_mesh();
     VesselTree *tree = coil_tree();
-    Pose *pose = pose_create(WIRE);
+    Pose *pose = pose_create(WIRE, 1, &(int){WIRE});
     TubeStretch stretch = {.end = WIRE, .radius = 0.18, .attenuation = 0.55};
     ToolLooks looks = {.count = 1, .tool = {{.stretch_count = 1, .stretch = &stretch}}};
     for (int i = 0; i < WIRE; i++)

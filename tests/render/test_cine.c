@@ -1,4 +1,4 @@
-// The cine loop: a ring buffer of images, replay at the pulses' times, files that come back the same and refuse what is damaged.
+// The cine loop: a ring buffer of images, replay at the times of the pulses, files that are read back unchanged, and damaged files that are refused.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -43,7 +43,7 @@ static void fill_pose(Pose *pose, int image, double time_s, double pulses_s)
 
 static bool add(Cine *cine, int image, double time_s, double pulses_s)
 {
-    Pose *pose = pose_create(NODES);
+    Pose *pose = pose_create(NODES, 1, &(int){NODES});
     assert_non_null(pose);
     fill_pose(pose, image, time_s, pulses_s);
     float contrast[TREE];
@@ -67,7 +67,7 @@ static Cine *loop_of(int count, int capacity, double pulses_s)
 
 static void check_image(const Cine *cine, int index, int image)
 {
-    Pose *pose = pose_create(NODES);
+    Pose *pose = pose_create(NODES, 1, &(int){NODES});
     assert_non_null(pose);
     CineFrame frame = cine_frame(cine, index);
     fill_pose(pose, image, frame.pose->time_s, (double)frame.pose->xray.pulses_s);
@@ -103,7 +103,7 @@ static void the_oldest_image_goes(void **state)
     assert_true(cine_record(cine));
     assert_true(cine_count(cine) == 0 && cine_dropped(cine) == 0 && cine_is_recording(cine));
     assert_true(add(cine, 7, 1, 15));
-    assert_false(add(cine, 7, 1.01, 15));   // the same pulse's image, drawn again
+    assert_false(add(cine, 7, 1.01, 15));   // the image of the same pulse, drawn again
     assert_int_equal(cine_count(cine), 1);
     check_image(cine, 0, 7);
     cine_free(cine);
@@ -130,10 +130,10 @@ static void a_locked_loop_keeps_what_it_has(void **state)
     cine_free(cine);
 }
 
-static void memory_is_said_and_bounded(void **state)
+static void memory_is_reported_and_bounded(void **state)
 {
     (void)state;
-    // 30 s at 30/s of a usual tool and tree
+    // 30 s at 30/s of a typical tool and tree
     const CineShape usual = {1, {301}, 1372};
     size_t bytes = cine_bytes(&usual, 900);
     assert_true(bytes > (size_t)900 * 300 * 200 && bytes < (size_t)900 * (300 * 210 + 1372 * 4 + 1200));
@@ -152,7 +152,7 @@ static void adding_allocates_nothing(void **state)
     (void)state;
     need_counting();
     Cine *cine = loop_of(3, 4, 15);
-    Pose *pose = pose_create(NODES);
+    Pose *pose = pose_create(NODES, 1, &(int){NODES});
     fill_pose(pose, 1, 1, 15);
     cine_record(cine);
     long before = heap_calls();
@@ -184,7 +184,7 @@ static void replay_keeps_the_pulses_times(void **state)
     Cine *cine = loop_of(30, 30, 15);
     assert_true(fabs(cine_duration_s(cine) - 2) < 1e-9);
     CinePlayer player = cine_player_start(cine);
-    for (int i = 0; i < 500; i++) {   // 5 s by 10 ms: two and a half rounds
+    for (int i = 0; i < 500; i++) {   // 5 s in steps of 10 ms: two and a half rounds
         int image = cine_player_advance(&player, cine, 0.01), due = (int)floor(0.01 * (i + 1) * 15 + 1e-6) % 30;
         assert_true(image == due || image == (due + 29) % 30);   // rounding at a border
     }
@@ -200,7 +200,7 @@ static void replay_keeps_the_pulses_times(void **state)
     player.speed = 1;
     assert_int_equal(cine_player_advance(&player, cine, 1e6), 29);
     assert_false(player.is_playing);
-    // odd values do no harm
+    // invalid values do no harm
     player = cine_player_start(cine);
     player.speed = NAN;
     player.frame = 1000;
@@ -231,7 +231,7 @@ static void an_empty_loop_shows_nothing(void **state)
     assert_int_equal(player.frame, -1);
     assert_int_equal(cine_player_advance(&player, cine, 1), -1);
     assert_true(cine_duration_s(cine) == 0);
-    // an image that comes while it is shown is shown
+    // an image that arrives while the loop is shown is shown too
     cine_record(cine);
     add(cine, 3, 1, 15);
     player.is_playing = true;
@@ -271,11 +271,11 @@ static void a_file_comes_back_the_same(void **state)
     cine_free(cine);
 }
 
-// Two tools whose shared centreline has another number of nodes in each image.
+// Two tools whose shared centreline has a different number of nodes in each image.
 static Pose *coaxial_image(int image)
 {
     const int nodes[2] = {4, 6};
-    Pose *pose = pose_create_tools(10, 2, nodes);
+    Pose *pose = pose_create(10, 2, nodes);
     assert_non_null(pose);
     pose->node_count = 6 + image % 3;
     pose->time_s = image;
@@ -289,7 +289,7 @@ static Pose *coaxial_image(int image)
     for (int k = 0; k < 2; k++) {
         pose->tool[k].inserted_mm = 3 * k + image;
         pose->tool[k].push_n = 0.1 * k;
-        // the inner one was exchanged for one of fewer nodes
+        // the inner one was exchanged for one with fewer nodes
         if (k == 1 && image % 2) {
             pose->tool[k].fitted = 2;
             pose->tool[k].node_count = 5;
@@ -343,8 +343,8 @@ static void several_tools_are_kept(void **state)
         }
         pose_free(expected);
     }
-    // a pose of other tools is not taken
-    Pose *other = pose_create(10);
+    // a pose of other tools is ignored
+    Pose *other = pose_create(10, 1, &(int){10});
     assert_false(cine_add(read, &(CineFrame){other, NULL, 99}));
     pose_free(other);
     for (size_t n = 0; n < length; n++) {
@@ -363,7 +363,7 @@ static void several_tools_are_kept(void **state)
     cine_free(cine);
 }
 
-// Version 2 knew no exchange: all nodes of each tool.
+// Version 2 had no exchange: all nodes of each tool.
 static void loops_of_before_exchanges_are_read(void **state)
 {
     (void)state;
@@ -373,7 +373,7 @@ static void loops_of_before_exchanges_are_read(void **state)
     assert_true(cine && cine_record(cine) && cine_add(cine, &(CineFrame){pose, NULL, 1}));
     size_t length;
     uint8_t *bytes = cine_pack(cine, &length);
-    // the two counts of each tool stand behind its five figures, and are followed by its nodes: 4 and 6 of 76 bytes, then the checksum
+    // the two counts of each tool follow its five figures, and its nodes follow the counts: 4 and 6 of 76 bytes, then the checksum
     size_t second = length - 8 - 6 * 76 - 8, first = second - 5 * 8 - 4 * 76 - 8;
     const int32_t counts[2][2] = {{0, 4}, {0, 6}};
     assert_memory_equal(bytes + first, counts[0], 8);
@@ -422,14 +422,14 @@ static void a_damaged_file_is_refused(void **state)
     cine_free(cine);
 }
 
-// Values that cannot be drawn are refused though the checksum is right.
+// Values that cannot be drawn are refused even if the checksum is right.
 static void what_cannot_be_drawn_is_refused(void **state)
 {
     (void)state;
     for (int what = 0; what < 9; what++) {
         Cine *cine = create_cine(NODES, TREE, 3);
         cine_record(cine);
-        Pose *pose = pose_create(NODES);
+        Pose *pose = pose_create(NODES, 1, &(int){NODES});
         float contrast[TREE] = {0};
         fill_pose(pose, 1, 1, 15);
         if (what == 0)
@@ -518,7 +518,7 @@ int main(void)
         cmocka_unit_test(the_counter_counts),
         cmocka_unit_test(the_oldest_image_goes),
         cmocka_unit_test(a_locked_loop_keeps_what_it_has),
-        cmocka_unit_test(memory_is_said_and_bounded),
+        cmocka_unit_test(memory_is_reported_and_bounded),
         cmocka_unit_test(adding_allocates_nothing),
         cmocka_unit_test(other_tools_are_not_taken),
         cmocka_unit_test(replay_keeps_the_pulses_times),

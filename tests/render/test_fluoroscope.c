@@ -1,4 +1,4 @@
-// The pictures of fluoroscopy: Beer and Lambert, noise, blades, DSA, roadmap, held image, mirrors, bad vessels. Skipped by name where no EGL is.
+// The pictures of fluoroscopy: Beer-Lambert law, noise, blades, DSA, roadmap, held image, mirrored scenes, bad vessels. Skipped by name without EGL.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -37,7 +37,8 @@ typedef struct Tool {
 } Tool;
 static Tool tool_make(int count, Vec3 a, Vec3 b, double radius, double attenuation)
 {
-    Tool tool = {.pose = pose_create(count), .stretch = {.end = vec3_distance(a, b), .radius = radius, .attenuation = attenuation}, .looks = {.count = 1}};
+    Tool tool = {
+        .pose = pose_create(count, 1, &count), .stretch = {.end = vec3_distance(a, b), .radius = radius, .attenuation = attenuation}, .looks = {.count = 1}};
     for (int i = 0; i < count; i++)
         tool.pose->tool[0].node[i] = (ToolNode){.s = vec3_distance(a, b) * i / (count - 1.0), .position = vec3_mix(a, b, i / (count - 1.0)), .radius = radius};
     return tool;
@@ -52,7 +53,7 @@ static void tool_give(Tool *tool, FluoroscopeOptions *options)
 
 static void tool_free(Tool *tool) { pose_free(tool->pose); }
 
-// A ball of contrast of radius 6 in the middle, a wire from a to b.
+// A ball of contrast agent of radius 6 in the middle, a wire from a to b.
 typedef struct Patient {
     TriangleMesh ball;
     Tool wire;
@@ -80,7 +81,7 @@ static void patient_close(Patient *patient)
 static void known_thickness_gives_known_grey(void **state)
 {
     (void)state;
-    // a ball of contrast 16 mm across, a rod of 4 mm, one through the other at the top
+    // a ball of contrast agent 16 mm across and a rod of 4 mm, intersecting at the top
     TriangleMesh ball = ball_of(8, vec3(0, 0, 0));
     FluoroscopeOptions options = quiet_room(&ball);
     Tool rod = tool_make(31, vec3(-30, 0, -3), vec3(30, 0, -3), 2, 0.15);
@@ -94,7 +95,7 @@ static void known_thickness_gives_known_grey(void **state)
         s->frame.contrast = &c;
         s->frame.pulse++;
         room_draw(s);
-        // four pixels a millimetre; rays are almost parallel to the axis. Rounding of the picture is half a step, of the noise-free base less
+        // four pixels per millimetre; rays are almost parallel to the axis. The picture is rounded by half a step, the noise-free base by less
         double slab = 0.105 * (double)c;
         assert_near(room_grey(s, 120, 120 + 16), live_grey(slab * 2 * sqrt(64 - 16)), 1.5);
         assert_near(room_grey(s, 20, 120 - 12), live_grey(0.15 * 4), 1.5);
@@ -106,7 +107,7 @@ static void known_thickness_gives_known_grey(void **state)
     mesh_clear(&ball);
 }
 
-// A thicker device in the tool's place, with fewer nodes at other places: the same picture as if it had been there from the start; then the first one again.
+// A thicker device replaces the tool, with fewer nodes at other places: the picture is as if it had been there from the start; then the first one again.
 static void an_exchanged_tool_is_seen_as_it_is(void **state)
 {
     (void)state;
@@ -148,7 +149,7 @@ static void an_exchanged_tool_is_seen_as_it_is(void **state)
     }
     assert_near(first[0], live_grey(0.15 * 4), 1.5);
     assert_near(expected[0], live_grey(0.1 * 8), 1.5);
-    assert_true(first[1] > expected[1] + 5);       // 3 mm off the axis only the thick one is
+    assert_true(first[1] > expected[1] + 5);       // 3 mm off the axis there is only the thick one
     room_close(s);
     tool_free(&rod);
     tool_free(&thick);
@@ -160,7 +161,7 @@ static void noise_is_that_of_the_quanta(void **state)
     (void)state;
     TriangleMesh slab;
     const Vec3 corner[4] = {{-40, -10, 0}, {40, -10, 0}, {40, 10, 0}, {-40, 10, 0}};
-    slab = prism_mesh(corner, 4, 40);   // 20 mm of contrast in the upper half
+    slab = prism_mesh(corner, 4, 40);   // 20 mm of contrast agent in the upper half
     FluoroscopeOptions options = quiet_room(&slab);
     for (int k = 0; k < 2; k++) {
         options.quanta = k ? 2000 : 550;
@@ -177,7 +178,7 @@ static void noise_is_that_of_the_quanta(void **state)
             double sigma = 255 * 1.75 * 0.72 * pow(transmission, 0.72 - 1) * sqrt(transmission / options.quanta);
             print_message("quanta %g, I %.3f: grey %.2f (%.2f), sigma %.3f (%.3f)\n", options.quanta, transmission, half[h].mean, live_grey(attenuation),
                           half[h].deviation, sqrt(sigma * sigma + 1.0 / 12));
-            // 44,800 pixels of which about seven share their noise: the estimate's own sigma is 0.9 %; rays through the slab's edges are a little longer
+            // 44,800 pixels; noise is correlated over about seven: the estimate's own sigma is 0.9 %; rays through the slab's edges are a little longer
             assert_near(half[h].deviation / sqrt(sigma * sigma + 1.0 / 12), 1, 0.03);
             assert_near(half[h].mean, live_grey(attenuation), h ? 1.5 : 0.5);
         }
@@ -203,7 +204,7 @@ static void the_same_pulse_gives_the_same_picture(void **state)
             memcpy(first, other->rgb, bytes);
     }
     assert_true(memcmp(first, other->rgb, bytes) != 0);
-    // pulses that are nothing to each other
+    // independent pulses
     double product = 0, square = 0;
     uint8_t *last = malloc(bytes);
     memcpy(last, other->rgb, bytes);
@@ -217,7 +218,7 @@ static void the_same_pulse_gives_the_same_picture(void **state)
             product += (first[at] - m.mean) * (last[at] - m.mean);
             square += (first[at] - m.mean) * (first[at] - m.mean);
         }
-    assert_true(fabs(product / square) < 0.25);   // of 1,600 pixels, some 230 independent: three sigmas are 0.2
+    assert_true(fabs(product / square) < 0.25);   // 1,600 pixels, about 230 independent: three sigmas are 0.2
     free(first);
     free(last);
     room_close(other);
@@ -242,7 +243,7 @@ static void blades_cover_what_they_are_set_to(void **state)
     assert_near(room_grey(s, 100, 200) / open, 0.5, 0.1);
     assert_near(room_grey(s, 200, 350) / open, 0.5, 0.1);
     assert_true(room_grey(s, 92, 200) < 0.1 * open && room_grey(s, 108, 200) > 0.9 * open);
-    // rounded: the corner of the opening is dark a pixel or two inside
+    // rounded: in the corner, the opening is dark for a pixel or two
     assert_true(room_grey(s, 103, 346) < 0.3 * open);
     room_close(s);
 }
@@ -251,7 +252,7 @@ static void dsa_shows_the_vessel_alone(void **state)
 {
     (void)state;
     Patient patient;
-    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 15), vec3(30, 0, 15), 320);   // a plain head
+    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 15), vec3(30, 0, 15), 320);   // a head without bones
     if (!s) {
         patient_close(&patient);
         skip();
@@ -265,7 +266,7 @@ static void dsa_shows_the_vessel_alone(void **state)
     assert_true(fluoroscope_state(s->view).has_mask && !fluoroscope_state(s->view).mask_has_moved);
     s->frame.pulse++;
     room_draw(s);
-    // an empty injection: flat within the noise of picture and mask, in front of bones, air cells and the wire
+    // without contrast agent: flat within the noise of picture and mask, in front of bones, air cells and the wire
     double flat = 255 * 0.62;
     const CArm *c_arm = &s->view->c_arm;
     for (int y = 30; y < 290; y += 20)
@@ -274,16 +275,16 @@ static void dsa_shows_the_vessel_alone(void **state)
             double a = anatomy_along(&s->view->anatomy, c_arm_source(c_arm), pixel_ray(c_arm, 320, x + 10, y + 10));
             double transmission = fmin(exp(s->view->tone.exposure - a), 1);
             double sigma = flat * s->view->options.dsa_gain * sqrt(2 / (s->view->options.quanta * s->view->options.dsa_dose * transmission));
-            assert_near(m.mean, flat, 5 * sigma * 2.7 / 20 + 0.5);   // 400 pixels, noise alike over 2.7
+            assert_near(m.mean, flat, 5 * sigma * 2.7 / 20 + 0.5);   // 400 pixels, with noise correlated over 2.7
             assert_near(m.deviation / sigma, 1, 0.35);
         }
-    // contrast: the ball alone
+    // contrast agent: only the ball
     s->frame.contrast = &full;
     s->frame.pulse++;
     room_draw(s);
     assert_near(room_moments(s, 157, 157, 163, 163).mean / (flat * exp(-s->view->options.dsa_gain * 0.105 * 12)), 1, 0.12);
     assert_near(room_moments(s, 40, 40, 80, 80).mean, flat, 2);
-    // the mask stays while the tool moves: it is white where it was, dark where it is
+    // the mask stays while the tool moves: white where the tool was, dark where it is
     s->frame.contrast = NULL;
     for (int i = 0; i < 31; i++)
         patient.wire.pose->tool[0].node[i].position.z -= 5;
@@ -291,7 +292,7 @@ static void dsa_shows_the_vessel_alone(void **state)
     room_draw(s);
     int was = 160 + 15 * 4, is = 160 + 10 * 4;
     assert_true(room_moments(s, 60, was - 1, 260, was + 1).mean > flat + 20 && room_moments(s, 60, is - 1, 260, is + 1).mean < flat - 20);
-    // turned, the mask no longer fits
+    // after a rotation the mask no longer fits
     s->frame.xray.lao_deg = 10;
     s->frame.pulse++;
     room_draw(s);
@@ -318,12 +319,12 @@ static void the_roadmap_keeps_the_last_bolus(void **state)
         patient_close(&patient);
         skip();
     }
-    // before any contrast there is nothing to overlay
+    // before any contrast agent there is nothing to overlay
     s->frame.xray.mode = XRAY_ROADMAP;
     room_draw(s);
     assert_false(fluoroscope_state(s->view).has_roadmap);
     assert_int_equal(blueness(s, 120, 130), 0);
-    // a bolus comes and goes in live fluoroscopy; then the mask is taken
+    // a bolus passes in live fluoroscopy; then the mask is taken
     s->frame.xray.mode = XRAY_LIVE;
     for (int k = 0; k < 5; k++) {
         const float c[5] = {0, 0.5f, 1, 0.3f, 0};
@@ -340,7 +341,7 @@ static void the_roadmap_keeps_the_last_bolus(void **state)
     assert_true(fluoroscope_state(s->view).has_roadmap);
     assert_true(blueness(s, 120, 130) > 40);
     assert_int_equal(blueness(s, 120, 200), 0);
-    // the live tool is seen over it, and the overlay turns with the C-arm
+    // the live tool is visible over it, and the overlay rotates with the C-arm
     assert_true(room_grey(s, 120, 120) < 0.85 * room_grey(s, 120, 130));
     s->frame.xray.lao_deg = 60;
     s->frame.xray.field_mm = 100;
@@ -353,7 +354,7 @@ static void the_roadmap_keeps_the_last_bolus(void **state)
     s->frame.pulse++;
     room_draw(s);
     assert_false(fluoroscope_state(s->view).has_roadmap);
-    // the other way: first the roadmap, then the bolus; what it reached stays when it has gone
+    // the other order: first the roadmap, then the bolus; the vessels that it reached stay visible
     s->frame.xray.mask = 2;
     for (int k = 0; k < 4; k++) {
         const float c[4] = {0, 0.4f, 1, 0};
@@ -380,7 +381,7 @@ static void without_pedal_the_last_image_holds(void **state)
     room_draw(s);
     assert_false(fluoroscope_state(s->view).is_held);
     memcpy(before, s->rgb, bytes);
-    // the pedal is off, everything moves, pulses are counted on: the picture stays but for the sign in its corner
+    // the pedal is off, everything moves, pulses are counted on: the picture stays except for the sign in its corner
     s->frame.xray.pedal = 0;
     s->frame.pulse += 5;
     s->frame.contrast = &full;
@@ -435,12 +436,12 @@ static void a_mirrored_scene_gives_the_mirrored_picture(void **state)
             dark += a < live_grey(0.15);
         }
     assert_true(dark > 800);
-    assert_true(differ < 8);   // a tool's end that falls on the middle between pixels
+    assert_true(differ < 8);   // a tool's end halfway between pixels
     free(picture[0]);
     free(picture[1]);
 }
 
-static void unfit_vessels_are_told(void **state)
+static void unfit_vessels_are_reported(void **state)
 {
     (void)state;
     TriangleMesh tube = bent_tube_mesh(3, -15, 15, 10, 0.1, 1, 0.5, 32);
@@ -448,19 +449,19 @@ static void unfit_vessels_are_told(void **state)
     XrayRoom *s = room_open(&options, 200);
     if (!s)
         skip();
-    // open: closed by lids, and said so
+    // open: closed by lids, with a message
     assert_true(room_says(s, "open at 2 places"));
     s->frame.contrast = &full;
     room_draw(s);
     assert_near(room_grey(s, 100, 100), live_grey(0.105 * 6), 2);
-    // before the source: nothing drawn, and said so
+    // in front of the source: nothing is drawn, with a message
     s->frame.xray.table_mm[1] = -790;   // the patient's front is -y
     s->frame.pulse++;
     room_draw(s);
     assert_true(fluoroscope_state(s->view).is_out_of_beam);
     assert_near(room_grey(s, 100, 100), live_grey(0), 1);
     room_close(s);
-    // the other way round as a whole
+    // oriented inwards as a whole
     for (int t = 0; t < tube.triangle_count; t++) {
         int b = tube.triangle[t][1];
         tube.triangle[t][1] = tube.triangle[t][2], tube.triangle[t][2] = b;
@@ -471,7 +472,7 @@ static void unfit_vessels_are_told(void **state)
     room_draw(s);
     assert_near(room_grey(s, 100, 100), live_grey(0.105 * 6), 2);
     room_close(s);
-    // one triangle turned: whole rays would be wrong
+    // one flipped triangle: whole rays would be wrong
     int b = tube.triangle[300][1];
     tube.triangle[300][1] = tube.triangle[300][2], tube.triangle[300][2] = b;
     s = room_open(&options, 200);
@@ -486,7 +487,7 @@ static void unfit_vessels_are_told(void **state)
     assert_true(room_says(s, "no contrast is drawn"));
     room_close(s);
     mesh_clear(&tube);
-    // options that are wrong are refused with a reason
+    // invalid options are refused with a reason
     FluoroscopeOptions bad = quiet_room(NULL);
     bad.patient.right = vec3(1, 1, 0);
     s = room_open(&bad, 64);
@@ -510,7 +511,7 @@ static void kept_layers_give_the_same_as_new_ones(void **state)
     float c = 0;
     s->frame.contrast = &c;
     for (int round = 0; round < 25; round++) {
-        // some pulses in which things move, some at rest; what is kept from them must not show
+        // some pulses with motion, some at rest; cached parts must not show
         for (int pulse = 0; pulse < 9; pulse++) {
             bool moves = pulse < 3;
             if (moves && random_in(&seed, 0, 1) < 0.5)
@@ -616,7 +617,7 @@ int main(void)
         cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
         cmocka_unit_test(without_pedal_the_last_image_holds),
         cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
-        cmocka_unit_test(unfit_vessels_are_told),
+        cmocka_unit_test(unfit_vessels_are_reported),
         cmocka_unit_test(odd_frames_are_survived),
         cmocka_unit_test(whatever_state_gl_is_in),
         cmocka_unit_test(kept_layers_give_the_same_as_new_ones),

@@ -1,4 +1,4 @@
-// An injection by a script or a session: what a replay shows is what the run had, a session becomes a script that injects the same, older recordings are read.
+// An injection by a script or a session: a replay shows what the run had, a session becomes a script that injects the same, and older recordings are read.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -36,7 +36,7 @@ static float live[STEPS / EACH + 1][64];
 static double live_injected_ml[STEPS / EACH + 1];
 static int nodes;
 
-// As `run` does it (`is_watched` false: nobody saw it, the script injects) or as a session with the same controls.
+// A run as `run` makes it (`is_watched` false: nobody watches, the script injects) or a session with the same controls.
 static RecordedRun *record(const char *name, bool is_watched)
 {
     Simulator *simulator = simulator_create(scene, NULL, &faults);
@@ -97,7 +97,7 @@ static void a_replay_shows_the_lumens_as_they_were(void **state)
         RecordedRun *run = record(watched ? "seen.h5" : "unseen.h5", watched);
         Playback *playback = playback_open(run, scene, NULL, &unseen);
         assert_non_null(playback);
-        for (int i = STEPS / EACH; i > 0; i--) {     // backwards: from places that are kept
+        for (int i = STEPS / EACH; i > 0; i--) {     // backwards, from stored moments
             playback_seek(playback, i * EACH * 0.001);
             assert_memory_equal(playback_filling(playback), live[i], (size_t)nodes * sizeof(float));
             assert_true(fabs(playback_injected_ml(playback) - live_injected_ml[i]) < 1e-12);
@@ -107,7 +107,7 @@ static void a_replay_shows_the_lumens_as_they_were(void **state)
         assert_true(fabs(playback_flow_ml_s(playback) - 1.5) < 1e-6);
         // 0.3 ml at first and 0.1 ml at the end
         assert_true(fabs(live_injected_ml[STEPS / EACH] - 0.4) < 1e-6);
-        assert_true(live[1][10] > 0.5F && live[1][10] <= 0.75F && live[1][30] <= 0);      // the wire takes a quarter of the lumen
+        assert_true(live[1][10] > 0.5F && live[1][10] <= 0.75F && live[1][30] <= 0);      // the wire takes up a quarter of the lumen
         playback_close(playback);
         recorded_run_free(run);
     }
@@ -121,7 +121,7 @@ static void a_session_becomes_a_script_that_injects_the_same(void **state)
     char *text = replay_script(run, &length);
     assert_non_null(text);
     const ToolNames tools = scene_tool_names(scene);
-    Script *script = script_parse_tools(text, length, "hand.csv", &tools, &faults);
+    Script *script = script_parse(text, length, "hand.csv", &tools, &faults);
     if (!script)
         fail_msg("%s", faults.text[0]);
     int cursor[2] = {0};
@@ -134,7 +134,7 @@ static void a_session_becomes_a_script_that_injects_the_same(void **state)
     recorded_run_free(run);
 }
 
-// Rewrites /xray without its last column, as it was before contrast agent had a tool.
+// Rewrites /xray without its last column, as in versions without injection through a tool.
 static void cut_xray(const char *path, const RecordedRun *run)
 {
     float *rows = malloc((size_t)run->step_count * XRAY_VALUES_BEFORE_TOOLS * sizeof *rows);
@@ -164,7 +164,7 @@ static void a_recording_from_before_is_read_and_is_its_session_s(void **state)
         assert_memory_equal(&older->xray[i], &run->xray[i], XRAY_VALUES_BEFORE_TOOLS * sizeof(float));
         assert_true(older->xray[i].contrast_tool <= 0);
     }
-    // a session's sum covers the tool where there is one, and is what it was where there is none
+    // the checksum of a session includes the tool if there is one, and is unchanged if there is none
     Session with, without;
     session_set_run(&with, run, "older.h5");
     session_set_run(&without, older, "older.h5");

@@ -1,4 +1,4 @@
-// The operator's controls without a window: what keys, sliders, mouse and a hand's buttons make of the controls.
+// The operator's controls without a window: the effect of keys, sliders, mouse and the buttons of a hand.
 #include "render/operator_controls.h"
 
 #include <setjmp.h>
@@ -55,7 +55,7 @@ static void the_c_arm_stops_at_its_limits(void **state)
     hold(&controls, ACTION_LAO, 1, 50);
     double turned = (double)controls.xray.lao_deg;
     assert_true(turned > 5 && turned < 90);
-    hold(&controls, ACTION_RAO, 1, 10);   // the same return path, whatever the frames
+    hold(&controls, ACTION_RAO, 1, 10);   // the same path back, for any frame rate
     assert_near((double)controls.xray.lao_deg, 0, 1e-4);
     hold(&controls, ACTION_LAO, 100, 100);
     assert_true(controls.xray.lao_deg == 90 && controls.xray.cra_deg == 0);
@@ -67,7 +67,7 @@ static void the_c_arm_stops_at_its_limits(void **state)
     assert_true(controls.xray.cra_deg == -45 && controls.xray.lao_deg == -90);
     press(&controls, ACTION_AP, 1);
     assert_true(controls.xray.cra_deg == 0 && controls.xray.lao_deg == 0);
-    // faster and slower; opposite keys stand still
+    // faster and slower; opposite keys cancel
     PanelActions both = {.mouse.view = -1};
     both.held[ACTION_LAO] = both.held[ACTION_FAST] = true;
     obey(&controls, &both, 1);
@@ -82,7 +82,7 @@ static void the_c_arm_stops_at_its_limits(void **state)
     assert_near((double)controls.xray.lao_deg, turned / 5, 1e-3);
 }
 
-// Where a point that stood in the picture's middle is seen after the table went for a second.
+// Projection of a point that was in the picture's middle after the table moved for a second.
 static void table_moves_by(const OperatorControls *before, ActionId action, double x, double y)
 {
     OperatorControls controls = *before;
@@ -165,7 +165,7 @@ static void pulse_rates_go_round(void **state)
     }
     press(&controls, ACTION_PULSES, 2);   // twice in one frame
     assert_true(controls.xray.pulses_s == 10);
-    controls.xray.pulses_s = 12;   // off the list: the next above
+    controls.xray.pulses_s = 12;   // not in the list: the next above
     press(&controls, ACTION_PULSES, 1);
     assert_true(controls.xray.pulses_s == 15);
 }
@@ -199,7 +199,7 @@ static void pedal_and_contrast_come_from_latch_keys_and_hands(void **state)
     assert_true(controls_xray(&controls, &pedal, 0).pedal == 1 && controls_xray(&controls, &pedal, 0).contrast_ml_s == 0);
     assert_true(controls_xray(&controls, &none, HAND_PEDAL).pedal == 1);
     assert_true(controls_xray(&controls, &contrast, 0).contrast_ml_s == 3 && controls_xray(&controls, &contrast, 0).pedal == 0);
-    assert_true(controls_xray(&controls, &none, 0).contrast_tool == 1);   // through the chosen tool
+    assert_true(controls_xray(&controls, &none, 0).contrast_tool == 1);   // through the selected tool
     controls.grip.chosen = 2;
     assert_true(controls_xray(&controls, &contrast, 0).contrast_tool == 3);
     controls.contrast_ml_s = 15;
@@ -211,7 +211,7 @@ static void pedal_and_contrast_come_from_latch_keys_and_hands(void **state)
     assert_true(controls_xray(&controls, &pedal, HAND_PEDAL).pedal == 1);
     press(&controls, ACTION_PEDAL_LATCH, 1);
     assert_true(controls_xray(&controls, &none, 0).pedal == 0);
-    // what is asked for is not kept: everything else is unchanged
+    // the requested value is not kept: everything else is unchanged
     controls.xray.lao_deg = 12;
     xray = controls_xray(&controls, &pedal, HAND_CONTRAST);
     assert_true(xray.lao_deg == 12 && controls.xray.pedal == 0 && controls.xray.contrast_ml_s == 0);
@@ -220,7 +220,7 @@ static void pedal_and_contrast_come_from_latch_keys_and_hands(void **state)
 static void a_slider_sets_what_it_shows_and_no_more(void **state)
 {
     (void)state;
-    // the panel shows a moment with the pedal down and contrast flowing; what a slider gives back has both
+    // the panel shows a moment with the pedal down and contrast agent flowing; the value of a slider includes both
     OperatorControls controls = controls_in_front();
     PanelActions actions = {.mouse.view = -1, .xray_set = true};
     actions.held[ACTION_PEDAL] = actions.held[ACTION_CONTRAST] = true;
@@ -231,18 +231,18 @@ static void a_slider_sets_what_it_shows_and_no_more(void **state)
     assert_true(controls.xray.lao_deg == -33 && controls.xray.collimator[2] == 0.5F);
     XrayControl xray = controls_xray(&controls, &actions, 0);
     assert_true(xray.pedal == 1 && xray.contrast_ml_s == 3);
-    // released later: neither stays on by the slider
+    // released later: the slider keeps neither on
     PanelActions none = {.mouse.view = -1};
     xray = controls_xray(&controls, &none, 0);
     assert_true(xray.pedal == 0 && xray.contrast_ml_s == 0 && xray.lao_deg == -33);
-    // nor does it release the latch, with the pedal shown as it was before
+    // nor does it release the latch, with the pedal shown as before
     actions = none;
     actions.pressed[ACTION_PEDAL_LATCH] = 1;
     actions.xray_set = true;
     actions.xray = xray;
     obey(&controls, &actions, 0.02);
     assert_true(controls_xray(&controls, &none, 0).pedal == 1);
-    // keys of the same frame count on top of it
+    // keys of the same frame are added to it
     actions = none;
     actions.xray_set = true;
     actions.xray = controls.xray;
@@ -271,7 +271,7 @@ static void the_tool_goes_at_three_speeds_and_stops(void **state)
     actions.held[ACTION_FAST] = false;
     actions.held[ACTION_SLOW] = true;
     assert_near(controls_command(&controls, &actions).push_mm_s, 2, 1e-12);
-    actions.held[ACTION_PULL] = true;   // both ways: none
+    actions.held[ACTION_PULL] = true;   // both directions cancel
     assert_near(controls_command(&controls, &actions).push_mm_s, 0, 0);
     actions.held[ACTION_PUSH] = false;
     assert_near(controls_command(&controls, &actions).push_mm_s, -2, 1e-12);
@@ -289,15 +289,15 @@ static void the_keys_choose_lock_and_let_go(void **state)
     assert_int_equal(controls.grip.chosen, 2);
     press(&controls, ACTION_TOOL_4, 1);           // there is none
     assert_int_equal(controls.grip.chosen, 2);
-    press(&controls, ACTION_LOCK, 1);             // the innermost with the one around it
+    press(&controls, ACTION_LOCK, 1);             // locks the innermost tool and the one around it
     assert_true(hand_grip_lead(&controls.grip, 2) == 1 && hand_grip_lead(&controls.grip, 1) == 1);
     press(&controls, ACTION_LOCK, 2);             // twice in one frame: as before
     assert_int_equal(controls.grip.locked, 4);
-    press(&controls, ACTION_LET_GO, 1);
+    press(&controls, ACTION_RELEASE, 1);
     assert_true(controls.grip.released == 4 && controls.grip.locked == 0);
     press(&controls, ACTION_TOOL_1, 1);
     assert_true(controls.grip.chosen == 0 && controls.grip.released == 4);
-    // chosen and locked in one frame: the one that was chosen
+    // selected and locked in one frame: the newly selected one
     PanelActions actions = {.mouse.view = -1};
     actions.pressed[ACTION_TOOL_2] = actions.pressed[ACTION_LOCK] = 1;
     obey(&controls, &actions, 0.02);
@@ -316,7 +316,7 @@ static void a_second_hand_moves_the_other_of_the_pair(void **state)
     assert_near(chosen.twist_deg_s, 0, 0);
     assert_near(partner.push_mm_s, 2, 1e-12);
     assert_near(partner.twist_deg_s, 24, 1e-12);
-    controls.tool_count = 1;                      // there is no other: its keys must not move the one
+    controls.tool_count = 1;                      // there is no other tool: its keys must not move the one
     partner = controls_partner_command(&controls, &actions);
     assert_true(partner.push_mm_s == 0 && partner.twist_deg_s == 0);
     controls.tool_count = 2;
@@ -335,7 +335,7 @@ static void the_mouse_turns_the_c_arm_and_magnifies(void **state)
     for (int i = 0; i < 20; i++)
         obey(&controls, &actions, 0.02);
     assert_true(controls.xray.lao_deg == 90 && controls.xray.cra_deg == -45);
-    actions.mouse = (PanelMouse){.view = VIEW_FLUOROSCOPY, .drag_x = 0.2};   // no button: nothing
+    actions.mouse = (PanelMouse){.view = VIEW_FLUOROSCOPY, .drag_x = 0.2};   // no button: no effect
     OperatorControls before = controls;
     obey(&controls, &actions, 0.02);
     assert_memory_equal(&controls.xray, &before.xray, sizeof controls.xray);
@@ -348,7 +348,7 @@ static void the_mouse_turns_the_c_arm_and_magnifies(void **state)
     actions.mouse.scroll = -1000;
     obey(&controls, &actions, 0.02);
     assert_true(controls.xray.field_mm == 400);
-    // other views leave the X-ray system alone
+    // other views do not affect the X-ray system
     static const int others[] = {VIEW_3D, VIEW_ANGIOSCOPY, -1, VIEW_COUNT, 99};
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         before = controls;
@@ -361,7 +361,7 @@ static void the_mouse_turns_the_c_arm_and_magnifies(void **state)
 static void the_mouse_moves_the_free_camera(void **state)
 {
     (void)state;
-    // dragged to the right by a tenth of the view's height, what is seen goes to the right by as much
+    // a drag to the right by a tenth of the view's height moves the scene to the right by as much
     OperatorControls controls = controls_in_front();
     const ViewPort *port = &layout.view[VIEW_3D];
     Camera view = free_camera_projection(&controls.look.camera, port->width, port->height, 1);
@@ -372,7 +372,7 @@ static void the_mouse_moves_the_free_camera(void **state)
     Vec3 moved = vec3_sub(camera_project(&view, point), at);
     assert_near(moved.x, 0.1 * port->height, 1e-6);
     assert_near(moved.y, -0.04 * port->height, 1e-6);   // pixels count downwards, the drag upwards
-    // what is under the mouse stays there while it zooms
+    // the point under the mouse stays there while zooming
     actions.mouse = (PanelMouse){.view = VIEW_3D, .x = 0.8, .y = 0.3, .scroll = 2};
     Camera before = view;
     double right_mm = 0.3 * port->width * before.mm_per_pixel, up_mm = -0.2 * port->height * before.mm_per_pixel;
@@ -383,7 +383,7 @@ static void the_mouse_moves_the_free_camera(void **state)
     at = camera_project(&view, under);
     assert_near(at.x, 0.8 * port->width, 1e-6);
     assert_near(at.y, 0.7 * port->height, 1e-6);
-    // turned about its focus, and home again
+    // rotated about its focus, and back to the home view
     actions.mouse = (PanelMouse){.view = VIEW_3D, .buttons = WINDOW_MOUSE_LEFT, .drag_x = 0.1};
     Vec3 focus = controls.look.camera.focus;
     obey(&controls, &actions, 0.02);

@@ -1,4 +1,4 @@
-// What the tests of the live views share: a context with a canvas, a tool's pose, pixels.
+// Shared by the tests of the live views: a context with a canvas, a tool's pose, pixels.
 #ifndef SELDINGER_TESTS_RENDER_VIEW_STAGE_H
 #define SELDINGER_TESTS_RENDER_VIEW_STAGE_H
 
@@ -29,7 +29,7 @@ typedef struct ViewStage {
     ViewPort port;             // all of it
 } ViewStage;
 
-// False if no EGL is: skip then.
+// False without EGL: skip the test then.
 static inline bool stage_open(ViewStage *stage)
 {
     char message[256] = "";
@@ -75,10 +75,10 @@ static inline int count_different(StagePixels a, StagePixels b, int more_than)
     return count;
 }
 
-// A straight tool along the unit `along`, its frames' y axes along `up`; free, in open space, without force.
+// A straight tool along the unit vector `along`, with its frames' y axes along `up`; free, in open space, without force.
 static inline Pose *straight_pose(int count, Vec3 from, Vec3 along, Vec3 up, double spacing, double radius)
 {
-    Pose *pose = pose_create(count);
+    Pose *pose = pose_create(count, 1, &count);
     assert_non_null(pose);
     Mat3 axes = mat3_from_columns(along, up, vec3_cross(along, up));
     for (int i = 0; i < count; i++) {
@@ -92,14 +92,14 @@ static inline Pose *straight_pose(int count, Vec3 from, Vec3 along, Vec3 up, dou
     return pose;
 }
 
-// Two straight tools along x from 0: a catheter to x = `catheter`, a wire in it to x = `wire`, which may be shorter; nodes every `spacing`. The catheter touches
-// the wall as far as it goes.
+// Two straight tools along x from 0: a catheter to x = `catheter`, a wire in it to x = `wire`, which may be shorter; nodes every `spacing`. The catheter
+// touches the wall over its whole length.
 static inline Pose *coaxial_pose(double catheter, double wire, double spacing, double catheter_radius, double wire_radius)
 {
     const double tip[2] = {catheter, wire}, radius[2] = {catheter_radius, wire_radius};
     int nodes[2] = {(int)ceil(catheter / spacing) + 1, (int)ceil(wire / spacing) + 1},
         shared = nodes[0] + (wire > catheter ? (int)ceil((wire - catheter) / spacing) : 0);
-    Pose *pose = pose_create_tools(shared, 2, nodes);
+    Pose *pose = pose_create(shared, 2, nodes);
     assert_non_null(pose);
     Mat3 axes = mat3_from_columns(vec3(1, 0, 0), vec3(0, 1, 0), vec3(0, 0, 1));
     for (int k = 0; k < 2; k++) {
@@ -122,7 +122,7 @@ static inline Pose *coaxial_pose(double catheter, double wire, double spacing, d
     return pose;
 }
 
-// The looks of these two: blue and white.
+// The appearance of these two: blue and white.
 typedef struct CoaxialLooks {
     TubeStretch stretch[2];
     ToolLooks looks;

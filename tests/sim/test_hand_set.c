@@ -243,14 +243,14 @@ static void buttons_choose_lock_and_let_go(void **state)
     hand_grip_obey(&grip, 3, 0, &before);
     hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER | HAND_LOCK, &before);          // locks the innermost tool and the one around it
     assert_true(grip.chosen == 2 && grip.locked == 4);
-    hand_grip_obey(&grip, 3, HAND_LET_GO, &before);
+    hand_grip_obey(&grip, 3, HAND_RELEASE, &before);
     assert_true(grip.released == 4 && grip.locked == 0);
-    hand_grip_obey(&grip, 3, HAND_LET_GO | HAND_CHOOSE_OUTER, &before);
+    hand_grip_obey(&grip, 3, HAND_RELEASE | HAND_CHOOSE_OUTER, &before);
     assert_true(grip.chosen == 1 && grip.released == 4);
 }
 
 // Requesting another device holds the tool and unlocks it; only existing tools and devices are accepted.
-static void a_device_is_asked_for(void **state)
+static void a_device_is_requested(void **state)
 {
     (void)state;
     HandGrip grip = {.chosen = 1, .locked = 6, .released = 1};
@@ -318,7 +318,7 @@ int main(void)
                                        cmocka_unit_test(locked_tools_move_as_one_and_are_felt_together),
                                        cmocka_unit_test(a_tool_that_was_let_go_is_moved_by_no_hand),
                                        cmocka_unit_test(buttons_choose_lock_and_let_go),
-                                       cmocka_unit_test(a_device_is_asked_for),
+                                       cmocka_unit_test(a_device_is_requested),
                                        cmocka_unit_test(no_grip_contradicts_itself),
                                        cmocka_unit_test(there_is_room_for_so_many_hands)};
     return cmocka_run_group_tests(tests, NULL, NULL);

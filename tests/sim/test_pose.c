@@ -111,7 +111,7 @@ static void tools_end_where_their_tips_are(void **state)
         // only the catheter passes the mouth, whatever the length of the wire
         double mouth = pose->position[pose->first_free_node].x;
         assert_true(mouth > 1 - 0.02 && pose->position[pose->first_free_node - 1].x < 1);
-        assert_true(pose->tool[1].is_let_go == (i == 1749) && !pose->tool[0].is_let_go);
+        assert_true(pose->tool[1].is_released == (i == 1749) && !pose->tool[0].is_released);
     }
     pose_free(pose);
     stop(simulator, scene, vessel);

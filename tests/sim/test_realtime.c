@@ -194,14 +194,14 @@ static void a_session_replays_bit_for_bit(void **state)
     // also from its own scene as a script; its pose equals the state
     size_t length;
     char *script = replay_script(run, &length);
-    Script *parsed = script_parse(script, length, "hand.csv", &faults);
+    Script *parsed = script_parse(script, length, "hand.csv", NULL, &faults);
     assert_non_null(parsed);
     Simulator *scripted = simulator_create(scene, rig.vessel, &faults);
     DriveOptions drive = drive_default_options();
     drive.script = parsed;
     simulator_drive(scripted, &drive);
     assert_true(simulator_hash(scripted) == hash);
-    Pose *pose = pose_create(run->node_count);
+    Pose *pose = pose_create(run->node_count, 1, &run->node_count);
     pose_from_run(pose, scene, run, run->frame_count - 1);
     const WireState *last = simulator_state(scripted);
     assert_memory_equal(pose->position, last->position, sizeof(Vec3) * (size_t)run->node_count);

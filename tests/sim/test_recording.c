@@ -232,7 +232,7 @@ static void assert_replays(const RecordedRun *run)
     size_t length;
     char *text = replay_script(run, &length);
     ToolNames names = scene_tool_names(scene);
-    Script *script = script_parse_tools(text, length, "hand.csv", &names, &faults);
+    Script *script = script_parse(text, length, "hand.csv", &names, &faults);
     if (!script)
         fail_msg("%s", faults.text[0]);
     int cursor = 0;
@@ -470,7 +470,7 @@ static void what_is_read_of_exchanged_tools(void **state)
     text_of_scene = scene_text;
 }
 
-// A copy with one changed piece is rejected with this message.
+// A copy with one changed piece is refused with this message.
 static void expect_refused(const char *path, void (*change)(hid_t file), const char *words)
 {
     char broken[256];
@@ -870,7 +870,7 @@ static void look(void *context, bool done)
     hsize_t count[2] = {0, 0};
     if (access(watched->path, F_OK) != 0)
         return;      // the file has no name yet
-    if (!WHOLE_RUN && !done && watched->states % 6 > 0) {      // the same writes are made; that each leaves a whole file, the optimised build looks at
+    if (!WHOLE_RUN && !done && watched->states % 6 > 0) {      // the same writes are made; the optimised build checks that each leaves a complete file
         watched->states++;
         watched->writes++;
         return;
@@ -1095,7 +1095,7 @@ static void a_full_disk_leaves_what_was_flushed(void **state)
     assert_true(count[0] > 2000 && load_rows(path) == (int64_t)count[0]);
 }
 
-static void what_is_no_recording_is_said(void **state)
+static void what_is_no_recording_is_reported(void **state)
 {
     (void)state;
     char path[256];
@@ -1150,7 +1150,7 @@ int main(int count, char **argument)
         cmocka_unit_test(a_kill_leaves_a_file_that_opens),
         cmocka_unit_test(a_full_index_leaves_what_was_flushed),
         cmocka_unit_test(a_full_disk_leaves_what_was_flushed),
-        cmocka_unit_test(what_is_no_recording_is_said),
+        cmocka_unit_test(what_is_no_recording_is_reported),
     };
     return cmocka_run_group_tests(tests, set_up, remove_folder);
 }

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// cmocka's own compares in single precision
+// cmocka's own function compares in single precision
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
 
 #define VERSION "seldinger: 1\n"
@@ -275,6 +275,7 @@ static const Broken broken[] = {
     {WHOLE "script: [{t_s: 0, push_mm_s: 5}, {t_s: 0}]\n", "4:34", "does not follow"},
     {WHOLE "script: [{push_mm_s: 5}]\n", "4:10", "has no key 't_s'"},
     {WHOLE "script: [{t_s: 0, push_cm_s: 5}]\n", "4:19", "expected 'push_mm_s'"},
+    {WHOLE "script: [{t_s: 0, push_mm_s: 5}]\n", "4:10", "expected another row with a later time"},
     {WHOLE "script: [[0, 5]]\n", "4:10", "2 entries"},
     // aliases
     {VERSION "wire: &w {sections: [*w]}\n" SHEATH, "2:7", ""},
@@ -311,8 +312,8 @@ static void all_faults_come_in_one_pass(void **state)
                       "sheath: 4\n"
                       "simulation: {step_ms: -1}\n"
                       "targets: [{name: a}]\n"));
-    // version; radius; line_cm and no piece in its place; friction; contac; elements; diameter_cm and its lack; modulus;
-    // direction; second sheath; step; target without point and radius
+    // version; radius; line_cm, and no path piece; friction; contac; elements; diameter_cm, and no diameter_mm; modulus; direction; second sheath; step; target
+    // without point and radius
     const char *words[] = {"seldinger",
                            "radius_mm",
                            "line_mm",

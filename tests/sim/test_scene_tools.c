@@ -16,7 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
-// cmocka's own compares in single precision
+// cmocka's own function compares in single precision
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
 
 #define VERSION "seldinger: 1\n"
@@ -101,7 +101,7 @@ static void each_tool_has_its_own_keys(void **state)
     assert_near(b->wire.damping_mass, 1e-3, 1e-18);
     assert_near(a->wire.damping_mass, 0, 0);
     assert_near(b->wire.section[0].length, 350, 0);
-    assert_near(scene_attenuation(scene, 299), 4, 0);
+    assert_near(scene_tool_attenuation(scene, 0, 299), 4, 0);
     assert_near(scene_tool_attenuation(scene, 0, 299), 4, 0);
     assert_near(scene_tool_attenuation(scene, 1, 346), 6, 0);
     assert_near(scene_tool_attenuation(scene, 1, 344), 0.55, 0);
@@ -228,7 +228,7 @@ static void each_fault_of_a_script_has_its_place(void **state)
         char place[64];
         faults_clear(&faults);
         snprintf(place, sizeof place, "s.csv:%s: ", broken_script[i].place);
-        Script *script = script_parse_tools(broken_script[i].text, strlen(broken_script[i].text), "s.csv", &tools, &faults);
+        Script *script = script_parse(broken_script[i].text, strlen(broken_script[i].text), "s.csv", &tools, &faults);
         if (script || !says(place, broken_script[i].words))
             wrong++,
                 print_error("%s-- expected %s%s, got: %s\n", broken_script[i].text, place, broken_script[i].words, faults.count ? faults.text[0] : "nothing");
@@ -238,7 +238,7 @@ static void each_fault_of_a_script_has_its_place(void **state)
     // several at once
     const char two[] = "t_s,wir.push_mm_s,guide.push_mm_s,micro.spin\n0,1,0,0\n";
     faults_clear(&faults);
-    assert_null(script_parse_tools(two, strlen(two), "s.csv", &tools, &faults));
+    assert_null(script_parse(two, strlen(two), "s.csv", &tools, &faults));
     assert_int_equal(faults.count, 3);
 }
 
@@ -452,7 +452,7 @@ static void a_device_file_gives_what_the_scene_does_not(void **state)
     assert_near(b->friction_inside, 0.3, 0);
     scene_free(scene);
 
-    // faults in the device have their place in the device file, besides those of the scene; a given stiffness is checked
+    // faults in the device have their position in the device file, those of the scene in the scene; a given stiffness is checked
     write_text(scene_path, VERSION SHEATH "tools: [{name: a, device: device.yaml, inserted_mm: x}]\n");
     write_text(device_path, DEVICE "kinds: wire\nbending_n_mm2: 100\n");
     faults_clear(&faults);
