@@ -47,17 +47,17 @@ void heap_is_empty(size_t bytes, const char *file)
     int length =
         snprintf(message, sizeof message, "seldinger: out of memory (could not allocate %zu bytes in %.60s); close other programs or use a smaller input\n",
                  bytes, from ? from : file);
-    ssize_t said = write(STDERR_FILENO, message, (size_t)length);
-    (void)said;
+    ssize_t written = write(STDERR_FILENO, message, (size_t)length);
+    (void)written;
     part_files_remove();
     _exit(2);
 }
 
-bool heap_has_room(size_t bytes)
+bool heap_can_allocate(size_t bytes)
 {
-    void *volatile room = malloc(bytes);      // volatile prevents the compiler from removing it
-    bool has = room != NULL;
-    free(room);
+    void *volatile block = malloc(bytes);     // volatile prevents the compiler from removing it
+    bool has = block != NULL;
+    free(block);
     return has;
 }
 

@@ -21,9 +21,9 @@ void *heap_grown(void *old, size_t count, size_t size, const char *file);
 char *heap_text(const char *text, const char *file);
 #define HEAP_TEXT(text) heap_text(text, __FILE__)
 // True if a block of this size can be allocated now. Check this before calling a library that crashes if out of memory.
-bool heap_has_room(size_t bytes);
+bool heap_can_allocate(size_t bytes);
 // Four times what the HDF5 library (1.10) allocates at once for the cache of a file (H5AC_create).
-#define HEAP_ROOM_OF_HDF5 ((size_t)8 << 20)
+#define HEAP_RESERVE_OF_HDF5 ((size_t)8 << 20)
 // For a library, which must not end the program: runs call(context). Returns false if an allocation failed and ended the call early; `*lacking` is then the
 // size of the
 // failed allocation [bytes], or 1 if unknown. A failed allocation in a thread of base/parallel.h also ends the call. Memory and open files that the call had

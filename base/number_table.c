@@ -99,8 +99,8 @@ int number_table_columns(const char *text, size_t length, NumberColumn *column, 
 
 static bool read_header(Cursor *cursor, int *column_count)
 {
-    Field want[NUMBER_TABLE_COLUMNS], got[NUMBER_TABLE_COLUMNS];
-    *column_count = split_fields(cursor->header, cursor->header + strlen(cursor->header), want, NUMBER_TABLE_COLUMNS);
+    Field expected[NUMBER_TABLE_COLUMNS], got[NUMBER_TABLE_COLUMNS];
+    *column_count = split_fields(cursor->header, cursor->header + strlen(cursor->header), expected, NUMBER_TABLE_COLUMNS);
     const char *line, *end;
     if (!next_line(cursor, &line, &end)) {
         faults_add(cursor->faults, cursor->file, cursor->line ? cursor->line : 1, 1, "is empty; expected the first line '%s'", cursor->header);
@@ -108,7 +108,8 @@ static bool read_header(Cursor *cursor, int *column_count)
     }
     int count = split_fields(line, end, got, NUMBER_TABLE_COLUMNS);
     for (int i = 0; i < *column_count || i < count; i++) {
-        if (i < *column_count && i < count && i < NUMBER_TABLE_COLUMNS && got[i].length == want[i].length && !memcmp(got[i].name, want[i].name, want[i].length))
+        if (i < *column_count && i < count && i < NUMBER_TABLE_COLUMNS && got[i].length == expected[i].length &&
+            !memcmp(got[i].name, expected[i].name, expected[i].length))
             continue;
         int column = i < count && i < NUMBER_TABLE_COLUMNS ? got[i].column : (int)(end - line) + 1;
         int shown = i < count && i < NUMBER_TABLE_COLUMNS ? (int)(got[i].length < 40 ? got[i].length : 40) : 0;

@@ -52,7 +52,7 @@ static void leave_slot(PartFile *part)
 }
 
 // PATH.part-XXXXXXXXXXXX, 60 random bits; names of at most 255 bytes are cut.
-static bool make_name(const char *path, char *name, size_t room)
+static bool make_name(const char *path, char *name, size_t capacity)
 {
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdef";
     uint8_t random[12];
@@ -64,13 +64,13 @@ static bool make_name(const char *path, char *name, size_t room)
     tail[12] = 0;
     const char *slash = strrchr(path, '/');
     int folder = slash ? (int)(slash - path) + 1 : 0, most = NAME_MAX - 18;
-    snprintf(name, room, "%.*s%.*s.part-%s", folder, path, most, path + folder, tail);
+    snprintf(name, capacity, "%.*s%.*s.part-%s", folder, path, most, path + folder, tail);
     return true;
 }
 
-static int open_new(PartFile *part, const char *path, mode_t mode, size_t room)
+static int open_new(PartFile *part, const char *path, mode_t mode, size_t capacity)
 {
-    for (int i = 0; i < NAME_TRIES && make_name(path, part->name, room); i++) {
+    for (int i = 0; i < NAME_TRIES && make_name(path, part->name, capacity); i++) {
         part->slot = take_slot(part->name);
         int file = open(part->name, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode);
         if (file >= 0)
@@ -108,10 +108,10 @@ bool part_file_begin(PartFile *part, const char *path)
 {
     struct stat there;
     bool replaces = stat(path, &there) == 0 && S_ISREG(there.st_mode);
-    size_t room = strlen(path) + 32;
-    *part = (PartFile){.descriptor = -1, .slot = -1, .path = strdup(path), .name = malloc(room)};
+    size_t capacity = strlen(path) + 32;
+    *part = (PartFile){.descriptor = -1, .slot = -1, .path = strdup(path), .name = malloc(capacity)};
     if (part->path && part->name)
-        part->descriptor = open_new(part, path, replaces ? 0600 : 0666, room);
+        part->descriptor = open_new(part, path, replaces ? 0600 : 0666, capacity);
     if (part->descriptor < 0) {
         forget(part);
         return false;

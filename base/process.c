@@ -20,8 +20,8 @@ void process_stop(int number)
 {
     part_files_remove();
     static const char message[] = "\nstopped; no unfinished file is left\n";
-    ssize_t said = write(STDERR_FILENO, message, sizeof message - 1);
-    (void)said;
+    ssize_t written = write(STDERR_FILENO, message, sizeof message - 1);
+    (void)written;
     signal(number, SIG_DFL);
     raise(number);
 }

@@ -1,5 +1,5 @@
 // Five panels: detection by surface, error against time, growth, artificial friction, work lost. All axes but the lists' are logarithmic: a decade
-// has the same length everywhere. Representations differ by colour (Okabe and Ito's, told apart by the colour-blind) and by shape.
+// has the same length everywhere. Representations differ by colour (Okabe and Ito's, which the colour-blind can distinguish) and by shape.
 #include "bench/collision_chart.h"
 
 #include "base/output.h"
@@ -115,14 +115,14 @@ static void draw_axis(FILE *out, const Axis *axis, bool upwards, double begin, d
     for (int decade = low; decade <= high; decade++)
         for (int digit = 1; digit < 10 && (decade < high || digit == 1); digit++) {
             double value = digit * power_of_ten(decade), at = place(axis, value);
-            bool told = digit == 1 || (high - low <= 2 && (digit == 2 || digit == 5));
+            bool labelled = digit == 1 || (high - low <= 2 && (digit == 2 || digit == 5));
             if (digit > 1 && high - low > 4)
                 continue;
             if (upwards)
                 fprintf(out, "<path class=\"%s\" d=\"M%.1f %.1fH%.1f\"/>", digit == 1 ? "decade" : "grid", begin, at, end);
             else
                 fprintf(out, "<path class=\"%s\" d=\"M%.1f %.1fV%.1f\"/>", digit == 1 ? "decade" : "grid", at, begin, end);
-            if (!told)
+            if (!labelled)
                 continue;
             fprintf(out, "<text class=\"tick %s\" x=\"%.1f\" y=\"%.1f\">", upwards ? "up" : "along", upwards ? begin - 6 : at, upwards ? at + 4 : end + 16);
             print_number(out, value);

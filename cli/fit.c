@@ -38,9 +38,9 @@ static bool save(const FitCommand *command, const VesselTree *model, const TreeF
 }
 
 // Prints the figures to standard output and writes them as JSON. False with faults.
-static bool tell(const FitCommand *command, const TreeFit *fit, Faults *faults)
+static bool write_results(const FitCommand *command, const TreeFit *fit, Faults *faults)
 {
-    bool spoken = !command->quiet && !cli_is_standard_output(command->json);
+    bool prints = !command->quiet && !cli_is_standard_output(command->json);
     double voxel = command->fit.local.voxel_mm > 0 ? command->fit.local.voxel_mm : lim_fit_default_options().voxel_mm;
     FitFigures figures = fit_figures(fit->model, voxel, fit->seconds);
     figures.left_out = (long)fit->left_out;
@@ -49,12 +49,12 @@ static bool tell(const FitCommand *command, const TreeFit *fit, Faults *faults)
         faults_add(faults, command->tree, 0, 0, "out of memory while measuring the model");
         return false;
     }
-    if (spoken)
+    if (prints)
         fit_figures_print(stdout, fit->model, &figures, voxel);
-    if (spoken && command->measure)
+    if (prints && command->measure)
         model_measure_print(stdout, &measure);
     cJSON *root = cJSON_CreateObject();
-    bool good = (!spoken && !command->json) || reach_report(fit->model, command->tree, command->junctions.tool_radius, spoken ? stdout : NULL, root, faults);
+    bool good = (!prints && !command->json) || reach_report(fit->model, command->tree, command->junctions.tool_radius, prints ? stdout : NULL, root, faults);
     fit_figures_add(root, fit->model, &figures, voxel);
     if (command->measure)
         model_measure_add(root, &measure);
@@ -84,7 +84,7 @@ static int call(void *structure, Faults *faults)
         good = tree_fit(tree, command->tree, &command->fit, &progress, &fit, faults) && save(command, fit.model, &from, faults);
     else
         fit.model = tree, tree = NULL;
-    good = good && tell(command, &fit, faults) && draw(command, fit.model, faults);
+    good = good && write_results(command, &fit, faults) && draw(command, fit.model, faults);
     vessel_tree_free(fit.model);
     vessel_tree_free(tree);
     tree_file_info_free(&from);

@@ -52,7 +52,7 @@ static double seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static bool tell(const ImportCommand *command, const ImportFigures *figures, Faults *faults)
+static bool write_figures(const ImportCommand *command, const ImportFigures *figures, Faults *faults)
 {
     char text[TEXT_MAX];
     cJSON *root = cJSON_CreateObject();
@@ -110,7 +110,7 @@ static int call(void *structure, Faults *faults)
     bool good = mesh && import(command, mesh, &found, faults);
     found.seconds = seconds() - start;
     if (good)
-        tell(command, &found, faults);
+        write_figures(command, &found, faults);
     surface_free(mesh);
     return EXIT_DONE;
 }

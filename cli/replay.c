@@ -56,7 +56,7 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
     return (!options->movie || film_movie(options->movie, &film, run, scene, open, faults)) && good;
 }
 
-// The window; a session goes on from a moment of it where the user wants that.
+// The window; a session can be continued from any moment of the recording.
 static int show(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
     ReplayWindowOptions window = {.name = options->recording,

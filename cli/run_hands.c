@@ -15,27 +15,27 @@ struct RunHands {
     HandSet set;
     double dt;
     unsigned buttons;            // pressed in the last step
-    pthread_t speaker;
+    pthread_t printer;
     _Atomic int ending;
 };
 
-static void nap(long milliseconds) { nanosleep(&(struct timespec){.tv_nsec = milliseconds * 1000000}, NULL); }
+static void wait_ms(long milliseconds) { nanosleep(&(struct timespec){.tv_nsec = milliseconds * 1000000}, NULL); }
 
-static void say_all(Hands *hands)
+static void print_messages(Hands *hands)
 {
     char text[HAND_MESSAGE_LENGTH];
     while (hands_message(hands, text, sizeof text))
         fprintf(stderr, "device: %s\n", text);
 }
 
-static void *speak(void *argument)
+static void *print_until_end(void *argument)
 {
     RunHands *hands = argument;
     while (!atomic_load(&hands->ending)) {
-        say_all(hands->hands);
-        nap(50);
+        print_messages(hands->hands);
+        wait_ms(50);
     }
-    say_all(hands->hands);
+    print_messages(hands->hands);
     return NULL;
 }
 
@@ -86,9 +86,9 @@ RunHands *run_hands_open(int map_count, const char *const *map, const Scene *sce
         return NULL;
     }
     for (int waited_ms = 0; waited_ms < patience_s * 1000 && !is_any_ready(hands->hands); waited_ms += 10)
-        nap(10);
+        wait_ms(10);
     if (!is_any_ready(hands->hands)) {
-        say_all(hands->hands);
+        print_messages(hands->hands);
         faults_add(faults, "--device", 0, 0, "no matching device was connected within %g s; `seldinger devices` lists the connected devices", patience_s);
         hands_close(hands->hands);
         free(hands);
@@ -97,7 +97,7 @@ RunHands *run_hands_open(int map_count, const char *const *map, const Scene *sce
     hand_set_init(&hands->set, scene->tool_count);
     for (int i = 0; i < HANDS_MOST * MAP_HANDS; i++)
         hand_set_add(&hands->set, hands_port(hands->hands, i / MAP_HANDS) + i % MAP_HANDS);
-    if (pthread_create(&hands->speaker, NULL, speak, hands) == 0)
+    if (pthread_create(&hands->printer, NULL, print_until_end, hands) == 0)
         return hands;
     faults_add(faults, "--device", 0, 0, "cannot start a thread for the messages of the devices");
     hands_close(hands->hands);
@@ -123,7 +123,7 @@ void run_hands_close(RunHands *hands)
     if (!hands)
         return;
     atomic_store(&hands->ending, 1);
-    pthread_join(hands->speaker, NULL);
+    pthread_join(hands->printer, NULL);
     hands_close(hands->hands);
     free(hands);
 }

@@ -64,7 +64,7 @@ TriangleMesh *isosurface_of_field(double (*field)(const void *of, Vec3 x), const
     TriangleMesh *mesh = march->mesh;
     march_end(march);
     free(job);
-    if (good && march_mend_normals(mesh))
+    if (good && march_repair_normals(mesh))
         return mesh;
     triangle_mesh_free(mesh);
     return NULL;

@@ -79,7 +79,7 @@ static double carried_height(double z, double h, double *slope, double *bend)
 }
 
 // The point at which a node's field is evaluated for the wall at x.
-static Vec3 asked_at(const FieldVessel *field, const FieldNode *node, Vec3 x)
+static Vec3 transformed_point(const FieldVessel *field, const FieldNode *node, Vec3 x)
 {
     if (!node->carried)
         return x;
@@ -235,7 +235,7 @@ static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec
     const FieldNode *n = &field->node[node];
     m->bound_at = x;
     m->bound_for = fabs(gap) + fmin(BOUND * n->radius, BOUND_MOST);
-    field->kernels->bends(field->row, list->blob, list->count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
+    field->kernels->bends(field->row, list->blob, list->count, transformed_point(field, n, x), m->bound_for, &m->down, &m->up);
     SEL_ASSERT(m->down >= 0 && m->up >= 0, "bounds of second derivatives are at least 0");
 }
 
@@ -314,7 +314,7 @@ static void list_near(const FieldVessel *field, FieldBlock *b, int i, int node, 
 {
     static const double SETTLE_SKIN = 0.25;      // relative to the radius
     const FieldNode *n = &field->node[node];
-    Vec3 q = asked_at(field, n, vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
+    Vec3 q = transformed_point(field, n, vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
     double skin = SETTLE_SKIN * n->radius;
     if (!fresh && vec3_norm2(vec3_sub(q, lists->at[i])) <= skin * skin)
         return;
@@ -394,7 +394,7 @@ static double field_here(const FieldVessel *field, int node, Vec3 x)
 {
     const FieldNode *n = &field->node[node];
     FieldLane at_x, at_y, at_z, f;
-    Vec3 q = asked_at(field, n, x);
+    Vec3 q = transformed_point(field, n, x);
     for (int i = 0; i < FOOT_BLOCK; i++)
         at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
     field->kernels->look(field->row, n->seen, n->seen_count, at_x, at_y, at_z, f);
@@ -406,7 +406,7 @@ static void look(const FieldVessel *field, int node, const BlobList *list, const
 {
     FieldLane at_x, at_y, at_z;
     for (int i = 0; i < FOOT_BLOCK; i++) {
-        Vec3 q = asked_at(field, &field->node[node], place[i]);
+        Vec3 q = transformed_point(field, &field->node[node], place[i]);
         at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
     }
     field->kernels->look(field->row, list->blob, list->count, at_x, at_y, at_z, f);
@@ -428,7 +428,7 @@ static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle
 // [mm] A sharply bent wall has other feet close by: the foot is not trusted over more travel than this.
 static double bend_radius(const Foot *foot) { return 0.15 / fmax(sqrt(sym3_norm2(&foot->hessian)), 1e-3); }
 
-// Returns whether the wall at a foot bends no more than that of a round vessel. Only then are the few points of room_about enough to test its surroundings. In
+// Returns whether the wall at a foot bends no more than that of a round vessel. Only then are the few points of clear_radius enough to test its surroundings. In
 // the lumen, h is the curvature of the wall's offset surface through X, and h / (1 - g h) that of the wall.
 static bool bends_gently(const Foot *foot, double radius)
 {
@@ -443,7 +443,7 @@ static bool bends_gently(const Foot *foot, double radius)
 // Tests whether a ball that touches the wall at the foot, larger than the gap by up to half a radius, lies all on x's side, at points on two spheres in it: a
 // flat wall that comes closer to the centre than 0.92 of the ball's radius is detected by one of 80 points. Returns how far x may move [mm] until a wall other
 // than the foot's could be the closest; 0: there is no such ball.
-static double room_about(const FieldVessel *field, double side, const Foot *foot, const BlobList *list)
+static double clear_radius(const FieldVessel *field, double side, const Foot *foot, const BlobList *list)
 {
     static const double wider[] = {0.25, 0.1};
     enum { TRIES = sizeof wider / sizeof wider[0] };
@@ -452,12 +452,12 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
     if (!bends_gently(foot, node->radius))
         return 0;
     for (int t = 0; t < TRIES; t++) {
-        double ball = size + wider[t] * node->radius, room = 0.55 * (0.92 * ball - size);
+        double ball = size + wider[t] * node->radius, slack = 0.55 * (0.92 * ball - size);
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
         if (is_at_inlet(field, node, middle, ball))
             continue;
-        if (room > 0.01 * node->radius && is_clear(field, list, middle, ball, side, vec3_scale(foot->normal, -side)))
-            return fmin(room, bend_radius(foot));
+        if (slack > 0.01 * node->radius && is_clear(field, list, middle, ball, side, vec3_scale(foot->normal, -side)))
+            return fmin(slack, bend_radius(foot));
     }
     return 0;
 }
@@ -489,7 +489,7 @@ static void add_sheet(Sheets *s, const Foot *foot)
 // Returns whether the foot lies on the vessel's wall. Far from its cell a node does not see all of the lumen, so its field may end where there is no wall.
 static bool is_known_there(const FieldVessel *field, const Foot *foot)
 {
-    Vec3 q = asked_at(field, &field->node[foot->node], foot->at);
+    Vec3 q = transformed_point(field, &field->node[foot->node], foot->at);
     int cell = cell_of(field, q, foot->node);
     return cell == foot->node || sees_all(field, q, foot->node) || walls_apart(field, foot->node, cell, q) <= AGREE;
 }
@@ -611,7 +611,7 @@ static void move_to_cell(const FieldVessel *field, Vec3 x, Foot *foot)
 {
     enum { CELLS = 4 };
     for (int k = 0; k < CELLS; k++) {
-        Vec3 q = asked_at(field, &field->node[foot->node], foot->at);
+        Vec3 q = transformed_point(field, &field->node[foot->node], foot->at);
         int cell = cell_of(field, q, foot->node);
         Foot next;
         if (cell == foot->node || (sees_all(field, q, foot->node) && walls_apart(field, foot->node, cell, q) > AGREE) ||
@@ -637,7 +637,7 @@ static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
         across = vec3_cross(d, out);
         for (int k = 0; k < AROUND; k++)
             start[k] = vec3_add_scaled(vec3_add_scaled(axis, n->radius * same_cos(PI * k / 3), out), n->radius * same_sin(PI * k / 3), across);
-        double f = blobby_gradient(&blobs, asked_at(field, n, x), &g), slope = vec3_norm(g);
+        double f = blobby_gradient(&blobs, transformed_point(field, n, x), &g), slope = vec3_norm(g);
         double step = slope > 1e-100 ? fmax(-n->radius, fmin(n->radius, f / slope)) : 0;
         start[AROUND] = vec3_add_scaled(x, slope > 0 ? -step / slope : 0, g);
         int found = settle(field, x, node, start, AROUND + 1, side > 0 ? FEW_ROUNDS : ROUNDS, foot);
@@ -702,7 +702,7 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const Blo
 {
     const FieldNode *node = &field->node[foot->node];
     *hit = (VesselHit){.gap = foot->gap, .normal = foot->normal, .hessian = foot->hessian, .node = foot->node, .flags = foot->sure ? 0 : VESSEL_UNSURE};
-    Vec3 q = asked_at(field, node, foot->at);
+    Vec3 q = transformed_point(field, node, foot->at);
     bool held = m->has_foot && m->node == foot->node && vec3_norm2(vec3_sub(q, m->held_at)) <= m->held_for2;
     m->node = foot->node;
     m->has_foot = foot->sure;
@@ -747,7 +747,7 @@ static void set_flags(const FieldVessel *field, Vec3 x, int node, VesselHit *hit
 static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
 {
     const FieldNode *n = &field->node[node];
-    Vec3 g, q = asked_at(field, n, x), out = vec3_sub(x, n->center);
+    Vec3 g, q = transformed_point(field, n, x), out = vec3_sub(x, n->center);
     Blobby blobs = blobby_of(field->tree, node);
     double f = blobby_gradient(&blobs, q, &g), slope = vec3_norm(g), gap = n->radius - vec3_norm(out);
     Vec3 normal = vec3_negate(vec3_unit_or(out, vec3_normal_to(field->tree->direction[node])));
@@ -769,7 +769,7 @@ static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets 
         set_clearance(m, x, sheets.foot[0].gap);
     } else {
         set_clearance(m, x, clear_ball(field, &field->node[sheets.foot[0].node], x, sheets.foot[0].gap, list));
-        m->trust = room_about(field, side, &sheets.foot[0], list);
+        m->trust = clear_radius(field, side, &sheets.foot[0], list);
         if (m->trust == 0) {
             Vec3 before = sheets.foot[0].at;
             look_for_rivals(field, x, side, &sheets);
@@ -789,7 +789,7 @@ static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets 
     set_flags(field, x, m->node, hit);
 }
 
-static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
+static void find_from_scratch(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     int node = walk(field, x, m->node, 4);
     double side = field_here(field, node, x) > 0 ? 1 : -1;
@@ -815,17 +815,17 @@ static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Vesse
     set_flags(field, x, node, hit);
 }
 
-static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
+static void answer_from_scratch(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     bool known = m->has_foot;
     int from = m->node;
     double before = vec3_dot(vec3_sub(m->place, m->foot), m->normal), travel = vec3_distance(x, m->place);
-    find_afresh(field, x, m, hit);
+    find_from_scratch(field, x, m, hit);
     if (!known || hit->flags & VESSEL_UNSURE)
         return;
     // a gap that changes because a foot was followed badly is no defect of the model: only if the former node has no wall here is it one
     bool other = hit->node != from && travel < BLOB_FLOOD_MARGIN * field->node[from].radius &&
-                 walls_apart(field, from, hit->node, asked_at(field, &field->node[hit->node], m->foot)) > APART;
+                 walls_apart(field, from, hit->node, transformed_point(field, &field->node[hit->node], m->foot)) > APART;
     if (other || m->contradicted)
         compare_gaps(m, before, travel, hit);
 }
@@ -836,9 +836,9 @@ static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, Ve
     BlobList list;
     list_about(field, x, foot, &list);
     Vec3 g;
-    double travel = vec3_distance(x, m->place), side = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &g) > 0 ? 1 : -1;
+    double travel = vec3_distance(x, m->place), side = field_at(field, &list, transformed_point(field, &field->node[foot->node], x), &g) > 0 ? 1 : -1;
     if (side * foot->gap < -1e-9) {
-        answer_afresh(field, x, m, hit);
+        answer_from_scratch(field, x, m, hit);
         return;
     }
     answer_surely(field, x, side, (Sheets){.count = 1, .foot = {*foot}}, &list, m, hit);
@@ -900,7 +900,7 @@ static bool answer_cheaply(const FieldVessel *field, Vec3 x, double reach, Vesse
 
 // The foot has left the region of its held blobs: determines the cell and the list around q. Returns false if q is too far from the cell. A node whose field
 // contradicts the own one there is not adopted.
-static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
+static bool renew_list(const FieldVessel *field, VesselMemory *m, Vec3 q)
 {
     int cell = cell_of(field, q, m->node);
     if (cell != m->node) {
@@ -957,13 +957,13 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
 }
 
 // Renews the lists of lanes that have left the region of their held blobs; a lane that has moved too far for that is lost.
-static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned lanes, const Batch *batch, const int *point, bool seek)
+static void lanes_renew_lists(const FieldVessel *field, FieldBlock *b, unsigned lanes, const Batch *batch, const int *point, bool seek)
 {
     for (; lanes != 0; lanes &= lanes - 1) {
         int i = __builtin_ctz(lanes);
         VesselMemory *m = &batch->memory[point[i]];
-        Vec3 p = vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), q = asked_at(field, &field->node[m->node], p);
-        if (!hold_anew(field, m, q)) {
+        Vec3 p = vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), q = transformed_point(field, &field->node[m->node], p);
+        if (!renew_list(field, m, q)) {
             b->foot.state[i] = FOOT_LOST;
             continue;
         }
@@ -978,7 +978,7 @@ static unsigned moved_lanes(const FieldVessel *field, const FieldBlock *b, unsig
     for (int i = 0; i < count; i++) {
         if (!b->foot.at.carried[i] && !all)
             continue;
-        Vec3 q = asked_at(field, &field->node[batch->memory[point[i]].node], vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
+        Vec3 q = transformed_point(field, &field->node[batch->memory[point[i]].node], vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
         double far2 = vec3_norm2(vec3_sub(q, vec3(b->held_x[i], b->held_y[i], b->held_z[i])));
         moved = (moved & ~(1u << i)) | (far2 <= b->held_for2[i] ? 0u : 1u << i);
     }
@@ -1026,10 +1026,10 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
         }
     if (seek || b.foot.at.any_carried)
         moved = moved_lanes(field, &b, moved, batch, point, count, seek);
-    lanes_hold_anew(field, &b, moved, batch, point, seek);
+    lanes_renew_lists(field, &b, moved, batch, point, seek);
     for (int round = 0; round < (seek ? SEEK_ROUNDS : FOLLOW_ROUNDS) && (done & all) != all; round++) {
         if (round > 0)
-            lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point, seek);
+            lanes_renew_lists(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point, seek);
         sample(field, &b);
         done = field->kernels->newton(&b, seek);
     }
@@ -1090,7 +1090,7 @@ static void query_batch(const FieldVessel *field, int count, const Vec3 *point, 
     for (int i = 0; i < batch.sought.count; i += FOOT_BLOCK)
         follow_block(field, &batch, &batch.sought, i);
     for (int i = 0; i < batch.afresh.count; i++)
-        answer_afresh(field, point[batch.afresh.point[i]], &memory[batch.afresh.point[i]], &hit[batch.afresh.point[i]]);
+        answer_from_scratch(field, point[batch.afresh.point[i]], &memory[batch.afresh.point[i]], &hit[batch.afresh.point[i]]);
 }
 
 static void field_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)

@@ -53,12 +53,12 @@ typedef struct FootBatch {
     // input
     FootLane xx, xy, xz;             // X [mm]
     FootLane radius, bend;           // of the node [mm], the length scale of the problem; and its inverse
-    FootLane room;                   // [mm] a foot closer than this, in the node's cell, is the closest
+    FootLane unique;                 // [mm] a foot closer than this, in the node's cell, is the closest
     FootLane longest;                // [mm] upper bound of a step; unless careful, a longer step makes the lane FOOT_LOST
     FootLane allowed;                // [mm] |f|/|g| at which a foot is accepted; its position may be off by a hundred times that
     FootSample at;                   // the current foot
     // Remembered, for foot_predict: at.x.. holds the foot, at.gx.. the X that it belongs to, nx.. the normal, axx.. the Hessian of the gap.
-    FootLane inside;                 // 1 or 0; after foot_predict: the start is near, and closer than `room`
+    FootLane inside;                 // 1 or 0; after foot_predict: the start is near, and closer than `unique`
     FootLane estimate;               // see foot_estimate
     // output
     FootLane state;
@@ -96,7 +96,7 @@ static inline __attribute__((always_inline)) void foot_predict(FootBatch *restri
         double down = 0.5 * (tx * bx + ty * by + tz * bz), near = tx * tx + ty * ty + tz * tz < 0.04 * radius * radius ? 1.0 : 0.0;
         px = near > 0 ? px + tx - down * nx : px, py = near > 0 ? py + ty - down * ny : py, pz = near > 0 ? pz + tz - down * nz : pz;
         b->at.x[i] = px, b->at.y[i] = py, b->at.z[i] = pz;
-        near = gap + closer < b->room[i] ? near : 0.0;
+        near = gap + closer < b->unique[i] ? near : 0.0;
         b->inside[i] = gap + closer > -0.05 * radius ? near : 0.0;
         b->longest[i] = 0.5 * radius;
         b->allowed[i] = allowed;

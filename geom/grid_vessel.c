@@ -354,7 +354,7 @@ static int next_to(const Making *m, int first, int count, Vec3 x)
 }
 
 // Determines the vertex from which each lattice point of block b is queried.
-static bool ask_from(Making *m, int b)
+static bool find_starts(Making *m, int b)
 {
     double cell = m->grid->options.cell_mm;
     const int *base = m->base[b];
@@ -378,7 +378,7 @@ static bool ask_from(Making *m, int b)
 static bool sample_block(Making *m, int b)
 {
     double cell = m->grid->options.cell_mm, band = m->grid->options.band_mm;
-    if (!ask_from(m, b))
+    if (!find_starts(m, b))
         return false;
     memcpy(m->grid->block[b].base, m->base[b], sizeof *m->base);
     vessel_query(m->exact, POINTS, m->point, band + 2 * BLOCK * cell, m->memory, m->hit);

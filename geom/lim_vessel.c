@@ -40,7 +40,7 @@ typedef struct NodeModel {
     bool carried;            // near the inlet: the wall continues upstream
     double radius, bend;     // [mm]; bend: its inverse
     Vec3 center;
-    double room;             // [mm] a foot in this cell at a smaller distance is the closest: see measure_room
+    double unique;           // [mm] a foot in this cell at a smaller distance is the closest: see unique_distance
     double ball2;            // [mm^2] (1.2 r)^2: beyond it, power_walk also searches other nodes
     double least;            // [mm] blend_least; 0 if nothing is blended
     double clear;            // [mm] distance from the node's centre to the wall of this model, minus a margin; < 0: unknown
@@ -77,7 +77,7 @@ typedef struct Lane {
 typedef struct LaneBatch {
     int count;
     Lane *of[FOOT_BATCH];
-    int asked_count, asked[FOOT_BATCH + 1];   // the lanes that are not trusted
+    int untrusted_count, untrusted[FOOT_BATCH + 1]; // the lanes that are not trusted
     FootBatch foot;
     FootSample at_x;         // fields at X of these lanes, consecutively
     Lane lane[FOOT_BATCH];   // in the order of the points
@@ -175,7 +175,7 @@ static void fill_block(FootBatch *b, int count)
         FootSample *s = &b->at;
         s->x[i] = s->y[i] = s->z[i] = s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
         s->hxx[i] = s->hxy[i] = s->hxz[i] = s->hyy[i] = s->hyz[i] = s->hzz[i] = 0;
-        b->xx[i] = b->xy[i] = b->xz[i] = b->room[i] = b->nx[i] = b->ny[i] = b->nz[i] = b->half[i] = 0;
+        b->xx[i] = b->xy[i] = b->xz[i] = b->unique[i] = b->nx[i] = b->ny[i] = b->nz[i] = b->half[i] = 0;
         b->sxx[i] = b->sxy[i] = b->sxz[i] = b->syy[i] = b->syz[i] = b->szz[i] = 0;
         b->axx[i] = b->axy[i] = b->axz[i] = b->ayy[i] = b->ayz[i] = b->azz[i] = 0;
         b->radius[i] = b->bend[i] = 1;
@@ -342,15 +342,15 @@ static void follow_feet(const LimVessel *lim, FootBatch *b, int count)
 }
 
 // Evaluates the field at X for the lanes that are not trusted.
-static void ask_at_points(const LimVessel *lim, LaneBatch *batch)
+static void estimate_untrusted(const LimVessel *lim, LaneBatch *batch)
 {
     FootBatch *b = &batch->foot;
     FootSample *s = &batch->at_x;
     FootLane estimate;
-    int n = batch->asked_count, lane[FOOT_BATCH];
+    int n = batch->untrusted_count, lane[FOOT_BATCH];
     s->any_carried = false;
     for (int k = 0; k < n; k++) {
-        int i = batch->asked[k];
+        int i = batch->untrusted[k];
         set_sample(lim, s, k, batch->of[i]->node, lane_point(b, i));
         lane[k] = k;
     }
@@ -359,7 +359,7 @@ static void ask_at_points(const LimVessel *lim, LaneBatch *batch)
         s->f[k] = s->gx[k] = s->gy[k] = s->gz[k] = 0;
     lim->kernels->estimate(s, estimate, n, lim->tree->iso_level);
     for (int k = 0; k < n; k++) {
-        int i = batch->asked[k];
+        int i = batch->untrusted[k];
         b->inside[i] = s->f[k] > 0;
         b->estimate[i] = estimate[k];
     }
@@ -392,12 +392,12 @@ static void project_batch(const LimVessel *lim, LaneBatch *batch)
 {
     FootBatch *b = &batch->foot;
     int lane[FOOT_BATCH], n = 0, count = batch->count;
-    if (batch->asked_count > 0)
-        ask_at_points(lim, batch);
+    if (batch->untrusted_count > 0)
+        estimate_untrusted(lim, batch);
     follow_feet(lim, b, count);
     lim->kernels->finish(b, count);
-    for (int k = 0; k < batch->asked_count; k++) {
-        int i = batch->asked[k];
+    for (int k = 0; k < batch->untrusted_count; k++) {
+        int i = batch->untrusted[k];
         batch->of[i]->again |= is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
     }
     for (int i = 0; i < count; i++) {
@@ -441,8 +441,8 @@ static void check_batch(const LimVessel *lim, LaneBatch *batch, const VesselMemo
     FootBatch *b = &batch->foot;
     FootSample *at = &batch->at_x;
     int lane[FOOT_BATCH], n = 0;
-    for (int k = 0; k < batch->asked_count; k++) {
-        int i = batch->asked[k];
+    for (int k = 0; k < batch->untrusted_count; k++) {
+        int i = batch->untrusted[k];
         Lane *of = batch->of[i];
         if (!of->sure || !(b->gap[i] > 0.3 * b->radius[i]))
             continue;
@@ -504,7 +504,7 @@ static double spacing2(const VesselTree *tree, int node)
 }
 
 // Evaluates a partner for the lanes [lane, lane + n) of a batch of `count`; lanes whose walls differ much are evaluated a second time.
-static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *partner, int *lane, int n, int count)
+static void sample_partners(const LimVessel *lim, const FootBatch *b, FootPartner *partner, int *lane, int n, int count)
 {
     int again = 0;
     sample(lim, &partner->at, lane, n, false);
@@ -558,7 +558,7 @@ static void blend_batch(const LimVessel *lim, const LaneBatch *batch, double rea
             lane[n++] = i;
             last = partners[i] > k + 1 ? i + 1 : last;
         }
-        ask_partners(lim, b, &partner, lane, n, with);
+        sample_partners(lim, b, &partner, lane, n, with);
         lim->kernels->mix(b, &partner, &mixture, with);
         with = last;
     }
@@ -663,7 +663,7 @@ static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x
     const NodeModel *m = &lim->model[node];
     b->at.group[i] = m->group, b->at.groups[i] = m->groups;
     b->at.carried[i] = m->carried, b->at.any_carried |= m->carried;
-    b->radius[i] = m->radius, b->bend[i] = m->bend, b->room[i] = m->room;
+    b->radius[i] = m->radius, b->bend[i] = m->bend, b->unique[i] = m->unique;
     b->xx[i] = x.x, b->xy[i] = x.y, b->xz[i] = x.z;
     if (memory->has_foot) {
         b->at.x[i] = memory->foot.x, b->at.y[i] = memory->foot.y, b->at.z[i] = memory->foot.z;
@@ -729,7 +729,7 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
         return;
     batch.count = n;
     order_lanes(&batch, with);
-    batch.asked_count = 0;
+    batch.untrusted_count = 0;
     b->at.any_carried = false;
     for (int i = 0; i < n; i++)
         set_lane(lim, b, i, batch.of[i]->node, point[batch.of[i]->point], &memory[batch.of[i]->point]);
@@ -742,8 +742,8 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
         of->checked = false;
         of->again = !m->has_foot;
         of->trusted = m->has_foot & (m->trusted > 0) & of->at_home & (b->inside[i] > 0);
-        batch.asked[batch.asked_count] = i;
-        batch.asked_count += !of->trusted;
+        batch.untrusted[batch.untrusted_count] = i;
+        batch.untrusted_count += !of->trusted;
     }
     project_batch(lim, &batch);
     check_batch(lim, &batch, memory);
@@ -893,10 +893,10 @@ static bool is_lumen_within(const Blobby *blobs, Vec3 middle, double radius)
     return lumen;
 }
 
-// Computes `room`: whether the model's wall around the node is a single sheet with free lumen in front of it. For feet around the node, over the length of its
+// Computes `unique`: whether the model's wall around the node is a single sheet with free lumen in front of it. For feet around the node, over the length of its
 // cell, the function tests 14 directions from the centre of a ball that touches the wall there: if all are lumen, a foot closer than 0.6 times the ball's
 // radius is the closest. The ball has a radius of 0.8 r, or less, down to 0.3 r, where there is not enough room, as next to a branch.
-static double measure_room(const LimVessel *lim, int node)
+static double unique_distance(const LimVessel *lim, int node)
 {
     enum { AROUND = 8 };
     const VesselTree *tree = lim->tree;
@@ -953,7 +953,7 @@ static void fill_models(LimVessel *lim, size_t groups, size_t nears)
         // less than the distance found, in case that foot is on another side
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
         m->clear = s.converged && s.distance > 0 ? fmin(0.95 * s.distance, tree->radius[i]) : -HUGE_VAL;
-        m->room = measure_room(lim, i);
+        m->unique = unique_distance(lim, i);
         m->near = near;
         m->all_near = near_groups_of(tree, i);
         m->near_groups = fill_near(tree, i, sqrt(m->ball2), near);

@@ -130,8 +130,8 @@ typedef struct Search {
 // [mm] the radius within which boxes are visited for a closest triangle at sqrt(distance2), enlarged by more than the rounding of boxes and point to float.
 static float widened(const Search *s)
 {
-    double room = 1e-6 * (s->mesh->size + vec3_norm(s->x));
-    return (float)(sqrt(s->distance2) * (1 + 1e-6) + room);
+    double margin = 1e-6 * (s->mesh->size + vec3_norm(s->x));
+    return (float)(sqrt(s->distance2) * (1 + 1e-6) + margin);
 }
 
 static bool look_at(Search *s, int group)
@@ -176,8 +176,8 @@ static bool is_proven(const GroupSurroundings *around, const Search *s)
 {
     double d = sqrt(s->distance2);
     for (int i = 0; i < around->balls; i++) {
-        double room = around->ball[i].radius - d;
-        if (room > 0 && vec3_norm2(vec3_sub(s->x, around->ball[i].center)) < room * room)
+        double inside = around->ball[i].radius - d;
+        if (inside > 0 && vec3_norm2(vec3_sub(s->x, around->ball[i].center)) < inside * inside)
             return true;
     }
     return false;
@@ -537,9 +537,9 @@ static void add_to_hull(Hull *hull, double *area, Vec3 a, Vec3 b, Vec3 c)
 // Returns false if out of memory.
 static bool measure_hull(const MeshVessel *m, Hull *hull)
 {
-    size_t room = (size_t)m->vertex_count + 1;
-    int *rim = malloc(room * sizeof *rim), *count = calloc(room, sizeof *count);
-    Vec3 *sum = calloc(room, sizeof *sum);
+    size_t capacity = (size_t)m->vertex_count + 1;
+    int *rim = malloc(capacity * sizeof *rim), *count = calloc(capacity, sizeof *count);
+    Vec3 *sum = calloc(capacity, sizeof *sum);
     bool good = rim && count && sum;
     *hull = (Hull){0, 0, 0};
     for (int v = 0; good && v < m->vertex_count; v++)

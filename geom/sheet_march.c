@@ -179,7 +179,7 @@ static bool find_blocks(SheetMarch *job, int first, int end)
 
 // Returns whether all points of the ball (x, h) lie clearly outside their node's ball and move to a node whose ball holds them (power_walk.h). The list of
 // paths does not depend on the point, so what holds for a block holds for its points.
-static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
+static bool walks_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
 {
     const VesselTree *tree = job->tree;
     double near = vec3_distance(x, tree->center[job->node[ball]]) - h;
@@ -265,7 +265,7 @@ static bool list_candidates(SheetMarch *job, const MarchBlock *b)
         c->node = job->node[ball];
         c->ball = ball;
         c->reach = job->reach[ball];
-        if (!list_rivals(job, c, middle, h) || goes_elsewhere(job, ball, middle, h))
+        if (!list_rivals(job, c, middle, h) || walks_elsewhere(job, ball, middle, h))
             continue;
         c->model = blobby_of(job->tree, c->node);
         field_bounds(&c->model, middle, h, &c->low, &high);
@@ -377,7 +377,7 @@ static void find_states(SheetMarch *job, Vec3 x, States *states)
     states->count = 0;
     for (int k = 0; k < job->candidate_count && states->count < STATES_MAX; k++) {
         const Candidate *c = &job->candidate[k];
-        if (vec3_norm2(vec3_sub(x, job->tree->center[c->node])) > c->reach * c->reach || is_beaten(job, c, x) || goes_elsewhere(job, c->ball, x, 0))
+        if (vec3_norm2(vec3_sub(x, job->tree->center[c->node])) > c->reach * c->reach || is_beaten(job, c, x) || walks_elsewhere(job, c->ball, x, 0))
             continue;
         double field = blobby_field(&c->model, x);
         if (field > 0) {
@@ -434,7 +434,7 @@ static bool add_vertex(SheetMarch *job, KeyMap *map, uint64_t key, const int at[
     *index = *found;
     if (!is_new)
         return true;
-    if (!march_make_room(&job->march))
+    if (!march_reserve(&job->march))
         return false;
     int beside[3] = {at[0], at[1], at[2]};
     beside[axis] += up ? 1 : -1;

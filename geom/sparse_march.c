@@ -104,7 +104,7 @@ Vec3 march_block_ball(const March *march, const MarchBlock *b, double *radius)
     return vec3(b->base[0] * march->cell + half, b->base[1] * march->cell + half, b->base[2] * march->cell + half);
 }
 
-bool march_make_room(March *march)
+bool march_reserve(March *march)
 {
     TriangleMesh *mesh = march->mesh;
     int capacity = march->vertex_capacity, same = capacity;
@@ -140,7 +140,7 @@ static bool add_vertex(March *march, const MarchBlock *b, const int at[3], int a
     *index = *found;
     if (!is_new)
         return true;
-    if (!march_make_room(march))
+    if (!march_reserve(march))
         return false;
     int step[3] = {axis == 0, axis == 1, axis == 2}, low = march_index(at[0], at[1], at[2]);
     int high = low + march_index(step[0], step[1], step[2]);
@@ -180,7 +180,7 @@ bool march_block(March *march, MarchBlock *b)
     return true;
 }
 
-bool march_mend_normals(TriangleMesh *mesh)
+bool march_repair_normals(TriangleMesh *mesh)
 {
     bool missing = false;
     for (int v = 0; v < mesh->vertex_count && !missing; v++)

@@ -62,12 +62,12 @@ int march_block_beside(const March *march, const MarchBlock *b, const int steps[
 // A lattice point's key, below 2^60.
 uint64_t march_key(int i, int j, int k);
 // Makes room for one more vertex in the mesh's arrays. Returns false if out of memory. march_add_triangle adds a triangle, with the same result.
-bool march_make_room(March *march);
+bool march_reserve(March *march);
 bool march_add_triangle(March *march, const int corner[3]);
 // Adds the triangles of the current block. Returns false if out of memory.
 bool march_block(March *march, MarchBlock *b);
 // Sets the normal of each vertex that has none (0) from its triangles, weighted by area. Returns false if out of memory.
-bool march_mend_normals(TriangleMesh *mesh);
+bool march_repair_normals(TriangleMesh *mesh);
 // Frees everything that the march owns except the mesh.
 void march_end(March *march);
 

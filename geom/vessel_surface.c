@@ -29,13 +29,13 @@ static const double APART = 1.05;
 static const double MARGIN = 2.8;
 
 // Points to query: lattice points of a block, or a block's middle.
-typedef struct Questions {
+typedef struct Queries {
     int count;
     int of[MARCH_POINTS], ball[MARCH_POINTS];
     Vec3 point[MARCH_POINTS];
     VesselMemory memory[MARCH_POINTS];
     VesselHit hit[MARCH_POINTS];
-} Questions;
+} Queries;
 
 enum { NO_WALL = -1000 };    // [cells]
 
@@ -45,7 +45,7 @@ typedef struct VesselMarch {
     const Vec3 *center;
     const double *reach;
     const int *from;
-    Questions ask;
+    Queries queries;
     double other[MARCH_POINTS];              // the largest gap below 0 among the other balls' results for a lattice point
     int capacity;
     int *made_in;            // block in which each vertex was made
@@ -81,37 +81,40 @@ static int deepest_ball(const VesselMarch *job, const MarchBlock *b, Vec3 x, dou
 
 static int node_from(const VesselMarch *job, int ball, Vec3 x) { return job->vessel->locate(job->vessel, x, job->from ? job->from[ball] : -1); }
 
-static void add_question(VesselMarch *job, int of, int ball, Vec3 x, int node)
+static void add_query(VesselMarch *job, int of, int ball, Vec3 x, int node)
 {
-    Questions *ask = &job->ask;
-    ask->of[ask->count] = of;
-    ask->ball[ask->count] = ball;
-    ask->point[ask->count] = x;
-    ask->memory[ask->count++] = (VesselMemory){.node = node};
+    Queries *queries = &job->queries;
+    queries->of[queries->count] = of;
+    queries->ball[queries->count] = ball;
+    queries->point[queries->count] = x;
+    queries->memory[queries->count++] = (VesselMemory){.node = node};
 }
 
-static void put_questions(VesselMarch *job, double reach) { vessel_query(job->vessel, job->ask.count, job->ask.point, reach, job->ask.memory, job->ask.hit); }
+static void run_queries(VesselMarch *job, double reach)
+{
+    vessel_query(job->vessel, job->queries.count, job->queries.point, reach, job->queries.memory, job->queries.hit);
+}
 
 // Queues queries of x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to nodes not yet queried. Returns false if
 // there is not enough room for all.
-static bool ask_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, double margin, int first_node)
+static bool queue_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, double margin, int first_node)
 {
     enum { NODES_MAX = 16 };
-    int asked[NODES_MAX] = {first_node}, count = 1;
+    int queried[NODES_MAX] = {first_node}, count = 1;
     for (int l = b->first; l >= 0; l = job->march.link[l].next) {
         int n = job->march.link[l].ball, k = 0;
         double most = job->reach[n] + margin;
         if (!(vec3_norm2(vec3_sub(x, job->center[n])) < most * most))
             continue;
         int node = node_from(job, n, x);
-        while (k < count && asked[k] != node)
+        while (k < count && queried[k] != node)
             k++;
         if (k < count)
             continue;
-        if (count == NODES_MAX || job->ask.count == MARCH_POINTS)
+        if (count == NODES_MAX || job->queries.count == MARCH_POINTS)
             return false;
-        asked[count++] = node;
-        add_question(job, of, n, x, node);
+        queried[count++] = node;
+        add_query(job, of, n, x, node);
     }
     return true;
 }
@@ -120,11 +123,11 @@ static bool block_is_plain(VesselMarch *job, const MarchBlock *b)
 {
     double h;
     Vec3 middle = march_block_ball(&job->march, b, &h);
-    job->ask.count = 0;
-    bool all_out = ask_others(job, b, 0, middle, h + MARGIN * job->march.cell, -1);
-    put_questions(job, 1.01 * h);
-    for (int n = 0; n < job->ask.count; n++) {
-        const VesselHit *hit = &job->ask.hit[n];
+    job->queries.count = 0;
+    bool all_out = queue_others(job, b, 0, middle, h + MARGIN * job->march.cell, -1);
+    run_queries(job, 1.01 * h);
+    for (int n = 0; n < job->queries.count; n++) {
+        const VesselHit *hit = &job->queries.hit[n];
         if (hit->flags & VESSEL_OPEN_END)
             return false;
         if (hit->gap > h)
@@ -135,13 +138,13 @@ static bool block_is_plain(VesselMarch *job, const MarchBlock *b)
 }
 
 // Applies the results of the second round: one result of inside is enough.
-static void hear_others(VesselMarch *job)
+static void merge_others(VesselMarch *job)
 {
     March *march = &job->march;
-    put_questions(job, 2 * march->cell);
-    for (int n = 0; n < job->ask.count; n++) {
-        const VesselHit *hit = &job->ask.hit[n];
-        int at = job->ask.of[n];
+    run_queries(job, 2 * march->cell);
+    for (int n = 0; n < job->queries.count; n++) {
+        const VesselHit *hit = &job->queries.hit[n];
+        int at = job->queries.of[n];
         if (hit->flags & (VESSEL_OPEN_END | VESSEL_BEYOND))
             continue;
         double lesser = fmin(hit->gap, march->value[at]);
@@ -149,10 +152,10 @@ static void hear_others(VesselMarch *job)
             job->other[at] = fmax(job->other[at], lesser);
         if (hit->gap > march->value[at]) {
             march->value[at] = hit->gap;
-            march->owner[at] = job->ask.ball[n];
+            march->owner[at] = job->queries.ball[n];
         }
     }
-    job->ask.count = 0;
+    job->queries.count = 0;
 }
 
 // For a point inside one lumen by g and outside another by s, the wall between the lumens has a thickness of s - g.
@@ -171,7 +174,7 @@ static void sample_block(VesselMarch *job, const MarchBlock *b)
     March *march = &job->march;
     int node[MARCH_POINTS];
     double margin = MARGIN * march->cell;
-    job->ask.count = 0;
+    job->queries.count = 0;
     for (int i = 0; i < MARCH_SIDE; i++)
         for (int j = 0; j < MARCH_SIDE; j++)
             for (int k = 0; k < MARCH_SIDE; k++) {
@@ -181,25 +184,25 @@ static void sample_block(VesselMarch *job, const MarchBlock *b)
                 march->owner[at] = ball;
                 job->other[at] = NO_WALL * march->cell;
                 if (ball >= 0)
-                    add_question(job, at, ball, x, node_from(job, ball, x));
+                    add_query(job, at, ball, x, node_from(job, ball, x));
             }
-    put_questions(job, 2 * march->cell);
-    for (int n = 0; n < job->ask.count; n++) {
-        march->value[job->ask.of[n]] = gap_of(&job->ask.hit[n]);
-        node[job->ask.of[n]] = job->ask.hit[n].node;
+    run_queries(job, 2 * march->cell);
+    for (int n = 0; n < job->queries.count; n++) {
+        march->value[job->queries.of[n]] = gap_of(&job->queries.hit[n]);
+        node[job->queries.of[n]] = job->queries.hit[n].node;
     }
-    job->ask.count = 0;
+    job->queries.count = 0;
     for (int i = 0; i < MARCH_SIDE; i++)
         for (int j = 0; j < MARCH_SIDE; j++)
             for (int k = 0; k < MARCH_SIDE; k++) {
                 int at = march_index(i, j, k);
                 if (!(march->value[at] <= 0.5 * APART * march->cell))
                     continue;
-                if (job->ask.count > MARCH_POINTS / 2)
-                    hear_others(job);
-                ask_others(job, b, at, march_point(march, b, i, j, k), margin, node[at]);
+                if (job->queries.count > MARCH_POINTS / 2)
+                    merge_others(job);
+                queue_others(job, b, at, march_point(march, b, i, j, k), margin, node[at]);
             }
-    hear_others(job);
+    merge_others(job);
     keep_apart(job);
     for (int at = 0; at < MARCH_POINTS; at++)
         if (!isnan(march->value[at]))        // finite, so that the crossing of an edge can be interpolated
@@ -423,7 +426,7 @@ TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *
     TriangleMesh *mesh = job->march.mesh;
     if (good)
         settle_all(vessel, mesh, 0, NULL, MOVE * cell_mm);
-    if (!good || !trim(job) || !march_mend_normals(mesh)) {
+    if (!good || !trim(job) || !march_repair_normals(mesh)) {
         triangle_mesh_free(mesh);
         mesh = NULL;
     }
@@ -489,7 +492,7 @@ TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vesse
                 memcpy(out[k], (int[3]){v[k], m[k], m[(k + 2) % 3]}, sizeof out[k]);
             memcpy(out[3], m, sizeof out[3]);
         }
-        good = march_mend_normals(fine);
+        good = march_repair_normals(fine);
     }
     free(middle);
     free(end);

@@ -522,7 +522,7 @@ static bool play(ForceFeedback *force, int64_t now_us, const HidTransport *trans
     return 2 * (now_us - force->started_us) < force->effect_us || start_effects(force, now_us, transport, device);
 }
 
-static void let_go(ForceFeedback *force, const char *why)
+static void stop_forces(ForceFeedback *force, const char *why)
 {
     force->guard.sent[0] = force->guard.sent[1] = 0;
     force->guard.why_zero = why;
@@ -531,7 +531,7 @@ static void let_go(ForceFeedback *force, const char *why)
 static void give_up(ForceFeedback *force, const HidTransport *transport, void *device)
 {
     force_stop(force, transport, device);
-    let_go(force, "the device accepts no forces");
+    stop_forces(force, "the device accepts no forces");
     snprintf(force->text, sizeof force->text, "none: the device accepts no forces (%d consecutive writes failed)", MOST_FAILURES);
 }
 
@@ -546,13 +546,13 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
     bool has_ended = force->may_play && now_us - force->started_us >= force->effect_us;
     force_guard(&force->guard, &force->map, wanted, atomic_load(&port->step), now_us, report_us, paused);
     if (has_ended && !force->guard.why_zero[0])
-        let_go(force, "the effect ended before it was restarted");
+        stop_forces(force, "the effect ended before it was restarted");
     else if (force->must_rest && !force->guard.why_zero[0])
-        let_go(force, "the device did not accept a report");
+        stop_forces(force, "the device did not accept a report");
     bool is_played = !force->guard.why_zero[0] && play(force, now_us, transport, device);
     if (!is_played) {
         if (!force->guard.why_zero[0])
-            let_go(force, "the device did not accept a report");
+            stop_forces(force, "the device did not accept a report");
         force->must_rest = !rest(force, transport, device);
     }
     if (force->failures >= MOST_FAILURES)

@@ -21,7 +21,7 @@ struct Hands {
     HandShared shared;
     HidTransport *own_transport;
     UsbContext *usb;
-    bool has_told_usb;
+    bool has_reported_usb;
     DeviceMap *map[MOST_MAPS], *built_in[BUILT_IN_COUNT];
     int map_count, rescan_ms;
     bool use_built_in, use_usb;
@@ -146,7 +146,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     slot->encoder_runs = slot->encoder != NULL;
     slot->has_thread = pthread_create(&slot->thread, NULL, slot->encoder ? hand_run_encoder : hand_run_hid, slot) == 0;
     if (slot->has_thread)
-        hand_say(shared, is_back ? "%s is back (map '%s')" : "%s drives the tool (map '%s')", name, map->name);
+        hand_report(shared, is_back ? "%s is back (map '%s')" : "%s drives the tool (map '%s')", name, map->name);
     else
         faults_add(faults, name, 0, 0, "cannot start a thread for it");
     return slot->has_thread;
@@ -206,7 +206,7 @@ static bool is_connected(const Hands *hands, const HidDeviceInfo *device)
     return false;
 }
 
-static void tell_refusal(Hands *hands, const HidDeviceInfo *device, const Faults *faults)
+static void report_refusal(Hands *hands, const HidDeviceInfo *device, const Faults *faults)
 {
     Refusal *refusal = refusal_of(hands, device);
     if (!refusal)
@@ -215,7 +215,7 @@ static void tell_refusal(Hands *hands, const HidDeviceInfo *device, const Faults
     refusal->attempts += refusal->attempts < 3;
     // udev sets permissions shortly after the device appears: retry at each scan, report at the second
     for (int i = 0; refusal->attempts == 2 && i < faults->count && i < 4; i++)
-        hand_say(&hands->shared, "not used: %s", faults->text[i]);
+        hand_report(&hands->shared, "not used: %s", faults->text[i]);
 }
 
 static void try_device(Hands *hands, const HidDeviceInfo *device, const DeviceMap *map, bool is_encoder)
@@ -231,7 +231,7 @@ static void try_device(Hands *hands, const HidDeviceInfo *device, const DeviceMa
         faults_add(&faults, name, 0, 0, "is not used: at most %d devices can drive the tools", HANDS_MOST);
     else if (is_encoder ? connect_encoder(hands, slot, device, map, name, &faults) : connect_hid(hands, slot, device, map, name, &faults))
         return;
-    tell_refusal(hands, device, &faults);
+    report_refusal(hands, device, &faults);
 }
 
 static const DeviceMap *encoder_map(const Hands *hands, const UsbDeviceInfo *device)
@@ -257,9 +257,9 @@ static void look_for_encoders(Hands *hands)
         usb_context_close(hands->usb);
         hands->usb = usb_context_open();
     }
-    if (!hands->usb && !hands->has_told_usb)
-        hand_say(&hands->shared, "USB encoders cannot be used: libusb does not start");
-    hands->has_told_usb |= !hands->usb;
+    if (!hands->usb && !hands->has_reported_usb)
+        hand_report(&hands->shared, "USB encoders cannot be used: libusb does not start");
+    hands->has_reported_usb |= !hands->usb;
     int count = hands->usb ? usb_encoder_list(hands->usb, found, HANDS_MOST * 2) : 0;
     for (int i = 0; i < count; i++) {
         HidDeviceInfo device = {.vendor_id = found[i].vendor_id, .product_id = found[i].product_id, .interface_number = -1};

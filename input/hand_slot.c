@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000, TELL_AGAIN_US = 10000000 };
+enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000, REPORT_INTERVAL_US = 10000000 };
 
 int64_t hand_now_us(void)
 {
@@ -14,7 +14,7 @@ int64_t hand_now_us(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-void hand_say(HandShared *shared, const char *format, ...)
+void hand_report(HandShared *shared, const char *format, ...)
 {
     va_list arguments;
     pthread_mutex_lock(&shared->lock);
@@ -81,22 +81,22 @@ static void start_force(HandSlot *slot)
     bool plays = force_start(&slot->force, slot->map, slot->descriptor, &shared->transport, slot->device, hand_now_us());
     show_force(slot);
     if (slot->map->force.is_wanted && !plays)
-        hand_say(shared, "%s: force: %s", slot->info.name, slot->force.text);
+        hand_report(shared, "%s: force: %s", slot->info.name, slot->force.text);
 }
 
-// Reports when the watchdog has set the force to zero, at most once per TELL_AGAIN_US, and once when the device accepts nothing any more.
-static void tell_watchdog(HandSlot *slot, double sent_before, bool played_before, int64_t now)
+// Reports when the watchdog has set the force to zero, at most once per REPORT_INTERVAL_US, and once when the device accepts nothing any more.
+static void report_watchdog(HandSlot *slot, double sent_before, bool played_before, int64_t now)
 {
     if (played_before && !slot->force.block[0]) {
         show_force(slot);
-        hand_say(slot->shared, "%s: force: %s", slot->info.name, slot->force.text);
+        hand_report(slot->shared, "%s: force: %s", slot->info.name, slot->force.text);
         return;
     }
     const char *why = slot->force.guard.why_zero;
-    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0 && now >= slot->tell_from_us) {
-        hand_say(slot->shared, "%s: force to zero, %s%s", slot->info.name, why,
-                 strstr(why, "silent") ? "(if the device reports only changes, set force: {quiet_ms: 0} in its map)" : "");
-        slot->tell_from_us = now + TELL_AGAIN_US;
+    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0 && now >= slot->report_from_us) {
+        hand_report(slot->shared, "%s: force to zero, %s%s", slot->info.name, why,
+                    strstr(why, "silent") ? "(if the device reports only changes, set force: {quiet_ms: 0} in its map)" : "");
+        slot->report_from_us = now + REPORT_INTERVAL_US;
     }
 }
 
@@ -105,7 +105,7 @@ void *hand_run_hid(void *argument)
     HandSlot *slot = argument;
     HandShared *shared = slot->shared;
     int64_t report_us = hand_now_us(), counted_from = report_us, informed = 0, reports_then = slot->state.reports;
-    bool is_there = true, has_told_bad = slot->state.bad_reports > 0;
+    bool is_there = true, has_reported_bad = slot->state.bad_reports > 0;
     double hz = 0;
     start_force(slot);
     int wait_ms = slot->force.block[0] ? FORCE_WAIT_MS : READ_WAIT_MS;
@@ -119,15 +119,15 @@ void *hand_run_hid(void *argument)
         now = is_there ? wait_for_force(slot, now) : now;
         if (is_there)
             force_tick(&slot->force, slot->port, now, report_us, atomic_load(&shared->paused), &shared->transport, slot->device);
-        tell_watchdog(slot, sent_before, played_before, now);
+        report_watchdog(slot, sent_before, played_before, now);
         if (now - counted_from >= COUNT_RATE_US) {
             hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
             counted_from = now;
             reports_then = slot->state.reports;
         }
-        if (!has_told_bad && slot->state.bad_reports > 0) {
-            hand_say(shared, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are ignored", slot->info.name);
-            has_told_bad = true;
+        if (!has_reported_bad && slot->state.bad_reports > 0) {
+            hand_report(shared, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are ignored", slot->info.name);
+            has_reported_bad = true;
         }
         if (now - informed >= INFO_US) {
             update_info(slot, HAND_READY, hz);
@@ -142,7 +142,7 @@ void *hand_run_hid(void *argument)
     shared->transport.close(shared->transport.context, slot->device);
     slot->device = NULL;
     if (!is_there)
-        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to continue", slot->info.name);
+        hand_report(shared, "%s was unplugged: the tool stops; plug it in again to continue", slot->info.name);
     atomic_store(&slot->has_ended, true);
     return NULL;
 }
@@ -158,7 +158,7 @@ void *hand_run_encoder(void *argument)
     HandSlot *slot = argument;
     HandShared *shared = slot->shared;
     int64_t counted_from = hand_now_us(), informed = 0, reports_then = slot->state.reports, bad_before = slot->state.bad_reports;
-    bool is_there = true, has_told_bad = false;
+    bool is_there = true, has_reported_bad = false;
     double hz = 0;
     while (is_there && !atomic_load(&shared->quit)) {
         int64_t lines = slot->state.reports;
@@ -168,9 +168,9 @@ void *hand_run_encoder(void *argument)
         slot->state.bad_reports = bad_before + stream->bad_lines + stream->errors;
         if (slot->state.reports > lines)
             map_publish(slot->map, &slot->state, slot->port);
-        if (!has_told_bad && stream->bad_lines > 3 && stream->lines == 0) {
-            hand_say(shared, "%s sends no lines of counts as described in its map; check serial: {baud, counts}", slot->info.name);
-            has_told_bad = true;
+        if (!has_reported_bad && stream->bad_lines > 3 && stream->lines == 0) {
+            hand_report(shared, "%s sends no lines of counts as described in its map; check serial: {baud, counts}", slot->info.name);
+            has_reported_bad = true;
         }
         if (now - counted_from >= COUNT_RATE_US) {
             hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
@@ -188,7 +188,7 @@ void *hand_run_encoder(void *argument)
     usb_encoder_close(slot->encoder);
     slot->encoder = NULL;
     if (!is_there)
-        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to continue", slot->info.name);
+        hand_report(shared, "%s was unplugged: the tool stops; plug it in again to continue", slot->info.name);
     atomic_store(&slot->has_ended, true);
     return NULL;
 }

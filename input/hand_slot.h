@@ -33,7 +33,7 @@ typedef struct HandSlot {
     void *device;                    // while its thread runs; NULL for an encoder
     UsbEncoder *encoder;             // the same of an encoder
     ForceFeedback force;
-    int64_t tell_from_us;            // when the watchdog may be reported again
+    int64_t report_from_us;          // when the watchdog may be reported again
     pthread_t thread;
     bool has_thread, encoder_runs;   // the scanner's: the thread is there, and for an encoder
     ATOMIC(bool) has_ended;          // the device was removed; the scanner joins the thread
@@ -41,7 +41,7 @@ typedef struct HandSlot {
 } HandSlot;
 
 int64_t hand_now_us(void);
-void hand_say(HandShared *shared, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void hand_report(HandShared *shared, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // Thread functions; the argument is a HandSlot with its device opened. They close it.
 void *hand_run_hid(void *slot);
 void *hand_run_encoder(void *slot);

@@ -102,8 +102,8 @@ static bool is_survived(Hdf5Source *source)
 // Takes ownership of the source's file.
 static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, const char *name, const char *needs, Faults *faults)
 {
-    if (!heap_has_room(HEAP_ROOM_OF_HDF5))
-        heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
+    if (!heap_can_allocate(HEAP_RESERVE_OF_HDF5))
+        heap_is_empty(HEAP_RESERVE_OF_HDF5, __FILE__);
     Hdf5Reader *reader = HEAP_ZEROED(1, sizeof *reader);
     *reader = (Hdf5Reader){.source = *source,
                            .file = -1,

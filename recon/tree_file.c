@@ -310,7 +310,7 @@ static size_t image_length(const Image *image)
 
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults)
 {
-    if (!heap_has_room(HEAP_ROOM_OF_HDF5)) {
+    if (!heap_can_allocate(HEAP_RESERVE_OF_HDF5)) {
         faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library is out of memory");
         return false;
     }

@@ -405,7 +405,7 @@ static void view_matrix(const AngioscopeView *view, Vec3 origin, double aspect, 
     }
 }
 
-static void ask_normals(Angioscope *scope, Patch *patch)
+static void find_normals(Angioscope *scope, Patch *patch)
 {
     patch->has_field_normals = true;
     if (!scope->vessel)
@@ -465,7 +465,7 @@ static void draw_wall(Angioscope *scope, const AngioscopeView *view, double aspe
     for (int i = 0; i < count; i++) {
         Patch *patch = &scope->patch[scope->seen[i].patch];
         if (!patch->has_field_normals)
-            ask_normals(scope, patch);
+            find_normals(scope, patch);
         scope->draw_count[i] = patch->index_count;
         scope->draw_offset[i] = at_byte((size_t)patch->first_index * sizeof(uint32_t));
     }

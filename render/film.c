@@ -26,7 +26,7 @@ typedef struct Film {
     Playback *playback;
     TrainerPanel shown;
     Rescore *rescore;
-    bool has_told_difference;
+    bool has_reported_difference;
     double sampled_s;                // time up to which the plots have samples
     uint8_t *rgb;                    // (height, width, 3)
 } Film;
@@ -116,8 +116,8 @@ static const ScoreFigures *score_now(Film *film)
 {
     rescore_advance(film->rescore, playback_pose(film->playback)->step, HUGE_VAL);
     int64_t different = rescore_first_different(film->rescore);
-    if (different >= 0 && !film->has_told_difference) {
-        film->has_told_difference = true;
+    if (different >= 0 && !film->has_reported_difference) {
+        film->has_reported_difference = true;
         fprintf(stderr, "the simulation differs from the recording from step %lld on: the score is not updated after that step\n", (long long)different);
     }
     return rescore_at(film->rescore, playback_time_s(film->playback));

@@ -120,7 +120,7 @@ static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
     f->looks = options->tools;
     f->tool_count = options->tools ? options->tools->count : 0;
     for (int k = 0; k < f->tool_count; k++)
-        f->tool_room[k] = options->pose->tool[k].node_capacity, tool_nodes += (size_t)f->tool_room[k];
+        f->tool_capacity[k] = options->pose->tool[k].node_capacity, tool_nodes += (size_t)f->tool_capacity[k];
     f->shown.position = calloc(tool_nodes, sizeof *f->shown.position);
     f->shown.filling = calloc(tool_nodes, sizeof *f->shown.filling);
     f->shown.contrast = calloc(nodes, sizeof *f->shown.contrast);
@@ -221,7 +221,7 @@ static bool has_these_tools(Fluoroscope *f, const Pose *pose)
 {
     bool same = pose && pose->tool_count == f->tool_count;
     for (int k = 0; same && k < f->tool_count; k++)
-        same = pose->tool[k].node_count <= f->tool_room[k] && (f->shown.tool[k] = path_of(f, k, &pose->tool[k]));
+        same = pose->tool[k].node_count <= f->tool_capacity[k] && (f->shown.tool[k] = path_of(f, k, &pose->tool[k]));
     return same;
 }
 
@@ -239,7 +239,7 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
             f->shown.position[i] = pose->tool[k].node[j].position;
             f->shown.filling[i] = filling && filling[j] > 0 ? fminf(filling[j], 1) : 0;
         }
-        filling = filling ? filling + f->tool_room[k] : NULL;
+        filling = filling ? filling + f->tool_capacity[k] : NULL;
     }
     for (int n = 0; n < nodes; n++) {
         float c = frame->contrast ? frame->contrast[n] : 0;

@@ -25,7 +25,7 @@ struct Fluoroscope {
     FluoroscopeOptions options;  // its pointers are invalid
     int tool_count;
     const ToolLooks *looks;
-    int tool_room[TOOLS_MOST];   // upper limit of nodes
+    int tool_capacity[TOOLS_MOST]; // upper limit of nodes
     RibbonPath tool[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device, made when it is first seen
     Anatomy anatomy;
     Lumen lumen;

@@ -24,8 +24,8 @@ typedef struct RibbonPoint {
 bool ribbon_path_make(RibbonPath *path, int node_count, const double *s, int stretch_count, const TubeStretch *stretch)
 {
     const double same = 1e-6;            // [mm] a border at a point is that point
-    int room = node_count > 1 ? (node_count - 1) * PARTS + stretch_count + 1 : 1, at = 0;
-    *path = (RibbonPath){.node_count = node_count, .place = malloc((size_t)room * sizeof *path->place)};
+    int capacity = node_count > 1 ? (node_count - 1) * PARTS + stretch_count + 1 : 1, at = 0;
+    *path = (RibbonPath){.node_count = node_count, .place = malloc((size_t)capacity * sizeof *path->place)};
     if (!path->place)
         return false;
     double before = 0;

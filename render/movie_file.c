@@ -18,7 +18,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { LEAST_SIDE = 2, MOST_SIDE = 8192, OUTPUT = 3, WORDS = 400, PATIENCE_S = 60 };
+enum { LEAST_SIDE = 2, MOST_SIDE = 8192, OUTPUT = 3, MESSAGE_BYTES = 400, PATIENCE_S = 60 };
 
 struct MovieFile {
     char *path;
@@ -26,18 +26,18 @@ struct MovieFile {
     int even_width, even_height;
     uint8_t *even;               // (even_height, even_width, 3); NULL if the given size is even
     pid_t encoder;
-    int frames, words, output;   // descriptors: our ends of both sockets, and the unnamed file
+    int frames, messages, output; // descriptors: our ends of both sockets, and the unnamed file
     int count;
     bool failed, late;
-    char last_words[WORDS + 1];
-    size_t said;
+    char message_text[MESSAGE_BYTES + 1];
+    size_t message_length;
 };
 
 extern char **environ;
 
 static void forget(MovieFile *movie)
 {
-    const int open[] = {movie->frames, movie->words, movie->output};
+    const int open[] = {movie->frames, movie->messages, movie->output};
     for (int i = 0; i < 3; i++)
         if (open[i] >= 0)
             close(open[i]);
@@ -57,7 +57,7 @@ static int nameless_file(const char *path)
     return file;
 }
 
-static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
+static int spawn_encoder(MovieFile *movie, double fps, int frames, int messages)
 {
     char size[32], rate[32];
     snprintf(size, sizeof size, "%dx%d", movie->even_width, movie->even_height);
@@ -114,7 +114,7 @@ static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, frames, STDIN_FILENO);
     posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, words, STDERR_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, messages, STDERR_FILENO);
     posix_spawn_file_actions_adddup2(&actions, movie->output, OUTPUT);
     posix_spawnattr_init(&attributes);
     sigset_t none, plain;
@@ -135,18 +135,18 @@ static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
 // Creates the sockets and starts the encoder. Returns false with errno.
 static bool start_encoder(MovieFile *movie, double fps)
 {
-    int frames[2], words[2];
+    int frames[2], messages[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, frames) != 0)
         return false;
     movie->frames = frames[0];
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, words) != 0) {
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, messages) != 0) {
         close(frames[1]);
         return false;
     }
-    movie->words = words[0];
-    int why = spawn_encoder(movie, fps, frames[1], words[1]);
+    movie->messages = messages[0];
+    int why = spawn_encoder(movie, fps, frames[1], messages[1]);
     close(frames[1]);
-    close(words[1]);
+    close(messages[1]);
     errno = why;
     return why == 0;
 }
@@ -168,7 +168,7 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
     }
     MovieFile *movie = calloc(1, sizeof *movie);
     if (movie) {
-        *movie = (MovieFile){.path = strdup(path), .width = width, .height = height, .frames = -1, .words = -1, .output = -1};
+        *movie = (MovieFile){.path = strdup(path), .width = width, .height = height, .frames = -1, .messages = -1, .output = -1};
         movie->even_width = width + width % 2;
         movie->even_height = height + height % 2;
         bool odd = movie->even_width != width || movie->even_height != height;
@@ -201,23 +201,23 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
 static void listen_to_encoder(MovieFile *movie, bool wait)
 {
     for (;;) {
-        char heard[WORDS];
-        ssize_t count = recv(movie->words, heard, sizeof heard, wait ? 0 : MSG_DONTWAIT);
+        char received[MESSAGE_BYTES];
+        ssize_t count = recv(movie->messages, received, sizeof received, wait ? 0 : MSG_DONTWAIT);
         if (count < 0 && errno == EINTR)
             continue;
         if (count <= 0)
             return;
-        size_t size = (size_t)count, keep = movie->said + size > WORDS ? WORDS - size : movie->said;
-        memmove(movie->last_words, movie->last_words + movie->said - keep, keep);
-        memcpy(movie->last_words + keep, heard, size);
-        movie->said = keep + size;
+        size_t size = (size_t)count, keep = movie->message_length + size > MESSAGE_BYTES ? MESSAGE_BYTES - size : movie->message_length;
+        memmove(movie->message_text, movie->message_text + movie->message_length - keep, keep);
+        memcpy(movie->message_text + keep, received, size);
+        movie->message_length = keep + size;
     }
 }
 
 // Also reads the encoder's messages meanwhile, to avoid a deadlock.
 static bool send_all(MovieFile *movie, const uint8_t *bytes, size_t size)
 {
-    struct pollfd ends[] = {{.fd = movie->frames, .events = POLLOUT}, {.fd = movie->words, .events = POLLIN}};
+    struct pollfd ends[] = {{.fd = movie->frames, .events = POLLOUT}, {.fd = movie->messages, .events = POLLIN}};
     while (size > 0) {
         int ready = poll(ends, 2, 1000 * PATIENCE_S);
         if (ready < 0 && errno == EINTR)
@@ -280,8 +280,8 @@ static int end_encoder(MovieFile *movie, bool kill_it)
 // Links the unnamed file to its final path. Returns false with errno.
 static bool publish(const MovieFile *movie)
 {
-    size_t room = 1 << 20;
-    char *buffer = malloc(room);
+    size_t capacity = 1 << 20;
+    char *buffer = malloc(capacity);
     PartFile part;
     if (!buffer || !part_file_begin(&part, movie->path)) {
         free(buffer);
@@ -289,7 +289,7 @@ static bool publish(const MovieFile *movie)
     }
     ssize_t count = 0;
     bool good = true;
-    for (off_t at = 0; good && (count = pread(movie->output, buffer, room, at)) > 0; at += count)
+    for (off_t at = 0; good && (count = pread(movie->output, buffer, capacity, at)) > 0; at += count)
         good = part_file_write(&part, buffer, (size_t)count);
     good = good && count == 0 && part_file_finish_synced(&part);
     part_file_drop(&part);
@@ -300,10 +300,10 @@ static bool publish(const MovieFile *movie)
 // The last non-empty line of the encoder's messages.
 static const char *last_line(MovieFile *movie)
 {
-    char *text = movie->last_words;
-    while (movie->said > 0 && (unsigned char)text[movie->said - 1] <= ' ')
-        movie->said--;
-    text[movie->said] = 0;
+    char *text = movie->message_text;
+    while (movie->message_length > 0 && (unsigned char)text[movie->message_length - 1] <= ' ')
+        movie->message_length--;
+    text[movie->message_length] = 0;
     char *line = strrchr(text, '\n');
     return line ? line + 1 : text;
 }
@@ -312,7 +312,7 @@ bool movie_file_close(MovieFile *movie, char *message, size_t capacity)
 {
     struct stat status;
     int ended = end_encoder(movie, movie->late || movie->count == 0);
-    const char *words = last_line(movie);
+    const char *messages = last_line(movie);
     bool good = false;
     if (movie->late)
         message_fail(message, capacity, "%s: ffmpeg accepted no frame for %d s; no video was written", movie->path, PATIENCE_S);
@@ -320,8 +320,9 @@ bool movie_file_close(MovieFile *movie, char *message, size_t capacity)
         message_fail(message, capacity, "%s: the video has no frames; expected at least one", movie->path);
     else if (WIFSIGNALED(ended))
         message_fail(message, capacity, "%s: ffmpeg was ended by signal %d after %d frames; no video was written", movie->path, WTERMSIG(ended), movie->count);
-    else if (movie->failed || !WIFEXITED(ended) || WEXITSTATUS(ended) != 0 || words[0])
-        message_fail(message, capacity, "%s: ffmpeg failed: %s; no video was written", movie->path, words[0] ? words : "it ended early without a message");
+    else if (movie->failed || !WIFEXITED(ended) || WEXITSTATUS(ended) != 0 || messages[0])
+        message_fail(message, capacity, "%s: ffmpeg failed: %s; no video was written", movie->path,
+                     messages[0] ? messages : "it ended early without a message");
     else if (fstat(movie->output, &status) != 0 || status.st_size == 0)
         message_fail(message, capacity, "%s: ffmpeg wrote nothing; no video was written", movie->path);
     else if (!(good = publish(movie)))

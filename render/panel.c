@@ -115,7 +115,7 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
     bool is_refused = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0;   // Escape, or the button
     // a second click on the close button of the window confirms
     bool is_confirmed = panel->answer > 0 || (panel->dialogue != DIALOGUE_TRAINEE && has_key(input, WINDOW_KEY_ENTER)) ||
-                        (panel->dialogue == DIALOGUE_QUIT && input->close == WINDOW_CLOSE_ASKED);
+                        (panel->dialogue == DIALOGUE_QUIT && input->close == WINDOW_CLOSE_REQUESTED);
     if (panel->dialogue == DIALOGUE_TRAY)
         take_tray(panel, input, actions);
     int full_screen = actions->pressed[ACTION_FULL_SCREEN], picture = actions->pressed[ACTION_SCREENSHOT];
@@ -167,7 +167,7 @@ static void take_own_actions(Panel *panel, const WindowInput *input, PanelAction
         panel->has_panels = !panel->has_panels;
     if (pressed[ACTION_HINTS] % 2)
         panel->has_hints = !panel->has_hints;
-    if (pressed[ACTION_QUIT] > 0 || input->close == WINDOW_CLOSE_ASKED)
+    if (pressed[ACTION_QUIT] > 0 || input->close == WINDOW_CLOSE_REQUESTED)
         open_dialogue(panel, DIALOGUE_QUIT);
     else if (pressed[ACTION_RESTART] > 0)
         open_dialogue(panel, DIALOGUE_RESTART);

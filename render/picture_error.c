@@ -50,7 +50,7 @@ bool picture_page_error_surface(PicturePage *page, const PictureOptions *options
     }
     surface_view_draw_points(page->view, &camera, camera.center, mesh->vertex_count, point);
     picture_page_end_panel(page, panel, x, y);
-    picture_page_scale_bar(page, x + 16 * page->scale, y + height - 14 * page->scale, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
+    picture_page_scale_bar(page, x + 16 * page->scale, y + height - 14 * page->scale, 0.22 * width, camera.mm_per_pixel, PAGE_INK);
     free(point);
     return true;
 }
@@ -71,7 +71,7 @@ static void picture_page_class_chart(PicturePage *page, double x, double y, doub
     }
     for (int k = 0; k < BINS; k++)
         most = bin[k] > most ? bin[k] : most;
-    overlay_fill(page->overlay, x, y, width, height, SHEET_PANEL);
+    overlay_fill(page->overlay, x, y, width, height, PAGE_PANEL);
     for (int k = 0; k < BINS; k++) {
         double from = end * k / BINS, tall = bin[k] > 0 ? fmax((height - 30 * s) * bin[k] / most, 1.5 * s) : 0;
         overlay_fill(page->overlay, x + width * k / BINS, y + height - tall, width / BINS - 1, tall, color[from < 0.5 ? 0 : from < 1 ? 1 : from < 2 ? 2 : 3]);
@@ -80,15 +80,15 @@ static void picture_page_class_chart(PicturePage *page, double x, double y, doub
         double left = x + width * border[k] / end, right = x + width * border[k + 1] / end;
         char text[64];
         if (k > 0)
-            overlay_line(page->overlay, left, y, left, y + height, SHEET_INK, s);
+            overlay_line(page->overlay, left, y, left, y + height, PAGE_INK, s);
         snprintf(text, sizeof text, "C%d %.1f %%", k + 1, count > 0 ? 100.0 * in_class[k] / count : 0);
         picture_page_text_anchored(page, 0.5 * (left + right), y + 4 * s, 0.5, TEXT_SMALL, color[k], text);
         snprintf(text, sizeof text, "%g", border[k]);
-        picture_page_text_anchored(page, left, y + height + 4 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+        picture_page_text_anchored(page, left, y + height + 4 * s, 0.5, TEXT_SMALL, PAGE_INK, text);
     }
     char text[96];
     snprintf(text, sizeof text, "d_a [voxels of %g mm], %d local models, tallest bar %d", voxel, count, most);
-    picture_page_text(page, x, y + height + 24 * s, TEXT_SMALL, SHEET_MUTED, "%s", text);
+    picture_page_text(page, x, y + height + 24 * s, TEXT_SMALL, PAGE_MUTED, "%s", text);
 }
 
 bool picture_of_error(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm,
@@ -111,7 +111,7 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
         picture_page_title(&page, gap, 18 * s, page.width - 2 * gap, options->title ? options->title : "distance of the surface to the data");
         picture_page_color_bar(&page, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale,
                                "data to surface [mm]: blue outside the model, red inside");
-        picture_page_text(&page, left, top + 90 * s, TEXT_NORMAL, SHEET_INK, "local models by distance to their data (Table 4)");
+        picture_page_text(&page, left, top + 90 * s, TEXT_NORMAL, PAGE_INK, "local models by distance to their data (Table 4)");
         picture_page_class_chart(&page, left, top + 120 * s, column, 240 * s, tree->node_count, tree->error, voxel_mm);
         drawn = picture_page_save(&page, path);
     }

@@ -95,7 +95,7 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
     }
     surface_view_draw_points(page->view, &camera, camera.center, count, point);
     picture_page_end_panel(page, panel, x, y);
-    picture_page_scale_bar(page, x + 16 * s, y + height - 14 * s, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
+    picture_page_scale_bar(page, x + 16 * s, y + height - 14 * s, 0.22 * width, camera.mm_per_pixel, PAGE_INK);
     free(point);
     return true;
 }
@@ -113,16 +113,16 @@ static void draw_histogram(FitDrawing *drawing, double x, double y, double width
     }
     for (int i = 0; i < BINS; i++)
         most = bin[i] > most ? bin[i] : most;
-    overlay_fill(page->overlay, x, y, width, height, SHEET_PANEL);
+    overlay_fill(page->overlay, x, y, width, height, PAGE_PANEL);
     for (int i = 0; i < BINS; i++) {
         double tall = (height - 6 * page->scale) * (double)bin[i] / (double)most;
         Color color = color_diverging((i + 0.5) / BINS * 2 - 1);
         overlay_fill(page->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color);
-        overlay_rectangle(page->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color_with_alpha(SHEET_MUTED, 0.5), 1);
+        overlay_rectangle(page->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color_with_alpha(PAGE_MUTED, 0.5), 1);
     }
-    overlay_line(page->overlay, x + width / 2, y, x + width / 2, y + height, SHEET_MUTED, page->scale);
+    overlay_line(page->overlay, x + width / 2, y, x + width / 2, y + height, PAGE_MUTED, page->scale);
     if (beyond > 0)
-        picture_page_text(page, x + 6 * page->scale, y + 4 * page->scale, TEXT_SMALL, SHEET_MUTED, "%lld outside this range", (long long)beyond);
+        picture_page_text(page, x + 6 * page->scale, y + 4 * page->scale, TEXT_SMALL, PAGE_MUTED, "%lld outside this range", (long long)beyond);
 }
 
 // The zero of the field on the edge between two corners.
@@ -194,8 +194,8 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     slice.across = aside;
     slice.normal = vec3_cross(slice.along, aside);
-    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%d: r %.2f, error %.2f mm", node, r, tree->error ? tree->error[node] : NAN);
-    overlay_fill(page->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_PANEL);
+    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%d: r %.2f, error %.2f mm", node, r, tree->error ? tree->error[node] : NAN);
+    overlay_fill(page->overlay, slice.x, slice.y, slice.side, slice.side, PAGE_PANEL);
     overlay_push_clip(page->overlay, slice.x, slice.y, slice.side, slice.side);
     double px, py, off, scale = slice.side / (2 * slice.half);
     for (int64_t b = tree->blob_offset[node]; b < tree->blob_offset[node + 1]; b++) {
@@ -209,20 +209,20 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     for (int i = 0; i < tree->node_count; i++)
         if (tree->parent[i] == node || tree->parent[node] == i)
             draw_contour(drawing, &slice, i, (Color){150, 154, 160, 150}, s);
-    draw_contour(drawing, &slice, node, SHEET_INK, 1.8 * s);
+    draw_contour(drawing, &slice, node, PAGE_INK, 1.8 * s);
     for (int64_t k = tree->point_offset[node]; k < tree->point_offset[node + 1]; k++) {
         slice_place(&slice, tree->point[k], &px, &py, &off);
         if (fabs(off) > 0.3 * r || !isfinite(drawing->distance[k]))
             continue;
-        overlay_disc(page->overlay, px, py, 3.2 * s, color_with_alpha(SHEET_INK, 0.7));
+        overlay_disc(page->overlay, px, py, 3.2 * s, color_with_alpha(PAGE_INK, 0.7));
         overlay_disc(page->overlay, px, py, 2.5 * s, color_diverging(drawing->distance[k] / drawing->full_scale));
     }
     overlay_pop_clip(page->overlay);
-    overlay_rectangle(page->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_FAINT, s);
+    overlay_rectangle(page->overlay, slice.x, slice.y, slice.side, slice.side, PAGE_FAINT, s);
     char blobs[32];
     snprintf(blobs, sizeof blobs, "%d blobs", blobby_of(tree, node).count);
-    picture_page_label(page, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, SHEET_MUTED, blobs);
-    picture_page_scale_bar(page, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
+    picture_page_label(page, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, PAGE_MUTED, blobs);
+    picture_page_scale_bar(page, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, PAGE_INK);
 }
 
 // Chooses the largest errors first, and none next to one already chosen.
@@ -262,14 +262,14 @@ static bool draw_fit(FitDrawing *drawing)
     snprintf(title, sizeof title, "signed distance [mm]: blue outside the model, red inside");
     picture_page_color_bar(page, left, y, column, 12 * s, map_diverging, -1, -drawing->full_scale, drawing->full_scale, title);
     y += 66 * s;
-    picture_page_text(page, left, y, TEXT_NORMAL, SHEET_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
+    picture_page_text(page, left, y, TEXT_NORMAL, PAGE_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
                       (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99), percentile(drawing, 1));
-    picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f per node", tree->node_count, (long long)tree->blob_count,
+    picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, PAGE_INK, "%d nodes, %lld blobs, %.1f per node", tree->node_count, (long long)tree->blob_count,
                       (double)tree->blob_count / tree->node_count);
     y += 56 * s;
     if (worst < 1)
         return true;
-    picture_page_text(page, left, y, TEXT_NORMAL, SHEET_MUTED, "nodes with the largest errors, cut through axis and worst point; walls of neighbours grey");
+    picture_page_text(page, left, y, TEXT_NORMAL, PAGE_MUTED, "nodes with the largest errors, cut through axis and worst point; walls of neighbours grey");
     y += 28 * s;
     int best_columns = 1;
     double room = page->height - gap - y, best = 0;

@@ -162,7 +162,7 @@ static void draw_wall(JunctionDrawing *drawing, const JunctionCell *cell)
             if (!over_image && f[0] > 0)
                 overlay_fill(overlay, corner[0][0], corner[0][1], pixel, pixel, LUMEN);
             for (int k = 0; k + 1 < cuts; k += 2)
-                overlay_line(overlay, cut[k][0], cut[k][1], cut[k + 1][0], cut[k + 1][1], over_image ? (Color){80, 220, 255, 255} : SHEET_INK, 1.6 * s);
+                overlay_line(overlay, cut[k][0], cut[k][1], cut[k + 1][0], cut[k + 1][1], over_image ? (Color){80, 220, 255, 255} : PAGE_INK, 1.6 * s);
         }
 }
 
@@ -198,9 +198,9 @@ static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const Reac
     Color color = clearance < 0 ? CAPPED : clearance < tool ? NARROW : OPEN;
     find_plane(of, junction, &cell);
     find_near(in, &cell);
-    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance,
+    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance,
                       junction->apart ? ", apart" : "");
-    overlay_fill(page->overlay, cell.x, cell.y, cell.side, cell.side, SHEET_PANEL);
+    overlay_fill(page->overlay, cell.x, cell.y, cell.side, cell.side, PAGE_PANEL);
     overlay_push_clip(page->overlay, cell.x, cell.y, cell.side, cell.side);
     draw_image(drawing, &cell);
     draw_wall(drawing, &cell);
@@ -212,7 +212,7 @@ static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const Reac
     if (drawing->what->value)
         overlay_fill(page->overlay, cell.x + 2 * s, cell.y + cell.side - 32 * s, 0.35 * cell.side + 12 * s, 30 * s, (Color){0, 0, 0, 130});
     picture_page_scale_bar(page, cell.x + 6 * s, cell.y + cell.side - 6 * s, 0.35 * cell.side, 2 * cell.half / cell.side,
-                           drawing->what->value ? (Color){255, 255, 255, 255} : SHEET_INK);
+                           drawing->what->value ? (Color){255, 255, 255, 255} : PAGE_INK);
 }
 
 // --- Pages ---
@@ -261,7 +261,7 @@ static void draw_head(JunctionDrawing *drawing, const char *title, int first, in
     double s = page->scale;
     picture_page_title(page, 20 * s, 14 * s, page->width - 40 * s, title);
     picture_page_text(
-        page, 20 * s, 42 * s, TEXT_SMALL, SHEET_MUTED,
+        page, 20 * s, 42 * s, TEXT_SMALL, PAGE_MUTED,
         "junctions %d to %d of %d, narrowest first: section through parent's axis and branch; wall %s, centreline blue, data orange; frame red: capped, "
         "orange: less than %.2f mm",
         first + 1, end, count, drawing->what->value ? "light blue over the image" : "black, lumen tinted", drawing->what->tool_radius);

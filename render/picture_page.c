@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-const Color SHEET_INK = {34, 37, 42, 255}, SHEET_MUTED = {104, 108, 115, 255}, SHEET_FAINT = {206, 207, 205, 255};
-const Color SHEET_PAPER = {255, 255, 255, 255}, SHEET_PANEL = {248, 248, 246, 255};
+const Color PAGE_INK = {34, 37, 42, 255}, PAGE_MUTED = {104, 108, 115, 255}, PAGE_FAINT = {206, 207, 205, 255};
+const Color PAGE_PAPER = {255, 255, 255, 255}, PAGE_PANEL = {248, 248, 246, 255};
 
 double picture_page_scale_of(const PictureOptions *options) { return fmin(fmax(fmin(options->width / 1.6, options->height) / 1000, 0.6), 4); }
 
@@ -44,7 +44,7 @@ bool picture_page_save(PicturePage *page, const char *path)
     uint8_t *rgb = malloc((size_t)page->width * (size_t)page->height * 3);
     if (!rgb)
         return message_fail(page->message, page->capacity, "not enough memory for a picture of %d x %d pixels", page->width, page->height);
-    const float paper[3] = {(float)SHEET_PAPER.r / 255, (float)SHEET_PAPER.g / 255, (float)SHEET_PAPER.b / 255};
+    const float paper[3] = {(float)PAGE_PAPER.r / 255, (float)PAGE_PAPER.g / 255, (float)PAGE_PAPER.b / 255};
     gl_canvas_begin(&page->canvas, paper);
     overlay_finish(page->overlay);
     gl_canvas_read(&page->canvas, rgb);
@@ -72,15 +72,15 @@ void picture_page_close(PicturePage *page)
 
 GlCanvas *picture_page_begin_panel(PicturePage *page, int width, int height)
 {
-    if (page->panel_count == SHEET_PANELS) {
-        message_fail(page->message, page->capacity, "more than %d panels in one picture", SHEET_PANELS);
+    if (page->panel_count == PAGE_PANELS) {
+        message_fail(page->message, page->capacity, "more than %d panels in one picture", PAGE_PANELS);
         return NULL;
     }
     GlCanvas *panel = &page->panel[page->panel_count];
     if (!gl_canvas_create(panel, width < 1 ? 1 : width, height < 1 ? 1 : height, 4, page->message, page->capacity))
         return NULL;
     page->panel_count++;
-    const float ground[3] = {(float)SHEET_PANEL.r / 255, (float)SHEET_PANEL.g / 255, (float)SHEET_PANEL.b / 255};
+    const float ground[3] = {(float)PAGE_PANEL.r / 255, (float)PAGE_PANEL.g / 255, (float)PAGE_PANEL.b / 255};
     gl_canvas_begin(panel, ground);
     return panel;
 }
@@ -93,7 +93,7 @@ void picture_page_end_panel(PicturePage *page, const GlCanvas *panel, double x, 
 
 unsigned picture_page_grey_texture(PicturePage *page, int width, int height, const uint8_t *grey)
 {
-    if (page->texture_count == SHEET_PANELS)
+    if (page->texture_count == PAGE_PANELS)
         return 0;
     unsigned texture;
     glGenTextures(1, &texture);
@@ -142,13 +142,13 @@ double picture_page_title(PicturePage *page, double x, double y, double room, co
         snprintf(shown, sizeof shown, "...%s", text + cut);
         overlay_text_size(page->overlay, TEXT_LARGE, shown, &width, NULL);
     }
-    overlay_text(page->overlay, x, y, TEXT_LARGE, SHEET_INK, shown);
+    overlay_text(page->overlay, x, y, TEXT_LARGE, PAGE_INK, shown);
     return width;
 }
 
 void picture_page_label(PicturePage *page, double x, double y, double anchor, TextSize size, Color color, const char *text)
 {
-    const Color halo = color_with_alpha(SHEET_PANEL, 0.55);
+    const Color halo = color_with_alpha(PAGE_PANEL, 0.55);
     for (int i = -1; i <= 1; i++)
         for (int j = -1; j <= 1; j++)
             if (i || j)
@@ -173,7 +173,7 @@ void picture_page_color_bar(PicturePage *page, double x, double y, double width,
 {
     double s = page->scale, text_height;
     overlay_text_size(page->overlay, TEXT_SMALL, title, NULL, &text_height);
-    picture_page_text(page, x, y, TEXT_SMALL, SHEET_INK, "%s", title);
+    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%s", title);
     double top = y + text_height + 4 * s;
     int parts = (int)width;
     for (int i = 0; i < parts; i++)
@@ -183,11 +183,11 @@ void picture_page_color_bar(PicturePage *page, double x, double y, double width,
         char text[32];
         tick_format(text, sizeof text, k * step, step);
         double at = x + width * (k * step - low) / (high - low);
-        overlay_line(page->overlay, at, top + height, at, top + height + 4 * s, SHEET_INK, s);
+        overlay_line(page->overlay, at, top + height, at, top + height + 4 * s, PAGE_INK, s);
         double text_width;
         overlay_text_size(page->overlay, TEXT_SMALL, text, &text_width, NULL);
         double left = fmin(fmax(at - text_width / 2, x), x + width - text_width);
-        overlay_text(page->overlay, left, top + height + 5 * s, TEXT_SMALL, SHEET_INK, text);
+        overlay_text(page->overlay, left, top + height + 5 * s, TEXT_SMALL, PAGE_INK, text);
     }
 }
 

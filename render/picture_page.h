@@ -10,7 +10,7 @@
 #include "render/picture.h"
 #include "render/surface_view.h"
 
-enum { SHEET_PANELS = 32 };
+enum { PAGE_PANELS = 32 };
 
 typedef struct PicturePage {
     int width, height;         // [pixel]
@@ -20,14 +20,14 @@ typedef struct PicturePage {
     Overlay *overlay;
     SurfaceView *view;
     int panel_count;
-    GlCanvas panel[SHEET_PANELS];
+    GlCanvas panel[PAGE_PANELS];
     int texture_count;
-    unsigned texture[SHEET_PANELS];
+    unsigned texture[PAGE_PANELS];
     char *message;             // the caller's
     size_t capacity;
 } PicturePage;
 
-extern const Color SHEET_INK, SHEET_MUTED, SHEET_FAINT, SHEET_PAPER, SHEET_PANEL;
+extern const Color PAGE_INK, PAGE_MUTED, PAGE_FAINT, PAGE_PAPER, PAGE_PANEL;
 
 // 1 for 1600 x 1000 pixels.
 double picture_page_scale_of(const PictureOptions *options);

@@ -278,7 +278,7 @@ static void label_panel(RunDrawing *drawing, const Camera *camera, double x, dou
         overlay_text_size(page->overlay, TEXT_NORMAL, name, &width, &height);
         bool fits_right = p.x + away + width < camera->width - 4 * s;
         double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s), top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
-        picture_page_label(page, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : SHEET_MUTED, name);
+        picture_page_label(page, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : PAGE_MUTED, name);
     }
 }
 
@@ -333,7 +333,7 @@ static void outline_close_up(RunDrawing *drawing, const Camera *whole, const Cam
     Vec3 p = camera_project(whole, close->center);
     double half = 0.5 * close->width * close->mm_per_pixel / whole->mm_per_pixel;
     overlay_push_clip(drawing->page->overlay, x, y, whole->width, whole->height);
-    overlay_rectangle(drawing->page->overlay, x + p.x - half, y + p.y - half, 2 * half, 2 * half, SHEET_MUTED, 1.2 * drawing->page->scale);
+    overlay_rectangle(drawing->page->overlay, x + p.x - half, y + p.y - half, 2 * half, 2 * half, PAGE_MUTED, 1.2 * drawing->page->scale);
     overlay_pop_clip(drawing->page->overlay);
 }
 
@@ -363,8 +363,8 @@ static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x
         const PoseTool *own = &tool->pose->tool[k];
         const ToolLook *look = &tool->looks->tool[k];
         overlay_fill(page->overlay, x, y + 3 * s, 14 * s, 14 * s, look->on_paper);
-        picture_page_text(page, x + 22 * s, y, TEXT_NORMAL, SHEET_INK, "%s, %.1f mm inserted", look->name, own->inserted_mm);
-        picture_page_text(page, x + 22 * s, y + 0.9 * line, TEXT_NORMAL, SHEET_MUTED, "push %.3g N, torque %.3g N mm", own->push_n, own->torque_n_mm);
+        picture_page_text(page, x + 22 * s, y, TEXT_NORMAL, PAGE_INK, "%s, %.1f mm inserted", look->name, own->inserted_mm);
+        picture_page_text(page, x + 22 * s, y + 0.9 * line, TEXT_NORMAL, PAGE_MUTED, "push %.3g N, torque %.3g N mm", own->push_n, own->torque_n_mm);
     }
     return 2 * line * tool->pose->tool_count + 6 * s;
 }
@@ -378,10 +378,10 @@ static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x
     double largest = largest_force(1, tool);
     for (int i = 0; tool->force && i < tool->node_count; i++)
         touching += vec3_norm2(tool->force[i]) > 0;
-    picture_page_text(page, x, y, TEXT_NORMAL, SHEET_INK, "largest %.3g %s, %d nodes touch the wall", largest < 1 ? 1000 * largest : largest,
+    picture_page_text(page, x, y, TEXT_NORMAL, PAGE_INK, "largest %.3g %s, %d nodes touch the wall", largest < 1 ? 1000 * largest : largest,
                       largest < 1 ? "mN" : "N", touching);
     Vec3 tip = tool->position[tool->node_count - 1];
-    picture_page_text(page, x, y + line, TEXT_NORMAL, SHEET_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
+    picture_page_text(page, x, y + line, TEXT_NORMAL, PAGE_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
     overlay_push_clip(page->overlay, x, y, width, page->height - y);
     for (int i = 0; i < targets; i++) {
         const SceneTarget *target = &drawing->scene->target[i];
@@ -402,8 +402,8 @@ static bool draw_side_view(RunDrawing *drawing, const Camera *whole, const Pictu
     frame_all(drawing, &side, (int)width, (int)height, 12 * s, s);
     if (!draw_panel(drawing, &side, &drawing->style, tool, x, y))
         return false;
-    picture_page_label(page, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, SHEET_MUTED, "from the right");
-    picture_page_scale_bar(page, x + 14 * s, y + (int)height - 10 * s, 0.2 * width, side.mm_per_pixel, SHEET_INK);
+    picture_page_label(page, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, PAGE_MUTED, "from the right");
+    picture_page_scale_bar(page, x + 14 * s, y + (int)height - 10 * s, 0.2 * width, side.mm_per_pixel, PAGE_INK);
     return true;
 }
 
@@ -421,7 +421,7 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     if (!draw_panel(drawing, &whole, &drawing->style, tool, gap, top))
         return false;
     label_panel(drawing, &whole, gap, top);
-    picture_page_scale_bar(page, gap + 16 * s, top + height - 14 * s, 0.22 * width, whole.mm_per_pixel, SHEET_INK);
+    picture_page_scale_bar(page, gap + 16 * s, top + height - 14 * s, 0.22 * width, whole.mm_per_pixel, PAGE_INK);
 
     double left = page->width - gap - column, below = top;
     if (options->inset) {
@@ -432,9 +432,9 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
         if (!draw_panel(drawing, &close, &style, tool, left, top))
             return false;
         label_panel(drawing, &close, left, top);
-        overlay_rectangle(page->overlay, left, top, (int)column, (int)column, SHEET_MUTED, 1.2 * s);
+        overlay_rectangle(page->overlay, left, top, (int)column, (int)column, PAGE_MUTED, 1.2 * s);
         outline_close_up(drawing, &whole, &close, gap, top);
-        picture_page_scale_bar(page, left + 14 * s, top + column - 12 * s, 0.3 * column, close.mm_per_pixel, SHEET_INK);
+        picture_page_scale_bar(page, left + 14 * s, top + column - 12 * s, 0.3 * column, close.mm_per_pixel, PAGE_INK);
         below += column + 18 * s;
     }
     force_bar(drawing, left, below, column);
@@ -452,10 +452,10 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     overlay_text_size(page->overlay, TEXT_NORMAL, text, &wide, NULL);
     double title = picture_page_title(page, gap, 18 * s, page->width - 2 * gap - wide - 28 * s, options->title);
     double start = gap + (title > 0 ? title + 28 * s : 0);
-    overlay_text(page->overlay, start, 23 * s, TEXT_NORMAL, SHEET_INK, text);
+    overlay_text(page->overlay, start, 23 * s, TEXT_NORMAL, PAGE_INK, text);
     overlay_push_clip(page->overlay, start + wide, 0, page->width - gap - start - wide, top);
     if (tool->label)
-        picture_page_text(page, start + wide + 24 * s, 23 * s, TEXT_NORMAL, SHEET_MUTED, "%s", tool->label);
+        picture_page_text(page, start + wide + 24 * s, 23 * s, TEXT_NORMAL, PAGE_MUTED, "%s", tool->label);
     overlay_pop_clip(page->overlay);
     return true;
 }
@@ -495,14 +495,14 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
                            tool->pose->tool[k].push_n);
     overlay_push_clip(page->overlay, x, y, whole->width, header);
     if (tool->label)
-        picture_page_text(page, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
-    picture_page_text(page, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s", text);
+        picture_page_text(page, x, y, TEXT_NORMAL, PAGE_INK, "%s", tool->label);
+    picture_page_text(page, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? PAGE_MUTED : PAGE_INK, "%s", text);
     overlay_pop_clip(page->overlay);
     double top = y + header;
     if (!draw_panel(drawing, whole, &drawing->style, tool, x, top))
         return false;
     label_panel(drawing, whole, x, top);
-    picture_page_scale_bar(page, x + 12 * s, top + whole->height - 12 * s, 0.22 * whole->width, whole->mm_per_pixel, SHEET_INK);
+    picture_page_scale_bar(page, x + 12 * s, top + whole->height - 12 * s, 0.22 * whole->width, whole->mm_per_pixel, PAGE_INK);
     if (!drawing->options->inset)
         return true;
     Vec3 tip = tool->position[tool->node_count - 1];
@@ -518,8 +518,8 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     ShellStyle style = close_up_style(drawing, radius);
     if (!draw_panel(drawing, &close, &style, tool, left, above))
         return false;
-    overlay_rectangle(page->overlay, left, above, side, side, SHEET_MUTED, 1.2 * s);
-    picture_page_scale_bar(page, left + 10 * s, above + side - 8 * s, 0.36 * side, close.mm_per_pixel, SHEET_INK);
+    overlay_rectangle(page->overlay, left, above, side, side, PAGE_MUTED, 1.2 * s);
+    picture_page_scale_bar(page, left + 10 * s, above + side - 8 * s, 0.36 * side, close.mm_per_pixel, PAGE_INK);
     return true;
 }
 

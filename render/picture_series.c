@@ -106,15 +106,15 @@ static void draw_level(PicturePage *page, const Chart *chart, double level, cons
     double s = page->scale, y = chart->y + chart->height * (1 - (level - chart->low) / (chart->high - chart->low)), height;
     if (y < chart->y - 1e-6 || y > chart->y + chart->height + 1e-6)
         return;
-    overlay_line(page->overlay, chart->x, y, chart->x + chart->width, y, is_zero ? SHEET_MUTED : SHEET_FAINT, s);
+    overlay_line(page->overlay, chart->x, y, chart->x + chart->width, y, is_zero ? PAGE_MUTED : PAGE_FAINT, s);
     overlay_text_size(page->overlay, TEXT_SMALL, text, NULL, &height);
-    picture_page_text_anchored(page, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+    picture_page_text_anchored(page, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, PAGE_INK, text);
 }
 
 static void draw_grid(PicturePage *page, const Chart *chart, bool is_last)
 {
     double s = page->scale;
-    overlay_fill(page->overlay, chart->x, chart->y, chart->width, chart->height, SHEET_PANEL);
+    overlay_fill(page->overlay, chart->x, chart->y, chart->width, chart->height, PAGE_PANEL);
     char text[48];
     double step = tick_step(chart->high - chart->low, chart->height > 150 * s ? 6 : 4);
     if (chart->logarithmic) {
@@ -137,13 +137,13 @@ static void draw_grid(PicturePage *page, const Chart *chart, bool is_last)
     step = tick_step(chart->t1 - chart->t0, 10);
     for (double k = ceil(chart->t0 / step - 1e-9); k * step <= chart->t1 + 1e-9 * step; k++) {
         double x = chart->x + chart->width * (k * step - chart->t0) / (chart->t1 - chart->t0);
-        overlay_line(page->overlay, x, chart->y, x, chart->y + chart->height, SHEET_FAINT, s);
+        overlay_line(page->overlay, x, chart->y, x, chart->y + chart->height, PAGE_FAINT, s);
         tick_format(text, sizeof text, k * step, step);
         if (is_last)
-            picture_page_text_anchored(page, x, chart->y + chart->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+            picture_page_text_anchored(page, x, chart->y + chart->height + 5 * s, 0.5, TEXT_SMALL, PAGE_INK, text);
     }
     if (is_last)
-        picture_page_text_anchored(page, chart->x + chart->width / 2, chart->y + chart->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, "time [s]");
+        picture_page_text_anchored(page, chart->x + chart->width / 2, chart->y + chart->height + 23 * s, 0.5, TEXT_SMALL, PAGE_INK, "time [s]");
 }
 
 static void draw_panel(PicturePage *page, Chart *chart, int count, const double *time, const PicturePanel *panel, bool is_last, float (*point)[2])
@@ -152,7 +152,7 @@ static void draw_panel(PicturePage *page, Chart *chart, int count, const double 
     find_range(chart, count, panel);
     draw_grid(page, chart, is_last);
     double key = chart->x + chart->width;
-    picture_page_text(page, chart->x, chart->y - 22 * s, TEXT_NORMAL, SHEET_INK, "%s", panel->title ? panel->title : "");
+    picture_page_text(page, chart->x, chart->y - 22 * s, TEXT_NORMAL, PAGE_INK, "%s", panel->title ? panel->title : "");
     overlay_push_clip(page->overlay, chart->x, chart->y - 1, chart->width + 1, chart->height + 2);
     for (int k = 0; k < panel->line_count; k++)
         draw_line(page, chart, count, time, panel->line[k].value, color_qualitative(LINE_COLOR[k % 6]), point);
@@ -160,7 +160,7 @@ static void draw_panel(PicturePage *page, Chart *chart, int count, const double 
     for (int k = panel->line_count - 1; k >= 0; k--)
         if (panel->line[k].label) {
             Color color = color_qualitative(LINE_COLOR[k % 6]);
-            key -= picture_page_text_anchored(page, key, chart->y - 20 * s, 1, TEXT_SMALL, SHEET_INK, panel->line[k].label) + 6 * s;
+            key -= picture_page_text_anchored(page, key, chart->y - 20 * s, 1, TEXT_SMALL, PAGE_INK, panel->line[k].label) + 6 * s;
             overlay_fill(page->overlay, key - 18 * s, chart->y - 13 * s, 18 * s, 3 * s, color);
             key -= 36 * s;
         }
@@ -199,9 +199,9 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
         double x = chart.x + chart.width * (event[i].time_s - chart.t0) / (chart.t1 - chart.t0);
         if (!(x >= chart.x && x <= chart.x + chart.width))
             continue;
-        overlay_line(page.overlay, x, top + head - 4 * s, x, page.height - foot, SHEET_MUTED, 1.2 * s);
+        overlay_line(page.overlay, x, top + head - 4 * s, x, page.height - foot, PAGE_MUTED, 1.2 * s);
         if (event[i].label)
-            picture_page_label(&page, x, top - 12 * s, 0.5, TEXT_SMALL, SHEET_MUTED, event[i].label);
+            picture_page_label(&page, x, top - 12 * s, 0.5, TEXT_SMALL, PAGE_MUTED, event[i].label);
     }
     if (drawn)
         picture_page_title(&page, 20 * s, 12 * s, page.width - 40 * s, options->title);

@@ -123,23 +123,23 @@ static void draw_axes(PicturePage *page, const Panel *panel)
             if (direction) {
                 double y = panel->y + panel->height * (1 - part), height;
                 overlay_text_size(page->overlay, TEXT_SMALL, text, NULL, &height);
-                overlay_line(page->overlay, panel->x - 4 * s, y, panel->x, y, SHEET_INK, s);
-                picture_page_text_anchored(page, panel->x - 6 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+                overlay_line(page->overlay, panel->x - 4 * s, y, panel->x, y, PAGE_INK, s);
+                picture_page_text_anchored(page, panel->x - 6 * s, y - height / 2, 1, TEXT_SMALL, PAGE_INK, text);
             } else {
                 double x = panel->x + panel->width * part;
-                overlay_line(page->overlay, x, panel->y + panel->height, x, panel->y + panel->height + 4 * s, SHEET_INK, s);
-                picture_page_text_anchored(page, x, panel->y + panel->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+                overlay_line(page->overlay, x, panel->y + panel->height, x, panel->y + panel->height + 4 * s, PAGE_INK, s);
+                picture_page_text_anchored(page, x, panel->y + panel->height + 5 * s, 0.5, TEXT_SMALL, PAGE_INK, text);
             }
         }
     }
     char text[128];
     if (p->across_name) {
         snprintf(text, sizeof text, "%s [mm]", p->across_name);
-        picture_page_text_anchored(page, panel->x + panel->width / 2, panel->y + panel->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+        picture_page_text_anchored(page, panel->x + panel->width / 2, panel->y + panel->height + 23 * s, 0.5, TEXT_SMALL, PAGE_INK, text);
     }
     if (p->up_name) {
         snprintf(text, sizeof text, "%s [mm]", p->up_name);
-        picture_page_text_anchored(page, panel->x, panel->y - 20 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+        picture_page_text_anchored(page, panel->x, panel->y - 20 * s, 0.5, TEXT_SMALL, PAGE_INK, text);
     }
 }
 
@@ -257,7 +257,7 @@ static bool picture_of_projections(const char *path, const PictureOptions *optio
     char text[160];
     snprintf(text, sizeof text, "maximum intensity %.4g to %.4g; %d branch%s, %.0f mm", (double)low, (double)high, polyline_count,
              polyline_count == 1 ? "" : "es", length_of(polyline_count, polyline));
-    double wide = picture_page_text_anchored(&page, page.width - 20 * s, 17 * s, 1, TEXT_NORMAL, SHEET_MUTED, text);
+    double wide = picture_page_text_anchored(&page, page.width - 20 * s, 17 * s, 1, TEXT_NORMAL, PAGE_MUTED, text);
     picture_page_title(&page, 20 * s, 12 * s, page.width - wide - 60 * s, options->title);
     bool drawn = true;
     for (int k = 0; k < projection_count && drawn; k++)

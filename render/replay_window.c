@@ -26,7 +26,7 @@ typedef struct ReplayWindow {
     Rescore *rescore;
     TrainerPanel shown;
     TimelineState line;
-    bool resumes, has_told_difference;
+    bool resumes, has_reported_difference;
     double begun_s;
 } ReplayWindow;
 
@@ -105,8 +105,8 @@ static const ScoreFigures *score_now(ReplayWindow *replay)
 {
     rescore_advance(replay->rescore, playback_pose(replay->playback)->step, rescore_budget_s);
     int64_t different = rescore_first_different(replay->rescore);
-    if (different >= 0 && !replay->has_told_difference) {
-        replay->has_told_difference = true;
+    if (different >= 0 && !replay->has_reported_difference) {
+        replay->has_reported_difference = true;
         panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING,
                       "the repeated simulation differs from the recording: the score is not updated after that step");
     }
@@ -133,12 +133,12 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
     state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
     panel_draw(replay->panel, input, state, 0);
     replay->line.time_s = pose->time_s;
-    TimelineActions asked = timeline_draw(replay->timeline, input, &replay->line, layout->scale, layout->bottom, 0);
-    replay->line.is_playing ^= asked.toggle_play;
-    replay->line.speed = asked.speed;
-    replay->resumes |= asked.resume;
-    if (asked.seek)
-        seek(replay, asked.seek_s);
+    TimelineActions actions = timeline_draw(replay->timeline, input, &replay->line, layout->scale, layout->bottom, 0);
+    replay->line.is_playing ^= actions.toggle_play;
+    replay->line.speed = actions.speed;
+    replay->resumes |= actions.resume;
+    if (actions.seek)
+        seek(replay, actions.seek_s);
 }
 
 static void run_window(ReplayWindow *replay)
@@ -146,7 +146,7 @@ static void run_window(ReplayWindow *replay)
     const WindowInput *input;
     PanelActions actions = {0};
     double last = clock_s(CLOCK_MONOTONIC);
-    for (bool goes_on = true; goes_on;) {
+    for (bool is_running = true; is_running;) {
         bool visible = window_next_frame(replay->window, &input);
         double now = clock_s(CLOCK_MONOTONIC), passed = fmin(now - last, 0.1);
         last = now;
@@ -154,9 +154,9 @@ static void run_window(ReplayWindow *replay)
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
         controls_obey(&replay->controls, views_scene(replay->views), &actions, &layout, passed);
         obey(replay, &actions, passed);
-        goes_on = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
-                  !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);
-        if (!goes_on || !visible)
+        is_running = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
+                     !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);
+        if (!is_running || !visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
         draw(replay, input, &layout);

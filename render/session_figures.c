@@ -1,5 +1,5 @@
 // The session report's figures: strips over time, the tip's path in the C-arm's view, points over sessions. Colours are classes of page_style or, for
-// the path, steps of viridis' darker part, whose lightness grows with time: told apart by the colour-blind, and in print.
+// the path, steps of viridis' darker part, whose lightness grows with time, which the colour-blind can distinguish, also in print.
 #include "render/session_figures.h"
 
 #include "render/c_arm.h"
@@ -157,8 +157,8 @@ static XrayControl usual_view(const RecordedRun *run)
     XrayControl best = xray_default_control();
     int64_t most = 0, from = 0;
     for (int64_t i = 1; run->xray && i <= run->step_count; i++) {
-        bool goes_on = i < run->step_count && run->xray[i].lao_deg == run->xray[from].lao_deg && run->xray[i].cra_deg == run->xray[from].cra_deg;
-        if (goes_on)
+        bool is_same_view = i < run->step_count && run->xray[i].lao_deg == run->xray[from].lao_deg && run->xray[i].cra_deg == run->xray[from].cra_deg;
+        if (is_same_view)
             continue;
         int64_t seen = 0;
         for (int64_t k = from; k < i; k++)

@@ -25,7 +25,7 @@ static Scene *open_scene(const RecordedRun *run, NoteFunction note, OpenVessel *
     return scene;
 }
 
-static void say(const Faults *faults)
+static void print_faults(const Faults *faults)
 {
     for (int i = 0; i < faults->count && i < FAULTS_CAPACITY; i++)
         fprintf(stderr, "seldinger report: %s\n", faults->text[i]);
@@ -52,7 +52,7 @@ char *session_report(const char *path, const Session *session, const char *with,
         RecordedRun *run = *session->recording_path ? load_run(recording, gone) : NULL;
         Scene *scene = open_scene(run, note, &open, &tree, gone);
         Session *earlier = session_list(with, session->trainee, session->title, &page.earlier_count, &page.broken, gone);
-        say(gone);
+        print_faults(gone);
         if (page.broken > 0)
             fprintf(stderr, "seldinger report: %s: %d session file%s could not be read\n", with, page.broken, page.broken == 1 ? "" : "s");
         page.run = run;

@@ -216,7 +216,7 @@ static const WindowInput *window_poll(Window *w)
     w->clicked = 0;
     input->close = WINDOW_OPEN;
     if (glfwWindowShouldClose(w->window)) {
-        input->close = WINDOW_CLOSE_ASKED;
+        input->close = WINDOW_CLOSE_REQUESTED;
         glfwSetWindowShouldClose(w->window, GLFW_FALSE);
     }
     if (ended_by_signal)

@@ -57,7 +57,7 @@ typedef struct WindowEvent {
     float scroll_x, scroll_y;
 } WindowEvent;
 
-typedef enum { WINDOW_OPEN, WINDOW_CLOSE_ASKED, WINDOW_ENDED } WindowClose;   // by the title bar; by SIGINT, SIGTERM or SIGHUP
+typedef enum { WINDOW_OPEN, WINDOW_CLOSE_REQUESTED, WINDOW_ENDED } WindowClose; // by the title bar; by SIGINT, SIGTERM or SIGHUP
 
 enum { WINDOW_EVENTS = 256, WINDOW_GAMEPADS = 16, WINDOW_AXES = 16, WINDOW_BUTTONS = 64 };
 

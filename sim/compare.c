@@ -71,10 +71,10 @@ static bool is_whole(double value, int most) { return value >= 0 && value <= mos
 // Rows are sorted by time, tool and node; times are printed with six digits.
 static double time_slack(double t_s) { return 1e-5 * fmax(1, fabs(t_s)); }
 
-static bool comes_before(const PathRow *row, const PathRow *want, double slack)
+static bool comes_before(const PathRow *row, const PathRow *reference, double slack)
 {
-    bool same_time = fabs(row->t_s - want->t_s) <= slack;
-    return row->t_s < want->t_s - slack || (same_time && (row->tool < want->tool || (row->tool == want->tool && row->node < want->node)));
+    bool same_time = fabs(row->t_s - reference->t_s) <= slack;
+    return row->t_s < reference->t_s - slack || (same_time && (row->tool < reference->tool || (row->tool == reference->tool && row->node < reference->node)));
 }
 
 static void parse_rows(const NumberTable *table, const char *file, ToolPath *path, Faults *faults)
@@ -200,7 +200,7 @@ ToolPath *tool_path_create(Simulator *simulator, double duration_s)
     return NULL;
 }
 
-static bool make_room(ToolPath *path, int rows)
+static bool reserve_rows(ToolPath *path, int rows)
 {
     if (path->row_count + rows <= path->row_capacity)
         return true;
@@ -221,7 +221,7 @@ bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last)
     // also sample the end if it lies between two samples
     if (last ? due || steps == 0 : !due)
         return true;
-    if (!make_room(path, SAMPLED_NODES * path->tool_count))
+    if (!reserve_rows(path, SAMPLED_NODES * path->tool_count))
         return false;
     for (int k = 0; k < path->tool_count; k++) {
         int tip = stepper_tool_nodes(simulator_stepper(simulator), k, path->node) - 1, count = tip + 1 < SAMPLED_NODES ? tip + 1 : SAMPLED_NODES;
@@ -236,12 +236,12 @@ bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last)
 // Describes a difference in the tools' node counts.
 static void compare_counts(const ToolPath *golden, const ToolPath *run, PathDifference *difference)
 {
-    size_t room = sizeof difference->remark;
+    size_t capacity = sizeof difference->remark;
     if (golden->tool_count != run->tool_count)
-        snprintf(difference->remark, room, "%d tools, the golden has %d", run->tool_count, golden->tool_count);
+        snprintf(difference->remark, capacity, "%d tools, the golden has %d", run->tool_count, golden->tool_count);
     for (int k = 0; !difference->remark[0] && k < golden->tool_count; k++)
         if (golden->node_count[k] != run->node_count[k])
-            snprintf(difference->remark, room, "%d nodes, the golden has %d", run->node_count[k], golden->node_count[k]);
+            snprintf(difference->remark, capacity, "%d nodes, the golden has %d", run->node_count[k], golden->node_count[k]);
     difference->differs = difference->remark[0];
 }
 
@@ -252,22 +252,23 @@ PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, do
     int j = 0, missing = 0;
     double first_missing = 0;
     for (int i = 0; i < golden->row_count; i++) {
-        const PathRow *want = &golden->row[i];
-        double slack = time_slack(want->t_s);
-        while (j < run->row_count && comes_before(&run->row[j], want, slack))
+        const PathRow *reference = &golden->row[i];
+        double slack = time_slack(reference->t_s);
+        while (j < run->row_count && comes_before(&run->row[j], reference, slack))
             j++;
-        if (j == run->row_count || fabs(run->row[j].t_s - want->t_s) > slack || run->row[j].tool != want->tool || run->row[j].node != want->node) {
-            first_missing = missing++ ? first_missing : want->t_s;
+        if (j == run->row_count || fabs(run->row[j].t_s - reference->t_s) > slack || run->row[j].tool != reference->tool ||
+            run->row[j].node != reference->node) {
+            first_missing = missing++ ? first_missing : reference->t_s;
             continue;
         }
-        double distance = vec3_distance(run->row[j].position, want->position);
+        double distance = vec3_distance(run->row[j].position, reference->position);
         if (!(distance <= difference.worst_mm))
             difference.worst_mm = distance;
         if (!(distance <= tolerance_mm) && difference.first_node < 0) {
             difference.differs = true;
-            difference.first_t_s = want->t_s;
-            difference.first_tool = want->tool;
-            difference.first_node = want->node;
+            difference.first_t_s = reference->t_s;
+            difference.first_tool = reference->tool;
+            difference.first_node = reference->node;
             difference.first_mm = distance;
         }
     }

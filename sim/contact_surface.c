@@ -32,7 +32,7 @@ static double farthest_point(const VesselTree *tree, int node)
     return sqrt(far2);
 }
 
-static bool goes_on_upstream(const Vessel *exact, Vec3 inlet, Vec3 direction, double radius)
+static bool continues_upstream(const Vessel *exact, Vec3 inlet, Vec3 direction, double radius)
 {
     Vec3 x = vec3_add_scaled(inlet, -2 * radius, direction);
     VesselMemory memory = {.node = exact->locate(exact, x, -1)};
@@ -43,8 +43,8 @@ static bool goes_on_upstream(const Vessel *exact, Vec3 inlet, Vec3 direction, do
 
 static bool fill_balls(Balls *balls, const Vessel *exact, const VesselTree *nodes, bool open_end, double cell)
 {
-    size_t room = (size_t)nodes->node_count + UPSTREAM;
-    *balls = (Balls){0, calloc(room, sizeof(Vec3)), calloc(room, sizeof(double)), calloc(room, sizeof(int))};
+    size_t capacity = (size_t)nodes->node_count + UPSTREAM;
+    *balls = (Balls){0, calloc(capacity, sizeof(Vec3)), calloc(capacity, sizeof(double)), calloc(capacity, sizeof(int))};
     if (!balls->center || !balls->reach || !balls->from)
         return false;
     for (int i = 0; i < nodes->node_count; i++) {
@@ -56,7 +56,7 @@ static bool fill_balls(Balls *balls, const Vessel *exact, const VesselTree *node
     }
     Vec3 inlet, direction;
     double r = nodes->radius[0];
-    if (exact->inlet && exact->inlet(exact, &inlet, &direction) && goes_on_upstream(exact, inlet, direction, r))
+    if (exact->inlet && exact->inlet(exact, &inlet, &direction) && continues_upstream(exact, inlet, direction, r))
         for (int k = 1; k <= UPSTREAM; k++)
             add_ball(balls, vec3_add_scaled(inlet, -0.5 * r * k, direction), 1.2 * r + 2 * cell, balls->from[0]);
     return true;
@@ -70,8 +70,8 @@ static double thinnest_radius(const VesselTree *nodes)
     return thinnest;
 }
 
-static void tell(NoteFunction note, const char *name, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static void tell(NoteFunction note, const char *name, const char *format, ...)
+static void write_note(NoteFunction note, const char *name, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static void write_note(NoteFunction note, const char *name, const char *format, ...)
 {
     char text[200];
     va_list arguments;
@@ -87,7 +87,7 @@ static void drop_specks(TriangleMesh *mesh, double thinnest, const char *name, N
 {
     int dropped = surface_drop_specks(mesh, 4 * PI / 3 * thinnest * thinnest * thinnest);
     if (dropped > 0)
-        tell(note, name, "removed %d specks of its mesh, where neighbouring local models disagree", dropped);
+        write_note(note, name, "removed %d specks of its mesh, where neighbouring local models disagree", dropped);
 }
 
 TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes, bool open_end, double cell_mm, const char *name, NoteFunction note,
@@ -98,7 +98,7 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
     TriangleMesh *mesh = NULL;
     double thinnest = thinnest_radius(nodes);
     if (cell_mm > COARSE * thinnest)
-        tell(note, name, "its mesh has cells of %g mm, which are coarse for a radius of %g mm: thin vessels lose their shape", cell_mm, thinnest);
+        write_note(note, name, "its mesh has cells of %g mm, which are coarse for a radius of %g mm: thin vessels lose their shape", cell_mm, thinnest);
     if (fill_balls(&balls, exact, nodes, open_end, cell_mm))
         mesh = isosurface_of_vessel(exact, balls.count, balls.center, balls.reach, balls.from, cell_mm);
     if (!mesh)

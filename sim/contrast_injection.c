@@ -54,15 +54,15 @@ void contrast_injection_fit(ContrastInjection *injection, const int *fitted)
 
 int contrast_injection_tool(const ContrastInjection *injection, const XrayControl *xray)
 {
-    int asked = (int)lroundf(xray->contrast_tool) - 1;
-    return contrast_lumens_tool(injection->lumens, asked < injection->tool_count ? asked : injection->tool_count - 1);
+    int requested = (int)lroundf(xray->contrast_tool) - 1;
+    return contrast_lumens_tool(injection->lumens, requested < injection->tool_count ? requested : injection->tool_count - 1);
 }
 
 double contrast_injection_flow(ContrastInjection *injection, const XrayControl *xray, const double *inserted)
 {
-    double asked = fmax((double)xray->contrast_ml_s, 0);
-    int tool = asked > 0 ? contrast_injection_tool(injection, xray) : -1;
-    return tool < 0 ? asked : fmin(asked, contrast_lumens_passes(injection->lumens, tool, inserted));
+    double requested = fmax((double)xray->contrast_ml_s, 0);
+    int tool = requested > 0 ? contrast_injection_tool(injection, xray) : -1;
+    return tool < 0 ? requested : fmin(requested, contrast_lumens_passes(injection->lumens, tool, inserted));
 }
 
 void contrast_injection_advance(ContrastInjection *injection, double dt_s, const XrayControl *xray, double volume_ml, const TipPlaces *places)

@@ -37,7 +37,7 @@ struct ContrastLumens {
     int tool_count, piece_count;
     Bore device[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device that may be this tool …
     Bore bore[TOOLS_MOST];                   // … of the device inserted now, whose arrays these are
-    int room[TOOLS_MOST];                    // node count of the device with most nodes
+    int capacity[TOOLS_MOST];                // node count of the device with most nodes
     int fitted[TOOLS_MOST];
     Column column[TOOLS_MOST];
     Piece *piece;                            // pieces of the current lumen
@@ -89,7 +89,7 @@ static bool make_spare(ContrastLumens *lumens, const Scene *scene, int tool, int
     if (!wire_create(&nodes, &wire, why, (int)sizeof why))
         return false;
     bool good = make_bore(&lumens->device[tool][which], &wire, nodes.node_count, nodes.s);
-    lumens->room[tool] = nodes.node_count > lumens->room[tool] ? nodes.node_count : lumens->room[tool];
+    lumens->capacity[tool] = nodes.node_count > lumens->capacity[tool] ? nodes.node_count : lumens->capacity[tool];
     wire_destroy(&nodes);
     return good;
 }
@@ -104,7 +104,7 @@ ContrastLumens *contrast_lumens_create(const Scene *scene, const int *node_count
     for (int k = 0; good && k < scene->tool_count; k++) {
         WireOptions wire = scene_tool_wire(scene, k);
         lumens->tool_count = k + 1;
-        lumens->room[k] = node_count[k];
+        lumens->capacity[k] = node_count[k];
         good = make_bore(&lumens->device[k][0], &wire, node_count[k], s[k]);
         size_t most = (size_t)wire.section_count;
         for (int i = 1; good && i < scene_device_count(scene, k); i++) {
@@ -393,7 +393,7 @@ int contrast_lumens_node_count(const ContrastLumens *lumens)
 {
     int count = 0;
     for (int k = 0; k < lumens->tool_count; k++)
-        count += lumens->room[k];
+        count += lumens->capacity[k];
     return count;
 }
 
@@ -432,8 +432,8 @@ void contrast_lumens_read(ContrastLumens *lumens, const double *inserted, float 
 {
     for (int k = 0; k < lumens->tool_count; k++) {
         read_tool(lumens, k, inserted, filling);
-        for (int j = lumens->bore[k].node_count; j < lumens->room[k]; j++)
+        for (int j = lumens->bore[k].node_count; j < lumens->capacity[k]; j++)
             filling[j] = 0;
-        filling += lumens->room[k];
+        filling += lumens->capacity[k];
     }
 }

@@ -134,10 +134,10 @@ static double branch_radius(const Builder *b, int node)
     return sum / (to - from);
 }
 
-static double inlet_flow(const Builder *b, int inlet, double asked_ml_s)
+static double inlet_flow(const Builder *b, int inlet, double requested_ml_s)
 {
-    if (asked_ml_s > 0)
-        return 1000 * asked_ml_s;
+    if (requested_ml_s > 0)
+        return 1000 * requested_ml_s;
     double radius = child_count(b, inlet) > 0 ? branch_radius(b, b->next[b->first[inlet]]) : b->lumen[inlet];
     return fmin(INLET_SPEED * PI * radius * radius, HEART_FLOW);
 }

@@ -118,10 +118,10 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
             commands = settled(&commands);
         simulator_step(simulator, &commands);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
-        bool goes_on = !options->after_step || options->after_step(options->context, simulator, &commands);
+        bool keeps_running = !options->after_step || options->after_step(options->context, simulator, &commands);
         if (options->paced)
             keep_pace(&report, options->live, &base, base + (i + 1) * step_ns);
-        if (!goes_on) {
+        if (!keeps_running) {
             report.end = DRIVE_STOPPED;
             break;
         }

@@ -13,10 +13,10 @@ typedef struct TakeOver {
 
 static bool take_over_step(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    enum { TELL_EVERY = 64 };
+    enum { REPORT_INTERVAL = 64 };
     TakeOver *take_over = context;
     LiveSession *session = take_over->session;
-    if (take_over->options->progress && ++take_over->done % TELL_EVERY == 0)
+    if (take_over->options->progress && ++take_over->done % REPORT_INTERVAL == 0)
         take_over->options->progress(take_over->options->progress_context, (double)take_over->done / (double)take_over->steps);
     session_tracker_step(session->tracker, simulator, commands, xray);
     session->resumed_released = commands->released;

@@ -231,7 +231,7 @@ static hid_t driver_id(void)
 hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
 {
     // 12 MB are needed until the first chunks exist: HDF5 makes a B-tree for each dataset (H5B_create)
-    if (!heap_has_room(4 * HEAP_ROOM_OF_HDF5)) {
+    if (!heap_can_allocate(4 * HEAP_RESERVE_OF_HDF5)) {
         errno = ENOMEM;
         return -1;
     }

@@ -36,7 +36,7 @@ struct Realtime {
 
 RealtimeOptions realtime_default_options(void) { return (RealtimeOptions){.pose_ms = 10, .xray = xray_default_control()}; }
 
-static ToolCommands ask_hands(void *context)
+static ToolCommands read_hands(void *context)
 {
     Realtime *realtime = context;
     if (triple_buffer_fetch(&realtime->xray_buffer))
@@ -106,7 +106,7 @@ static void *run_session(void *argument)
 {
     Realtime *realtime = argument;
     DriveOptions drive = drive_default_options();
-    drive.hand = ask_hands;
+    drive.hand = read_hands;
     drive.hand_context = realtime;
     drive.duration_s = SCRIPT_LONGEST_S;
     drive.paced = true;

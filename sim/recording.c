@@ -103,8 +103,8 @@ RecordingOptions recording_session_options(void) { return (RecordingOptions){.fr
 
 void recording_prepare_process(void)
 {
-    if (!heap_has_room(HEAP_ROOM_OF_HDF5))
-        heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
+    if (!heap_can_allocate(HEAP_RESERVE_OF_HDF5))
+        heap_is_empty(HEAP_RESERVE_OF_HDF5, __FILE__);
     H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
 }
@@ -754,7 +754,7 @@ static void *slot_of(Ring *ring, int column)
     return ring->column[column].ring + (size_t)(head % ring->length) * ring->column[column].row_bytes;
 }
 
-static bool wait_for_room(Recording *recording, Ring *ring)
+static bool wait_for_space(Recording *recording, Ring *ring)
 {
     long long head = atomic_load_explicit(&ring->head, memory_order_relaxed);
     while (head - atomic_load_explicit(&ring->tail, memory_order_acquire) >= ring->length && !atomic_load(&recording->failed))
@@ -802,7 +802,7 @@ static void put_tools_frame(Recording *recording, const Stepper *stepper, int no
 
 static bool push_frame(Recording *recording, Simulator *simulator)
 {
-    if (!wait_for_room(recording, &recording->frames))
+    if (!wait_for_space(recording, &recording->frames))
         return false;
     static const NodeReport unused = {.force = {NAN, NAN, NAN}, .gap = NAN, .vessel_node = -1};
     const WireState *state = simulator_state(simulator);
@@ -851,7 +851,7 @@ static void put_exchange(Recording *recording, const Stepper *stepper, const Too
 
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    if (!wait_for_room(recording, &recording->steps))
+    if (!wait_for_space(recording, &recording->steps))
         return false;
     const StepReport *report = simulator_last(simulator);
     Ring *ring = &recording->steps;
@@ -921,8 +921,9 @@ static bool close_datasets(Column *column, int count)
 // Phase 1: the library builds the file.
 static bool close_built(Recording *recording)
 {
-    bool good = close_datasets(recording->step_column, MOST_STEP_COLUMNS) & close_datasets(recording->frame_column, MOST_FRAME_COLUMNS) &
-                close_datasets(recording->motion_column, MOST_FRAME_COLUMNS);
+    bool good = close_datasets(recording->step_column, MOST_STEP_COLUMNS);
+    good &= close_datasets(recording->frame_column, MOST_FRAME_COLUMNS);
+    good &= close_datasets(recording->motion_column, MOST_FRAME_COLUMNS);
     good &= recording->file < 0 || H5Fclose(recording->file) >= 0;
     recording->file = -1;
     return good;

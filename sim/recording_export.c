@@ -134,8 +134,8 @@ static bool export_frame(const char *path, const RecordedRun *run, int64_t frame
 bool recording_export_series(const RecordedRun *run, const char *path, Faults *faults)
 {
     int stem = (int)(strlen(path) - 4);
-    size_t room = strlen(path) + 32;
-    char *file = malloc(room);
+    size_t capacity = strlen(path) + 32;
+    char *file = malloc(capacity);
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
     OutputText list;
     bool good = file && output_text_open(&list);
@@ -146,13 +146,13 @@ bool recording_export_series(const RecordedRun *run, const char *path, Faults *f
     }
     fprintf(list.stream, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n");
     for (int64_t k = 0; good && k < run->frame_count; k++) {
-        snprintf(file, room, "%.*s_%05" PRId64 ".vtp", stem, path, k);
+        snprintf(file, capacity, "%.*s_%05" PRId64 ".vtp", stem, path, k);
         good = export_frame(file, run, k, faults);
         fprintf(list.stream, "<DataSet timestep=\"%.9g\" group=\"\" part=\"0\" file=\"%.*s_%05" PRId64 ".vtp\"/>\n", run->time_s[run->frame_step[k]],
                 stem - (int)(name - path), name, k);
     }
     fprintf(list.stream, "</Collection>\n</VTKFile>\n");
-    snprintf(file, room, "%.*s.pvd", stem, path);
+    snprintf(file, capacity, "%.*s.pvd", stem, path);
     if (good) {
         good = output_text_write(&list, file, faults);
     } else {

@@ -66,12 +66,12 @@ static void find_scenes(const char *folder, int depth, SceneList *list)
     DIR *open = depth < DEEPEST_FOLDER ? opendir(folder) : NULL;
     for (struct dirent *entry; open && (entry = readdir(open));) {
         struct stat status;
-        size_t room = strlen(folder) + strlen(entry->d_name) + 2;
+        size_t capacity = strlen(folder) + strlen(entry->d_name) + 2;
         if (entry->d_name[0] == '.')
             continue;
-        char *path = HEAP_ZEROED(room, 1);
+        char *path = HEAP_ZEROED(capacity, 1);
         bool slash = ends_with(folder, "/");
-        snprintf(path, room, "%s%s%s", folder, slash ? "" : "/", entry->d_name);
+        snprintf(path, capacity, "%s%s%s", folder, slash ? "" : "/", entry->d_name);
         if (lstat(path, &status) == 0 && S_ISDIR(status.st_mode))
             find_scenes(path, depth + 1, list);
         else if ((ends_with(path, ".yaml") || ends_with(path, ".yml")) && (scene_has_golden(path) || scene_has_verify(path)))

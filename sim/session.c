@@ -156,10 +156,10 @@ char *session_json(const Session *s)
 
 static bool is_hex(const char *text, size_t digits) { return strlen(text) == digits && strspn(text, "0123456789abcdef") == digits; }
 
-static void read_hex(const JsonReading *reading, const cJSON *object, const char *where, const char *key, size_t digits, bool may_lack, char *text)
+static void read_hex(const JsonReading *reading, const cJSON *object, const char *where, const char *key, size_t digits, bool is_optional, char *text)
 {
     json_text(reading, object, where, key, digits + 1, text);
-    if (!is_hex(text, digits) && !(may_lack && !*text))
+    if (!is_hex(text, digits) && !(is_optional && !*text))
         faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is not a string of %zu lower-case hexadecimal digits", where, key, digits);
 }
 
@@ -183,8 +183,8 @@ static int read_event_tool(const JsonReading *reading, const cJSON *event, const
     const char *names[TOOLS_MOST + 1] = {0};
     for (int k = 0; k < f->tool_count; k++)
         names[k] = f->tool[k].name;
-    bool says = cJSON_GetObjectItemCaseSensitive(event, "tool") != NULL;
-    return says && names[0] ? json_choice(reading, event, "events", "tool", names) : -1;
+    bool has_tool = cJSON_GetObjectItemCaseSensitive(event, "tool") != NULL;
+    return has_tool && names[0] ? json_choice(reading, event, "events", "tool", names) : -1;
 }
 
 static void read_events(const JsonReading *reading, const cJSON *list, Session *s)
@@ -283,7 +283,7 @@ static int is_json(const struct dirent *entry)
 }
 
 // Other JSON files (a run's summary) are ignored; one that claims to be a session but cannot be read is broken.
-static bool says_session(const char *text) { return strstr(text, "\"seldinger_session\"") != NULL; }
+static bool is_session_text(const char *text) { return strstr(text, "\"seldinger_session\"") != NULL; }
 
 Session *session_list(const char *folder, const char *trainee, const char *title, int *count, int *broken, Faults *faults)
 {
@@ -293,17 +293,17 @@ Session *session_list(const char *folder, const char *trainee, const char *title
     Session *list = found >= 0 ? calloc((size_t)found + 1, sizeof *list) : NULL;
     Faults *own = calloc(1, sizeof *own);
     for (int i = 0; i < found; i++) {
-        size_t length, room = strlen(folder) + strlen(entry[i]->d_name) + 2;
-        char *path = malloc(room), *text = NULL;
+        size_t length, capacity = strlen(folder) + strlen(entry[i]->d_name) + 2;
+        char *path = malloc(capacity), *text = NULL;
         if (path && list && own) {
-            snprintf(path, room, "%s/%s", folder, entry[i]->d_name);
+            snprintf(path, capacity, "%s/%s", folder, entry[i]->d_name);
             faults_clear(own);
             text = text_file_read(path, &length, own);
             Session *at = &list[*count];
             if (text && session_parse(text, length, path, at, own))
                 *count += !strcmp(at->trainee, trainee) && !strcmp(at->title, title);
             else
-                *broken += !text || says_session(text);
+                *broken += !text || is_session_text(text);
         } else {
             ++*broken;
         }

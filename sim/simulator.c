@@ -22,7 +22,7 @@ struct Simulator {
     StepEnergy before;       // of the previous state
     TargetReach *target;
     double dt;               // [ms]
-    int asked[TOOLS_MOST];   // devices requested by the last commands
+    int requested[TOOLS_MOST]; // devices requested by the last commands
 };
 
 static void measure_targets(Simulator *simulator)
@@ -205,14 +205,14 @@ void simulator_step_one_tool(Simulator *simulator, Command command) { simulator_
 static void exchange(Simulator *simulator, const ToolCommands *commands)
 {
     for (int k = 0; k < stepper_tool_count(simulator->stepper); k++) {
-        int asked = commands->fitted[k];
-        if (asked == simulator->asked[k])
+        int requested = commands->fitted[k];
+        if (requested == simulator->requested[k])
             continue;
-        simulator->asked[k] = asked;
-        if (asked == stepper_fitted(simulator->stepper, k))      // after a refused exchange
+        simulator->requested[k] = requested;
+        if (requested == stepper_fitted(simulator->stepper, k))  // after a refused exchange
             continue;
         double before = simulator->energy.watched ? stepper_elastic_energy(simulator->stepper) : 0;
-        StepExchange outcome = stepper_exchange(simulator->stepper, k, asked);
+        StepExchange outcome = stepper_exchange(simulator->stepper, k, requested);
         if (outcome == EXCHANGE_DONE) {
             simulator->totals.exchanges++;
             // the energy of the tools behind the hub, straight in the hand, is excluded

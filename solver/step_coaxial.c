@@ -172,11 +172,11 @@ static void clear(Local *local, int n)
 }
 
 // One of an element's own unknowns (12 of the nodes, 4 per tool) as a linear combination of at most two unknowns of its two nodes, [2 n].
-typedef struct Way {
+typedef struct UnknownMap {
     int count;
     int at[2];
     double by[2];
-} Way;
+} UnknownMap;
 
 static void put_nodes(const BeamTangent *t, double full[NODAL][NODAL])
 {
@@ -188,7 +188,7 @@ static void put_nodes(const BeamTangent *t, double full[NODAL][NODAL])
         }
 }
 
-static void add_ways(const Way *way, const CoaxialTangent *t, int columns, Local *local)
+static void add_mapped(const UnknownMap *map, const CoaxialTangent *t, int columns, Local *local)
 {
     double nodes[NODAL][NODAL];
     put_nodes(&t->nodes, nodes);
@@ -196,16 +196,16 @@ static void add_ways(const Way *way, const CoaxialTangent *t, int columns, Local
     for (int r = 0; r < all; r++)
         for (int c = 0; c < all; c++) {
             double value = r < NODAL ? c < NODAL ? nodes[r][c] : t->cross[r][c - NODAL] : c < NODAL ? t->cross[c][r - NODAL] : t->own[r - NODAL][c - NODAL];
-            for (int i = 0; i < way[r].count; i++)
-                for (int j = 0; j < way[c].count; j++)
-                    local->tangent[way[r].at[i]][way[c].at[j]] += value * way[r].by[i] * way[c].by[j];
+            for (int i = 0; i < map[r].count; i++)
+                for (int j = 0; j < map[c].count; j++)
+                    local->tangent[map[r].at[i]][map[c].at[j]] += value * map[r].by[i] * map[c].by[j];
         }
 }
 
 static void put(double *at, Vec3 v) { at[0] = v.x, at[1] = v.y, at[2] = v.z; }
 
 // Assembles an element whose own unknowns differ from those of its nodes.
-static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, const Way *way, const int *tool, double scale, Local *local)
+static void mapped_element(const Stepper *s, int c, const CoaxialInput *in, const UnknownMap *map, const int *tool, double scale, Local *local)
 {
     int columns = 4 * in->count;
     CoaxialOutput out;
@@ -214,7 +214,7 @@ static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, con
     keep_inner(s, c, in, &out, tool);
     coaxial_tangent(in, &out, scale, &t);
     clear(local, s->system.chain.size);
-    add_ways(way, &t, columns, local);
+    add_mapped(map, &t, columns, local);
     double own[NODAL + COAXIAL_COLUMNS];
     put(own, vec3_negate(out.beam.force2));
     put(own + 3, out.beam.moment1);
@@ -222,39 +222,39 @@ static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, con
     put(own + 9, out.beam.moment2);
     memcpy(own + NODAL, out.gradient, (size_t)columns * sizeof *own);
     for (int r = 0; r < NODAL + columns; r++)
-        for (int i = 0; i < way[r].count; i++)
-            local->gradient[way[r].at[i]] += own[r] * way[r].by[i];
+        for (int i = 0; i < map[r].count; i++)
+            local->gradient[map[r].at[i]] += own[r] * map[r].by[i];
 }
 
 // Node 2 contributes as in any element; only node 1 differs.
-static void far_ways(const CoaxialInput *in, const int *tool, int n, Way way[NODAL + COAXIAL_COLUMNS])
+static void map_far_node(const CoaxialInput *in, const int *tool, int n, UnknownMap map[NODAL + COAXIAL_COLUMNS])
 {
     for (int i = 0; i < 6; i++)
-        way[6 + i] = (Way){1, {n + i, 0}, {1, 0}};
+        map[6 + i] = (UnknownMap){1, {n + i, 0}, {1, 0}};
     for (int i = 0; i < in->count; i++) {
         int at = n + unknown_of(tool[i]);
         bool ends = i == 0 || in->span[i].has_tip;
-        way[NODAL + 4 * i + COAXIAL_S2] = ends ? (Way){0} : (Way){1, {at, 0}, {1, 0}};
-        way[NODAL + 4 * i + COAXIAL_PHI2] = ends ? (Way){0} : (Way){1, {at + 1, 0}, {1, 0}};
+        map[NODAL + 4 * i + COAXIAL_S2] = ends ? (UnknownMap){0} : (UnknownMap){1, {at, 0}, {1, 0}};
+        map[NODAL + 4 * i + COAXIAL_PHI2] = ends ? (UnknownMap){0} : (UnknownMap){1, {at + 1, 0}, {1, 0}};
     }
 }
 
 // At a tip, node 1 has the frame of the tool that continues, so that tool's angle is part of the node's rotation about the tangent.
-static void tip_ways(const Stepper *s, int c, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
+static void map_tip_node(const Stepper *s, int c, const CoaxialInput *in, const int *tool, UnknownMap map[NODAL + COAXIAL_COLUMNS])
 {
     int on = unknown_of(tool[0]);
     Vec3 t = quat_rotate(s->state.orientation[c], vec3(1, 0, 0));
     const double tangent[3] = {t.x, t.y, t.z};
-    far_ways(in, tool, s->system.chain.size, way);
+    map_far_node(in, tool, s->system.chain.size, map);
     for (int i = 0; i < 3; i++) {
-        way[i] = (Way){1, {i, 0}, {1, 0}};
-        way[3 + i] = (Way){2, {3 + i, on + 1}, {1, tangent[i]}};
+        map[i] = (UnknownMap){1, {i, 0}, {1, 0}};
+        map[3 + i] = (UnknownMap){2, {3 + i, on + 1}, {1, tangent[i]}};
     }
     for (int i = 0; i < in->count; i++) {
         int at = unknown_of(tool[i]);
-        Way *w = way + NODAL + 4 * i;
-        w[COAXIAL_S1] = (Way){1, {at, 0}, {1, 0}};
-        w[COAXIAL_PHI1] = i == 0 ? (Way){0} : (Way){2, {at + 1, on + 1}, {1, -1}};
+        UnknownMap *w = map + NODAL + 4 * i;
+        w[COAXIAL_S1] = (UnknownMap){1, {at, 0}, {1, 0}};
+        w[COAXIAL_PHI1] = i == 0 ? (UnknownMap){0} : (UnknownMap){2, {at + 1, on + 1}, {1, -1}};
     }
 }
 
@@ -262,9 +262,9 @@ static void tip_element(const Stepper *s, int c, double scale, Local *local)
 {
     int tool[STEP_TOOLS_MAX];
     CoaxialInput in = input_at(s, c, tool);
-    Way way[NODAL + COAXIAL_COLUMNS];
-    tip_ways(s, c, &in, tool, way);
-    element_by_ways(s, c, &in, way, tool, scale, local);
+    UnknownMap map[NODAL + COAXIAL_COLUMNS];
+    map_tip_node(s, c, &in, tool, map);
+    mapped_element(s, c, &in, map, tool, scale, local);
 }
 
 // Adds the tangent of an element between two nodes of the same tool.
@@ -386,9 +386,9 @@ static double straightened_twice(const Tool *t, double s)
     const CoaxialSection *p = t->section, *last = p + t->coaxial.count - 1;
     double sum = 0, once = 0, from = 0;
     for (;; from = p->end, p++) {
-        double way = (p < last ? fmin(s, p->end) : s) - from;
-        sum += once * way + 0.5 * density(p) * way * way;
-        once += density(p) * way;
+        double map = (p < last ? fmin(s, p->end) : s) - from;
+        sum += once * map + 0.5 * density(p) * map * map;
+        once += density(p) * map;
         if (p == last || s <= p->end)
             return sum;
     }
@@ -543,21 +543,21 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
     return in;
 }
 
-static void mouth_ways(const Stepper *s, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
+static void map_mouth_node(const Stepper *s, const CoaxialInput *in, const int *tool, UnknownMap map[NODAL + COAXIAL_COLUMNS])
 {
     const double d[3] = {s->entry.axis[0].x, s->entry.axis[0].y, s->entry.axis[0].z};
     bool at_tip = is_at_tip(s, s->first_free - 1);       // then the continuing tool has S and an angle at that node too
     int on = unknown_of(tool[0]) + 1;
-    far_ways(in, tool, s->system.chain.size, way);
+    map_far_node(in, tool, s->system.chain.size, map);
     for (int i = 0; i < 3; i++) {
-        way[i] = (Way){0};
-        way[3 + i] = at_tip ? (Way){2, {3, on}, {d[i], d[i]}} : (Way){1, {3, 0}, {d[i], 0}};
+        map[i] = (UnknownMap){0};
+        map[3 + i] = at_tip ? (UnknownMap){2, {3, on}, {d[i], d[i]}} : (UnknownMap){1, {3, 0}, {d[i], 0}};
     }
     for (int i = 0; i < in->count; i++) {
         int at = unknown_of(tool[i]);
-        Way *w = way + NODAL + 4 * i;
-        w[COAXIAL_S1] = i == 0 && !at_tip ? (Way){1, {0, 0}, {-1, 0}} : (Way){2, {at, 0}, {1, -1}};
-        w[COAXIAL_PHI1] = i == 0 ? (Way){0} : at_tip ? (Way){2, {at + 1, on}, {1, -1}} : (Way){1, {at + 1, 0}, {1, 0}};
+        UnknownMap *w = map + NODAL + 4 * i;
+        w[COAXIAL_S1] = i == 0 && !at_tip ? (UnknownMap){1, {0, 0}, {-1, 0}} : (UnknownMap){2, {at, 0}, {1, -1}};
+        w[COAXIAL_PHI1] = i == 0 ? (UnknownMap){0} : at_tip ? (UnknownMap){2, {at + 1, on}, {1, -1}} : (UnknownMap){1, {at + 1, 0}, {1, 0}};
     }
 }
 
@@ -565,9 +565,9 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
 {
     int c = s->first_free - 1, tool[STEP_TOOLS_MAX];
     CoaxialInput in = mouth_input(s, tool);
-    Way way[NODAL + COAXIAL_COLUMNS];
-    mouth_ways(s, &in, tool, way);
-    element_by_ways(s, c, &in, way, tool, scale, local);
+    UnknownMap map[NODAL + COAXIAL_COLUMNS];
+    map_mouth_node(s, &in, tool, map);
+    mapped_element(s, c, &in, map, tool, scale, local);
 }
 
 // The straightened length of a tool behind the mouth grows with S there. The tangent is scaled as for elements; it omits a negative slope, where a border would
@@ -578,10 +578,10 @@ static void add_straightening(const Stepper *s, double scale, double *gradient)
     double *d = s->system.chain.diag + block_of(s, s->first_free - 1);
     int tool[STEP_TOOLS_MAX];
     CoaxialInput in = mouth_input(s, tool);
-    Way way[NODAL + COAXIAL_COLUMNS];
-    mouth_ways(s, &in, tool, way);
+    UnknownMap map[NODAL + COAXIAL_COLUMNS];
+    map_mouth_node(s, &in, tool, map);
     for (int i = 0; i < in.count; i++) {
-        const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
+        const UnknownMap *w = &map[NODAL + 4 * i + COAXIAL_S1];
         double slope, force = straightening(&s->tools.tool[tool[i]], in.span[i].s1, &slope);
         for (int j = 0; j < w->count; j++) {
             gradient[w->at[j]] += force * w->by[j];

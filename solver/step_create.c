@@ -99,7 +99,7 @@ static bool allocate(Stepper *s)
     s->query.place = calloc(2 * points, sizeof *s->query.place);
     s->query.hit = calloc(2 * points, sizeof *s->query.hit);
     s->query.which = calloc(4 * points + m, sizeof *s->query.which);
-    s->points.room = calloc(4 * points + m, sizeof *s->points.room);
+    s->points.allowed = calloc(4 * points + m, sizeof *s->points.allowed);
     s->system.set.point = calloc(2 * points, sizeof *s->system.set.point);
     s->system.set.capacity = 2 * s->points.count;       // each may have a second contact, with the opposite wall
     s->system.factor = block_factor_create(s->wire.node_count, size);
@@ -107,7 +107,7 @@ static bool allocate(Stepper *s)
     s->system.solver = contact_solver_create(s->wire.node_count, size, s->system.set.capacity + (int)inner);
     s->tools.carrier = calloc(m, sizeof *s->tools.carrier);
     if (!s->memory || !s->points.place || !s->points.trial || !s->points.tried || !s->rig.fixed || !s->start.position || !s->points.start_force ||
-        !s->start.orientation || !s->points.slot_place || !s->query.point || !s->query.place || !s->query.hit || !s->query.which || !s->points.room ||
+        !s->start.orientation || !s->points.slot_place || !s->query.point || !s->query.place || !s->query.hit || !s->query.which || !s->points.allowed ||
         !s->system.set.point || !s->system.factor || !s->system.solver || !s->tools.carrier || !s->system.set.slide ||
         !block_chain_create(&s->system.chain, s->wire.node_count, size) || !allocate_scratch(s))
         return false;
@@ -126,9 +126,9 @@ static bool allocate(Stepper *s)
     s->state.slide_spin = s->state.slide_velocity + inner;
     s->state.slide_force = s->state.slide_spin + inner;
     SEL_REQUIRE(s->state.slide_force + inner <= s->memory + s->memory_count, "the arrays of the state fit the memory that they share");
-    s->points.linger = s->points.room + points;
-    s->points.lack = s->points.linger + points;
-    s->points.touch_next = s->points.lack + points;
+    s->points.linger = s->points.allowed + points;
+    s->points.overlap = s->points.linger + points;
+    s->points.touch_next = s->points.overlap + points;
     s->query.range = s->points.touch_next + points;
     s->query.near = s->query.which + points;
     s->points.candidate = s->query.near + points;
@@ -318,7 +318,7 @@ void stepper_destroy(Stepper *s)
     free(s->points.slot_place);
     free(s->points.slot);
     free(s->points.slot_start);
-    free(s->points.room);
+    free(s->points.allowed);
     free(s->system.set.slide);
     free(s->system.set.point);
     free(s->system.set.pair);

@@ -25,9 +25,9 @@ static const double DIP_MAX = 0.01;      // … and is queried again before that
 static const double GUARD_MAX = 0.3;     // [mm] of travel after which the wall's shape between two nodes is no longer known
 static const double LINGER = 0.9, LINGER_MAX = 0.006;     // as a share of the gap; [mm]
 static const double MET_FAR = 0.2;       // [mm] distance over which an opposite wall is remembered: as far as a plane approximates it
-static const double LACK_MAX = 0.045;    // [mm] most by which the gaps to two opposite walls may overlap; equals DEPTH_LAST of step_follow.c
+static const double OVERLAP_MAX = 0.045; // [mm] most by which the gaps to two opposite walls may overlap; equals DEPTH_LAST of step_follow.c
 static const double TOUCH_REACH = 0.05;  // [mm] of gap: beyond this, contact is placed at the point itself (step_touch.c)
-static const double NOTHING_KNOWN = -1;  // value of a clearance: neither place nor force is stored
+static const double FORGOTTEN = -1;      // clearance of a point after forget(); a flag beside it would change the state hash
 
 static Vec3 tangent_at(const Stepper *s, int node)
 {
@@ -134,17 +134,17 @@ bool stepper_escapes(const Stepper *s)
     if (!s->vessel)
         return false;
     for (int p = s->first_free; p < s->state.node_count; p++)
-        if (s->points.room[p] < HUGE_VAL && travel(s, p) > s->points.room[p])
+        if (s->points.allowed[p] < HUGE_VAL && travel(s, p) > s->points.allowed[p])
             return true;
     for (int p = first_slot(s); p < s->points.count; p++)
-        if (s->points.room[p] < HUGE_VAL && travel(s, p) > s->points.room[p])
+        if (s->points.allowed[p] < HUGE_VAL && travel(s, p) > s->points.allowed[p])
             return true;
     return false;
 }
 
 // Adds a query for a point at its trial position x. A point that was not queried for some time may have left its stored part of the vessel, so it is located
 // again.
-static void ask_there(Stepper *s, int point, Vec3 x, int *count)
+static void queue_trial(Stepper *s, int point, Vec3 x, int *count)
 {
     int nodes = s->state.node_count, from = s->points.place[point].node;
     s->query.which[*count] = point;
@@ -158,7 +158,7 @@ static void ask_there(Stepper *s, int point, Vec3 x, int *count)
 }
 
 // Runs the queries and stores their results for the next trial.
-static void answer_there(Stepper *s, int count)
+static void run_trials(Stepper *s, int count)
 {
     if (count > 0)
         vessel_query(s->vessel, count, s->query.point, 0.5, s->query.place, s->query.hit);
@@ -189,17 +189,17 @@ static double deepest_there(Stepper *s, bool would_go)
         if (p == s->points.count)
             break;
         double far = would_go ? travel(s, p) : travelled(s, p);
-        if (far < (s->points.room[p] < HUGE_VAL ? s->points.room[p]
-                   : would_go                   ? OVERSHOOT_TRAVEL
-                                                : 0) ||
+        if (far < (s->points.allowed[p] < HUGE_VAL ? s->points.allowed[p]
+                   : would_go                      ? OVERSHOOT_TRAVEL
+                                                   : 0) ||
             (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
-        ask_there(s, p, would_go ? vec3_add(place_of(s, p), motion(s, p)) : place_of(s, p), &count);
+        queue_trial(s, p, would_go ? vec3_add(place_of(s, p), motion(s, p)) : place_of(s, p), &count);
     }
-    answer_there(s, count);
+    run_trials(s, count);
     for (int k = 0; k < count; k++)
         if (!(s->query.hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            deepest = fmax(deepest, radius_of(s, s->query.which[k]) - s->query.hit[k].gap - s->points.lack[s->query.which[k]]);
+            deepest = fmax(deepest, radius_of(s, s->query.which[k]) - s->query.hit[k].gap - s->points.overlap[s->query.which[k]]);
     return deepest;
 }
 
@@ -244,7 +244,7 @@ static void forget(Stepper *s, int point)
 {
     s->points.place[point].node = -1;
     s->points.place[point].has_foot = false;
-    s->points.clearance[point] = NOTHING_KNOWN;
+    s->points.clearance[point] = FORGOTTEN;
     s->points.force[point] = vec3(0, 0, 0);
     s->points.met[point] = (WallMet){0};
     s->points.touch[point] = s->points.touch_next[point] = 0;
@@ -288,17 +288,17 @@ static void locate(Stepper *s, int point)
 // Is a point known to be too far away to touch the wall?
 static bool sleeps(Stepper *s, int point)
 {
-    s->points.room[point] = HUGE_VAL;
+    s->points.allowed[point] = HUGE_VAL;
     if (s->points.clearance[point] > 0 && s->iterate.knows_motion && travel(s, point) > s->points.clearance[point])
         s->points.clearance[point] = 0;
     if (!(s->points.clearance[point] > 0))
         return false;
     // its clearance was reduced by its reach when it was set
-    s->points.room[point] = s->points.clearance[point] + (point < s->state.node_count ? REACH : SLOT_REACH);
+    s->points.allowed[point] = s->points.clearance[point] + (point < s->state.node_count ? REACH : SLOT_REACH);
     return true;
 }
 
-static void ask(Stepper *s, int point, int *count)
+static void queue_point(Stepper *s, int point, int *count)
 {
     if (s->points.place[point].node < 0)
         locate(s, point);
@@ -361,7 +361,7 @@ static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
     bool faces = vec3_dot(met->across, hit->normal) < 0 && other > -radius && vec3_distance(x, met->where) < MET_FAR;
     if (!faces)
         met->across = vec3(0, 0, 0);
-    return s->points.lack[point] = faces ? fmin(LACK_MAX, fmax(0, -other - gap)) : 0;
+    return s->points.overlap[point] = faces ? fmin(OVERLAP_MAX, fmax(0, -other - gap)) : 0;
 }
 
 // A point that is no candidate is queried at its own position again. That may be nearer to the wall than the touch position by the distance between them, so
@@ -404,7 +404,7 @@ static int answer(Stepper *s, int first, int count, int *candidate)
             s->iterate.depth = fmax(s->iterate.depth, -gap - meet_across(s, point, s->query.point[k], hit));
         double sleep = 0, guarded = point < nodes || stepper_presses(s, point) ? -1 : guarded_for(s, point - nodes, hit, &sleep);
         if (guarded > own_reach - SLOT_REACH) {
-            s->points.room[point] = guarded;
+            s->points.allowed[point] = guarded;
             s->points.clearance[point] = sleep;
             leave_touch(s, point);
             continue;
@@ -418,7 +418,7 @@ static int answer(Stepper *s, int first, int count, int *candidate)
             leave_touch(s, point);
             continue;
         }
-        s->points.room[point] = gap;
+        s->points.allowed[point] = gap;
         if (gap > own_reach)
             s->points.clearance[point] = fmin(gap - own_reach, SLEEP_MAX);
         leave_touch(s, point);
@@ -426,7 +426,7 @@ static int answer(Stepper *s, int first, int count, int *candidate)
     return candidates;
 }
 
-static int ask_nodes(Stepper *s)
+static int queue_nodes(Stepper *s)
 {
     int count = 0;
     for (int i = s->first_free; i < s->state.node_count; i++) {
@@ -434,7 +434,7 @@ static int ask_nodes(Stepper *s)
         if (sleeps(s, i) || (s->rig.fixed[i] & DOF_POSITION) == DOF_POSITION)
             continue;
         s->query.answer_of[i] = count;
-        ask(s, i, &count);
+        queue_point(s, i, &count);
     }
     return count;
 }
@@ -447,7 +447,7 @@ static double clearance_by_nodes(const Stepper *s, const Slot *slot)
     return near > far ? near : far;
 }
 
-static int ask_slots(Stepper *s, int count)
+static int queue_slots(Stepper *s, int count)
 {
     int nodes = s->state.node_count;
     for (int p = first_slot(s); p < s->points.count; p++) {
@@ -456,12 +456,12 @@ static int ask_slots(Stepper *s, int count)
             continue;
         double bound = clearance_by_nodes(s, &s->points.slot[k]);
         if (bound > 0) {
-            s->points.room[p] = bound + REACH;
+            s->points.allowed[p] = bound + REACH;
             s->points.place[p].node = -1;      // may travel far before it is queried again
         }
         if (bound <= 0 && place_slot(s, k))
-            ask(s, p, &count);
-        else if (s->points.clearance[p] != NOTHING_KNOWN)
+            queue_point(s, p, &count);
+        else if (s->points.clearance[p] != FORGOTTEN)
             forget(s, p);    // its stored data become outdated; its neighbours' do not
     }
     return count;
@@ -586,10 +586,10 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     ContactPoint *across = &s->system.set.point[s->system.set.count];
     s->points.candidate[s->system.set.count++] = point;
     *across = *c;
-    c->gap += 0.5 * s->points.lack[point];
+    c->gap += 0.5 * s->points.overlap[point];
     across->normal = met->across;
     across->hessian = (Sym3){0};
-    across->gap = vec3_dot(met->across, touched(s, point)) - met->beyond + 0.5 * s->points.lack[point];
+    across->gap = vec3_dot(met->across, touched(s, point)) - met->beyond + 0.5 * s->points.overlap[point];
     across->roll = 0;
     across->slid = vec3(0, 0, 0);
     if (s->iterate.is_moved)
@@ -601,8 +601,8 @@ bool stepper_meet_walls(Stepper *s, double part)
     int count = 0;
     bool any = false;
     for (int k = 0; k < s->system.set.count; k++)
-        ask_there(s, s->points.candidate[k], touched(s, s->points.candidate[k]), &count);
-    answer_there(s, count);
+        queue_trial(s, s->points.candidate[k], touched(s, s->points.candidate[k]), &count);
+    run_trials(s, count);
     for (int k = 0; k < count; k++) {
         ContactPoint *c = &s->system.set.point[k];
         double radius = radius_of(s, s->points.candidate[k]), gap = s->query.hit[k].gap - radius;
@@ -727,14 +727,14 @@ void stepper_detect(Stepper *s)
         return;
     if (!s->iterate.is_moved && !s->iterate.knows_motion)
         memset(s->points.linger, 0, (size_t)s->points.count * sizeof *s->points.linger);
-    memset(s->points.lack, 0, (size_t)s->points.count * sizeof *s->points.lack);
+    memset(s->points.overlap, 0, (size_t)s->points.count * sizeof *s->points.overlap);
     if (!s->iterate.is_moved)
         memcpy(s->points.touch_next, s->points.touch, (size_t)s->points.count * sizeof *s->points.touch);
     take_trials(s);
     estimate_ranges(s);
-    int *candidate = s->query.near, nodes = ask_nodes(s);
+    int *candidate = s->query.near, nodes = queue_nodes(s);
     int node_candidates = answer(s, 0, nodes, candidate);
-    int count = ask_slots(s, nodes);
+    int count = queue_slots(s, nodes);
     int slot_candidates = answer(s, nodes, count, candidate + node_candidates);
     collect(s, candidate, node_candidates, slot_candidates);
     s->report.candidates = s->system.set.count;

@@ -5,7 +5,7 @@
 
 // Elements do not describe a tool that is compressed by more than this share of its length (a real one would have yielded), so the hand stalls.
 static const double SQUEEZE_MAX = 0.03;
-static const double LET_GO_TURN = 0.1;           // [rad] a node released at the mouth is turned by at most this much
+static const double RELEASE_TURN_MAX = 0.1;      // [rad] a node released at the mouth is turned by at most this much
 static const double SPRUNG = 0.1;                // of an element's length: with several tools, a node released further out than this stays on the line
 
 // The frame turned by the smallest rotation that aligns e1 with the line's direction.
@@ -39,7 +39,7 @@ static Vec3 mouth_curvature(const Stepper *s, int node)
     return vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
 }
 
-static void let_go(Stepper *s, int node)
+static void release_node(Stepper *s, int node)
 {
     WireState *w = &s->state;
     bool is_tip = node + 1 >= s->state.node_count;
@@ -54,8 +54,8 @@ static void let_go(Stepper *s, int node)
     }
     Vec3 curvature = is_tip ? stepper_tip_curvature(s) : mouth_curvature(s, node);
     double bend = vec3_norm(curvature) * along;
-    if (bend > LET_GO_TURN)          // it sprang out of the sheath: the curve is not known that far
-        curvature = vec3_scale(curvature, LET_GO_TURN / bend);
+    if (bend > RELEASE_TURN_MAX)     // it sprang out of the sheath: the curve is not known that far
+        curvature = vec3_scale(curvature, RELEASE_TURN_MAX / bend);
     w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->entry.axis[0]));
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
 }
@@ -79,9 +79,9 @@ static StepCommand stalled(Stepper *s, StepCommand command)
 {
     if (!s->entry.has_sheath)
         return command;
-    double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0), owed = s->state.inserted - actual;
-    if (fabs(owed) > 1e-9) {
-        command.advance += owed;
+    double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0), missing = s->state.inserted - actual;
+    if (fabs(missing) > 1e-9) {
+        command.advance += missing;
         s->state.inserted = actual;
     }
     if (command.advance > 0 && stepper_squeeze(s, s->state.position) > SQUEEZE_MAX) {
@@ -154,7 +154,7 @@ static void feed(Stepper *s, unsigned released)
         stepper_forget(s, i);
     }
     for (int i = s->first_free - 1; i >= held; i--)
-        let_go(s, i);
+        release_node(s, i);
     s->first_free = held;
     memcpy(s->points.start_force, s->points.force, (size_t)s->points.count * sizeof *s->points.force);
     stepper_begin(s);

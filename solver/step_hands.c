@@ -33,7 +33,7 @@ static double tool_moves(const Stepper *s, int k, int about, const double *u)
 static double around_moves(const Stepper *s, int k) { return k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->system.u) : 0; }
 
 // [mm] The distance that a tool's hub can advance before it meets the hub around it, or the sheath.
-static double hub_room(const Stepper *s, int k)
+static double hub_distance(const Stepper *s, int k)
 {
     if (k == 0)
         return s->entry.has_sheath ? vec3_dot(vec3_sub(s->entry.mouth, s->start.position[0]), s->entry.axis[0]) : HUGE_VAL;
@@ -46,7 +46,7 @@ static double wanted(const Stepper *s, int k, int about)
 {
     const Hand *hand = &s->hands.hand[k];
     if (!about && hand->is_stopped)
-        return hub_room(s, k) + (rides(s, k) ? 0 : around_moves(s, k));
+        return hub_distance(s, k) + (rides(s, k) ? 0 : around_moves(s, k));
     if (hand->is_released)
         return 0;
     if (k == 0)
@@ -181,8 +181,8 @@ static double hand_force(const Stepper *s, int k, int about)
 // says.
 static bool reaches_hub(const Stepper *s, int k)
 {
-    double room = hub_room(s, k);
-    return room < s->wire.length[0] && tool_moves(s, k, 0, s->system.u) - around_moves(s, k) > room;
+    double allowed = hub_distance(s, k);
+    return allowed < s->wire.length[0] && tool_moves(s, k, 0, s->system.u) - around_moves(s, k) > allowed;
 }
 
 static bool misjudges(Stepper *s, int k, int about)
@@ -323,7 +323,7 @@ void hands_count(Stepper *s)
         if (hand->slips[0] || hand->is_released || (was_cut && k > 0))
             *inserted = actual;
         if (was_cut && k == 0)       // the part of an advance that was not made is owed
-            *inserted = actual + fmax(-HAND_OWED_MAX, fmin(HAND_OWED_MAX, *inserted - actual));
+            *inserted = actual + fmax(-HAND_LAG_MAX, fmin(HAND_LAG_MAX, *inserted - actual));
         if (!was_cut && !hand->is_released)
             continue;
         if (k == 0)

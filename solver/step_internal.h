@@ -120,8 +120,8 @@ typedef struct Points {
     // of this step
     int *candidate;          // (P) indices of the points in the contact set
     double *touch_next;      // (P) [mm] `touch` at the end of this step
-    double *room;            // (P) [mm] allowed motion from the iterate of a point that is not a candidate; HUGE_VAL for candidates
-    double *lack;            // (P) [mm] missing room between walls that face each other
+    double *allowed;         // (P) [mm] allowed motion from the iterate of a point that is not a candidate; HUGE_VAL for candidates
+    double *overlap;         // (P) [mm] by which the gaps to two opposite walls overlap
     double *linger;          // (P) [mm] by which the wall is assumed closer in this step
     VesselMemory *trial;     // (P) results of the trials since the last detection: the wall …
     bool *tried;             // (P) … for the points that were tried
@@ -266,7 +266,7 @@ double stepper_follow(Stepper *s, bool halfway);
 void stepper_detect(Stepper *s);
 // Stores the forces of the solved set in their points.
 void stepper_keep_forces(Stepper *s);
-// Whether a point that was not a candidate has moved further than its room.
+// Whether a point that was not a candidate has moved further than allowed.
 bool stepper_escapes(const Stepper *s);
 // For use when every trial failed, as the wall may be closer than detection found it: at the next detection, the tried points search it from scratch.
 void stepper_doubt(Stepper *s);
@@ -344,7 +344,7 @@ double hands_work(const Stepper *s);           // [mJ] work of the hands in this
 double hands_valve_work(const Stepper *s);     // … and energy dissipated by the valves
 double hands_start_work(const Stepper *s, bool valves);     // … by the forces of the step's start; work of the valves is negative
 // [mm] maximum reduction of an advance that later steps make up.
-static const double HAND_OWED_MAX = 0.2;
+static const double HAND_LAG_MAX = 0.2;
 // Push [N] required by the strain of the tool at the hand.
 double stepper_strain_force(const Stepper *s);
 

@@ -66,7 +66,7 @@ static bool misjudges_border(Stepper *s)
 
 // Does the solution return to where the iterate came from? At an edge of the wall, each of two linearisations may send a tip to the other's position for ever;
 // the solution lies between them.
-static bool goes_back(const Stepper *s)
+static bool turns_back(const Stepper *s)
 {
     const double *before = s->iterate.kept + 7 * (size_t)s->state.node_count;
     double along = 0, came = 0;
@@ -143,7 +143,7 @@ static unsigned judge_motion(Stepper *s)
     int next = ++s->progress.linearisations;
     if (next >= 2 * s->newton_max || s->progress.has_failed || stepper_is_spent(s))
         return 0;
-    bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && goes_back(s);     // before the kept iterate is overwritten
+    bool touches = s->report.active > 0, is_back = next > 1 && s->vessel && turns_back(s);    // before the kept iterate is overwritten
     bool turns = s->progress.turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
     s->progress.makes_energy = makes_energy(s);
     s->progress.overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;

@@ -42,8 +42,9 @@ double stepper_slides(const Stepper *s)
     if (!s->is_slender)
         return 0;
     // a hand that slips or has just started does not move the tool, so the slide is limited to that of the last step
-    double asked = s->command.advance, went = s->dt * vec3_dot(s->state.velocity[0], s->entry.axis[0]), least = fmin(fabs(asked), fmin(fabs(went), SLIDE_MAX));
-    return asked * went > 0 ? asked > 0 ? least : -least : 0;
+    double advance = s->command.advance, moved = s->dt * vec3_dot(s->state.velocity[0], s->entry.axis[0]),
+           least = fmin(fabs(advance), fmin(fabs(moved), SLIDE_MAX));
+    return advance * moved > 0 ? advance > 0 ? least : -least : 0;
 }
 
 static Vec3 own_tangent(const Stepper *s, int node) { return quat_rotate(s->state.orientation[node], vec3(1, 0, 0)); }
@@ -140,19 +141,19 @@ static void lean(const Stepper *s, const Touch *t, Vec3 normal, Vec3 turns, Cont
     }
 }
 
-void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, const Touch *asked, ContactPoint *c)
+void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, const Touch *touch, ContactPoint *c)
 {
-    Vec3 along = asked->place.tangent, turns = sym3_mul_vec(&hit->hessian, along);
-    double slope = vec3_dot(hit->normal, along), bend = fmax(0, vec3_dot(along, turns) + vec3_dot(hit->normal, asked->bend)), stiff = fmax(STIFF, FIRM - bend),
+    Vec3 along = touch->place.tangent, turns = sym3_mul_vec(&hit->hessian, along);
+    double slope = vec3_dot(hit->normal, along), bend = fmax(0, vec3_dot(along, turns) + vec3_dot(hit->normal, touch->bend)), stiff = fmax(STIFF, FIRM - bend),
            roll = 1 / (bend + stiff);
-    double wish = asked->offset - (slope + stiff * asked->offset) * roll, most = REACH_OUT * asked->half;
-    bool rolls = fabs(wish) < most;
-    wish = rolls ? wish : wish > 0 ? most : -most;
+    double target = touch->offset - (slope + stiff * touch->offset) * roll, most = REACH_OUT * touch->half;
+    bool rolls = fabs(target) < most;
+    target = rolls ? target : target > 0 ? most : -most;
     // a moved iterate keeps the touching points of the tool
-    double step = wish - asked->offset, stride = s->iterate.is_moved ? 0 : fmin(STRIDE_MAX, fmax(STRIDE_LEAST, STRIDE * fabs(s->iterate.slides)));
+    double step = target - touch->offset, stride = s->iterate.is_moved ? 0 : fmin(STRIDE_MAX, fmax(STRIDE_LEAST, STRIDE * fabs(s->iterate.slides)));
     rolls &= fabs(step) < stride;
     step = fmax(-stride, fmin(stride, step));
-    double slides = s->iterate.is_moved ? 0 : fmax(-SLIDE_PART * asked->half, fmin(SLIDE_PART * asked->half, s->iterate.slides)), offset = asked->offset + step;
+    double slides = s->iterate.is_moved ? 0 : fmax(-SLIDE_PART * touch->half, fmin(SLIDE_PART * touch->half, s->iterate.slides)), offset = touch->offset + step;
     Touch t;
     touch_at(s, point, offset - slides, &t);
     if (!s->iterate.is_moved)
@@ -162,7 +163,7 @@ void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, cons
     c->xi = t.place.weight;
     c->lever[0] = t.place.lever[0];
     c->lever[1] = t.place.lever[1];
-    Vec3 on = vec3_add_scaled(vec3_scale(along, step), 0.5 * step * step, asked->bend);
+    Vec3 on = vec3_add_scaled(vec3_scale(along, step), 0.5 * step * step, touch->bend);
     c->normal = vec3_unit(vec3_add(hit->normal, sym3_mul_vec(&hit->hessian, on)));
     c->gap = gap + step * (slope + 0.5 * bend * step) - slides * vec3_dot(c->normal, along);
     c->slid = vec3_scale(along, slides);

@@ -35,7 +35,7 @@ WireStiffness wire_stiffness(const WireSection *section)
     };
 }
 
-static bool complain(char *why, int capacity, const char *what, int index, double value, const char *valid)
+static bool report_invalid(char *why, int capacity, const char *what, int index, double value, const char *valid)
 {
     char place[32] = "";
     if (index >= 0)
@@ -50,41 +50,41 @@ static bool within(double value, double low, double high) { return value >= low 
 static bool check_section(const WireSection *s, int i, char *why, int capacity)
 {
     if (!within(s->length, 1e-3, 1e5))
-        return complain(why, capacity, "length_mm of wire section", i, s->length, "0.001 to 100000 mm");
+        return report_invalid(why, capacity, "length_mm of wire section", i, s->length, "0.001 to 100000 mm");
     if (!within(s->diameter, 1e-3, 100))
-        return complain(why, capacity, "diameter_mm of wire section", i, s->diameter, "0.001 to 100 mm");
+        return report_invalid(why, capacity, "diameter_mm of wire section", i, s->diameter, "0.001 to 100 mm");
     if (!(s->inner_diameter >= 0 && s->inner_diameter <= 0.999 * s->diameter))
-        return complain(why, capacity, "inner_diameter_mm of wire section", i, s->inner_diameter, "0 to 0.999 times diameter_mm");
+        return report_invalid(why, capacity, "inner_diameter_mm of wire section", i, s->inner_diameter, "0 to 0.999 times diameter_mm");
     if (!within(s->young_modulus, 1e-3, 1e9))
-        return complain(why, capacity, "young_modulus (MPa) of wire section", i, s->young_modulus, "0.001 to 1e9 MPa (1e-6 to 1e6 GPa)");
+        return report_invalid(why, capacity, "young_modulus (MPa) of wire section", i, s->young_modulus, "0.001 to 1e9 MPa (1e-6 to 1e6 GPa)");
     if (!(s->poisson_ratio > -1 && s->poisson_ratio < 0.5))
-        return complain(why, capacity, "poisson_ratio of wire section", i, s->poisson_ratio, "above -1, below 0.5");
+        return report_invalid(why, capacity, "poisson_ratio of wire section", i, s->poisson_ratio, "above -1, below 0.5");
     if (!within(s->density, 1e-7, 1))
-        return complain(why, capacity, "density (g/mm3) of wire section", i, s->density, "1e-7 to 1 g/mm3 (1e-4 to 1000 g/cm3)");
+        return report_invalid(why, capacity, "density (g/mm3) of wire section", i, s->density, "1e-7 to 1 g/mm3 (1e-4 to 1000 g/cm3)");
     if (!within(fabs(s->rest_curvature) * s->diameter, 0, 1))
-        return complain(why, capacity, "rest_curvature_1_mm of wire section", i, s->rest_curvature, "within +-1/diameter");
+        return report_invalid(why, capacity, "rest_curvature_1_mm of wire section", i, s->rest_curvature, "within +-1/diameter");
     if (!within(fabs(s->rest_plane), 0, 1e3))
-        return complain(why, capacity, "rest_curvature_plane (rad) of wire section", i, s->rest_plane, "a finite angle");
+        return report_invalid(why, capacity, "rest_curvature_plane (rad) of wire section", i, s->rest_plane, "a finite angle");
     if (!(s->friction <= 10))
-        return complain(why, capacity, "friction of wire section", i, s->friction, "0 to 10, or negative for the wall's");
+        return report_invalid(why, capacity, "friction of wire section", i, s->friction, "0 to 10, or negative for the wall's");
     return true;
 }
 
 static bool check_rig(const WireOptions *o, double total, char *why, int capacity)
 {
     if (o->fix_count < 0 || (o->fix_count > 0 && !o->fix) || o->load_count < 0 || (o->load_count > 0 && !o->load))
-        return complain(why, capacity, "count of fixes or loads", -1, o->fix_count, "none, or an array of them");
+        return report_invalid(why, capacity, "count of fixes or loads", -1, o->fix_count, "none, or an array of them");
     for (int i = 0; i < o->fix_count; i++)
         if (!within(o->fix[i].s, 0, total * (1 + 1e-9)) || o->fix[i].dof > DOF_ALL)
-            return complain(why, capacity, "s_mm of fix", i, o->fix[i].s, "0 to the wire's length");
+            return report_invalid(why, capacity, "s_mm of fix", i, o->fix[i].s, "0 to the wire's length");
     for (int i = 0; i < o->load_count; i++) {
         const WireLoad *l = &o->load[i];
         if (!within(l->s, 0, total * (1 + 1e-9)))
-            return complain(why, capacity, "s_mm of load", i, l->s, "0 to the wire's length");
+            return report_invalid(why, capacity, "s_mm of load", i, l->s, "0 to the wire's length");
         if (!vec3_is_finite(l->force) || !vec3_is_finite(l->moment))
-            return complain(why, capacity, "force or moment of load", i, vec3_norm(l->force), "finite numbers");
+            return report_invalid(why, capacity, "force or moment of load", i, vec3_norm(l->force), "finite numbers");
         if (!within(l->ramp, 0, 1e12))
-            return complain(why, capacity, "ramp (ms) of load", i, l->ramp, "0 or a positive time");
+            return report_invalid(why, capacity, "ramp (ms) of load", i, l->ramp, "0 or a positive time");
     }
     return true;
 }
@@ -93,9 +93,9 @@ static bool check_rig(const WireOptions *o, double total, char *why, int capacit
 static bool wire_check(const WireOptions *o, char *why, int capacity)
 {
     if (o->elements < 1 || o->elements > ELEMENTS_MAX)
-        return complain(why, capacity, "elements of the wire", -1, o->elements, "1 to 10000");
+        return report_invalid(why, capacity, "elements of the wire", -1, o->elements, "1 to 10000");
     if (o->section_count < 1 || o->section_count > o->elements || !o->section)
-        return complain(why, capacity, "count of wire sections", -1, o->section_count, "at least 1, and at most as many as elements");
+        return report_invalid(why, capacity, "count of wire sections", -1, o->section_count, "at least 1, and at most as many as elements");
     double total = 0;
     for (int i = 0; i < o->section_count; i++) {
         if (!check_section(&o->section[i], i, why, capacity))
@@ -104,32 +104,32 @@ static bool wire_check(const WireOptions *o, char *why, int capacity)
     }
     int *elements = malloc((size_t)o->section_count * sizeof *elements);
     if (!elements)
-        return complain(why, capacity, "memory for wire sections", -1, o->section_count, "fewer sections");
+        return report_invalid(why, capacity, "memory for wire sections", -1, o->section_count, "fewer sections");
     bool is_good = wire_divide(o, elements);
     for (int i = 0; is_good && i < o->section_count; i++) {
         double angle = fabs(o->section[i].rest_curvature) * o->section[i].length / elements[i];
         if (angle > REST_ANGLE_MAX) {
             is_good = false;
-            complain(why, capacity, "rest bend (rad) of one element in wire section", i, angle, "at most 2: more elements");
+            report_invalid(why, capacity, "rest bend (rad) of one element in wire section", i, angle, "at most 2: more elements");
         }
     }
     free(elements);
     if (!is_good)
         return false;
     if (!within(o->damping_mass, 0, 1e6))
-        return complain(why, capacity, "damping_mass (1/ms)", -1, o->damping_mass, "0 to 1e6");
+        return report_invalid(why, capacity, "damping_mass (1/ms)", -1, o->damping_mass, "0 to 1e6");
     if (!within(o->damping_stiffness, 0, 1e6))
-        return complain(why, capacity, "damping_stiffness (ms)", -1, o->damping_stiffness, "0 to 1e6");
+        return report_invalid(why, capacity, "damping_stiffness (ms)", -1, o->damping_stiffness, "0 to 1e6");
     if (!vec3_is_finite(o->gravity) || !vec3_is_finite(o->start) || !vec3_is_finite(o->normal))
-        return complain(why, capacity, "gravity, start or normal", -1, o->gravity.x, "finite numbers");
+        return report_invalid(why, capacity, "gravity, start or normal", -1, o->gravity.x, "finite numbers");
     if (!within(vec3_norm(o->direction), 0.999, 1.001))
-        return complain(why, capacity, "length of the wire's direction", -1, vec3_norm(o->direction), "a unit vector");
+        return report_invalid(why, capacity, "length of the wire's direction", -1, vec3_norm(o->direction), "a unit vector");
     if (!within(o->hand_limit, 0, 1e9))
-        return complain(why, capacity, "hand_limit (N)", -1, o->hand_limit, "0 (never slips) to 1e9 N");
+        return report_invalid(why, capacity, "hand_limit (N)", -1, o->hand_limit, "0 (never slips) to 1e9 N");
     if (!within(o->valve_friction, 0, 1e9))
-        return complain(why, capacity, "valve_friction (N)", -1, o->valve_friction, "0 to 1e9 N");
+        return report_invalid(why, capacity, "valve_friction (N)", -1, o->valve_friction, "0 to 1e9 N");
     if (o->has_sheath && !within(o->inserted, 0, total * (1 + 1e-12)))
-        return complain(why, capacity, "inserted_mm", -1, o->inserted, "0 to the wire's length");
+        return report_invalid(why, capacity, "inserted_mm", -1, o->inserted, "0 to the wire's length");
     return check_rig(o, total, why, capacity);
 }
 

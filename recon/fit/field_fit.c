@@ -57,18 +57,18 @@ static bool is_crowded(const FieldModel *model, const int *first, const int *nex
     return false;
 }
 
-static bool put_base(FieldModel *model, int *first, int **next, int *room, int node, Vec3 x)
+static bool put_base(FieldModel *model, int *first, int **next, int *capacity, int node, Vec3 x)
 {
     const VesselTree *tree = model->tree;
     if (is_crowded(model, first, *next, node, x))
         return true;
     double reach = BASE_REACH * tree->radius[node];
-    if (model->count == *room) {
-        int *more = realloc(*next, (size_t)(2 * *room + 256) * sizeof *more);
+    if (model->count == *capacity) {
+        int *more = realloc(*next, (size_t)(2 * *capacity + 256) * sizeof *more);
         if (!more)
             return false;
         *next = more;
-        *room = 2 * *room + 256;
+        *capacity = 2 * *capacity + 256;
     }
     (*next)[model->count] = first[node];
     first[node] = model->count;
@@ -78,7 +78,7 @@ static bool put_base(FieldModel *model, int *first, int **next, int *room, int n
 static bool lay_base(FieldModel *model)
 {
     const VesselTree *tree = model->tree;
-    int *first = malloc((size_t)tree->node_count * sizeof *first), *next = NULL, room = 0;
+    int *first = malloc((size_t)tree->node_count * sizeof *first), *next = NULL, capacity = 0;
     bool good = first != NULL;
     for (int i = 0; i < tree->node_count && good; i++)
         first[i] = -1;
@@ -87,9 +87,9 @@ static bool lay_base(FieldModel *model)
             Vec3 a = tree->center[tree->parent[i]], b = tree->center[i];
             int steps = (int)(vec3_distance(a, b) / (BASE_APART * tree->radius[i]));
             for (int k = 1; k <= steps && good; k++)
-                good = put_base(model, first, &next, &room, i, vec3_mix(a, b, k * BASE_APART * tree->radius[i] / vec3_distance(a, b)));
+                good = put_base(model, first, &next, &capacity, i, vec3_mix(a, b, k * BASE_APART * tree->radius[i] / vec3_distance(a, b)));
         }
-        good = good && put_base(model, first, &next, &room, i, tree->center[i]);
+        good = good && put_base(model, first, &next, &capacity, i, tree->center[i]);
     }
     double r = tree->radius[0];
     for (int k = 1; good && vessel_tree_root_is_open(tree) && k * BASE_APART < FIELD_INLET_RADII + 0.5; k++)

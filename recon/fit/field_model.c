@@ -64,7 +64,7 @@ static void flood_chunk(void *context, long index)
         FieldBlob *blob = &model->blob[b];
         if (!blob->moved)
             continue;
-        int count = blob_flood_nodes(&flood, model->tree, blob->owner, blob->center, FIELD_ROOM * blob->reach);
+        int count = blob_flood_nodes(&flood, model->tree, blob->owner, blob->center, FIELD_MARGIN * blob->reach);
         int *node = realloc(blob->node, (size_t)count * sizeof *node);
         if (!node) {
             job->failed[index] = true;

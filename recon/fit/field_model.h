@@ -6,7 +6,7 @@
 #include "recon/fit/fit_lanes.h"
 
 // Factor by which a blob's reach may grow in a sweep; the lists of nodes and rows allow for it.
-#define FIELD_ROOM 1.15
+#define FIELD_MARGIN 1.15
 
 typedef struct FieldBlob {
     Vec3 center;
@@ -14,7 +14,7 @@ typedef struct FieldBlob {
     int owner;               // node from which the search for the nodes that see it starts
     Vec3 birth;              // initial position and size: priors
     double birth_reach;
-    int node_count, *node;   // nodes that see it, at FIELD_ROOM times its reach
+    int node_count, *node;   // nodes that see it, at FIELD_MARGIN times its reach
     bool is_base;            // its amplitude stays positive, because the base is lumen
     bool moved;              // the lists are up to date
 } FieldBlob;

@@ -29,7 +29,7 @@ static const double OUTSIDE = 0.15;
 enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
 typedef struct Draft {       // rows of a node while they are being collected
-    int data, guards, data_room, guard_room;
+    int data, guards, data_capacity, guard_capacity;
     Vec3 *point, *at;
     float (*bound)[2];
     bool failed;
@@ -53,32 +53,32 @@ bool field_link_is_lumen(const VesselTree *tree, int node)
 
 static void add_point(Draft *d, Vec3 x)
 {
-    if (d->data == d->data_room) {
-        int room = 2 * d->data_room + 64;
-        Vec3 *more = realloc(d->point, (size_t)room * sizeof *more);
+    if (d->data == d->data_capacity) {
+        int capacity = 2 * d->data_capacity + 64;
+        Vec3 *more = realloc(d->point, (size_t)capacity * sizeof *more);
         if (!more) {
             d->failed = true;
             return;
         }
         d->point = more;
-        d->data_room = room;
+        d->data_capacity = capacity;
     }
     d->point[d->data++] = x;
 }
 
 static void add_guard(Draft *d, Vec3 x, double low, double high)
 {
-    if (d->guards == d->guard_room) {
-        int room = 2 * d->guard_room + 64;
-        Vec3 *more = realloc(d->at, (size_t)room * sizeof *more);
+    if (d->guards == d->guard_capacity) {
+        int capacity = 2 * d->guard_capacity + 64;
+        Vec3 *more = realloc(d->at, (size_t)capacity * sizeof *more);
         d->at = more ? more : d->at;
-        float(*bound)[2] = realloc(d->bound, (size_t)room * sizeof *bound);
+        float(*bound)[2] = realloc(d->bound, (size_t)capacity * sizeof *bound);
         d->bound = bound ? bound : d->bound;
         if (!more || !bound) {
             d->failed = true;
             return;
         }
-        d->guard_room = room;
+        d->guard_capacity = capacity;
     }
     d->at[d->guards] = x;
     d->bound[d->guards][0] = (float)low;

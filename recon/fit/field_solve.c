@@ -73,7 +73,7 @@ static int find_blobs(const Sweep *sweep, int region, const RowTile *tile, int *
         if (sweep->region_of[b] != region)
             continue;
         LaneBlob lane = field_lane_blob(model->tree, tile->node, &model->blob[b]);
-        if (field_tile_meets(tile, &lane, (float)FIELD_ROOM))
+        if (field_tile_meets(tile, &lane, (float)FIELD_MARGIN))
             local[count++] = sweep->local_of[b];
     }
     return count;
@@ -309,7 +309,7 @@ static void linearise(Work *w)
 
 static double bound(double value, double most) { return fmax(-most, fmin(most, value)); }
 
-// Returns the blob after a step. `start`: the blob at the start of the sweep, whose rows are known up to FIELD_ROOM times its reach; a larger blob would be
+// Returns the blob after a step. `start`: the blob at the start of the sweep, whose rows are known up to FIELD_MARGIN times its reach; a larger blob would be
 // judged without the rows that it worsens.
 static FieldBlob moved_by(const FieldBlob *b, const double *step, const FieldBlob *start)
 {
@@ -327,10 +327,10 @@ static FieldBlob moved_by(const FieldBlob *b, const double *step, const FieldBlo
     double least = (b->is_base ? 0.75 : 0.5) * b->birth_reach, largest = fmin((b->is_base ? 1.5 : 2) * b->birth_reach, 1.12 * b->reach);
     to.reach = fmax(least, fmin(reach, largest));
     Vec3 gone = vec3_sub(to.center, start->center);
-    double beyond = vec3_norm(gone) + fmax(0, to.reach - start->reach), room = (FIELD_ROOM - 1) * start->reach;
-    if (beyond > room) {
-        to.center = vec3_add_scaled(start->center, room / beyond, gone);
-        to.reach = to.reach > start->reach ? start->reach + room / beyond * (to.reach - start->reach) : to.reach;
+    double beyond = vec3_norm(gone) + fmax(0, to.reach - start->reach), margin = (FIELD_MARGIN - 1) * start->reach;
+    if (beyond > margin) {
+        to.center = vec3_add_scaled(start->center, margin / beyond, gone);
+        to.reach = to.reach > start->reach ? start->reach + margin / beyond * (to.reach - start->reach) : to.reach;
     }
     to.moved = true;
     return to;

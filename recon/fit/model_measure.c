@@ -125,17 +125,17 @@ static double distance_to_data(const VesselTree *tree, int node, Vec3 x)
 
 static int ray_count(const VesselTree *tree, int node) { return tree->kind[node] == NODE_ANEURYSM ? SAC_RAYS : VESSEL_RAYS; }
 
-static VesselHit ask_on(const Job *job, VesselMemory *memory, Vec3 x)
+static VesselHit query_with(const Job *job, VesselMemory *memory, Vec3 x)
 {
     VesselHit hit;
     vessel_query(job->vessel, 1, &x, HUGE_VAL, memory, &hit);
     return hit;
 }
 
-static VesselHit ask(const Job *job, int node, Vec3 x)
+static VesselHit query_from(const Job *job, int node, Vec3 x)
 {
     VesselMemory memory = {.node = node};
-    return ask_on(job, &memory, x);
+    return query_with(job, &memory, x);
 }
 
 // Measures the jump at x, on the border between the cells of `node` and `other`.
@@ -145,8 +145,8 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
     Blobby a = blobby_of(job->tree, node), b = blobby_of(job->tree, other);
     SurfacePoint p = blobby_project(&a, x, x), q = blobby_project(&b, x, x);
     VesselMemory memory = {.node = node};
-    VesselHit before = ask_on(job, &memory, vec3_add_scaled(x, -aside, across)), behind = ask_on(job, &memory, vec3_add_scaled(x, aside, across));
-    VesselHit fresh = ask(job, other, vec3_add_scaled(x, aside, across));
+    VesselHit before = query_with(job, &memory, vec3_add_scaled(x, -aside, across)), behind = query_with(job, &memory, vec3_add_scaled(x, aside, across));
+    VesselHit fresh = query_from(job, other, vec3_add_scaled(x, aside, across));
     unsigned unfit = VESSEL_OPEN_END | VESSEL_BEYOND;
     if ((before.flags | behind.flags | fresh.flags) & unfit)
         return;
@@ -203,7 +203,7 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
             add_join(job, node, other, x, across, f);
     }
     if (job->truth) {
-        VesselHit hit = ask(job, node, p);
+        VesselHit hit = query_from(job, node, p);
         Vec3 wall = vec3_add_scaled(p, -hit.gap, hit.normal);
         if (!(hit.flags & (VESSEL_OPEN_END | VESSEL_BEYOND)) && !shape_beyond_open_end(job->truth, wall))
             f->wall[f->walls++] = (WallPoint){job->place[node], -shape_distance(job->truth, wall, NULL)};
@@ -258,7 +258,7 @@ static void measure_node(void *context, long index)
         cast_rays_of(job, node, f);
     for (int k = 0; k < LINK_SAMPLES && parent >= 0; k++) {
         double t = (k + 0.5) / LINK_SAMPLES, radius = tree->radius[node] + t * (tree->radius[parent] - tree->radius[node]);
-        VesselHit hit = ask(job, node, vec3_mix(tree->center[node], tree->center[parent], t));
+        VesselHit hit = query_from(job, node, vec3_mix(tree->center[node], tree->center[parent], t));
         f->clearance = fmin(f->clearance, hit.gap / fmin(radius, fmin(tree->radius[node], tree->radius[parent])));
     }
 }
@@ -318,10 +318,10 @@ static WallRow wall_row(const Job *job, int place, double *value)
 
 static bool add_up(const Job *job, ModelMeasure *out)
 {
-    size_t room = 1;
+    size_t capacity = 1;
     for (int i = 0; i < job->tree->node_count; i++)
-        room += (size_t)job->node[i].joins + (size_t)job->node[i].walls;
-    double *value = malloc(room * sizeof *value);
+        capacity += (size_t)job->node[i].joins + (size_t)job->node[i].walls;
+    double *value = malloc(capacity * sizeof *value);
     if (!value)
         return false;
     *out = (ModelMeasure){.bare_worst = -1, .ghost_worst = -1, .narrowest_node = -1, .least_clearance = HUGE_VAL};

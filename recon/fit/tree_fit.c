@@ -22,19 +22,19 @@ static FieldFitOptions shared_options(const TreeFitOptions *options)
     return field;
 }
 
-static int describe_fit(const TreeFitOptions *options, char *text, size_t room)
+static int describe_fit(const TreeFitOptions *options, char *text, size_t capacity)
 {
     const LimFitOptions *o = &options->local;
     if (options->preset == FIT_DEFAULT) {
         FieldFitOptions f = shared_options(options);
-        return snprintf(text, room,
+        return snprintf(text, capacity,
                         "fit:\n  preset: %s\n  edge_blur_mm: %g\n  target_mm: %g\n  voxel_mm: %g\n  tolerance_voxels: %g\n  tolerance_radii: %g\n"
                         "  tolerance_without_voxel_radii: %g\n  least_reach_voxels: %g\n  significance: %g\n  levels: %d\ntree:\n",
                         fit_preset_name[options->preset], options->edge_blur, f.target_mm, f.voxel_mm, f.tolerance_voxels, f.tolerance, f.tolerance_unknown,
                         f.least_reach_voxels, f.significance, f.levels);
     }
     return snprintf(
-        text, room,
+        text, capacity,
         "fit:\n  preset: %s\n  edge_blur_mm: %g\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
         "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
         "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
@@ -45,12 +45,12 @@ static int describe_fit(const TreeFitOptions *options, char *text, size_t room)
 
 char *tree_fit_parameters(const TreeFitOptions *options, const TreeFileInfo *tree)
 {
-    size_t room = 1024 + 4 * (tree->parameters ? strlen(tree->parameters) : 0);
-    char *text = HEAP_ZEROED(room, 1);
-    int n = describe_fit(options, text, room);
+    size_t capacity = 1024 + 4 * (tree->parameters ? strlen(tree->parameters) : 0);
+    char *text = HEAP_ZEROED(capacity, 1);
+    int n = describe_fit(options, text, capacity);
     char *out = text + n;
     bool line_start = true;
-    for (const char *in = tree->parameters; in && *in && out < text + room - 4; in++) {
+    for (const char *in = tree->parameters; in && *in && out < text + capacity - 4; in++) {
         if (line_start)
             *out++ = ' ', *out++ = ' ';
         *out++ = *in;
@@ -70,8 +70,8 @@ static double seconds_now(void)
 void tree_fit_complete_options(TreeFitOptions *options, const VesselTree *tree, const TreeFileInfo *info)
 {
     if (!options->has_voxel) {
-        double said = tree_file_number(info, "voxel_mm", 0);
-        options->local.voxel_mm = said > 1e-4 && said < 100 ? said : 0;
+        double stated = tree_file_number(info, "voxel_mm", 0);
+        options->local.voxel_mm = stated > 1e-4 && stated < 100 ? stated : 0;
     }
     if (options->edge_blur < 0)      // the points of a model were already corrected by its fit
         options->edge_blur = vessel_tree_is_model(tree) || options->preset == FIT_PAPER ? 0 : fmax(tree_file_number(info, "edge_blur_mm", 0), 0);

@@ -26,16 +26,16 @@ typedef struct Link {
     int station_count;
 } Link;
 
-bool nodes_create(Nodes *nodes, size_t room)
+bool nodes_create(Nodes *nodes, size_t capacity)
 {
     *nodes = (Nodes){0,
-                     calloc(room, sizeof(Vec3)),
-                     calloc(room, sizeof(Vec3)),
-                     calloc(room, sizeof(double)),
-                     calloc(room, sizeof(int)),
-                     calloc(room, sizeof(int)),
-                     calloc(room, sizeof(bool)),
-                     calloc(room, sizeof(bool))};
+                     calloc(capacity, sizeof(Vec3)),
+                     calloc(capacity, sizeof(Vec3)),
+                     calloc(capacity, sizeof(double)),
+                     calloc(capacity, sizeof(int)),
+                     calloc(capacity, sizeof(int)),
+                     calloc(capacity, sizeof(bool)),
+                     calloc(capacity, sizeof(bool))};
     return nodes->center && nodes->direction && nodes->radius && nodes->parent && nodes->sample && nodes->is_end && nodes->is_link;
 }
 
@@ -89,36 +89,36 @@ static double root_radius(const Nodes *n, const int *first_child, int node)
 
 // --- the surface ---
 
-typedef struct Room {        // context of the lattice search
+typedef struct BranchWall {  // context of the lattice search
     const Wall *wall;
     double radius;           // radius of the branch
-} Room;
+} BranchWall;
 
 // Returns true if the step stays inside. A winding number visits all triangles, so it is computed only behind walls that the step crosses.
 static bool stays_inside(const void *context, Vec3 a, Vec3 b)
 {
-    const Room *room = context;
-    double length = vec3_distance(a, b), past = 1e-4 * room->radius;
+    const BranchWall *branch = context;
+    double length = vec3_distance(a, b), past = 1e-4 * branch->radius;
     Vec3 along = vec3_unit_or(vec3_sub(b, a), vec3(1, 0, 0));
     for (int sheets = 0; length > 0 && sheets < 16; sheets++) {
-        double hit = mesh_tree_ray(room->wall->tree, a, along, length, NULL);
+        double hit = mesh_tree_ray(branch->wall->tree, a, along, length, NULL);
         if (!isfinite(hit))
             return true;
         a = vec3_add_scaled(a, hit + past, along);
         length -= hit + past;
-        if (mesh_winding(&room->wall->mesh, a) < 0.5)
+        if (mesh_winding(&branch->wall->mesh, a) < 0.5)
             return false;
     }
     return length <= 0;
 }
 
 // Distance to the wall as a fraction of the branch's radius.
-static double room_at(const void *context, Vec3 x)
+static double clearance_at(const void *context, Vec3 x)
 {
-    const Room *room = context;
+    const BranchWall *branch = context;
     Vec3 foot;
     int t = 0;
-    return fmin(1, mesh_tree_nearest(room->wall->tree, x, INFINITY, &foot, &t) / room->radius);
+    return fmin(1, mesh_tree_nearest(branch->wall->tree, x, INFINITY, &foot, &t) / branch->radius);
 }
 
 // --- links ---
@@ -140,20 +140,20 @@ static bool follow_skeleton(const Nodes *n, const Skeleton *s, Link *link)
 // Finds the skeleton's path, or the best path near the straight link if a wall crosses the skeleton's. Returns false if out of memory.
 static bool find_path(const Nodes *n, const Skeleton *s, const Wall *wall, Link *link)
 {
-    Room room = {wall, link->radius};
+    BranchWall branch = {wall, link->radius};
     bool inside = true;
     if (!follow_skeleton(n, s, link))
         return false;
     for (int i = 1; i < link->path.count; i++)
-        inside = inside && stays_inside(&room, link->path.point[i - 1], link->path.point[i]);
+        inside = inside && stays_inside(&branch, link->path.point[i - 1], link->path.point[i]);
     if (!inside) {
         free(link->path.point);
-        if (!link_lattice_path(n->center[link->parent], n->center[link->node], link->radius, 0.2 * link->radius, &(LinkGround){room_at, stays_inside, &room},
-                               &link->path))
+        if (!link_lattice_path(n->center[link->parent], n->center[link->node], link->radius, 0.2 * link->radius,
+                               &(LinkGround){clearance_at, stays_inside, &branch}, &link->path))
             return false;
     }
     for (int i = 0; i < link->path.count; i++)
-        link->path.share = fmin(link->path.share, room_at(&room, link->path.point[i]));
+        link->path.share = fmin(link->path.share, clearance_at(&branch, link->path.point[i]));
     return true;
 }
 
@@ -212,13 +212,13 @@ static void mark_hanging(const Nodes *n, int node, bool *hangs)
 // later ones are not considered. Returns false if out of memory.
 static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
 {
-    Room room = {wall, link->radius};
+    BranchWall branch = {wall, link->radius};
     double least = 3 * link->radius;
     int best = -1;
     Vec3 x = n->center[link->node];
     for (int i = 0; i < link->node; i++) {
         double apart = vec3_distance(x, n->center[i]) - n->radius[i] - link->radius;
-        if (apart < least && stays_inside(&room, n->center[i], x)) {
+        if (apart < least && stays_inside(&branch, n->center[i], x)) {
             least = apart;
             best = i;
         }
@@ -227,7 +227,7 @@ static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
         return true;
     link->parent = best;
     link->is_moved = true;
-    link->path = (LinkPath){malloc(2 * sizeof(Vec3)), 2, fmin(room_at(&room, n->center[best]), room_at(&room, x))};
+    link->path = (LinkPath){malloc(2 * sizeof(Vec3)), 2, fmin(clearance_at(&branch, n->center[best]), clearance_at(&branch, x))};
     if (!link->path.point)
         return false;
     link->path.point[0] = n->center[best];
@@ -315,9 +315,9 @@ static bool measure(const Nodes *n, const Skeleton *s, const Wall *wall, const i
 bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, ImportReport *report)
 {
     int count = 0, stations = 0;
-    size_t room = (size_t)nodes->count + 1;
-    int *first_child = malloc(room * sizeof *first_child), *place = malloc(room * sizeof *place);
-    bool *dropped = calloc(room, sizeof *dropped), *hangs = calloc(room, sizeof *hangs);
+    size_t capacity = (size_t)nodes->count + 1;
+    int *first_child = malloc(capacity * sizeof *first_child), *place = malloc(capacity * sizeof *place);
+    bool *dropped = calloc(capacity, sizeof *dropped), *hangs = calloc(capacity, sizeof *hangs);
     Link *link = first_child ? collect_links(nodes, first_child, &count) : NULL;
     Nodes out = {0};
     bool good = place && dropped && hangs && link;
@@ -337,7 +337,7 @@ bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, 
             dropped[i] = dropped[i] || hangs[i];
         }
     }
-    good = good && nodes_create(&out, room + (size_t)stations);
+    good = good && nodes_create(&out, capacity + (size_t)stations);
     if (good) {
         rebuild(nodes, link, count, wall, dropped, place, &out, report);
         nodes_free(nodes);

@@ -122,14 +122,14 @@ static void end_of_curve(const CurveSet *set, int curve, bool last, const MeshTr
 static bool is_junction(const CurveSet *set, int curve, Vec3 end, Vec3 outward, double radius)
 {
     for (int c = 0; c < set->curve_count; c++) {
-        bool passes = false, goes_on = false;
+        bool passes = false, continues = false;
         for (int i = set->offset[c]; c != curve && i < set->offset[c + 1]; i++) {
             Vec3 to = vec3_sub(set->point[i], end);
             double d = vec3_norm(to);
             passes = passes || d < 0.5 * radius;
-            goes_on = goes_on || (d > radius && d < 2 * radius && vec3_dot(to, outward) > -0.3 * d);
+            continues = continues || (d > radius && d < 2 * radius && vec3_dot(to, outward) > -0.3 * d);
         }
-        if (passes && goes_on)
+        if (passes && continues)
             return true;
     }
     return false;
@@ -140,8 +140,8 @@ static bool is_junction(const CurveSet *set, int curve, Vec3 end, Vec3 outward, 
 static bool find_openings(Wall *wall)
 {
     const SurfaceMesh *mesh = &wall->mesh;
-    size_t v = (size_t)mesh->vertex_count + 1, t_room = (size_t)mesh->triangle_count + 1;
-    int(*across)[3] = malloc(t_room * sizeof *across), *parent = malloc(v * sizeof *parent), *number = malloc(v * sizeof *number), count = 0;
+    size_t v = (size_t)mesh->vertex_count + 1, triangle_capacity = (size_t)mesh->triangle_count + 1;
+    int(*across)[3] = malloc(triangle_capacity * sizeof *across), *parent = malloc(v * sizeof *parent), *number = malloc(v * sizeof *number), count = 0;
     double *length = NULL;
     bool good = across && parent && number && link_sides(mesh, across);
     for (int i = 0; good && i < mesh->vertex_count; i++) {

@@ -44,7 +44,7 @@ typedef struct LineSearch {
 static int compare_tips(const void *a, const void *b)
 {
     const PathEntry *x = a, *y = b;
-    return x->way != y->way ? (x->way < y->way) - (x->way > y->way) : (x->place > y->place) - (x->place < y->place);
+    return x->cost != y->cost ? (x->cost < y->cost) - (x->cost > y->cost) : (x->place > y->place) - (x->place < y->place);
 }
 
 static bool find_paths(LineSearch *f, int start)
@@ -62,13 +62,13 @@ static bool find_paths(LineSearch *f, int start)
     const float least = (float)(0.2 * l->h), h = (float)l->h;
     while (good && f->heap.count) {
         PathEntry at = path_heap_pop(&f->heap);
-        if (at.way > f->cost[at.place])
+        if (at.cost > f->cost[at.place])
             continue;
         int other[LUMEN_NEIGHBOURS];
         float step[LUMEN_NEIGHBOURS];
         int count = lumen_neighbours(l, at.place, other, step);
         for (int k = 0; k < count && good; k++) {
-            float d = 0.5f * (fmaxf(l->distance[at.place], least) + fmaxf(l->distance[other[k]], least)), cost = at.way + step[k] * h / (d * d);
+            float d = 0.5f * (fmaxf(l->distance[at.place], least) + fmaxf(l->distance[other[k]], least)), cost = at.cost + step[k] * h / (d * d);
             if (cost < f->cost[other[k]]) {
                 f->cost[other[k]] = cost;
                 f->length[other[k]] = f->length[at.place] + step[k] * h;

@@ -444,7 +444,7 @@ typedef struct Text {
     int lines;
 } Text;
 
-static void __attribute__((format(printf, 2, 3))) say(Text *text, const char *format, ...)
+static void __attribute__((format(printf, 2, 3))) append_line(Text *text, const char *format, ...)
 {
     va_list list;
     va_start(list, format);
@@ -456,10 +456,10 @@ static void __attribute__((format(printf, 2, 3))) say(Text *text, const char *fo
     text->lines++;
 }
 
-static void say_finding(Text *text, const MeshFinding *f, const char *what, const char *of, const char *done)
+static void append_finding(Text *text, const MeshFinding *f, const char *what, const char *of, const char *done)
 {
     if (f->count)
-        say(text, "%d %s, first: %s %d at (%g, %g, %g)%s\n", f->count, what, of, f->first, f->place.x, f->place.y, f->place.z, done);
+        append_line(text, "%d %s, first: %s %d at (%g, %g, %g)%s\n", f->count, what, of, f->first, f->place.x, f->place.y, f->place.z, done);
 }
 
 int mesh_check_text(const MeshCheck *check, bool repaired, char *out, size_t capacity)
@@ -468,23 +468,23 @@ int mesh_check_text(const MeshCheck *check, bool repaired, char *out, size_t cap
     out[0] = '\0';
     if (check->unit_is_doubtful) {
         Vec3 e = vec3_sub(check->high, check->low);
-        say(&text, "size %g x %g x %g: probably not in millimetres%s\n", e.x, e.y, e.z, e.x < SMALL ? " but in metres; scale by 1000" : "");
+        append_line(&text, "size %g x %g x %g: probably not in millimetres%s\n", e.x, e.y, e.z, e.x < SMALL ? " but in metres; scale by 1000" : "");
     }
-    say_finding(&text, &check->duplicate_vertices, "vertices repeat others", "vertex", repaired ? ": welded" : "");
-    say_finding(&text, &check->unreferenced_vertices, "vertices are in no triangle", "vertex", repaired ? ": removed" : "");
-    say_finding(&text, &check->degenerate_triangles, "triangles have no area", "triangle", repaired ? ": removed if two corners coincide" : "");
-    say_finding(&text, &check->duplicate_triangles, "triangles repeat others", "triangle", repaired ? ": removed" : "");
-    say_finding(&text, &check->flipped_triangles, "triangles are oriented against their neighbours", "triangle", repaired ? ": flipped" : "");
+    append_finding(&text, &check->duplicate_vertices, "vertices repeat others", "vertex", repaired ? ": welded" : "");
+    append_finding(&text, &check->unreferenced_vertices, "vertices are in no triangle", "vertex", repaired ? ": removed" : "");
+    append_finding(&text, &check->degenerate_triangles, "triangles have no area", "triangle", repaired ? ": removed if two corners coincide" : "");
+    append_finding(&text, &check->duplicate_triangles, "triangles repeat others", "triangle", repaired ? ": removed" : "");
+    append_finding(&text, &check->flipped_triangles, "triangles are oriented against their neighbours", "triangle", repaired ? ": flipped" : "");
     if (check->inside_out_count)
-        say(&text, "normals point into the lumen%s%s\n", check->component_count > 1 ? " in some components" : "", repaired ? ": all flipped" : "");
+        append_line(&text, "normals point into the lumen%s%s\n", check->component_count > 1 ? " in some components" : "", repaired ? ": all flipped" : "");
     if (check->component_count > 1)
-        say(&text, "%d components that do not touch\n", check->component_count);
+        append_line(&text, "%d components that do not touch\n", check->component_count);
     if (check->open_edges.count) {
         char count[64];
         snprintf(count, sizeof count, ", in %d opening%s", check->opening_count, check->opening_count == 1 ? "" : "s");
-        say_finding(&text, &check->open_edges, "edges are open", "triangle", count);
+        append_finding(&text, &check->open_edges, "edges are open", "triangle", count);
     }
-    say_finding(&text, &check->nonmanifold_edges, "edges are shared by more than two triangles", "triangle", repaired ? ": kept" : "");
-    say_finding(&text, &check->one_sided_edges, "edges have no consistent orientation (one-sided surface)", "triangle", "");
+    append_finding(&text, &check->nonmanifold_edges, "edges are shared by more than two triangles", "triangle", repaired ? ": kept" : "");
+    append_finding(&text, &check->one_sided_edges, "edges have no consistent orientation (one-sided surface)", "triangle", "");
     return text.lines;
 }

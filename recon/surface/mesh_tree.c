@@ -191,7 +191,7 @@ double mesh_tree_nearest(const MeshTree *tree, Vec3 point, double reach, Vec3 *f
         }
         if (box->count == 0) {
             double first = box_distance2(&tree->box[box->first], point), second = box_distance2(&tree->box[box->first + 1], point);
-            // the nearer one goes on top of the stack
+            // the nearer one is put on top of the stack
             int nearer = box->first + (first >= second), farther = box->first + (first < second);
             if ((first < second ? second : first) <= best) {
                 away[height] = first < second ? second : first;
@@ -260,7 +260,7 @@ double mesh_tree_ray(const MeshTree *tree, Vec3 from, Vec3 direction, double rea
         if (box->count == 0) {
             double first = ray_enters(&tree->box[box->first], start, d, inverse, least(best, reach));
             double second = ray_enters(&tree->box[box->first + 1], start, d, inverse, least(best, reach));
-            // the nearer one goes on top of the stack
+            // the nearer one is put on top of the stack
             int nearer = box->first + (first >= second), farther = box->first + (first < second);
             if (isfinite(most(first, second))) {
                 enters[height] = most(first, second);

@@ -210,15 +210,15 @@ static void take_text(void *context, const char *text, int length)
 
 // --- array bodies ---
 
-// Decodes up to `want` bytes. White space is skipped; decoding stops at padding or at any other character. *used: number of characters read, including
+// Decodes up to `expected` bytes. White space is skipped; decoding stops at padding or at any other character. *used: number of characters read, including
 // padding.
-static size_t base64_decode(const char *text, size_t length, size_t want, unsigned char *out, size_t *used)
+static size_t base64_decode(const char *text, size_t length, size_t expected, unsigned char *out, size_t *used)
 {
     static const char alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     uint32_t bits = 0;
     int have = 0, quad = 0;
     size_t done = 0, at = 0;
-    for (; at < length && (done < want || quad); at++) {
+    for (; at < length && (done < expected || quad); at++) {
         char c = text[at];
         if (c == ' ' || c == '\n' || c == '\r' || c == '\t')
             continue;
@@ -232,7 +232,7 @@ static size_t base64_decode(const char *text, size_t length, size_t want, unsign
         have += 6;
         if (have >= 8) {
             have -= 8;
-            if (done < want)
+            if (done < expected)
                 out[done++] = (unsigned char)(bits >> have);
         }
     }

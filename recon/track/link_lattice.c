@@ -94,7 +94,7 @@ static bool cross_lattice(Lattice *l, const LinkGround *ground, int start, int g
         int at[3];
         if (here.place == goal)
             break;
-        if (here.way > l->cost[here.place])
+        if (here.cost > l->cost[here.place])
             continue;
         place_in(l, here.place, at);
         for (int n = 0; n < 27 && good; n++) {
@@ -103,7 +103,7 @@ static bool cross_lattice(Lattice *l, const LinkGround *ground, int start, int g
                 continue;
             int k = (next[2] * l->size[1] + next[1]) * l->size[0] + next[0];
             Vec3 a = point_of(l, at), b = point_of(l, next);
-            float cost = here.way + link_step_cost((float)vec3_distance(a, b), (double)l->clear[here.place], (double)l->clear[k]);
+            float cost = here.cost + link_step_cost((float)vec3_distance(a, b), (double)l->clear[here.place], (double)l->clear[k]);
             if (l->clear[k] < 0 || cost >= l->cost[k] || (ground->passes && !ground->passes(ground->context, a, b)))
                 continue;
             l->cost[k] = cost;

@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-static bool is_before(PathEntry a, PathEntry b) { return a.way < b.way || (a.way == b.way && a.place < b.place); }
+static bool is_before(PathEntry a, PathEntry b) { return a.cost < b.cost || (a.cost == b.cost && a.place < b.place); }
 
 bool path_heap_push(PathHeap *heap, PathEntry entry)
 {

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 typedef struct PathEntry {
-    float way;               // path length or cost from the start
+    float cost;              // path length or cost from the start
     int place;
 } PathEntry;
 

@@ -309,7 +309,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
                 good = track_append(&t->tree, &copy, point[i]);
             }
             bool is_joined = false;
-            good = good && rbt_mend_links(t, paint, before, &is_joined);
+            good = good && rbt_repair_links(t, paint, before, &is_joined);
             if (good && is_joined && !is_tube(t, t->tree.node + before, t->tree.count - before)) {   // including the path that joins it
                 track_cut(&t->tree, before);
                 is_joined = false;
@@ -338,7 +338,7 @@ static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Fo
         if (!track_append(&t->tree, &node, found->out.point + node.point_start))
             return false;
     }
-    if (!rbt_mend_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why, -1)))
+    if (!rbt_repair_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why, -1)))
         return false;
     rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
     return true;

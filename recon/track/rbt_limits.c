@@ -156,7 +156,7 @@ bool rbt_add_rival(Tracker *t, const RbtRegion *point, Vec3 start, int number, c
 {
     RbtSeed seed;
     Cylinder c;
-    char said[sizeof t->start];
+    char before[sizeof t->start];
     Track wanted = t->tree, rival = {0};
     if (!vessel_at(t, point, "not", path, faults, &seed, &c))
         return false;
@@ -167,12 +167,12 @@ bool rbt_add_rival(Tracker *t, const RbtRegion *point, Vec3 start, int number, c
         return false;
     }
     t->random = random_from_seed((uint64_t)t->parameters->seed, (uint64_t)(RIVAL_STREAM + number));
-    memcpy(said, t->start, sizeof said);
+    memcpy(before, t->start, sizeof before);
     t->tree = (Track){0};
     bool found = tracker_both_ways(t, &seed, &c, number);
     rival = t->tree;
     t->tree = wanted;
-    memcpy(t->start, said, sizeof said);
+    memcpy(t->start, before, sizeof before);
     if (!found && !t->out_of_memory)
         faults_add(faults, path, point->line, point->column,
                    "nothing could be tracked from the point of `not` (%g, %g, %g) mm; expected a point well inside a vessel", seed.start.x, seed.start.y,

@@ -205,7 +205,7 @@ static int search_box(const Tracker *t, Box *b, int start, double reach, double 
     *good = path_heap_push(&heap, (PathEntry){0, start});
     while (*good && heap.count > 0 && found < 0) {
         PathEntry here = path_heap_pop(&heap);
-        if (here.way > g->cost[here.place])
+        if (here.cost > g->cost[here.place])
             continue;
         if (b->owner[here.place] > 0) {
             found = here.place;
@@ -222,7 +222,7 @@ static int search_box(const Tracker *t, Box *b, int start, double reach, double 
             }
             if ((double)g->lit[k] < least)
                 continue;
-            float cost = here.way + link_step_cost(g->length[n], (double)g->lit[here.place], (double)g->lit[k]);
+            float cost = here.cost + link_step_cost(g->length[n], (double)g->lit[here.place], (double)g->lit[k]);
             if (cost < g->cost[k] && (double)cost < most) {
                 g->cost[k] = cost;
                 g->from[k] = here.place;

@@ -112,7 +112,7 @@ static int search_path(const Tracker *t, const RbtPaint *paint, int before, Vec3
     }
     while (good && heap.count > 0 && reached < 0) {
         PathEntry here = path_heap_pop(&heap);
-        if (here.way > s.cost[here.place])
+        if (here.cost > s.cost[here.place])
             continue;
         Vec3 x = volume_point_of(v, voxel_in(&s, here.place));
         if (paint) {
@@ -139,7 +139,7 @@ static int search_path(const Tracker *t, const RbtPaint *paint, int before, Vec3
             if (tracker_is_forbidden(t, volume_point_of(v, voxel)) || bright < 0.7 * least_lit)
                 continue;
             bright = 0.5 * (bright + lit(light, voxel_value(v, voxel)));
-            float cost = here.way + length[n] / (float)(bright * bright * bright);
+            float cost = here.cost + length[n] / (float)(bright * bright * bright);
             if (cost < s.cost[k]) {
                 s.cost[k] = cost;
                 s.from[k] = here.place;
@@ -198,7 +198,7 @@ static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const 
     return true;
 }
 
-bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joined)
+bool rbt_repair_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joined)
 {
     Track *tree = &t->tree, new = {0};
     int count = tree->count - first;

@@ -8,6 +8,6 @@
 // Checks the links of nodes `first` … t->tree.count-1 and rewrites that part of the tree. These nodes are one branch, whose first node is attached to an
 // earlier node (or is the root). `paint` holds the nodes before `first` (NULL: the branch's first link is not checked). *is_joined is false if no path
 // through the lumen leads to the tree; the branch is then removed. Returns false if out of memory.
-bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joined);
+bool rbt_repair_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joined);
 
 #endif

@@ -117,11 +117,11 @@ static void flood(Flood *f, const Tracker *t, const RbtPaint *paint, int first, 
         PathEntry here = path_heap_pop(&f->heap);
         Wet wet = f->wet[here.place];
         const Border *b = &border[wet.node - first];
-        if (here.way > wet.arc)
+        if (here.cost > wet.arc)
             continue;
         for (int n = 0; n < 27 && !f->out_of_memory; n++) {
             int next[3];
-            float arc = here.way + length[n];
+            float arc = here.cost + length[n];
             if (!neighbour_of(t->volume, wet.at, n, next) || arc > (float)b->reach)
                 continue;
             int known = find_wet(f, next);

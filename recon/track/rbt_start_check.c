@@ -177,7 +177,7 @@ bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
 }
 
 // Adds a warning about the noise, which alone is not a reason to refuse a start.
-static void say_noise(Tracker *t)
+static void report_noise(Tracker *t)
 {
     char text[240];
     RbtStartCheck *check = &t->check;
@@ -257,7 +257,7 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
     if (suited && !take_level(t, levels, suited))
         return false;
     refuse(t, &best);
-    say_noise(t);
+    report_noise(t);
     return !t->refusal[0];
 }
 
@@ -267,7 +267,7 @@ bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const T
 {
     Verdict v = judge(t, levels, seed->start, &first->cylinder, first->inlier_rate);
     refuse(t, &v);
-    say_noise(t);
+    report_noise(t);
     return !t->refusal[0];
 }
 

@@ -93,7 +93,7 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
             return false;
         if (!seed->has_toward)
             return tracker_both_ways(t, seed, &start, number);
-        tracker_say_start(t, seed, &start, "the root is the start");
+        tracker_report_start(t, seed, &start, "the root is the start");
     }
     if (is_first && seed->has_toward && seed->radius > 0 && !rbt_suit_given(t, t->levels, &start))
         return false;
@@ -485,7 +485,7 @@ static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
 // Tracks the whole tree: all branches found from the first start, then the cuts, then the branches that the other starts add.
 static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
 {
-    bool is_joined, good = run_seed(t, job, 0) && add_rivals(t, job, ends) && (rbt_mend_links(t, NULL, 0, &is_joined) || out_of_memory_at(job, 0));
+    bool is_joined, good = run_seed(t, job, 0) && add_rivals(t, job, ends) && (rbt_repair_links(t, NULL, 0, &is_joined) || out_of_memory_at(job, 0));
     RbtPaint *paint = good ? rbt_paint_create(t->volume) : NULL;
     t->paint = paint;
     good = good && (paint || out_of_memory_at(job, 0)) && grow(t, job, paint, 0, ends);
@@ -506,7 +506,7 @@ static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
         good = run_seed(t, job, i);
         for (int k = first; good && k < t->tree.count; k++)
             t->tree.node[k].branch = ends->count;
-        good = good && ((rbt_ends_add(ends, t->why, i) && rbt_mend_links(t, paint, first, &is_joined)) || out_of_memory_at(job, i)) &&
+        good = good && ((rbt_ends_add(ends, t->why, i) && rbt_repair_links(t, paint, first, &is_joined)) || out_of_memory_at(job, i)) &&
                grow(t, job, paint, first, ends);
     }
     t->paint = NULL;

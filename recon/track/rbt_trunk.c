@@ -49,7 +49,7 @@ bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number)
     return true;
 }
 
-void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root)
+void tracker_report_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root)
 {
     char radius[48] = "", direction[80] = "";
     if (!(seed->radius > 0))
@@ -96,7 +96,7 @@ bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, i
     if (found) {
         char root[120];
         snprintf(root, sizeof root, "tracked in both directions, the root is %s", why);
-        tracker_say_start(t, seed, start, side[1 - out].count > 0 ? root : why);
+        tracker_report_start(t, seed, start, side[1 - out].count > 0 ? root : why);
         t->why = end[out];
     }
     for (int i = 0; i < 2; i++)

@@ -11,6 +11,6 @@ bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number);
 // Tracks from a cylinder in both directions into the empty tree; nodes are in order from the root. Returns false if nothing was found, or if out of memory.
 bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number);
 // Describes the estimate at the first start in t->start, for the report.
-void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root);
+void tracker_report_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root);
 
 #endif

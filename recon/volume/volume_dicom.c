@@ -25,7 +25,7 @@
 // largest file: the length of the pixels is a 32-bit number
 #define DICOM_BYTES_MOST (((size_t)1 << 32) + ((size_t)1 << 26))
 
-enum { PREAMBLE = 128, UID_ROOM = 68, MAX_DEPTH = 24 };
+enum { PREAMBLE = 128, UID_CAPACITY = 68, MAX_DEPTH = 24 };
 #define UNDEFINED_LENGTH 0xffffffffu
 #define TAG(GROUP, ELEMENT) ((uint32_t)(GROUP) << 16 | (ELEMENT))
 
@@ -69,10 +69,10 @@ typedef struct Plane {
 } Plane;
 
 typedef struct DicomImage {
-    char series[UID_ROOM], sop[UID_ROOM], syntax[UID_ROOM], modality[20], description[UID_ROOM], photometric[20];
+    char series[UID_CAPACITY], sop[UID_CAPACITY], syntax[UID_CAPACITY], modality[20], description[UID_CAPACITY], photometric[20];
     long rows, columns, allocated, stored, high_bit, is_signed, samples, frames;
     Plane file, shared, *frame;
-    int frame_count, frame_room;
+    int frame_count, frame_capacity;
     bool is_walked;          // read completely, or up to the pixels
     bool has_pixels, is_encapsulated, big_endian, is_words;
     size_t pixel_place, pixel_length;
@@ -157,9 +157,9 @@ static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
     return true;
 }
 
-static void take_text(const Cursor *c, const Element *e, char *out, size_t room)
+static void take_text(const Cursor *c, const Element *e, char *out, size_t capacity)
 {
-    size_t n = e->length < room - 1 ? e->length : room - 1;
+    size_t n = e->length < capacity - 1 ? e->length : capacity - 1;
     memcpy(out, c->byte + c->at, n);
     while (n > 0 && (out[n - 1] == 0 || out[n - 1] == ' '))
         n--;
@@ -246,13 +246,13 @@ static bool take_value(const Cursor *c, const Element *e, DicomImage *image)
 
 static Plane *next_frame(DicomImage *image)
 {
-    if (image->frame_count == image->frame_room) {
-        int room = image->frame_room ? 2 * image->frame_room : 64;
-        Plane *more = realloc(image->frame, (size_t)room * sizeof *more);
+    if (image->frame_count == image->frame_capacity) {
+        int capacity = image->frame_capacity ? 2 * image->frame_capacity : 64;
+        Plane *more = realloc(image->frame, (size_t)capacity * sizeof *more);
         if (!more)
             return NULL;
         image->frame = more;
-        image->frame_room = room;
+        image->frame_capacity = capacity;
     }
     Plane *frame = &image->frame[image->frame_count++];
     memset(frame, 0, sizeof *frame);
@@ -479,7 +479,7 @@ typedef struct Slice {
 
 typedef struct Series {
     DicomFile *file;
-    int count, room;
+    int count, capacity;
 } Series;
 
 static void series_free(Series *s)
@@ -494,13 +494,13 @@ static void series_free(Series *s)
 // Adds an image to the series, which takes ownership of it. Returns false if out of memory.
 static bool series_add(Series *s, const char *path, const DicomImage *image)
 {
-    if (s->count == s->room) {
-        int room = s->room ? 2 * s->room : 64;
-        DicomFile *more = realloc(s->file, (size_t)room * sizeof *more);
+    if (s->count == s->capacity) {
+        int capacity = s->capacity ? 2 * s->capacity : 64;
+        DicomFile *more = realloc(s->file, (size_t)capacity * sizeof *more);
         if (!more)
             return false;
         s->file = more;
-        s->room = room;
+        s->capacity = capacity;
     }
     char *name = strdup(path);
     if (!name)
@@ -512,10 +512,10 @@ static bool series_add(Series *s, const char *path, const DicomImage *image)
 // Returns the position and scaling of a frame. Each value is the frame's own, else that given for all frames, else the file's.
 static Plane plane_of(const DicomImage *m, int frame)
 {
-    const Plane *said[3] = {m->frame_count > 0 ? &m->frame[frame] : &m->shared, &m->shared, &m->file};
+    const Plane *source[3] = {m->frame_count > 0 ? &m->frame[frame] : &m->shared, &m->shared, &m->file};
     Plane p = {.slope = 1};
     for (int i = 2; i >= 0; i--) {
-        const Plane *s = said[i];
+        const Plane *s = source[i];
 #define TAKE(HAS, FIELD)                                                                                                                                       \
     if (s->HAS)                                                                                                                                                \
     p.HAS = true, memcpy(&p.FIELD, &s->FIELD, sizeof p.FIELD)
@@ -671,10 +671,10 @@ static void file_close(OpenFile *open)
 
 static bool unpack(OpenFile *open, Faults *faults)
 {
-    enum { HEADER_ROOM = 1 << 20 };      // [bytes] more than a header grows when it is rewritten
+    enum { HEADER_GROWTH_MAX = 1 << 20 }; // [bytes] more than a header grows when it is rewritten
     const DicomImage *m = &open->file->image;
     DicomImage plain;
-    if (!dicom_unpack(open->file->path, m->pixel_place, m->syntax, m->pixel_place + bytes_of_pixels(m) + HEADER_ROOM, &open->own, faults) ||
+    if (!dicom_unpack(open->file->path, m->pixel_place, m->syntax, m->pixel_place + bytes_of_pixels(m) + HEADER_GROWTH_MAX, &open->own, faults) ||
         !read_image(&open->own, &plain, faults))
         return false;
     image_free(&plain);
@@ -775,13 +775,13 @@ static char **list_folder(const char *folder, int *count)
 {
     DIR *directory = opendir(folder);
     char **name = NULL;
-    int room = 0;
+    int capacity = 0;
     *count = directory ? 0 : -1;
     for (struct dirent *entry; directory && (entry = readdir(directory));) {
         if (entry->d_name[0] == '.')
             continue;
-        if (*count == room) {
-            char **more = realloc(name, (size_t)(room = room ? 2 * room : 256) * sizeof *name);
+        if (*count == capacity) {
+            char **more = realloc(name, (size_t)(capacity = capacity ? 2 * capacity : 256) * sizeof *name);
             if (!more)
                 break;
             name = more;

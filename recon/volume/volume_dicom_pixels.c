@@ -29,18 +29,18 @@ static void start(const char *program, int file, int answer, size_t most)
 // Reads all output of the program, up to `most` bytes. Returns false if there is more, or if out of memory.
 static bool take_answer(int answer, size_t most, uint8_t **byte, size_t *length)
 {
-    size_t room = 0;
+    size_t capacity = 0;
     *byte = NULL;
     *length = 0;
     for (;;) {
-        if (*length == room) {
-            room = room ? 2 * room : (size_t)1 << 20;
-            uint8_t *more = room / 2 <= most ? realloc(*byte, room) : NULL;
+        if (*length == capacity) {
+            capacity = capacity ? 2 * capacity : (size_t)1 << 20;
+            uint8_t *more = capacity / 2 <= most ? realloc(*byte, capacity) : NULL;
             if (!more)
                 return false;
             *byte = more;
         }
-        ssize_t part = read(answer, *byte + *length, room - *length);
+        ssize_t part = read(answer, *byte + *length, capacity - *length);
         if (part == 0)
             return *length <= most;
         if (part < 0 && errno != EINTR)

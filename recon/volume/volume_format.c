@@ -252,7 +252,7 @@ static size_t inflater_read(Inflater *inflater, uint8_t *out, size_t wanted)
     return made;
 }
 
-static void say_short(const Inflater *inflater, size_t made, size_t wanted, Faults *faults)
+static void report_short(const Inflater *inflater, size_t made, size_t wanted, Faults *faults)
 {
     const FileBytes *data = inflater->data;
     if (inflater->state == Z_DATA_ERROR || inflater->state == Z_NEED_DICT)
@@ -285,7 +285,7 @@ bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Fau
     size_t made = inflater_read(&inflater, out, wanted);
     inflateEnd(&inflater.stream);
     if (made < wanted)
-        say_short(&inflater, made, wanted, faults);
+        report_short(&inflater, made, wanted, faults);
     return made == wanted;
 }
 
@@ -410,7 +410,7 @@ static bool inflate_values(const VolumeHeader *header, const FileBytes *data, si
     }
     bool good = made == wanted;
     if (!good) {
-        say_short(&inflater, made + got, wanted, faults);
+        report_short(&inflater, made + got, wanted, faults);
     } else if (inflater_read(&inflater, &excess, 1) > 0) {
         faults_add_at_byte(faults, data->path, data->offset,
                            "the compressed data holds more than the %zu bytes that the header promises; expected a header and data "

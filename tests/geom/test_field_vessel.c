@@ -800,8 +800,8 @@ static void no_wall_where_a_field_ends(void **state)
     assert_true(asked > FORKS * PLACES / 2 && ends == 0);
 }
 
-// A model that contradicts itself: from the middle on, nodes lack every second blob, so that their wall is narrower. This is flagged, and no tool jumps.
-static void contradiction_is_told(void **state)
+// A model that contradicts itself: from the middle on, every second blob of the nodes is missing, so that their wall is narrower. This is flagged, and no tool jumps.
+static void contradiction_is_reported(void **state)
 {
     (void)state;
     enum { N = 60, CUT = 30 };
@@ -956,7 +956,7 @@ int main(void)
         cmocka_unit_test(crowded_places),
         cmocka_unit_test(rough_walls_are_met),
         cmocka_unit_test(no_wall_where_a_field_ends),
-        cmocka_unit_test(contradiction_is_told),
+        cmocka_unit_test(contradiction_is_reported),
         cmocka_unit_test(cleft_behind_the_wall),
         cmocka_unit_test(no_wall_is_nearer),
     };

@@ -752,7 +752,7 @@ static void bad_meshes_are_refused(void **state)
     }
 }
 
-static void without_embree_the_fault_says_so(void **state)
+static void without_embree_is_a_fault(void **state)
 {
     (void)state;
     if (mesh_vessel_available())
@@ -783,6 +783,6 @@ int main(void)
                                        cmocka_unit_test(every_instruction_set_gives_the_same_bits),
                                        cmocka_unit_test(threads_do_not_disturb_each_other),
                                        cmocka_unit_test(bad_meshes_are_refused),
-                                       cmocka_unit_test(without_embree_the_fault_says_so)};
+                                       cmocka_unit_test(without_embree_is_a_fault)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -99,7 +99,7 @@ static void check_commands(const RecordedRun *run, const Log *log, double mm_s, 
         while (next < 0 || (next < log->axis.count && fabs(log->axis.entry[next].value * mm_s / AXIS - command) > 1e-9 * mm_s))
             next++;
         if (next >= log->axis.count) {
-            CHECK(false, "step %" PRId64 " was told %.9g mm/s, which the axis did not say, or said before what step %" PRId64 " was told", i, command, i - 1);
+            CHECK(false, "step %" PRId64 " was commanded %.9g mm/s, which the axis did not give, or gave before step %" PRId64, i, command, i - 1);
             return;
         }
         values_used += next != at;
@@ -110,7 +110,7 @@ static void check_commands(const RecordedRun *run, const Log *log, double mm_s, 
     printf("%d of %" PRId64 " steps led by the axis, by %d of the %d values it took; commands sum to %.6f mm, the tool moved %.6f mm\n", steps_led,
            run->step_count, values_used, log->axis.count, way, moved);
     CHECK(steps_led >= steps_wanted, "the axis led only %d steps", steps_led);
-    CHECK(fabs(way - moved) <= 1e-6, "the tool did not move as it was told");
+    CHECK(fabs(way - moved) <= 1e-6, "the tool did not move as commanded");
     CHECK(moved > 0.1, "the tool hardly moved");
 }
 

@@ -98,7 +98,7 @@ static void check(const RecordedRun *run, const Sent *sent, double mm_s, double 
             continue;
         const double push = run->command[2 * i];
         if (!is_said(sent, before, after, push, mm_s))
-            CHECK(other++ > 0, "step %" PRId64 " was told %.6f mm/s, which none of the reports %" PRId64 " to %" PRId64 " says", i, push, before, after);
+            CHECK(other++ > 0, "step %" PRId64 " was commanded %.6f mm/s, which none of the reports %" PRId64 " to %" PRId64 " gives", i, push, before, after);
         if (taken[i] >= sent->count)
             continue;            // the joystick rests: no newer report was there
         const double lead = sent->report[taken[i] - 1].t_ms - (double)i * run->step_ms;
@@ -112,7 +112,7 @@ static void check(const RecordedRun *run, const Sent *sent, double mm_s, double 
            " steps; longest gap %.1f ms as sent, %.0f ms as used, at most %" PRId64 " in one step\n",
            sent->count, all, sent->count - all, latest_ms, aged, gap_ms, (double)(longest_still + 1) * run->step_ms, most_at_once);
     CHECK(sent->count > 0 && all == sent->count, "%" PRId64 " reports were sent and %" PRId64 " taken", sent->count, all);
-    CHECK(other == 0, "%" PRId64 " steps were told what no report says", other);
+    CHECK(other == 0, "%" PRId64 " steps were commanded what no report gives", other);
     CHECK(sent->faults == 0, "%" PRId64 " faults found by the device", sent->faults);
     free(taken);
 }

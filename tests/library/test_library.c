@@ -337,7 +337,7 @@ static void a_scene_in_code_is_that_of_the_file(void **state)
     sel_scene_destroy(built);
 }
 
-static void faults_of_a_scene_in_code_are_told(void **state)
+static void faults_of_a_scene_in_code_are_reported(void **state)
 {
     (void)state;
     SelSceneOptions options = sel_scene_defaults();
@@ -696,7 +696,7 @@ int main(void)
         cmocka_unit_test(two_simulators_in_turn_are_two_alone),
         cmocka_unit_test(threads_share_a_scene),
         cmocka_unit_test(a_scene_in_code_is_that_of_the_file),
-        cmocka_unit_test(faults_of_a_scene_in_code_are_told),
+        cmocka_unit_test(faults_of_a_scene_in_code_are_reported),
         cmocka_unit_test(a_tube_in_code_is_a_tube),
         cmocka_unit_test(what_is_read_agrees),
         cmocka_unit_test(structures_may_grow),

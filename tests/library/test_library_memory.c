@@ -181,8 +181,8 @@ static SelStatus reconstruct(SelContext *context)
     return status;
 }
 
-typedef SelStatus (*Story)(SelContext *context);
-static const Story story[] = {simulate, replay, reconstruct};
+typedef SelStatus (*CountedCall)(SelContext *context);
+static const CountedCall story[] = {simulate, replay, reconstruct};
 enum { STORIES = sizeof story / sizeof *story };
 static int refusals = 4;
 
@@ -258,12 +258,12 @@ static void it_cannot_be_changed_later(void **state)
     assert_int_equal(sel_set_allocator(NULL), SEL_ERROR_STATE);
 }
 
-static long count_of(Story told)
+static long count_of(CountedCall call)
 {
     SelContext *context = NULL;
     assert_int_equal(sel_context_create(NULL, &context), SEL_OK);
     long before = asked;
-    assert_int_equal(told(context), SEL_OK);
+    assert_int_equal(call(context), SEL_OK);
     sel_context_destroy(context);
     return asked - before;
 }

@@ -24,7 +24,7 @@ static SurfaceMesh *spoilt(const char *more)
     return mesh;
 }
 
-static MeshCheck mended(SurfaceMesh *mesh)
+static MeshCheck repaired(SurfaceMesh *mesh)
 {
     MeshCheck first, second;
     assert_true(mesh_repair(mesh, &first));
@@ -41,7 +41,7 @@ static void test_whole(void **state)
 {
     (void)state;
     char text[512];
-    MeshCheck c = mended(spoilt(last));
+    MeshCheck c = repaired(spoilt(last));
     assert_int_equal(mesh_check_text(&c, true, text, sizeof text), 0);
     assert_float_equal(c.volume, 24, 1e-12);
     assert_float_equal(c.area, 52, 1e-12);
@@ -50,19 +50,19 @@ static void test_whole(void **state)
 static void test_spoilt(void **state)
 {
     (void)state;
-    MeshCheck c = mended(spoilt("f 8 5 1 4\n"));   // the last face is flipped
+    MeshCheck c = repaired(spoilt("f 8 5 1 4\n")); // the last face is flipped
     assert_int_equal(c.flipped_triangles.count, 2);
     assert_int_equal(c.flipped_triangles.first, 10);
     assert_float_equal(c.volume, 24, 1e-12);
-    c = mended(spoilt(""));                        // the last face is missing
+    c = repaired(spoilt(""));                      // the last face is missing
     assert_int_equal(c.open_edges.count, 4);
     assert_int_equal(c.opening_count, 1);
     assert_float_equal(c.volume, 24, 1e-12);
-    c = mended(spoilt("f 4 1 5 8\nf 1 5 4\nv 9 9 9\nv 0 0 0\nf 1 1 2\n"));
+    c = repaired(spoilt("f 4 1 5 8\nf 1 5 4\nv 9 9 9\nv 0 0 0\nf 1 1 2\n"));
     assert_int_equal(c.unreferenced_vertices.count, 1);
     assert_int_equal(c.duplicate_vertices.count, 0 + 1);
     assert_int_equal(c.degenerate_triangles.count, 1);
-    c = mended(spoilt("f 4 1 5 8\nf 4 1 5\n"));
+    c = repaired(spoilt("f 4 1 5 8\nf 4 1 5\n"));
     assert_int_equal(c.duplicate_triangles.count, 1);
     assert_int_equal(c.duplicate_triangles.first, 12);
     assert_float_equal(c.volume, 24, 1e-12);
@@ -79,7 +79,7 @@ static void test_inside_out_and_units(void **state)
     }
     for (int i = 0; i < mesh->vertex_count; i++)
         mesh->vertex[i] = vec3_scale(mesh->vertex[i], 0.001);
-    MeshCheck c = mended(mesh);
+    MeshCheck c = repaired(mesh);
     assert_int_equal(c.inside_out_count, 1);
     assert_int_equal(c.flipped_triangles.count, 0);
     assert_true(c.unit_is_doubtful);

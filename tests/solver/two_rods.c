@@ -284,10 +284,10 @@ static int find_least(TwoRods *rods, Work *work)
     const double first = 1e-4, last = 1e-10, balanced = 1e-6;    // links of 0.25 mm, EI / h^3 of 1,000 N/mm: rounding leaves 1e-7 N
     int steps = 0;
     for (double mu = first;; mu = fmax(mu / 10, last)) {
-        bool goes_on = true;
+        bool continues = true;
         barrier_energy(rods, mu);
-        for (; imbalance(rods, work->fixed) > fmax(balanced, mu) && goes_on && steps < ITERATIONS; steps++)
-            goes_on = descend(rods, mu, work);
+        for (; imbalance(rods, work->fixed) > fmax(balanced, mu) && continues && steps < ITERATIONS; steps++)
+            continues = descend(rods, mu, work);
         if (!(mu > last) || steps >= ITERATIONS)
             return imbalance(rods, work->fixed) <= balanced ? steps : -1;
     }

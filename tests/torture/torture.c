@@ -30,12 +30,12 @@
 
 // --- the commands ---
 
-enum { LARGE = 1, WINDOW = 2, CLOCKED = 4, GOES_ON = 8, DRAWS = 16 };
+enum { LARGE = 1, WINDOW = 2, CLOCKED = 4, CONTINUE = 8, DRAWS = 16 };
 typedef struct Case {
     const char *command;   // IN/: the folder of inputs; the command runs in an empty folder
     const char *outputs; // names of the files that it writes; older versions of them exist before
     const char *uses;    // inputs that are copied to its folder
-    int traits;          // WINDOW: needs a display. CLOCKED: its output depends on the clock. GOES_ON: continues without the failed part, and reports it.
+    int traits;          // WINDOW: needs a display. CLOCKED: its output depends on the clock. CONTINUE: continues without the failed part, and reports it.
                            // DRAWS: pictures
 } Case;
 
@@ -63,9 +63,9 @@ static const Case cases[] = {
     {"check check --update", "check/scene.golden.csv", "check", 0},
     {"replay IN/tools.h5 --verify", "", "", 0},
     {"replay IN/run.h5 --scene t", "", "", 0},
-    {"report run.h5 --quiet", "run.html", "run.h5", GOES_ON},
-    {"devices", "", "", GOES_ON},
-    {"nav IN/scene.yaml --sessions s --duration-s 0.5 --size 640x480 --quiet", "", "", WINDOW | CLOCKED | GOES_ON},
+    {"report run.h5 --quiet", "run.html", "run.h5", CONTINUE},
+    {"devices", "", "", CONTINUE},
+    {"nav IN/scene.yaml --sessions s --duration-s 0.5 --size 640x480 --quiet", "", "", WINDOW | CLOCKED | CONTINUE},
     {"run IN/scene.yaml --duration-s 30 --record t.h5 --final t.csv --quiet", "t.h5 t.csv", "", LARGE},
     {"run IN/scene.yaml --picture t.png --quiet", "t.png", "", LARGE | DRAWS},
     {"segment IN/tree.nrrd --start 0,0,0 -o t.h5 --threads 1 --quiet", "t.h5", "", LARGE},
@@ -482,9 +482,9 @@ static void judge(const Case *c, int code, int bad, bool one_message, const char
     failed_file(name, sizeof name);
     if (code >= SIGNALLED)
         fault(c, how, code == LATE ? "takes too long" : "ends by signal %d", code - SIGNALLED);
-    else if (odd && !(code == 0 && c->traits & GOES_ON && lines > 0))
+    else if (odd && !(code == 0 && c->traits & CONTINUE && lines > 0))
         fault(c, how, "ends with %d, %s", code, odd);
-    else if (code == 0 && !said_differs && !(c->traits & GOES_ON) && !is_same(in(".", "said"), in(".", "reference-said")))
+    else if (code == 0 && !said_differs && !(c->traits & CONTINUE) && !is_same(in(".", "said"), in(".", "reference-said")))
         fault(c, how, "ends with 0 and says something else");
     else if (code != 0 && bad >= 0 && code != bad &&
              !(code == 3 && (c->traits & WINDOW || strstr(said, "recording stopped") || strstr(said, "cannot be written") || strstr(said, "cannot write to"))))
@@ -589,7 +589,7 @@ static void take_fork(long number, const char *place)
     for (int i = 0; i < 3; i++) {
         snprintf(fork_name, sizeof fork_name, "forks/%ld/%s", number, name[i]);
         if (rename(in(".", fork_name), in(".", name[i])) != 0)
-            give_up("lacks ", fork_name);
+            give_up("cannot restore ", fork_name);
     }
     snprintf(fork_name, sizeof fork_name, "forks/%ld", number);
     rmdir(in(".", fork_name));
