@@ -2,7 +2,7 @@
 """References of coaxial-turn.yaml: two tubes of the same rest curvature, one in the other, clamped together and turned against each other at the clamp.
 
     phi'' = c sin phi,  phi'(L) = 0,  c = EI1 EI2 / (EI1 + EI2) kappa^2 (1/GJ1 + 1/GJ2)
-is shot from the tip to the clamp. The tips snap round where the angle at the clamp is largest; beyond that phi is what lacks to a whole turn.
+is shot from the tip to the clamp. The tips snap where the angle at the clamp is largest; beyond that, phi is the rest of a whole turn.
 """
 from math import degrees, radians, sin
 

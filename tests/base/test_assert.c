@@ -1,4 +1,4 @@
-// Broken assumptions end the program with a message; those that hold cost nothing and change nothing.
+// Violated assumptions end the program with a message; assumptions that hold cost nothing and change nothing.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,7 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-// Runs `breaks` in a process of its own; what it says on stderr, and its signal (0: none).
+// Runs `breaks` in its own process; returns its standard error and its signal (0: none).
 static int dies_of(void (*breaks)(void), char *said, size_t capacity)
 {
     int ends[2];
@@ -57,7 +57,7 @@ static void a_message_says_where_and_what(void **state)
     assert_string_equal(said, "");
 }
 
-// In a build without them the condition is not even looked at.
+// In a build without assertions the condition is not evaluated.
 static void assertions_are_on_where_the_build_says(void **state)
 {
     (void)state;
@@ -68,7 +68,7 @@ static void assertions_are_on_where_the_build_says(void **state)
     assert_int_equal(looked, SELDINGER_ASSERTS);
 }
 
-// A chain that is longer than what its factor was made for: it would be written beyond the end.
+// A chain that is longer than its factor's capacity: the factor would be written beyond its end.
 static void factors_too_long_a_chain(void)
 {
     BlockChain chain;

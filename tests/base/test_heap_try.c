@@ -1,4 +1,4 @@
-// What a library does when it runs out of memory: the call is broken off, on whichever of its threads, and the program goes on.
+// A library that runs out of memory: the call is aborted, on whichever thread it runs, and the program continues.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,7 +15,7 @@
 enum { MUCH = 12345, JOBS = 64, BAD_JOB = 17 };
 
 static void succeed(void *context) { *(int *)context += 1; }
-static void lack(void *context)
+static void allocate_all(void *context)
 {
     *(int *)context += 1;
     heap_is_empty(MUCH, __FILE__);
@@ -37,17 +37,17 @@ static void a_call_without_memory_is_broken_off(void **state)
     (void)state;
     int calls = 0;
     size_t lacking = 0;
-    assert_false(heap_try(lack, &calls, &lacking));
+    assert_false(heap_try(allocate_all, &calls, &lacking));
     assert_int_equal(calls, 1);
     assert_int_equal(lacking, MUCH);
     assert_false(heap_is_tried());
 }
 
-// The inner call ends, the outer one goes on.
+// The inner call is aborted, the outer one continues.
 static void nest(void *context)
 {
     size_t lacking = 0;
-    assert_false(heap_try(lack, context, &lacking));
+    assert_false(heap_try(allocate_all, context, &lacking));
     assert_true(heap_is_tried());
     *(int *)context += 10;
 }

@@ -1,4 +1,4 @@
-// A table of options: each type, each way of writing, each fault; and what is printed from it.
+// A table of options: each type, each syntax, each fault, and the printed texts.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -70,7 +70,7 @@ static const OptionTable table = {.program = "seldinger try",
 
 static char said[4096];
 
-// Cuts `line` at its blanks and parses it; what is said on standard error comes into `said`.
+// Splits `line` at blanks and parses it; standard error goes to `said`.
 static int parse(const OptionTable *of, const char *line, void *values)
 {
     static char copy[400];

@@ -1,4 +1,5 @@
-// Files take their place whole or not at all, with the rights that they had; their parts can be neither guessed nor planted and do not stay.
+// Files replace others completely or not at all and keep their permissions; the names of temporary files cannot be guessed or created in advance, and no
+// temporary file remains.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -95,7 +96,7 @@ static void rights_and_owner_stay(void **state)
     }
 }
 
-// While it is made nobody else can read what a private file will hold.
+// While a private file is written, nobody else can read its new contents.
 static void a_private_file_is_private_from_the_start(void **state)
 {
     (void)state;
@@ -209,7 +210,7 @@ static void a_stop_removes_all_parts(void **state)
     close(ready[1]);
 }
 
-// More at once than are remembered: only a stop would leave them.
+// More temporary files at once than are remembered: only those of an interrupted program would remain.
 static void many_parts_at_once(void **state)
 {
     (void)state;
@@ -224,13 +225,13 @@ static void many_parts_at_once(void **state)
         write_whole(in_folder("many"), "again");
 }
 
-static void what_is_written_through_is_told(void **state)
+static void what_is_written_through_is_reported(void **state)
 {
     (void)state;
     assert_int_equal(mkfifo(in_folder("fifo"), 0600), 0);
     assert_true(part_file_is_through(in_folder("fifo")));
     assert_true(part_file_is_through("/dev/null"));
-    assert_true(part_file_is_through("/dev/stdout"));    // even where it is a regular file: the link would be replaced
+    assert_true(part_file_is_through("/dev/stdout"));    // even if it is a regular file: the link would be replaced
     assert_false(part_file_is_through(in_folder("nothing")));
     assert_false(part_file_is_through(folder));
     put("plain", "x");
@@ -248,7 +249,7 @@ int main(void)
         cmocka_unit_test(names_may_be_as_long_as_they_get),
         cmocka_unit_test(a_stop_removes_all_parts),
         cmocka_unit_test(many_parts_at_once),
-        cmocka_unit_test(what_is_written_through_is_told),
+        cmocka_unit_test(what_is_written_through_is_reported),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

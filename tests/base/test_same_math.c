@@ -1,5 +1,5 @@
-// Elementary functions of our own: their error against 80-bit arithmetic, their special values, laws, and their bits: one sum over a million results, the
-// same with each compiler and on each machine.
+// Our own elementary functions: their error compared with 80-bit arithmetic, special values, laws, and their bits: one checksum over a million results, which
+// is the same with each compiler and on each machine.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,7 +24,7 @@ static double uniform(double low, double high)
     return low + (high - low) * (double)(seed >> 11) * 0x1p-53;
 }
 
-// 2^low to 2^high, of either sign; made without any function whose bits are in question.
+// 2^low to 2^high with either sign, computed without any of the tested functions.
 static double of_any_size(int low, int high)
 {
     double size = uniform(1, 2), exponent = uniform(0, high - low), sign = uniform(0, 1) < 0.5 ? -1 : 1;
@@ -39,7 +39,7 @@ typedef struct Function {
     long double (*reference)(long double);
     double (*draw)(int low, int high);
     int low, high;
-    double error;            // most units in the last place, as base/same_math.h says
+    double error;            // largest error in units in the last place, as stated in base/same_math.h
 } Function;
 
 static const Function function[] = {
@@ -125,7 +125,7 @@ static void errors_of_two_arguments_are_as_stated(void **state)
     assert_true(power <= 0.7);
 }
 
-// Where the reduced argument is smallest and bits of pi are lost first: by the double nearest to a multiple of pi / 2.
+// Where the reduced argument is smallest and bits of pi are lost first: at the doubles nearest to multiples of pi / 2.
 static void zeros_of_sine_and_cosine(void **state)
 {
     (void)state;
@@ -135,13 +135,13 @@ static void zeros_of_sine_and_cosine(void **state)
         assert_true(error_of(same_sin(x), sinl(x)) <= 0.8);
         assert_true(error_of(same_cos(x), cosl(x)) <= 0.8);
     }
-    // 6381956970095103 2^797 is nearest of all doubles to a multiple of pi / 2
+    // 6381956970095103 2^797 is the double nearest to a multiple of pi / 2
     assert_true(error_of(same_cos(0x1.6ac5b262ca1ffp+849), -4.68716592425462761112e-19L) <= 0.8);
 }
 
 static bool same_bits(double a, double b) { return (isnan(a) && isnan(b)) || memcmp(&a, &b, sizeof a) == 0; }
 
-// The C library's results there are prescribed, and so are their signs.
+// The C standard prescribes these results and their signs.
 static void special_values(void **state)
 {
     (void)state;
@@ -182,7 +182,7 @@ static void laws(void **state)
         assert_true(same_bits(same_pow(2, k), ldexp(1, k)));
 }
 
-// What another compiler, instruction set or machine must give too. The number is that of gcc 12, -O3, on x86-64; it changes with the formulas alone.
+// Other compilers, instruction sets and machines must give the same. The number is that of gcc 12, -O3, on x86-64; it changes only with the formulas.
 static void every_machine_gives_these_bits(void **state)
 {
     (void)state;
@@ -210,7 +210,7 @@ static double seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-// Printed, not judged: what a call costs beside the C library's.
+// Prints the cost of a call compared with the C library's; there is no limit.
 static void what_they_cost(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-// One choice of the instruction set for all kernels: by environment, by force, by number; each set gives the same bits. (Kernels with a test of their own
-// for each set: test_block_chain, test_beam_element, test_coaxial, test_lim_vessel, test_field_vessel, test_mesh_vessel, test_bspline, test_lim_energy,
-// test_field_fit. Here are the others.)
+// One choice of the instruction set for all kernels: by environment, by force, by number; each set gives the same bits. (These have their own test of each set:
+// test_block_chain, test_beam_element, test_coaxial, test_lim_vessel, test_field_vessel, test_mesh_vessel, test_bspline, test_lim_energy, test_field_fit. This
+// file tests the others.)
 #include "base/simd_kernel.h"
 #include "recon/track/ransac_cylinder.h"
 #include "solver/node_turn.h"
@@ -20,7 +20,7 @@
 static int (*const width_on[SIMD_COUNT])(void) = SIMD_FORMS(width);
 static void (*const sums_on[SIMD_COUNT])(const double *, const double *, int, double *) = SIMD_FORMS(sums);
 
-// The first test: the variable is read once.
+// Must be the first test: the variable is read once.
 static void the_environment_chooses(void **state)
 {
     (void)state;
@@ -29,7 +29,7 @@ static void the_environment_chooses(void **state)
     assert_int_equal(simd_choose(0), SIMD_SSE2);
 }
 
-static void no_set_is_chosen_that_the_processor_lacks(void **state)
+static void no_set_is_chosen_without_support_by_the_processor(void **state)
 {
     (void)state;
     for (int number = 1; number <= SIMD_COUNT; number++) {
@@ -60,7 +60,7 @@ static void a_text_is_compiled_for_each_set(void **state)
 
 enum { TURNS = 37 };
 
-// About one axis the turn is known: (cos(a/2), n sin(a/2)).
+// For a rotation about one axis the result is known: (cos(a/2), n sin(a/2)).
 static void nodes_turn_by_the_same_bits(void **state)
 {
     (void)state;
@@ -116,7 +116,7 @@ static void circles_are_found_by_the_same_bits(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_environment_chooses), cmocka_unit_test(no_set_is_chosen_that_the_processor_lacks),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_environment_chooses), cmocka_unit_test(no_set_is_chosen_without_support_by_the_processor),
                                        cmocka_unit_test(a_text_is_compiled_for_each_set), cmocka_unit_test(nodes_turn_by_the_same_bits),
                                        cmocka_unit_test(circles_are_found_by_the_same_bits)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-// What is edited is changed, what is not stays byte for byte, in block and flow style.
+// An edit changes the given values and leaves all other bytes, in block and flow style.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -68,7 +68,7 @@ static void items_are_appended(void **state)
     assert_null(yaml_edit_append("t: {}\n", "u.v", "1"));
 }
 
-static void what_cannot_be_edited_is_told(void **state)
+static void what_cannot_be_edited_is_reported(void **state)
 {
     (void)state;
     assert_null(yaml_edit("a: 1\n", "b", "2", false));
@@ -88,6 +88,6 @@ static void what_cannot_be_edited_is_told(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(keys_are_added),
-                                       cmocka_unit_test(items_are_appended), cmocka_unit_test(what_cannot_be_edited_is_told)};
+                                       cmocka_unit_test(items_are_appended), cmocka_unit_test(what_cannot_be_edited_is_reported)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

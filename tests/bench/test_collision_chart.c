@@ -269,7 +269,7 @@ static void what_is_missing_has_no_mark(void **state)
     check_ticks(&page.panel[0]);
 }
 
-static void a_place_that_cannot_be_written_is_told(void **state)
+static void a_place_that_cannot_be_written_is_reported(void **state)
 {
     (void)state;
     static Faults faults;
@@ -282,6 +282,6 @@ static void a_place_that_cannot_be_written_is_told(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_figure_has_its_mark), cmocka_unit_test(marks_stand_where_the_axes_say),
-                                       cmocka_unit_test(what_is_missing_has_no_mark), cmocka_unit_test(a_place_that_cannot_be_written_is_told)};
+                                       cmocka_unit_test(what_is_missing_has_no_mark), cmocka_unit_test(a_place_that_cannot_be_written_is_reported)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -1,4 +1,4 @@
-// A JSON file that the program wrote into the test's folder (tests/folder.h).
+// Reads a JSON file that the program wrote into the test's folder (tests/folder.h).
 #ifndef SELDINGER_TESTS_CLI_JSON_FILE_H
 #define SELDINGER_TESTS_CLI_JSON_FILE_H
 

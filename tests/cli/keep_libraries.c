@@ -1,5 +1,5 @@
-// Preloaded into a program that is looked at for leaks: libraries stay once they are loaded. LeakSanitizer takes what a graphics driver keeps for leaked
-// once the driver is unloaded, and nothing that it could be excused by has a name then.
+// Preloaded into a program that is checked for leaks: keeps libraries loaded. Otherwise LeakSanitizer reports the memory of a graphics driver as leaked after
+// the driver was unloaded, and a suppression cannot name a library that is gone.
 int dlclose(void *handle);
 
 int dlclose(void *handle)

@@ -1,4 +1,4 @@
-// The program as a user runs it in the test's folder (tests/folder.h). What it says, errors too, goes to `output`.
+// Runs the program in the test's folder (tests/folder.h). Standard output and standard error go to `output`.
 #ifndef SELDINGER_TESTS_CLI_PROGRAM_H
 #define SELDINGER_TESTS_CLI_PROGRAM_H
 
@@ -7,7 +7,7 @@
 
 static char output[1 << 16];
 
-// Runs `BEFORE seldinger ARGUMENTS`. Returns the exit code, -signal where it was ended by one.
+// Runs `BEFORE seldinger ARGUMENTS`. Returns the exit code, or -signal if a signal ended it.
 static inline int run_in(const char *before, const char *arguments)
 {
     char command[2000];

@@ -1,5 +1,5 @@
-// A mesh as the vessel (`vessel: {mesh: F}`) and vessels turned into meshes and grids (`--contact`): defects of a mesh are reported and repaired, or
-// the mesh is refused, and the wire lies where it lies in the exact tube.
+// A mesh as the vessel (`vessel: {mesh: F}`), and vessels converted to meshes and grids (`--contact`): defects of a mesh are reported and repaired, or the mesh
+// is refused; the wire has the same position as in the exact tube.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -22,7 +22,7 @@ enum { AROUND = 36, RINGS = 81, VERTICES = AROUND * RINGS + 2, TRIANGLES = 2 * A
 
 static int run(const char *arguments) { return run_in("", arguments); }
 
-// --- A closed tube of radius 1 about the x axis, 40 mm long, facing out of the lumen ---
+// --- A closed tube of radius 1 about the x axis, 40 mm long, normals out of the lumen ---
 
 typedef struct Pipe {
     double vertex[VERTICES][3];
@@ -103,8 +103,8 @@ static double between(const double a[3], const double b[3])
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-// Runs the pipe as it is written; `words` must be among what is said.
-static void told(const char *words, double tip[3])
+// Runs the tube as it was written; the output must contain `words`.
+static void run_reports(const char *words, double tip[3])
 {
     assert_int_equal(run("run scene.yaml --quiet --summary s.json"), 0);
     if (*words && !strstr(output, words))
@@ -120,7 +120,7 @@ static void refused(const char *words)
     assert_null(fopen(in_folder("out.json"), "r"));
 }
 
-// The good pipe and its scene; skips the test where no mesh can be a vessel.
+// Writes the tube without defects and its scene; skips the test if the build has no mesh contact.
 static void start_with(Pipe *good)
 {
     pipe_make(good);
@@ -131,13 +131,13 @@ static void start_with(Pipe *good)
         skip();
 }
 
-static void a_bad_mesh_is_told_and_mended_or_refused(void **state)
+static void a_bad_mesh_is_reported_and_repaired_or_refused(void **state)
 {
     (void)state;
     static Pipe good, bad;
     double tip[3], other[3];
     start_with(&good);
-    told("", tip);
+    run_reports("", tip);
     assert_string_equal(output, "");
     assert_true(tip[0] > 19);
 
@@ -145,21 +145,21 @@ static void a_bad_mesh_is_told_and_mended_or_refused(void **state)
     for (int t = 0; t < bad.count; t += 7)
         turn(bad.triangle[t]);
     pipe_write(&bad, 1);
-    told("oriented against their neighbours", other);
+    run_reports("oriented against their neighbours", other);
     assert_true(between(tip, other) < 1e-6);
 
     bad = good;
     for (int t = 0; t < bad.count; t++)
         turn(bad.triangle[t]);
     pipe_write(&bad, 1);
-    told("normals point into the lumen: all flipped", other);
+    run_reports("normals point into the lumen: all flipped", other);
     assert_true(between(tip, other) < 1e-6);
 
     bad = good;
     memcpy(bad.triangle[bad.count++], good.triangle[100], sizeof good.triangle[0]);
     memcpy(bad.triangle[bad.count++], (int[3]){5, 5, 6}, sizeof good.triangle[0]);
     pipe_write(&bad, 1);
-    told("1 triangles repeat others", other);
+    run_reports("1 triangles repeat others", other);
     assert_non_null(strstr(output, "1 triangles have no area"));
     assert_true(between(tip, other) < 1e-6);
 
@@ -169,14 +169,14 @@ static void a_bad_mesh_is_told_and_mended_or_refused(void **state)
     refused("edges of three triangles or more");
 
     bad = good;
-    bad.count -= 2 * AROUND / 3;     // some of the wall of the last third
+    bad.count -= 2 * AROUND / 3;     // removes part of the wall in the last third
     pipe_write(&bad, 1);
-    told("edges are open", other);
+    run_reports("edges are open", other);
 
     pipe_write(&good, 0.001);
     refused("mesh_scale: 1000 for metres");
     scene_write("mesh: pipe.obj, mesh_scale: 1000", "[0.5, 0, 0]");
-    told("", other);
+    run_reports("", other);
     assert_true(between(tip, other) < 1e-6);
 }
 
@@ -201,7 +201,7 @@ static void a_mesh_that_cannot_be_the_vessel_is_refused(void **state)
     refused("needs a bounded wall");
 }
 
-// Every surface of one tube holds the same wire: where the exact tube holds it, to what its cells leave.
+// With each contact surface of one tube the wire has the position of the exact tube, within the error of the cells.
 static void all_surfaces_of_a_tube_hold_the_same_wire(void **state)
 {
     (void)state;
@@ -210,7 +210,7 @@ static void all_surfaces_of_a_tube_hold_the_same_wire(void **state)
     scene_write("tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 0, 1], radius_mm: 1, "
                 "path: [{line_mm: 8}, {arc: {radius_mm: 12, angle_deg: 90}}, {line_mm: 12}]}",
                 "[0.5, 0, 0]");
-    told("", tip);
+    run_reports("", tip);
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
         char arguments[100];
         snprintf(arguments, sizeof arguments, "run scene.yaml --quiet --contact %s --summary s.json", kinds[k]);
@@ -227,7 +227,7 @@ static void all_surfaces_of_a_tube_hold_the_same_wire(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_bad_mesh_is_told_and_mended_or_refused),
+        cmocka_unit_test(a_bad_mesh_is_reported_and_repaired_or_refused),
         cmocka_unit_test(a_mesh_that_cannot_be_the_vessel_is_refused),
         cmocka_unit_test(all_surfaces_of_a_tube_hold_the_same_wire),
     };

@@ -1,5 +1,5 @@
-// The exercises can be done: the hand beside each scene holds the target without an error and without leaving the vessel, and the one with errors is
-// scored accordingly. Skipped by name where a scene's model is not made, and under sanitizers, where a fit and minutes of steps would take too long.
+// The exercises can be solved: the script of each scene holds the target without an error and without leaving the vessel, and the script with errors is scored
+// accordingly. Skipped by name if a scene's model does not exist, and under sanitizers, where a fit and minutes of steps would take too long.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -39,15 +39,15 @@ static cJSON *run(const char *name, const char *suffix, const char *model)
 static double number(const cJSON *json, const char *name) { return cJSON_GetObjectItem(json, name)->valuedouble; }
 static const char *state_of(const cJSON *score) { return cJSON_GetObjectItem(score, "state")->valuestring; }
 
-// What is left to correct in coaxial steps: how many may stop at the contact solve's cap or have their motion cut, and what share of the hands' work
-// single steps may gain. Of other flags none; a single tool has none at all.
-typedef struct LeftToMend {
+// Allowed defects of coaxial steps: how many steps may reach the limit of the contact solver or have their motion cut, and what share of the hands' work single
+// steps may gain. Other flags are not allowed; a single tool may have none at all.
+typedef struct AllowedDefects {
     int unconverged, limited;
     double gained;
-    bool is_drawn_out;       // to be exchanged: a tool is drawn back as far as it goes, no fault
-} LeftToMend;
+    bool is_drawn_out;       // a tool is pulled back to its hub in order to be exchanged, which is not an error
+} AllowedDefects;
 
-static void is_solved(const char *name, const char *model, LeftToMend left)
+static void is_solved(const char *name, const char *model, AllowedDefects left)
 {
     cJSON *score = run(name, "", model);
     assert_string_equal(state_of(score), "reached");
@@ -72,7 +72,7 @@ static void is_solved(const char *name, const char *model, LeftToMend left)
 
 static double errors_of(const cJSON *score, const char *kind) { return number(cJSON_GetObjectItem(cJSON_GetObjectItem(score, "errors"), kind), "count"); }
 
-// `kind`: an error that it makes besides going the wrong way; NULL: none in particular.
+// `kind`: an error that the script makes in addition to taking a wrong branch; NULL: none in particular.
 static void errs(const char *name, const char *model, const char *kind)
 {
     cJSON *score = run(name, "-errors", model);
@@ -86,54 +86,54 @@ static void errs(const char *name, const char *model, const char *kind)
 static void the_aneurysm_is_reached(void **state)
 {
     (void)state;
-    is_solved("aneurysm", NULL, (LeftToMend){0});
+    is_solved("aneurysm", NULL, (AllowedDefects){0});
     errs("aneurysm", NULL, NULL);
 }
 
 static void the_middle_cerebral_artery_is_selected(void **state)
 {
     (void)state;
-    is_solved("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5", (LeftToMend){0});
+    is_solved("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5", (AllowedDefects){0});
     errs("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5", NULL);
 }
 
 static void the_left_carotid_is_selected(void **state)
 {
     (void)state;
-    is_solved("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5", (LeftToMend){0});
+    is_solved("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5", (AllowedDefects){0});
     errs("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5", NULL);
 }
 
-// Over the wire that was led there; without a wire ahead of it, past it.
+// With the wire ahead, the microcatheter follows it; without, it passes the aneurysm.
 static void the_microcatheter_follows_its_wire(void **state)
 {
     (void)state;
-    is_solved("microcatheter", NULL, (LeftToMend){.unconverged = 3, .gained = 0.01});
+    is_solved("microcatheter", NULL, (AllowedDefects){.unconverged = 3, .gained = 0.01});
     errs("microcatheter", NULL, "wire_lost");
 }
 
-// The wire holds the Simmons catheter straight; drawn back it lets it form. Pushed too far, it springs into the next artery.
+// The wire holds the Simmons catheter straight; when it is pulled back, the catheter takes its shape. Pushed too far, it springs into the next artery.
 static void the_simmons_catheter_takes_the_left_carotid(void **state)
 {
     (void)state;
-    // most of it as the border of its tip's bend passes the sheath's mouth, 15.4 mm in
-    is_solved("simmons", SOURCE_DIR "/scenes/arch/arch.h5", (LeftToMend){.unconverged = 3, .gained = 0.01});
+    // most of it when the border of the tip's bend passes the sheath's mouth, 15.4 mm in
+    is_solved("simmons", SOURCE_DIR "/scenes/arch/arch.h5", (AllowedDefects){.unconverged = 3, .gained = 0.01});
     errs("simmons", SOURCE_DIR "/scenes/arch/arch.h5", NULL);
 }
 
-// Over the wire that stays where it is; drawn back with it, the wire is lost on the new microcatheter's way.
+// With the wire held in place, the catheters are exchanged over it; pulled back with the catheter, the wire loses its place.
 static void the_microcatheter_is_exchanged_over_its_wire(void **state)
 {
     (void)state;
-    is_solved("over-the-wire", NULL, (LeftToMend){.gained = 0.03, .is_drawn_out = true});
+    is_solved("over-the-wire", NULL, (AllowedDefects){.gained = 0.03, .is_drawn_out = true});
     errs("over-the-wire", NULL, "tip_moved");
 }
 
-// The soft wire is exchanged for the stiff one while the catheter stays in place; a released catheter does not stay.
+// The soft wire is exchanged for the stiff one while the catheter stays in place; a released catheter moves.
 static void the_wire_is_exchanged_for_a_stiff_one(void **state)
 {
     (void)state;
-    is_solved("stiff-exchange", SOURCE_DIR "/scenes/arch/arch.h5", (LeftToMend){.unconverged = 30, .limited = 200, .gained = 0.01, .is_drawn_out = true});
+    is_solved("stiff-exchange", SOURCE_DIR "/scenes/arch/arch.h5", (AllowedDefects){.unconverged = 30, .limited = 200, .gained = 0.01, .is_drawn_out = true});
     errs("stiff-exchange", SOURCE_DIR "/scenes/arch/arch.h5", "tip_moved");
 }
 

@@ -1,5 +1,5 @@
-// `export` as a user runs it: the four formats of a surface hold the same closed surface, facing outwards, with the vertex fields where there is place
-// for them; centrelines come back from our own readers as they went out.
+// `export` as a user runs it: the four surface formats contain the same closed surface with outward normals, with vertex fields if the format has them; our own
+// readers give back the centrelines that were written.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -53,7 +53,7 @@ static void all_formats_hold_the_same_surface(void **state)
         assert_int_equal(check.component_count, 1);
         assert_int_equal(check.open_edges.count + check.nonmanifold_edges.count + check.one_sided_edges.count + check.flipped_triangles.count, 0);
         assert_int_equal(check.inside_out_count, 0);
-        if (k > 0) {   // numbers of nine digits; an STL has seven
+        if (k > 0) {   // numbers have nine digits; seven in an STL
             assert_true(fabs(check.area - area) < 1e-5 * area);
             assert_true(fabs(check.volume - volume) < 1e-5 * volume);
             assert_int_equal(check.triangle_count, triangles);
@@ -92,7 +92,7 @@ static void vertices_carry_their_errors(void **state)
         assert_true(node >= 0 && node < tree->node_count);
         assert_true(isfinite(x[6]) && x[7] >= 0);
         close += fabs(x[6]) < 0.1;
-        // not upstream of the root, around it
+        // around the root, not upstream of it
         Vec3 away = vec3_sub(vec3(x[0], x[1], x[2]), tree->center[0]);
         if (vec3_norm(away) < 2 * tree->radius[0])
             assert_true(vec3_dot(away, tree->direction[0]) > -1e-6);
@@ -132,10 +132,10 @@ static void centrelines_come_back(void **state)
                 int near = -1;
                 for (int n = 0; n < tree->node_count && near < 0; n++)
                     near = vec3_distance(set->point[i], tree->center[n]) < 1e-6 && fabs(set->radius[i] - tree->radius[n]) < 1e-6 ? n : -1;
-                assert_true(near >= 0);   // every point a node, with its radius
+                assert_true(near >= 0);   // each point is a node, with its radius
                 read += i > set->offset[c] ? vec3_distance(set->point[i], set->point[i - 1]) : 0;
             }
-        assert_true(fabs(read - length) < 1e-5 * length);   // every link, once
+        assert_true(fabs(read - length) < 1e-5 * length);   // each link exists once
         curve_set_free(set);
     }
     vessel_tree_free(tree);

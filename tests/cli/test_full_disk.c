@@ -50,7 +50,7 @@ static void failed(const char *arguments, int expected, const char *words)
         fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", arguments, code, output, expected, words);
 }
 
-// What it says on standard error; standard output is full.
+// Collects standard error; standard output is full.
 static int run_full(const char *arguments)
 {
     char command[1000];
@@ -83,7 +83,7 @@ static void standard_output_that_is_full(void **state)
         if (code == 0 || (!strstr(output, "cannot be written") && !strstr(output, "cannot write to standard output")))
             fail_msg("`%s` to a full device ended with %d and said: %s", arguments[i], code, output);
     }
-    // closed: allowed if nothing is printed, and printed text must not go into another file
+    // closed standard output: allowed if nothing is printed; printed text must not go into another file
     char command[1000];
     snprintf(command, sizeof command, "cd '%s' && %s run tube.yaml --duration-s 0.01 --record closed.h5 --quiet >&- 2>/dev/null", folder, SELDINGER_PROGRAM);
     assert_int_equal(system(command), 0);

@@ -1,4 +1,4 @@
-// Scenes that once failed (scenes/hard): no tool springs at the sheath's mouth, makes energy, or stays restless while the hand rests.
+// Scenes that failed in earlier versions (scenes/hard): no tool jumps at the sheath's mouth, gains energy, or keeps moving while the hand rests.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -19,11 +19,11 @@ static char folder[] = "/tmp/seldinger-hard-XXXXXX";
 #include "tests/short_run.h"
 #include "tests/cli/json_file.h"
 
-// What holds of a run with up to 3 s of rest afterwards.
+// Limits for a run with up to 3 s of rest at its end.
 typedef struct HardCase {
     const char *scene;
-    double push, gained;         // [N] largest either way at the hand; [mJ] in one step that nobody gave
-    int cut, not_converged;      // steps at most
+    double push, gained;         // [N] largest force at the hand in either direction; [mJ] largest unexplained gain of energy in one step
+    int cut, not_converged;      // maximum number of steps
     bool rests;
 } HardCase;
 
@@ -61,7 +61,7 @@ static cJSON *holds(HardCase c)
     return s;
 }
 
-// EI k^2 / 2, and a thousandth: 8.2448 N and 60.470 N.
+// EI k^2 / 2 and 0.1 % more: 8.2448 N and 60.470 N.
 static void curved_tools_leave_the_mouth(void **state)
 {
     (void)state;
@@ -79,7 +79,7 @@ static void what_is_let_go_is_not_cut_for_ever(void **state)
     cJSON_Delete(holds((HardCase){"let-go", 16, 0.2, 0, 10, true}));
 }
 
-// 139 to 192 mJ are stored; without friction or damping nothing but the integration takes energy.
+// 139 to 192 mJ are stored; without friction or damping only the integration dissipates energy.
 static void a_tool_rests_with_the_hand(void **state)
 {
     (void)state;
@@ -98,7 +98,8 @@ static void a_hand_slips_above_its_limit(void **state)
     cJSON_Delete(s);
 }
 
-// Exact without clearance: 2.905 N mm at 90 degrees (phi'' = EI k k0 / GJ sin phi over 15.19 mm, 3.80 mm straight before); 5 um leave it 3 % lower.
+// Exact without clearance: 2.905 N mm at 90 degrees (phi'' = EI k k0 / GJ sin phi over 15.19 mm, after 3.80 mm of straight tool); 5 um of clearance lower it by
+// 3 %.
 static void twist_passes_a_clearance_of_5_um(void **state)
 {
     (void)state;
@@ -110,7 +111,7 @@ static void twist_passes_a_clearance_of_5_um(void **state)
     cJSON_Delete(s);
 }
 
-// The inner hand's work counts too: without it 840 of 1000 steps were cut, for ever.
+// The work of the inner hand counts too: without it, 840 of 1000 steps were cut, up to the end.
 static void an_inner_hand_pushes_a_stiff_bend_out(void **state)
 {
     (void)state;
@@ -121,7 +122,7 @@ static void an_inner_hand_pushes_a_stiff_bend_out(void **state)
     cJSON_Delete(s);
 }
 
-// EI k^2 / 2 = 0.767 N is what straightening takes, until the tip is in.
+// Straightening takes EI k^2 / 2 = 0.767 N until the tip is inside.
 static void a_curved_tip_is_drawn_into_the_sheath(void **state)
 {
     (void)state;
@@ -129,14 +130,14 @@ static void a_curved_tip_is_drawn_into_the_sheath(void **state)
     cJSON_Delete(holds((HardCase){"withdrawn", 0.767 * 1.002, 0.002, 0, 0, true}));
 }
 
-// The element across the mouth has the length that the tool has moved, not the commanded length: 17 mJ in a step before.
+// The element across the mouth has the length that the tool has moved, not the commanded length, which gained 17 mJ in a step.
 static void a_hand_that_slips_makes_no_energy(void **state)
 {
     (void)state;
     cJSON_Delete(holds((HardCase){"hand-slips-in-bends", 20, 1e-6, 0, 0, true}));
 }
 
-// Behind the mouth too, whole turns of the tool that continues at a tip are no twist: 3,908 mJ in a step before, and 87 steps not solved.
+// Whole turns of the tool that continues at a tip are not twist, behind the mouth too: before, a step gained 3,908 mJ, and 87 steps were not solved.
 static void a_guide_is_drawn_back_over_a_turned_wire(void **state)
 {
     (void)state;
@@ -144,7 +145,7 @@ static void a_guide_is_drawn_back_over_a_turned_wire(void **state)
     cJSON_Delete(holds((HardCase){"guide-withdrawn", 0.5, 0.25, 0, 0, true}));
 }
 
-// The chord from the mouth to the first node is short there, and a small turn stretches it: 1.4e-3 of the work gained before.
+// The chord from the mouth to the first node is short, and a small turn stretches it: before, 1.4e-3 of the work was gained.
 static void a_curl_is_drawn_into_the_sheath(void **state)
 {
     (void)state;
@@ -155,14 +156,14 @@ static void a_curl_is_drawn_into_the_sheath(void **state)
     cJSON_Delete(s);
 }
 
-// Single steps gained 2.1e-2, 8.1e-2, 3.9e3, 8.9e-3 and 1.2e-3 of the work before.
+// Before, single steps gained 2.1e-2, 8.1e-2, 3.9e3, 8.9e-3 and 1.2e-3 of the work.
 static void quick_steps_gain_no_energy(void **state)
 {
     (void)state;
     NEED_WHOLE_RUNS();
     const struct {
         const char *name;
-        double share;        // of the work of hands and loads that all steps together may gain
+        double share;        // share of the work of hands and loads that all steps together may gain
     } scene[] = {
         {"stiff-wire-turned", 1e-3}, {"wire-in-soft-guide", 5e-3}, {"tips-nearly-flush", 5e-3}, {"twist-at-mouth", 1e-4}, {"whole-turns-inside", 2e-4}};
     for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
@@ -174,7 +175,7 @@ static void quick_steps_gain_no_energy(void **state)
     }
 }
 
-// A tip that the wall holds keeps its node, and one that comes out far in a step gets it for that step: without a node it went 2.3 mm through the wall.
+// A tip held by the wall keeps its node, and a tip that comes out far in a step gets a node for that step: without it, the tip passed 2.3 mm through the wall.
 static void an_inner_tip_stays_within_the_wall(void **state)
 {
     (void)state;

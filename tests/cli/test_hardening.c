@@ -1,5 +1,5 @@
-// The program as it was built: what an attacker who has found a fault in a reader would still have to get past. By readelf and objdump; skipped by name
-// where they are not installed.
+// Build flags that hinder an attacker who has found a defect in a reader, checked in the program by readelf and objdump. Skipped by name if these are not
+// installed.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,7 +17,7 @@
 
 static char *text;
 
-// What `command PROGRAM` prints, in `text`; its exit code.
+// Puts the output of `command PROGRAM` into `text`; returns its exit code.
 static int of_program(const char *command)
 {
     char line[4300];
@@ -29,7 +29,7 @@ static int of_program(const char *command)
     assert_non_null(pipe);
     length = fread(text, 1, room - 1, pipe);
     text[length] = 0;
-    // what does not fit is read too, or the command would be stopped
+    // surplus output is read too; otherwise the command would be stopped
     for (char rest[4096]; fread(rest, 1, sizeof rest, pipe) > 0;)
         continue;
     return WEXITSTATUS(pclose(pipe));
@@ -91,7 +91,7 @@ static void its_stacks_are_guarded(void **state)
     need("objdump");
     assert_int_equal(of_program("readelf -W --dyn-syms"), 0);
     expect("__stack_chk_fail");
-    // large frames touch each page on their way: or $0,(%rsp)
+    // large frames touch each of their pages: or $0,(%rsp)
     assert_int_equal(of_program("probed() { objdump -d --no-show-raw-insn -j .text \"$1\" | grep -E 'or[lq]? +[$]0x0,[(]%[re]?sp[)]' | head -n 1; }; probed"),
                      0);
     expect("(%rsp)");

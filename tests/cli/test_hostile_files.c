@@ -1,4 +1,4 @@
-// Files that a user got from elsewhere and that would make a reader wait, or take memory that no header promises: refused soon, with a message.
+// Hostile files that would make a reader wait, or allocate memory that no header states: they are refused soon, with a message.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -90,7 +90,7 @@ static void what_is_no_file_is_refused(void **state)
     for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++)
         for (size_t k = 0; k < sizeof what / sizeof *what; k++) {
             char arguments[200];
-            // a folder may hold scenes, or a series' slices
+            // a folder may contain scenes or the slices of a series
             if (!strcmp(what[k], "sub") && (strstr(verbs[i], "check") || strstr(verbs[i], "--volume")))
                 continue;
 #ifndef SELDINGER_RENDER
@@ -128,7 +128,7 @@ static void what_a_file_names_is_refused(void **state)
 
 // --- memory ---
 
-// `plain`, then a gzip stream: `head`, then so many MB of zeros.
+// `plain`, then a gzip stream: `head` and the given number of MB of zeros.
 static void put_zeros(const char *name, const char *plain, const void *head, size_t head_length, int megabytes)
 {
     static const char zeros[MB];
@@ -142,10 +142,10 @@ static void put_zeros(const char *name, const char *plain, const void *head, siz
     gzclose(file);
 }
 
-// Within 400 MB of address space, a third of which libraries take.
+// Limits the address space to 400 MB, a third of which the libraries use.
 static void ends_in_little_memory(const char *arguments, int expected, const char *words)
 {
-    // a sanitizer's shadow takes more
+    // the shadow memory of a sanitizer is larger
     int code = run_in(WHOLE_RUN ? "ulimit -v 400000 && timeout -k 1 60" : "timeout -k 1 60", arguments);
     if (code != expected || !strstr(output, words))
         fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", arguments, code, output, expected, words);
@@ -170,7 +170,7 @@ static void a_stream_is_read_as_far_as_its_header_says(void **state)
     put_zeros("skip.nii.gz", "", nifti, sizeof nifti, 512);
     ends_in_little_memory("info fits.nrrd", 0, "128");
     ends_in_little_memory("info bomb.nrrd", 2, "holds more than the 1048576 bytes that the header promises");
-    // 352 bytes of header, skipped too: the last voxels are missing
+    // 352 bytes of header are skipped too, so the last voxels are missing
     ends_in_little_memory("info skip.nii.gz", 2, "the data ends after");
 }
 
@@ -240,7 +240,7 @@ static void packed_arrays_hold_what_their_piece_promises(void **state)
 {
     (void)state;
     put_vtp("few.vtp", "3");
-    put_vtp("many.vtp", "44739242");    // as many as there are
+    put_vtp("many.vtp", "44739242");    // as many points as stated
     ends_in_little_memory("import --surface few.vtp -o out.h5", 2, "more values than the piece's header promises");
     ends_in_little_memory("import --surface many.vtp -o out.h5", 2, "more than 67 million in all");
 }

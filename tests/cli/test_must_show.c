@@ -1,5 +1,5 @@
-// What the owner asks to see of the program as a whole: the same bits for any number of threads, and no preferred direction in space: the mirror image
-// of a vessel and its scene gives the mirrored path, the turned and shifted one the turned and shifted path.
+// Properties of the whole program: bit-identical results for any number of threads, and no preferred direction in space: the mirror image of a vessel and its
+// scene gives the mirrored path, and the rotated and shifted one the rotated and shifted path.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -26,7 +26,7 @@ static Faults faults;
 #include "tests/cli/program.h"
 #include "tests/short_run.h"
 
-// Runs `seldinger ARGUMENTS` in the folder; its words go to `output`. Fails where it does not end with 0.
+// Runs `seldinger ARGUMENTS` in the folder with its output in `output`. Fails if the exit code is not 0.
 static void run(const char *arguments)
 {
     int code = run_in("", arguments);
@@ -95,7 +95,7 @@ static void segment_and_fit_do_not_depend_on_threads(void **state)
 
 // --- symmetry ---
 
-typedef struct Motion {      // x -> turn x + shift; a mirror where the determinant is negative
+typedef struct Motion {      // x -> turn x + shift; a mirror image if the determinant is negative
     Mat3 turn;
     Vec3 shift;
     double sign;             // determinant
@@ -129,7 +129,7 @@ static void move_model(const char *from, const Motion *m, const char *to)
 
 typedef enum { AT_ROOT, AT_ENTRY, AT_ENTRY_WITH_NORMAL } Place;
 
-// A wire with a J tip whose bend stands 40 degrees out of the frame's plane, pushed and twisted into the moved model.
+// A wire with a J tip whose plane is rotated by 40 degrees, pushed and twisted into the moved model.
 static RecordedRun *run_moved(const char *name, const Motion *m, Place place, double duration_s)
 {
     VesselTree *tree = load("phantom.h5");
@@ -172,7 +172,7 @@ static RecordedRun *run_moved(const char *name, const Motion *m, Place place, do
     return recorded;
 }
 
-// The furthest that any node of `b` is from the moved node of `a` in the frames up to `until_s`.
+// Largest distance between a node of `b` and the moved node of `a` in the frames up to `until_s`.
 static double parting(const RecordedRun *a, const Motion *m, const RecordedRun *b, double until_s)
 {
     double worst = 0;
@@ -234,7 +234,7 @@ static void a_turned_and_shifted_scene_gives_the_same_path_there(void **state)
 
 // --- numbers ---
 
-// Every number of a text is finite; the gap of a node that no vessel holds (in the sheath: its vessel_node is -1) is `inf`.
+// All numbers of a text are finite; the gap of a node outside any vessel (in the sheath: its vessel_node is -1) is `inf`.
 static void all_numbers_are_finite(const char *name)
 {
     char *text = calloc(1, 1 << 20), *next = text;

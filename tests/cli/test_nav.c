@@ -1,5 +1,5 @@
-// The trainer from outside, as a user has it: `seldinger nav` under a virtual X server, keys by xdotool; what it leaves, its replay, what goes on from it.
-// Skipped by name where Xvfb or xdotool is not installed.
+// The trainer as a user runs it: `seldinger nav` under a virtual X server, with keys by xdotool; the files that it writes, its replay, and sessions continued
+// from them. Skipped by name if Xvfb or xdotool is not installed.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -48,7 +48,7 @@ static bool is_installed(const char *program)
     return system(command) == 0;
 }
 
-// Xvfb finds a free display by itself and says which.
+// Xvfb finds a free display number and prints it.
 static int open_display(void **state)
 {
     int said[2];
@@ -57,7 +57,7 @@ static int open_display(void **state)
     put("scene.yaml", scene);
     put("coaxial.yaml", coaxial);
 #ifdef KEEP_LIBRARIES
-    // what LeakSanitizer then tells is ours; it must not insist on being the first library
+    // LeakSanitizer's reports are then about our code; it must accept not being the first library
     setenv("LD_PRELOAD", KEEP_LIBRARIES, 1);
     setenv("ASAN_OPTIONS", "verify_asan_link_order=0", 1);
 #endif
@@ -110,7 +110,7 @@ static int run(const char *format, ...)
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-// The same; prints the output if it does not end with `code`.
+// The same; prints the output if the exit code is not `code`.
 #define RUNS(code, ...)                                                                                                                                        \
     do {                                                                                                                                                       \
         int ended = run(__VA_ARGS__);                                                                                                                          \
@@ -121,7 +121,7 @@ static int run(const char *format, ...)
 
 static bool ends_with(const char *text, const char *end) { return strlen(text) >= strlen(end) && !strcmp(text + strlen(text) - strlen(end), end); }
 
-// The newest recording in FOLDER/sessions; its path in a buffer of the function's.
+// The newest recording in FOLDER/sessions; its path is in a static buffer.
 static const char *newest_recording(void)
 {
     static char path[600];
@@ -147,7 +147,7 @@ static RecordedRun *load(const char *path)
     return recorded;
 }
 
-// What a session has done so far, or in all.
+// What a session has done so far or in total.
 typedef struct Motion {
     double inserted;         // [mm]
     double twisted;          // [deg] by all commands
@@ -161,8 +161,8 @@ static Motion motion_of(const RecordedRun *recorded)
     return motion;
 }
 
-// This program as a hand calls it, `test_nav --moved RECORDING MM DEG`: exit code 0 once the recording, which is still being written, has so much motion;
-// the name is empty until it has a first row.
+// Called as `test_nav --moved RECORDING MM DEG` by the script of keys: exit code 0 once the recording, which is still being written, contains this motion; the
+// name is empty until the first row is written.
 static int has_moved(char **argument)
 {
     RecordedRun *recorded = recorded_run_load_series(argument[0], &faults);
@@ -173,8 +173,8 @@ static int has_moved(char **argument)
     return motion.inserted > strtod(argument[1], NULL) && motion.twisted > strtod(argument[2], NULL) ? 0 : 1;
 }
 
-// Waits until the window shows a picture, then holds keys as a user does; the session is ended by Esc and Enter. A key is seen once a picture, and a picture can
-// take seconds under a sanitizer on a loaded machine: keys that move the tool are held until it has moved.
+// Waits until the window shows a picture, then holds keys as a user does; Esc and Enter end the session. Keys are read once per picture, which can take seconds
+// under a sanitizer on a loaded machine: keys that move the tool are held until it has moved.
 static const char hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
                            "moved() { $TEST_NAV --moved \"$(ls -t sessions/*.h5 2>/dev/null | head -1)\" $1 $2; }; xdotool key e; sleep 0.3; "
                            "xdotool keydown Up; until moved 4.1 -1; do sleep 0.3; done; xdotool keyup Up; "
@@ -201,7 +201,7 @@ static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
     print_message("%lld steps, %.1f mm in, %.0f degrees\n", (long long)recorded->step_count, motion.inserted, motion.twisted);
     assert_true(was_on && flowed && marked);
     assert_true(motion.inserted > 2 + 2 && motion.twisted > 5);
-    assert_true(recorded->step_count < 55000);   // Esc and Enter ended it, not the clock
+    assert_true(recorded->step_count < 55000);   // ended by Esc and Enter, not by the time limit
 
     snprintf(json, sizeof json, "%.*s.json", (int)strlen(path) - 3, path);
     static Session session;
@@ -221,7 +221,7 @@ static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
     assert_int_equal(access(in_folder("seen.png"), R_OK), 0);
 }
 
-static void a_session_goes_on_from_a_moment_of_another(void **state)
+static void a_session_continues_from_a_moment_of_another(void **state)
 {
     (void)state;
     need_display();
@@ -242,7 +242,7 @@ static void a_session_goes_on_from_a_moment_of_another(void **state)
     free(said);
 }
 
-// The thread by the arrows, then both at once by two hands, then locked, then let go; the window drawn all the while.
+// Moves the thread by the arrow keys, then both tools by two hands, then both locked, then releases them, while the window draws.
 static const char two_hands[] =
     "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
     "xdotool key 2; sleep 0.2; xdotool keydown Up; sleep 2; xdotool keydown u; sleep 1.5; xdotool keyup u; xdotool keyup Up; sleep 0.2; "
@@ -257,7 +257,7 @@ static void two_tools_are_moved_by_keys(void **state)
     RUNS(0, "(%s) & exec %s nav coaxial.yaml --sessions sessions --duration-s 60 --size 800x600 >out.txt 2>&1", two_hands, SELDINGER_PROGRAM);
     RecordedRun *recorded = load(newest_recording());
     assert_int_equal(recorded->tool_count, 2);
-    double alone = 0, both = 0, together = 0;          // seconds in which the thread was pushed alone, both were, both were turned
+    double alone = 0, both = 0, together = 0;          // seconds in which only the thread was pushed, both were pushed, both were rotated
     for (int64_t i = 0; i < recorded->step_count; i++) {
         const double *outer = recorded->tool[0].command + 2 * i, *inner = recorded->tool[1].command + 2 * i;
         alone += inner[0] > 0 && outer[0] == 0 ? 0.001 : 0;
@@ -277,7 +277,7 @@ static void two_tools_are_moved_by_keys(void **state)
     RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
 }
 
-// The thread is still in: refused. It is drawn back, its tip shaped on the tray, and pushed in again.
+// While the thread is inserted, an exchange is refused. It is pulled back, its tip is shaped on the tray, and it is pushed in again.
 static const char exchanging_hands[] =
     "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
     "xdotool key 2; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.3; xdotool key Return; sleep 0.5; xdotool key x; sleep 0.3; "
@@ -310,7 +310,7 @@ static void a_recording_is_shown_in_the_window(void **state)
 {
     (void)state;
     need_display();
-    // LeakSanitizer itself crashes at times, when it stops the program's threads while one of the GL driver's ends: that says nothing about the program
+    // LeakSanitizer itself sometimes crashes when it stops the program's threads while a thread of the GL driver ends; this does not concern the program
     bool sanitizer_crashed = true;
     for (int i = 0; i < 5 && sanitizer_crashed; i++) {
         int ended = run("exec %s replay '%s' --duration-s 3 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
@@ -324,7 +324,7 @@ static void a_recording_is_shown_in_the_window(void **state)
     assert_false(sanitizer_crashed);
 }
 
-// Killed while a key is held; the next start asks, and Enter has it scored.
+// Killed while a key is held; the next start offers to recover the session, and Enter has it scored.
 static const char killing_hand[] =
     "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
     "xdotool key e; xdotool keydown Up; sleep 3; kill -9 $(xdotool getwindowpid $W); xdotool keyup Up";
@@ -339,11 +339,11 @@ static void a_session_that_was_cut_off_is_recovered(void **state)
     need_display();
     RUNS(137, "(%s) & %s nav scene.yaml --sessions killed --trainee Eve --duration-s 60 --size 800x600 >out.txt 2>&1; exit $?", killing_hand,
          SELDINGER_PROGRAM);
-    RUNS(0, "while xdotool search --name Seldinger: >/dev/null 2>&1; do sleep 0.1; done");   // a busy X server shows a dead program's window a little longer
+    RUNS(0, "while xdotool search --name Seldinger: >/dev/null 2>&1; do sleep 0.1; done"); // a busy X server shows the window of a dead program a little longer
     RUNS(0, "test $(ls killed/*.h5 | wc -l) = 1 && ! ls killed/*.json 2>/dev/null && cp killed/*.h5 cut-off.h5");
     RUNS(0, "(%s) & exec %s nav scene.yaml --sessions killed --duration-s 60 --size 800x600 >out.txt 2>&1", recovering_hand, SELDINGER_PROGRAM);
     RUNS(0, "grep -q '\"trainee\":[[:space:]]*\"Eve\"' killed/*.json");
-    // the same by the report alone
+    // the same by `report` alone
     RUNS(0, "%s report cut-off.h5 --quiet && grep -q '\"trainee\":[[:space:]]*\"Eve\"' cut-off.json && test -s cut-off.html", SELDINGER_PROGRAM);
     RecordedRun *recorded = load(in_folder("cut-off.h5"));
     static Session session;
@@ -353,7 +353,7 @@ static void a_session_that_was_cut_off_is_recovered(void **state)
     recorded_run_free(recorded);
 }
 
-static void without_a_display_it_says_so(void **state)
+static void a_missing_display_is_reported(void **state)
 {
     (void)state;
     RUNS(2, "DISPLAY= WAYLAND_DISPLAY= %s nav scene.yaml --no-record >out.txt 2>&1", SELDINGER_PROGRAM);
@@ -373,11 +373,11 @@ int main(int argc, char **argv)
     self[length] = 0;
     setenv("TEST_NAV", self, 1);
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
-                                       cmocka_unit_test(a_session_goes_on_from_a_moment_of_another),
+                                       cmocka_unit_test(a_session_continues_from_a_moment_of_another),
                                        cmocka_unit_test(a_recording_is_shown_in_the_window),
                                        cmocka_unit_test(two_tools_are_moved_by_keys),
                                        cmocka_unit_test(a_tip_is_shaped_and_put_in_from_the_tray),
                                        cmocka_unit_test(a_session_that_was_cut_off_is_recovered),
-                                       cmocka_unit_test(without_a_display_it_says_so)};
+                                       cmocka_unit_test(a_missing_display_is_reported)};
     return cmocka_run_group_tests(tests, open_display, close_display);
 }

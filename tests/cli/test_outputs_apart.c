@@ -1,4 +1,4 @@
-// No verb writes over what it reads, nor one output over another: refused before anything is written, with both options' names.
+// No verb overwrites an input, and no output overwrites another: refused before anything is written, with the names of both options.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -53,7 +53,7 @@ static int make_files(void **state)
            symlink("later.h5", in_folder("dangling.h5")) || mkdir(in_folder("sub"), 0755);
 }
 
-// Exit code 2, the words, and every file as it was.
+// Exit code 2, the message, and all files unchanged.
 static void refused(const char *arguments, const char *words)
 {
     static char before[1 << 16], after[1 << 16];
@@ -162,7 +162,7 @@ static void a_recording_and_its_scene_are_kept(void **state)
     must_run("replay rec/run.h5 --scene again --quiet");
 }
 
-// What takes all and holds nothing may be given twice; files beside the inputs are fine.
+// /dev/null may be given twice; files beside the inputs are allowed.
 static void what_loses_nothing_is_allowed(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// `seldinger replay` as a user has it: a run recorded, simulated again, made into a scene, drawn; recordings that were tampered with, cut, or are none.
+// `seldinger replay`: a run is recorded, simulated again, converted to a scene and drawn; recordings that were changed, cut off or are of another kind.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -33,7 +33,7 @@ static const char model_scene[] = "seldinger: 1\n"
                                   "sheath: {entry_mm: [0, 0, 0], direction: [0, 0, 1], inserted_mm: 1}\n"
                                   "script: [[0, 10, 0], [0.2, 0, 90], [0.25, 0, 0]]\n";
 
-// Its output is in `said`; $S in a command is the program.
+// The output goes to `said`; $S in a command is the program.
 static int run(const char *format, ...)
 {
     char command[2000], text[1500];
@@ -65,7 +65,7 @@ static int set_up(void **state)
     return run("$S run scenes/bend.yaml --record bend.h5 --quiet && cd scenes && $S run capsule.yaml --record ../capsule.h5 --quiet");
 }
 
-// A copy of a recording with a dataset's row, or a text, changed.
+// Makes a copy of a recording with a changed row of a dataset or a changed text.
 static hid_t open_copy(const char *from, const char *to)
 {
     assert_int_equal(run("cp %s %s", from, to), 0);
@@ -108,7 +108,7 @@ static void a_run_is_simulated_again(void **state)
     ends(0, "300 steps (0.300 s) simulated again, the same state at each", "$S replay bend.h5 --verify");
     ends(0, "", "$S replay bend.h5 --verify --quiet");
     assert_string_equal(said, "");
-    // from any folder, whatever was changed in the scene's own file since
+    // from any folder, even if the scene's own file was changed since
     ends(0, "250 steps", "mkdir -p elsewhere/deep && cd elsewhere/deep && $S replay ../../capsule.h5 --verify");
     ends(0, "250 steps", "cd / && $S replay \"$OLDPWD/capsule.h5\" --verify");
 }
@@ -150,16 +150,16 @@ static void a_recording_becomes_a_scene(void **state)
     ends(0, "same", "$S check again");
     ends(0, "", "$S run again/scene.yaml --record again.h5 --quiet && $S replay again.h5 --verify --quiet");
     ends(0, "same", "sed -i 's/,100,/,101,/' again/hand.csv && ! $S check again; sed -i 's/,101,/,100,/' again/hand.csv && $S check again");
-    // the model as it is named from there
+    // the model by its path relative to that folder
     ends(0, "scene.yaml, hand.csv", "mkdir -p far/away && cd scenes && $S replay ../capsule.h5 --scene ../far/away/made");
     ends(0, "model: \"../../../models/capsule.h5\"", "cat far/away/made/scene.yaml");
     ends(0, "same", "$S check far/away/made");
     ends(0, "same", "cd far && $S check away/made");
     ends(0, "same", "$S replay capsule.h5 --scene . --quiet && $S check . && rm scene.yaml hand.csv scene.golden.csv");
-    // what cannot be written, and a folder that is a file
+    // a path that cannot be written, and a folder that is a file
     ends(2, "nowhere/made", "$S replay bend.h5 --scene nowhere/made");
     ends(2, "bend.h5", "$S replay capsule.h5 --scene bend.h5");
-    // of a recording that differs there is a scene, too, but it is told
+    // a recording that differs is converted too, with a message
     ends(1, "differs from step 40", "$S replay pushed.h5 --scene pushed");
     ends(0, "same", "$S check pushed");
 }
@@ -170,7 +170,7 @@ static void the_kind_of_contact_is_kept(void **state)
     ends(0, "", "$S run scenes/capsule.yaml --contact grid --record grid.h5 --quiet && $S replay grid.h5 --verify --quiet");
     ends(0, "contact: \"grid\"", "$S replay grid.h5 --scene grid --quiet && cat grid/scene.yaml");
     ends(0, "same", "$S check grid");
-    // it is no other kind's run
+    // it is not a run with another contact
     ends(1, "", "cmp -s again/scene.golden.csv grid/scene.golden.csv");
 }
 
@@ -248,7 +248,7 @@ static void need_egl(void)
     gl_context_destroy(context);
 }
 
-static void pictures_are_of_the_moment_and_size_asked_for(void **state)
+static void pictures_are_of_the_moment_and_size_requested(void **state)
 {
     (void)state;
     need_egl();
@@ -258,7 +258,7 @@ static void pictures_are_of_the_moment_and_size_asked_for(void **state)
     assert_int_equal(png[18] << 8 | png[19], 320);
     assert_int_equal(png[22] << 8 | png[23], 240);
     free(png);
-    // without --at it is the end; any time beyond that is the end, too
+    // without --at the end; a time beyond the end is the end, too
     ends(0, "", "$S replay bend.h5 --picture last.png --at 0.3 --size 320x240 --no-panels && cmp end.png last.png");
     ends(0, "", "$S replay bend.h5 --picture past.png --at 1000 --size 320x240 --no-panels && cmp end.png past.png");
     ends(1, "", "$S replay bend.h5 --picture first.png --at 0 --size 320x240 --no-panels && cmp -s end.png first.png");
@@ -294,7 +294,7 @@ int main(void)
         cmocka_unit_test(what_is_no_recording_is_refused),
         cmocka_unit_test(wrong_options_are_refused),
 #ifdef SELDINGER_RENDER
-        cmocka_unit_test(pictures_are_of_the_moment_and_size_asked_for),
+        cmocka_unit_test(pictures_are_of_the_moment_and_size_requested),
         cmocka_unit_test(a_film_has_its_frames),
 #endif
     };

@@ -1,6 +1,5 @@
-// `info --report`: one page that stands alone. Its markup is checked as XML (which it also is), for what would fetch anything, and for its figures; then
-// a real browser shows it: the figures are there and coloured, nothing is complained of, nothing is asked of the network. The browser's part is skipped
-// by name where there is none.
+// `info --report`: a self-contained page. Its markup, which is also XML, is checked for references to other files and for its figures; then a real browser
+// shows it: the figures are visible and coloured, there are no error messages and no network requests. The browser's part is skipped by name if there is none.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,7 +23,7 @@ static char folder[] = "/tmp/seldinger-report-XXXXXX";
 static const char *browser;  // NULL: none
 static int branch_count;      // of the model
 
-// The phantom fitted, with a place made half as wide in the middle of its first branch.
+// The fitted phantom, with a stenosis of half the radius in the middle of its first branch.
 static int make_model(void)
 {
     static Faults faults;
@@ -142,7 +141,7 @@ static void check_page(const Seen *seen, int figures)
     assert_int_equal(seen->external, 0);
     assert_int_equal(seen->scripts, 0);
     assert_int_equal(seen->unnamed_images, 0);
-    assert_int_equal(seen->titled, 2 * seen->svg);   // a title and a description each
+    assert_int_equal(seen->titled, 2 * seen->svg);   // a title and a description for each
     assert_int_equal(seen->figures, figures);
     assert_int_equal(seen->sections, 7);
     assert_true(seen->has_notice);
@@ -156,7 +155,7 @@ static void the_page_of_a_model_is_whole(void **state)
     snprintf(arguments, sizeof arguments, "'%s' --report '%s'", in_folder("model.h5"), in_folder("model.html"));
     assert_int_equal(info(arguments), 0);
     char *said = text_of(in_folder("out.txt"));
-    assert_non_null(strstr(said, "nodes"));   // the figures too
+    assert_non_null(strstr(said, "nodes"));   // also the figures
     free(said);
     Seen *seen = read_page(in_folder("model.html"));
     check_page(seen, 2 + branch_count);
@@ -165,7 +164,7 @@ static void the_page_of_a_model_is_whole(void **state)
     assert_non_null(strstr(seen->text, "C1 "));
     assert_non_null(strstr(seen->text, "S1narrow place"));
     const char *percent = strstr(seen->text, " % narrower");
-    assert_true(percent && abs(atoi(percent - 2) - 50) < 5);   // of a reference that is not quite even
+    assert_true(percent && abs(atoi(percent - 2) - 50) < 5);   // of a reference of slightly uneven width
     assert_non_null(strstr(seen->text, "A1aneurysm"));
     assert_non_null(strstr(seen->text, "voxel 0.4 mm."));
     free(seen);
@@ -177,7 +176,7 @@ static void the_page_of_a_model_is_whole(void **state)
     free(second);
 }
 
-// A tree of one node, without points or model, whose texts are as hostile as a file may hold.
+// A tree of one node, without points or model, whose texts contain markup.
 static void hostile_texts_stay_text(void **state)
 {
     (void)state;
@@ -240,7 +239,7 @@ static void shown_free(Shown *shown)
     free(shown->net);
 }
 
-// Requests that the page made: the browser's own go to its maker.
+// Network requests of the page, without the browser's requests to its vendor.
 static int requests(const char *net)
 {
     int count = 0;
@@ -296,7 +295,7 @@ static void a_browser_shows_it(void **state)
     assert_int_equal(occurrences(shown.dom, "<figure id=\"figure-"), occurrences(page, "<figure id=\"figure-"));
     assert_int_equal(occurrences(shown.dom, "<polyline"), occurrences(page, "<polyline"));
     shown_free(&shown);
-    // colours of the style sheet: bars of class C1, the lines of orders 1 and 2, the narrow place, the sac's ring, much white
+    // colours of the style sheet: bars of class C1, the lines of orders 1 and 2, the narrow place, the sac's ring, mostly white
     assert_true(pixels_near(in_folder("light.png"), 0x00, 0x72, 0x5a) > 2000);
     assert_true(pixels_near(in_folder("light.png"), 0x0b, 0x5f, 0xa5) > 300);
     assert_true(pixels_near(in_folder("light.png"), 0xa8, 0x48, 0x0a) > 300);
@@ -308,7 +307,7 @@ static void a_browser_shows_it(void **state)
     assert_true(pixels_near(in_folder("dark.png"), 0x14, 0x17, 0x1a) > 1000000);
     assert_true(pixels_near(in_folder("dark.png"), 0x6f, 0xb8, 0xf5) > 300);
     shown_free(&shown);
-    // that this would have seen what it looks for: without the page's policy a picture is asked for, and a script complains
+    // the check can fail: without the page's policy a picture is requested and a script reports an error
     char *policy = strstr(page, "<meta http-equiv"), *end = policy ? strstr(policy, "/>") : NULL, *body = strstr(page, "<body>");
     assert_true(end && body);
     memset(policy, ' ', (size_t)(end + 2 - policy));

@@ -1,5 +1,5 @@
-// The program gives the same bits whatever instructions the processor has and whichever C library it meets; what it was built from stands beside it; and
-// it does not tell where and when it was built. The long share, other compilers and another processor, is tests/tools/same-builds.
+// The program gives the same bits for any instruction set and C library; its bill of materials is beside it; and it contains neither the place nor the time of
+// the build. The longer part, with other compilers and another processor, is tests/tools/same-builds.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -32,7 +32,7 @@ static void need(const char *tool)
     }
 }
 
-// Whether the C library rounds this function as it likes: base/same_math.h has its place.
+// Whether C libraries round this function differently: base/same_math.h replaces it.
 static bool is_rounded_freely(const char *name)
 {
     static const char *const inexact[] = {"sin",   "cos",   "tan",   "sincos", "asin", "acos",   "atan",   "atan2", "sinh", "cosh",  "tanh",
@@ -94,7 +94,7 @@ static const char fitted[] = "seldinger: 1\n"
                              "  damping: {mass_1_s: 0.1, stiffness_s: 0.0002}\n"
                              "sheath: {inlet: root, inserted_mm: 2}\n"
                              "script: [[0, 40, 90], [0.3, 40, 90]]\n";
-// Two curved tools in an exact tube, turned against each other.
+// Two curved tools in an exact tube, rotated against each other.
 static const char several[] = "seldinger: 1\n"
                               "vessel:\n"
                               "  tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 1.5,\n"
@@ -125,7 +125,7 @@ static const char several[] = "seldinger: 1\n"
 static const char *const variant[] = {"SELDINGER_SIMD=avx512", "SELDINGER_SIMD=avx2", "SELDINGER_SIMD=sse2", NO_FUSED, "SELDINGER_SIMD=sse2 " NO_FUSED};
 enum { VARIANTS = sizeof variant / sizeof *variant };
 
-// The state after a run, its model fitted again.
+// The state after a run, with a new fit of its model.
 static void state_after(const char *scene, const char *environment, char hash[17])
 {
     char before[600];
@@ -158,13 +158,13 @@ static void instruction_sets_and_c_libraries_give_the_same_bits(void **state)
     }
 }
 
-// --- what it was built from ---
+// --- the bill of materials ---
 
 static const char *text_in(const cJSON *object, const char *key)
 {
     const char *text = cJSON_GetStringValue(cJSON_GetObjectItem(object, key));
     if (!text || !*text)
-        fail_msg("the bill of materials lacks %s", key);
+        fail_msg("the bill of materials has no %s", key);
     return text;
 }
 
@@ -203,7 +203,7 @@ static void check_package(const cJSON *package, const cJSON *packages)
     }
 }
 
-// The fields that SPDX 2.3 makes mandatory (clauses 6, 7 and 11), the program's digest, and that its own libraries are in it.
+// The fields that SPDX 2.3 requires (clauses 6, 7 and 11), the program's digest, and the program's own libraries.
 static void the_bill_of_materials_is_whole(void **state)
 {
     (void)state;
@@ -252,10 +252,10 @@ static void the_bill_of_materials_is_whole(void **state)
     free(text);
 }
 
-static void the_program_does_not_tell_where_it_was_built(void **state)
+static void the_program_does_not_contain_where_it_was_built(void **state)
 {
     (void)state;
-    NEED_WHOLE_RUNS();       // sanitizers put the sources' names into the program
+    NEED_WHOLE_RUNS();       // sanitizers put the names of source files into the program
     need("grep");
     const char *const secret[] = {SOURCE_DIR, BINARY_DIR};
     char command[1200];
@@ -280,7 +280,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_calls_what_c_libraries_round_differently),    cmocka_unit_test(no_product_is_fused_with_a_sum),
         cmocka_unit_test(instruction_sets_and_c_libraries_give_the_same_bits), cmocka_unit_test(the_bill_of_materials_is_whole),
-        cmocka_unit_test(the_program_does_not_tell_where_it_was_built),        cmocka_unit_test(no_source_asks_for_the_date),
+        cmocka_unit_test(the_program_does_not_contain_where_it_was_built),     cmocka_unit_test(no_source_asks_for_the_date),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -1,5 +1,5 @@
-// `seldinger report`: a page that stands alone, is also XML, and holds what the session holds; without a recording, with another's, with earlier sessions;
-// a browser prints it. The browser's part is skipped by name where there is none.
+// `seldinger report`: a self-contained page, which is also XML, with the contents of the session; without a recording, with another session's recording, with
+// earlier sessions; printed by a browser. The browser's part is skipped by name if there is none.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -165,7 +165,7 @@ static void the_same_bytes_twice(void **state)
     free(two);
 }
 
-static void what_lacks_is_said(void **state)
+static void missing_parts_are_reported(void **state)
 {
     (void)state;
     char arguments[900], *text;
@@ -177,7 +177,7 @@ static void what_lacks_is_said(void **state)
     assert_non_null(strstr(text, "recording was not found"));
     assert_non_null(strstr(text, "No other session was found"));
     free(text);
-    // another session's recording under its name
+    // the recording of another session under this session's name
     assert_int_equal(link(in_folder("first.h5"), in_folder("other.h5")), 0);
     assert_int_equal(report(arguments), 0);
     look_at(in_folder("other.html"), &text);
@@ -223,7 +223,7 @@ static void a_browser_prints_it(void **state)
     fclose(file);
 }
 
-static void no_browser_is_said(void **state)
+static void no_browser_is_reported(void **state)
 {
     (void)state;
     char command[900];
@@ -244,7 +244,7 @@ static bool comes(const char *path)
     return access(path, F_OK) == 0;
 }
 
-// With a browser that never ends and says where the page is: the trainee's page goes with the program.
+// With a browser that does not end and prints the path of the page: the page is removed when the program ends.
 static void a_stopped_report_leaves_no_page(void **state)
 {
     (void)state;
@@ -291,9 +291,9 @@ int main(void)
         cmocka_unit_test(wrong_use_is_refused),
         cmocka_unit_test(the_page_holds_the_session),
         cmocka_unit_test(the_same_bytes_twice),
-        cmocka_unit_test(what_lacks_is_said),
+        cmocka_unit_test(missing_parts_are_reported),
         cmocka_unit_test(a_browser_prints_it),
-        cmocka_unit_test(no_browser_is_said),
+        cmocka_unit_test(no_browser_is_reported),
         cmocka_unit_test(a_stopped_report_leaves_no_page),
     };
     return cmocka_run_group_tests(tests, set_up, remove_folder);

@@ -1,4 +1,4 @@
-// `run` with several tools: an exact reference from a scene file, what the summary and the final state say of each tool, and which a device moves.
+// `run` with several tools: an exact reference from a scene file, the summary and the final state of each tool, and which tool a device moves.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -43,7 +43,7 @@ static double value(const cJSON *tool, const char *part, const char *name)
     return cJSON_GetObjectItem(object, name)->valuedouble;
 }
 
-// Reference 1 of the coaxial tools: 0.03 N, tip (23.953622, 39.793075) mm; the tools' own stretch is 1.6e-3 mm.
+// Reference 1 of the coaxial tools: 0.03 N, tip (23.953622, 39.793075) mm; the tools stretch by 1.6e-3 mm.
 static void a_reference_from_a_scene(void **state)
 {
     (void)state;
@@ -57,7 +57,7 @@ static void a_reference_from_a_scene(void **state)
     assert_true(fabs(push - 0.03) < 1e-5 && off < 2e-3);
     assert_true(fabs(value(wire, NULL, "inserted_mm") - 30) < 1e-9);
     cJSON_Delete(root);
-    // one row a node of every tool, and a head
+    // one row per node of each tool, and a header
     char *text = text_of(in_folder("final.csv"));
     int lines = 0;
     for (const char *c = text; *c; c++)
@@ -85,7 +85,7 @@ static void two_tools_in_a_model_repeat(void **state)
     free(hash[1]);
 }
 
-// `arguments` with $D for the folder; what it says holds the words.
+// Runs with $D in `arguments` replaced by the folder; the output must contain the words.
 static void ends(int code, const char *words, const char *arguments)
 {
     char line[1000] = "";
@@ -99,7 +99,7 @@ static void ends(int code, const char *words, const char *arguments)
     free(text);
 }
 
-// Three tools that go in and out of each other in a bend: nodes come and go.
+// Three tools that move in and out of each other in a bend: nodes are added and removed.
 static const char three_tools[] =
     "seldinger: 1\n"
     "vessel: {tube: {radius_mm: 2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 20}]}, contact: tube, friction: "
@@ -136,13 +136,13 @@ static void a_run_of_three_tools_is_recorded_and_simulated_again(void **state)
     ends(0, "", "run $D/three.yaml --record $D/three.h5 --quiet");
     ends(0, "900 steps (0.900 s) simulated again, the same state at each", "replay $D/three.h5 --verify");
     ends(0, "name micro, kind microcatheter, length_mm 75, inserted_mm 19,", "info $D/three.h5");
-    // an inner tool's hand counts
+    // the hand of an inner tool counts
     char other[200];
     snprintf(other, sizeof other, "%s", in_folder("other.h5"));
     ends(0, "", "run $D/three.yaml --record $D/other.h5 --quiet");
     change_command(other, "/tools/2/command", 200);
     ends(1, "differs from step 200", "replay $D/other.h5 --verify");
-    // and as a scene with a golden path of each tool
+    // also as a scene with a golden path of each tool
     ends(0, "three-again: scene.yaml, hand.csv, scene.golden.csv", "replay $D/three.h5 --scene $D/three-again");
     ends(0, "name guide, push_mm 6, twist_deg 0, name micro, push_mm 15, twist_deg 27, name wire, push_mm 3, twist_deg 13.5", "info $D/three-again/hand.csv");
     ends(0, "same", "check $D/three-again");
@@ -169,13 +169,13 @@ static void a_tool_that_is_let_go_stays_so_in_a_replay(void **state)
     put("let-go.csv", "t_s,guide.push_mm_s,guide.twist_deg_s,micro.released\n0,20,0,0\n0.1,20,0,1\n0.4,0,0,0\n");
     ends(0, "", "run $D/three.yaml --script $D/let-go.csv --record $D/let-go.h5 --quiet");
     ends(0, "400 steps (0.400 s) simulated again, the same state at each", "replay $D/let-go.h5 --verify");
-    // the guide took it along
+    // the guide carried it along
     ends(0, "name micro, kind microcatheter, length_mm 75, inserted_mm 10,", "info $D/let-go.h5");
     ends(0, "let-go: scene.yaml", "replay $D/let-go.h5 --scene $D/let-go");
     ends(0, "same", "check $D/let-go");
     ends(0, "name guide, push_mm 8, twist_deg 0, name micro, push_mm 0, twist_deg 0, released_s 0.3, name wire, push_mm 0, twist_deg 0",
          "info $D/let-go/hand.csv");
-    // of a single tool too
+    // also of a single tool
     put("one.yaml", "seldinger: 1\nwire: {elements: 20, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.1}]}\n"
                     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 5}\n");
     put("one.csv", "t_s,push_mm_s,twist_deg_s,released\n0,50,0,0\n0.2,0,0,1\n0.4,0,0,0\n");
@@ -213,14 +213,14 @@ static void a_bench_experiment_is_met(void **state)
     double push = value(root, "proximal", "force_most_n");
     print_message("largest push %.4f N\n", push);
     assert_true(push > 0.088 && push < 0.137);
-    // the valve holds the wire where it was in the microcatheter
+    // the valve holds the wire at its place in the microcatheter
     const cJSON *tools = cJSON_GetObjectItem(root, "tools");
     assert_true(fabs(value(cJSON_GetArrayItem(tools, 0), NULL, "inserted_mm") - 190) < 1e-6);
     assert_true(fabs(value(cJSON_GetArrayItem(tools, 1), NULL, "inserted_mm") - 200) < 0.1);
     cJSON_Delete(root);
 }
 
-// Scenes/coaxial/exchange.yaml, and what is refused: a tool that is in, one that does not fit.
+// scenes/coaxial/exchange.yaml, and exchanges that are refused: the tool is not pulled back, or the new one does not fit.
 static void a_script_exchanges_tools(void **state)
 {
     (void)state;
@@ -248,8 +248,8 @@ static void a_script_exchanges_tools(void **state)
     ends(2, "single.yaml:5:17: the scene has one tool", "run $D/single.yaml --duration-s 0.1");
 }
 
-// Recording, replay to the bit, figures, files and a regression scene made of it, in another folder than the devices'; what was exchanged stays in while the
-// run settles.
+// Recording, bit-identical replay, figures, files and a regression scene made of it in another folder than the devices'; the exchanged tool stays while the run
+// settles.
 static void the_chain_follows_exchanges(void **state)
 {
     (void)state;
@@ -278,7 +278,7 @@ static void the_chain_follows_exchanges(void **state)
     ends(0, "exchanges 1", "info $D/swap.csv");
     put("only.csv", "t_s,wire.exchange\n0,0\n1,1\n");
     ends(0, "what             script", "info $D/only.csv");
-    // the first frame has the scene's wire, the last the other
+    // the first frame has the scene's wire, the last frame the other
     ends(0, "", "export $D/swap.h5 -o $D/rows.csv");
     text = text_of(in_folder("rows.csv"));
     static const char head[] = "t_s,step,tool,node,x_mm,y_mm,z_mm,qw,qx,qy,qz,carrier,exchange\n";
@@ -296,7 +296,7 @@ static void the_chain_follows_exchanges(void **state)
     ends(0, "", "run $D/swap.yaml --quiet --picture $D/swap.png --picture-at 0.2 --picture-at 0.65");
     assert_int_equal(access(in_folder("swap.png"), R_OK), 0);
 #endif
-    // a scene made of it names the device from where it lies, and its golden path holds; another script's does not
+    // a scene made of it refers to the device relative to its folder, and its golden path is met; that of another script is not
     ends(0, "", "replay $D/swap.h5 --scene $D/again");
     text = text_of(in_folder("again/scene.yaml"));
     assert_non_null(strstr(text, "- device: \"../device.yaml\""));
@@ -308,7 +308,7 @@ static void the_chain_follows_exchanges(void **state)
     ends(1, "0.450     0   29.9900000  of wire", "check $D/swap.yaml");
 }
 
-// The two devices of DualDeviceNav: both tips end within the benchmark's 5 mm of the target. `model`: what the scene needs.
+// The two devices of DualDeviceNav: both tips end within the benchmark's 5 mm of the target. `model`: file that the scene needs.
 static void two_devices_reach(const char *scene, const char *model, const double target[3])
 {
     NEED_WHOLE_RUNS();
@@ -350,7 +350,7 @@ static void golden_paths_of_the_scenes_hold(void **state)
     ends(0, "same", "check scenes/coaxial");
 }
 
-// A device moves one of the scene's tools, or the message lists them.
+// A device moves one of the scene's tools; for an unknown tool the message lists them.
 static void a_map_names_a_tool_of_the_scene(void **state)
 {
     (void)state;
@@ -373,7 +373,7 @@ static void a_score_has_each_tool(void **state)
     assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(tools, 1), "name")->valuestring, "micro");
     assert_true(fabs(value(cJSON_GetArrayItem(tools, 0), NULL, "inserted_mm") - 6) < 1e-6);
     assert_true(fabs(value(cJSON_GetArrayItem(tools, 1), NULL, "withdrawn_mm") - 3) < 1e-6);
-    // the wire is drawn to 9 mm, the microcatheter stands at 19
+    // the wire is pulled back to 9 mm, the microcatheter is at 19
     assert_true(fabs(value(cJSON_GetArrayItem(tools, 2), NULL, "behind_mm") - 10) < 1e-6);
     cJSON_Delete(root);
 }

@@ -1,4 +1,4 @@
-// What a verb leaves when it fails or is stopped: no part of a file; and the rights of what it writes over.
+// A verb that fails or is stopped leaves no temporary file, and an overwritten file keeps its permissions.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,7 +54,7 @@ static bool comes(const char *pattern)
     return is_there(pattern);
 }
 
-// A part with something in it: before the work a verb tries out whether it could write one.
+// True for a temporary file that is not empty: before the work, a verb creates an empty one to check that it can write.
 static bool is_written(const char *pattern)
 {
     char path[300];
@@ -79,7 +79,7 @@ static pid_t start(const char *const *argument)
     return child;
 }
 
-// The signal by which it ended, or 1000 and its exit code.
+// The signal that ended it, or 1000 and its exit code.
 static int end_of(pid_t child)
 {
     int status;
@@ -108,14 +108,14 @@ static void a_stopped_run_leaves_a_recording_and_no_part(void **state)
 {
     (void)state;
     static const char *const argument[] = {"seldinger", "run", "tube.yaml", "--duration-s", "1000", "--paced", "--record", "long.h5", "--quiet", NULL};
-    // in order: whole, and by exit code
+    // ends in order: complete file, exit code
     pid_t child = start(argument);
     assert_true(comes("long.h5"));
     kill(child, SIGTERM);
     assert_int_equal(end_of(child), 1000);
     assert_int_equal(run_in("", "info long.h5"), 0);
     assert_false(is_there("*.part*"));
-    // without an order
+    // ends without cleaning up
     child = start(argument);
     assert_true(comes("long.h5"));
     kill(child, SIGHUP);
@@ -146,7 +146,7 @@ static void each_stop_removes_the_part(void **state)
         assert_true(!is_there("out.stl") || size_of("out.stl") == whole);
         unlink(in_folder("out.stl"));
     }
-    // on the busiest machine one of them may be whole first, not all
+    // on a busy machine one of them may be complete before the signal, but not all
     assert_true(ended_by_it > 0);
 }
 

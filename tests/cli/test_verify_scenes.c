@@ -1,4 +1,4 @@
-// The verification table, through the program: every scene of scenes/verify passes, and the table can fail.
+// The verification table: every scene of scenes/verify passes, and the table can fail.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,7 +17,7 @@ static char folder[] = "/tmp/seldinger-verify-XXXXXX";
 #include "tests/cli/program.h"
 #include "tests/short_run.h"
 
-// The exit code of `check OPTIONS`; what it prints goes to `output`.
+// The exit code of `check OPTIONS`; its output goes to `output`.
 static int check(const char *options)
 {
     char arguments[600];
@@ -40,7 +40,7 @@ static void every_case_passes(void **state)
 {
     (void)state;
     NEED_WHOLE_RUNS();
-    // without the golden paths, which are another test
+    // without the golden paths, which another test checks
     char command[600];
     snprintf(command, sizeof command, "cp -r '" SOURCE_DIR "/scenes/verify' '%s' && rm -f '%s'/verify/*.golden.csv", folder, folder);
     assert_int_equal(system(command), 0);
@@ -64,7 +64,7 @@ static void a_missed_tolerance_fails(void **state)
 static void a_missed_order_fails(void **state)
 {
     (void)state;
-    // with a reference that is 0.0005 off the error does not fall, though every tolerance is met
+    // with a reference that is 0.0005 off, the error does not fall, although all tolerances are met
     write_scene("a.yaml", "verify: {elements: [5, 10], cases: [" DEFLECTION "reference: 0.71429, tolerance_percent: 0.14, order: 1.8}]}\n");
     assert_int_equal(check("a.yaml"), 1);
     assert_non_null(strstr(output, "ORDER"));
@@ -82,7 +82,7 @@ static void what_was_not_measured_fails(void **state)
     assert_non_null(strstr(output, "not at rest"));
 }
 
-static void bad_input_is_said(void **state)
+static void bad_input_is_reported(void **state)
 {
     (void)state;
     write_scene("a.yaml", "verify: {elements: [5], cases: [" DEFLECTION "tolerance: 1}]}\n");
@@ -111,7 +111,7 @@ static void write_two_tools(const char *cases)
 static void a_case_names_its_tool(void **state)
 {
     (void)state;
-    // 5 mm of the core lie beyond the clamp, all of the tube
+    // 5 mm of the core and all of the tube lie beyond the clamp
     write_two_tools("{name: core, tool: core, quantity: position_mm, s_mm: end, reference: 5, tolerance: 1.0e-6}, "
                     "{name: tube, tool: tube, quantity: position_mm, s_mm: end, reference: 60, tolerance: 1.0e-6}, "
                     "{name: first, quantity: position_mm, s_mm: 60, reference: 60, tolerance: 1.0e-6}, "
@@ -146,7 +146,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_case_passes),           cmocka_unit_test(a_missed_tolerance_fails), cmocka_unit_test(a_missed_order_fails),
-        cmocka_unit_test(what_was_not_measured_fails), cmocka_unit_test(bad_input_is_said),        cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(what_was_not_measured_fails), cmocka_unit_test(bad_input_is_reported),    cmocka_unit_test(threads_change_nothing),
         cmocka_unit_test(a_case_names_its_tool),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

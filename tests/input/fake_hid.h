@@ -1,4 +1,4 @@
-// HID devices that exist only here: a transport with queues, so that plugging, unplugging, floods and forces are tested with the real threads.
+// Simulated HID devices: a transport with queues, so that plugging, unplugging, floods and forces are tested with the real threads.
 #ifndef SELDINGER_TESTS_FAKE_HID_H
 #define SELDINGER_TESTS_FAKE_HID_H
 
@@ -21,16 +21,16 @@ typedef struct FakeDevice {
     HidDeviceInfo info;
     const uint8_t *descriptor;
     int descriptor_length;
-    bool is_plugged, is_open, may_not_open, is_gone, takes_no_writes;    // is_gone: unplugged while it was open
+    bool is_plugged, is_open, may_not_open, is_gone, takes_no_writes;    // is_gone: was unplugged while it was open
     FakeReport queue[FAKE_QUEUE];
-    long first, last;                // reports put in and taken out so far
+    long first, last;                // reports written and read so far
     FakeReport written[FAKE_WRITTEN];
     int64_t written_us[FAKE_WRITTEN];
     int written_count, features_sent;
     uint8_t last_feature[FAKE_REPORT];
-    FakeReport feature_answer;       // what get_feature gives; its byte 1 grows by `feature_grows` with each feature sent
+    FakeReport feature_answer;       // the result of get_feature; its byte 1 grows by `feature_grows` with each feature report sent
     int feature_grows;
-    int flood_hz;                    // > 0: makes reports of its own, without end
+    int flood_hz;                    // > 0: produces reports without end
     FakeReport flood;
 } FakeDevice;
 
@@ -184,7 +184,7 @@ static inline HidTransport fake_transport(FakeHid *hid)
                           .close = fake_close};
 }
 
-// Plugs device `index` in; its usages are taken from `usage` alone.
+// Plugs in device `index`; its usages are those of `usage`.
 static inline FakeDevice *fake_plug(FakeHid *hid, int index, int vendor, int product, const char *serial, uint32_t usage, const uint8_t *descriptor, int length)
 {
     FakeDevice *device = &hid->device[index];
@@ -210,7 +210,7 @@ static inline void fake_unplug(FakeHid *hid, int index)
     pthread_mutex_unlock(&hid->lock);
 }
 
-// Waits where the queue is full, as a device does that is asked for reports.
+// Waits if the queue is full, as a polled device does.
 static inline void fake_report(FakeHid *hid, int index, const uint8_t *bytes, int length)
 {
     FakeDevice *device = &hid->device[index];

@@ -1,4 +1,4 @@
-// Report descriptors of real devices, as bytes in hexadecimal, with where each was published.
+// Report descriptors of real devices as hexadecimal bytes, with their sources.
 #ifndef SELDINGER_TESTS_HID_RECORDINGS_H
 #define SELDINGER_TESTS_HID_RECORDINGS_H
 
@@ -41,8 +41,8 @@ static const char dualshock_4[] =
     "0933950cb10285940934953fb10285a009409506b10285a109419501b10285a209429501b10285a309439530b10285a40944950db10285f00947953fb10285f10948953fb10285f2094995"
     "0fb10285a7094a9501b10285a8094b9501b10285a9094c9508b10285aa094e9501b10285ab094f9539b10285ac09509539b10285ad0951950bb10285ae09529501b10285af09539502b102"
     "85b00954953fb10285e009579502b10285b30955953fb10285b40955953fb10285b50956953fb10285d00958953fb10285d40959953fb102c0";
-// Microsoft SideWinder Force Feedback 2: HIDMaestro profiles/microsoft, the native capture; the ranges of its choices,
-// which the capture has as 12 to 0, put right as in the PID specification
+// Microsoft SideWinder Force Feedback 2: HIDMaestro profiles/microsoft, the native capture; the ranges of its choices, which are 12 to 0 in the capture, are
+// corrected as in the PID specification
 static const char sidewinder_2[] =
     "05010904a1010901a100850109301600fe26ff01350046ff03750a9501810275069501810309311600fe26ff01750a95018102750695018103093515e0251f3500453f6514750695018102"
     "750295018103c0050f0992a1028502099f09a009a409a509a6150025017501950545006500810275039501810309941500250175019501810209221501252835014528750795018102c009"
@@ -76,7 +76,7 @@ static const HidRecording hid_recordings[] = {
 };
 enum { HID_RECORDING_COUNT = sizeof hid_recordings / sizeof *hid_recordings };
 
-// Bytes of a hexadecimal text into `bytes`; how many.
+// Decodes a hexadecimal text into `bytes`; returns their number.
 static inline size_t hid_bytes(const char *hex, uint8_t *bytes)
 {
     size_t count = 0;

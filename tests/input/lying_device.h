@@ -1,4 +1,4 @@
-// A SideWinder Force Feedback 2 on a clock of its own that plays what it takes and may lie about it: for tests and for the fuzz target.
+// A simulated SideWinder Force Feedback 2 with its own clock that plays what it accepts and may report false results: for tests and for the fuzz target.
 #ifndef SELDINGER_TESTS_LYING_DEVICE_H
 #define SELDINGER_TESTS_LYING_DEVICE_H
 
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// What becomes of a report: taken; refused; taken but said to be refused; only its first byte was sent.
+// What happens to a report: accepted; refused; accepted but reported as refused; only its first byte was sent.
 typedef enum DeviceAnswer { ANSWER_TAKES, ANSWER_REFUSES, ANSWER_TAKES_AND_DENIES, ANSWER_SHORT } DeviceAnswer;
 enum { LYING_BLOCKS = 4, LYING_LOG = 8192 };
 enum { REPORT_EFFECT = 1, REPORT_FORCE = 5, REPORT_OPERATION = 10, REPORT_CONTROL = 12 };    // its report ids
@@ -21,12 +21,12 @@ typedef struct LyingReport {
 
 typedef struct LyingDevice {
     int64_t now_us;
-    DeviceAnswer (*answer)(void *context);    // NULL: takes all
+    DeviceAnswer (*answer)(void *context);    // NULL: accepts all
     void *answer_context;
     int magnitude[LYING_BLOCKS];
     bool plays[LYING_BLOCKS];
     int64_t ends_us[LYING_BLOCKS], duration_us[LYING_BLOCKS];
-    int blocks;                               // handed out
+    int blocks;                               // assigned
     LyingReport log[LYING_LOG];
     int log_count;
 } LyingDevice;
@@ -88,7 +88,7 @@ static inline HidTransport lying_transport(void)
     return (HidTransport){.write = lying_write, .send_feature = lying_send_feature, .get_feature = lying_get_feature};
 }
 
-// Counts of force that the hand feels of effect `block` now, of 255 either way.
+// Force of effect `block` that the hand feels now, in counts of 255 in each direction.
 static inline int lying_felt(const LyingDevice *device, int block)
 {
     return device->plays[block] && device->now_us < device->ends_us[block] ? device->magnitude[block] : 0;

@@ -1,4 +1,4 @@
-// Force back to the hand: what is found in descriptors, the bytes that are sent, and what the guard lets through; with a clock of its own.
+// Force feedback: the controls found in descriptors, the bytes sent, and what the guard lets through; with a simulated clock.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -99,7 +99,7 @@ static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
     free(stick);
 }
 
-static void what_has_no_constant_force_says_so(void **state)
+static void what_has_no_constant_force_is_reported(void **state)
 {
     (void)state;
     static const struct {
@@ -138,7 +138,7 @@ static void the_reaction_comes_from_where_the_stick_goes(void **state)
 
 static const MapForce limits = {.is_wanted = true, .full_scale_n = 8, .max_n = 4, .slew_n_s = 200, .full_scale_n_mm = 40, .stall_ms = 50, .quiet_ms = 200};
 
-// One millisecond after another; simulation and device are alive by default.
+// Advances by one millisecond; by default simulation and device are alive.
 typedef struct Clock {
     ForceGuard guard;
     int64_t now, step, report;
@@ -158,7 +158,7 @@ static void forces_are_clamped_and_grow_no_faster_than_the_slew(void **state)
     (void)state;
     Clock clock = {.now = 5000000};
     double before = 0;
-    assert_true(tick(&clock, 1, true, true, false) == 0);    // at first it is not known whether the simulation lives
+    assert_true(tick(&clock, 1, true, true, false) == 0);    // at first it is unknown whether the simulation runs
     for (int i = 0; i < 100; i++) {
         double sent = tick(&clock, 100, true, true, false);
         assert_true(fabs(sent - before) <= 0.2 + 1e-12 && sent <= 4);
@@ -183,12 +183,12 @@ static void the_watchdog_takes_the_force_away_at_once(void **state)
     for (int i = 0; i < 50; i++)
         tick(&clock, 3, true, true, false);
     assert_true(near(clock.guard.sent[0], 3));
-    // the simulation stands: full force for less than 50 ms, then none
+    // the simulation stops: full force for less than 50 ms, then none
     for (int i = 1; i < 50; i++)
         assert_true(near(tick(&clock, 3, false, true, false), 3));
     assert_true(tick(&clock, 3, false, true, false) == 0);
     assert_non_null(strstr(clock.guard.why_zero, "simulation stalls"));
-    assert_true(near(tick(&clock, 3, true, true, false), 0.2));    // and grows again by the slew
+    assert_true(near(tick(&clock, 3, true, true, false), 0.2));    // and increases again at the slew rate
     for (int i = 0; i < 50; i++)
         tick(&clock, 3, true, true, false);
     // the device is silent
@@ -217,7 +217,7 @@ static void a_late_tick_does_not_jump(void **state)
     assert_true(before - sent <= 200 * 0.05 + 1e-9);
 }
 
-// --- with the threads and a device that is only there in fake_hid.h ---
+// --- with the threads and a simulated device (fake_hid.h) ---
 
 #define wait_for(condition)                                                                                                                                    \
     do {                                                                                                                                                       \
@@ -228,7 +228,7 @@ static void a_late_tick_does_not_jump(void **state)
             fail_msg("never: %s", #condition);                                                                                                                 \
     } while (0)
 
-// The magnitude in the last Set Constant Force report; 0 if none was sent. *when: the time of it.
+// The magnitude in the last Set Constant Force report; 0 if none was sent. *when: its time.
 static int magnitude_of(FakeHid *hid, int index, int *writes)
 {
     int magnitude = 0, count = 0;
@@ -255,7 +255,7 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
     assert_non_null(hid);
     HidTransport transport = fake_transport(hid);
     HandsOptions options = hands_default_options();
-    // a watchdog slow enough for a busy machine
+    // a watchdog that is slow enough for a busy machine
     DeviceMap *map = map_of("seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 40, invert: true}\n"
                             "force: {full_scale_n: 8, max_n: 4, stall_ms: 1000, quiet_ms: 10000}\n");
     options.map = (const DeviceMap *const *)&map;
@@ -272,7 +272,7 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
     HandInfo info;
     wait_for((hands_info(hands, 0, &info), strstr(info.force, "255 steps for 8 N")));
     const uint8_t rest[] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-    // 2 N of 8 N: 64 of 255 steps, reached by the slew; steps and reports continue
+    // 2 N of 8 N: 64 of 255 steps, reached at the slew rate; steps and reports continue
     atomic_store(&port->force_n, 2);
     int64_t until = fake_now_us() + 10000000;
     while (last_magnitude(hid, NULL) != 64 && fake_now_us() < until) {
@@ -282,7 +282,7 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
     }
     int writes;
     assert_int_equal(last_magnitude(hid, &writes), 64);
-    // every magnitude once, in order, about a millisecond after the one before
+    // each magnitude once, in order, about a millisecond after the one before
     pthread_mutex_lock(&hid->lock);
     int before = -1;
     int64_t before_us = 0;
@@ -299,13 +299,13 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
         before_us = hid->device[0].written_us[i];
     }
     pthread_mutex_unlock(&hid->lock);
-    // the simulation stands
+    // the simulation stops
     for (int i = 0; i < 2000 && last_magnitude(hid, NULL) != 0; i++) {
         fake_report(hid, 0, rest, sizeof rest);
         fake_sleep_us(1000);
     }
     assert_int_equal(last_magnitude(hid, NULL), 0);
-    // it continues, and the session ends: zero, stop, and nothing after
+    // it continues, and the session ends: zero force, stop, and no report afterwards
     until = fake_now_us() + 10000000;
     while (last_magnitude(hid, NULL) != 64 && fake_now_us() < until) {
         atomic_fetch_add(&port->step, 1);
@@ -321,7 +321,7 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
     free(map);
 }
 
-// Two tools, a stick each: what its first port says is felt, of whichever tool that is; the force of another tool that it moves too is not.
+// Two tools, each with its stick: the stick has the force of its first port, whichever tool that is, not the force of another tool that it also moves.
 static void two_sticks_feel_a_tool_each(void **state)
 {
     (void)state;
@@ -356,7 +356,7 @@ static void two_sticks_feel_a_tool_each(void **state)
         wait_for(atomic_load(&hands_port(hands, i)->state) == HAND_READY);
     }
     assert_true(atomic_load(&hands_port(hands, 0)->drives) == DRIVES_TOOL + 1 && atomic_load(&hands_port(hands, 1)->drives) == DRIVES_TOOL);
-    // as hand_set_answer has it: 1 N on the guide, 2 N on the wire
+    // as hand_set_answer gives it: 1 N on the guide, 2 N on the wire
     static const double push[] = {1, 2};
     const uint8_t rest[] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     int64_t until = fake_now_us() + 10000000;
@@ -380,7 +380,7 @@ static void two_sticks_feel_a_tool_each(void **state)
     free(map[1]);
 }
 
-static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told(void **state)
+static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_reported(void **state)
 {
     (void)state;
     static uint8_t bytes[HID_DESCRIPTOR_LIMIT];
@@ -403,7 +403,7 @@ static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told(void **s
     free(hid);
 }
 
-// Two effects, force along Y and torque along X, each with its own full scale; pure calls, no thread.
+// Two effects, force along Y and torque along X, each with its own full scale; no thread.
 static void torque_is_a_second_effect(void **state)
 {
     (void)state;
@@ -437,7 +437,7 @@ static void torque_is_a_second_effect(void **state)
     }
     assert_true(force.value[0] == -128 && force.value[1] == 64);    // half and a quarter of 255, rounded
     int before = device->written_count;
-    for (int i = 0; i < 5; i++) {    // nothing new to say, nothing said
+    for (int i = 0; i < 5; i++) {    // nothing new to send, so nothing is sent
         now += 1000;
         atomic_fetch_add(&port.step, 1);
         force_tick(&force, &port, now, now, false, &transport, device);
@@ -452,7 +452,7 @@ static void torque_is_a_second_effect(void **state)
         atomic_fetch_add(&port.step, 1);
         force_tick(&force, &port, now, now, false, &transport, device);
     }
-    assert_int_equal(force.block[0], 0);    // given up
+    assert_int_equal(force.block[0], 0);    // abandoned
     assert_non_null(strstr(force.text, "accepts no forces"));
     free(stick);
     free(map);
@@ -463,7 +463,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_real_joystick_gets_the_reports_that_it_describes),
-        cmocka_unit_test(what_has_no_constant_force_says_so),
+        cmocka_unit_test(what_has_no_constant_force_is_reported),
         cmocka_unit_test(the_reaction_comes_from_where_the_stick_goes),
         cmocka_unit_test(forces_are_clamped_and_grow_no_faster_than_the_slew),
         cmocka_unit_test(the_watchdog_takes_the_force_away_at_once),
@@ -471,7 +471,7 @@ int main(void)
         cmocka_unit_test(torque_is_a_second_effect),
         cmocka_unit_test(a_stick_feels_the_sheath_until_the_simulation_stands),
         cmocka_unit_test(two_sticks_feel_a_tool_each),
-        cmocka_unit_test(a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told),
+        cmocka_unit_test(a_haptic_joystick_needs_no_map_and_a_refused_effect_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

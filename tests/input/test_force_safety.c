@@ -1,4 +1,4 @@
-// The force on the hand when a device fails: no force that is not requested now, none that stays.
+// Force at the hand when a device fails: no force that is not requested now, and none that remains.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,7 +14,7 @@
 
 static const char map_text[] = "seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 40, invert: true}\ntwist: {source: X, deg_s: 90}\n"
                                "force: {full_scale_n: 8, max_n: 4, slew_n_s: 200, full_scale_n_mm: 40, stall_ms: 50, quiet_ms: 200}\n";
-enum { COUNTS_PER_N = 32, SLEW_COUNTS = 8 };    // 255 counts for 8 N; 200 N/s in a millisecond, rounded up
+enum { COUNTS_PER_N = 32, SLEW_COUNTS = 8 };    // 255 counts for 8 N; 200 N/s in one millisecond, rounded up
 
 typedef struct Bench {
     Faults faults;
@@ -60,7 +60,7 @@ static int tear_down(void **state)
 
 static bool start(Bench *bench) { return force_start(&bench->force, bench->map, bench->stick, &bench->transport, &bench->device, bench->device.now_us); }
 
-// One millisecond later the force is updated; the simulation advances by default.
+// Updates the force one millisecond later; by default the simulation advances.
 static void tick(Bench *bench, double force_n, bool steps)
 {
     bench->device.now_us += 1000;
@@ -91,14 +91,14 @@ static void a_force_is_held_as_long_as_it_is_wanted(void **state)
         tick(bench, 3, true);
         assert_int_equal(felt(bench), 96);    // 3 of 8 N of 255 counts
     }
-    // every effect is started again at least once in its half second
+    // each effect is restarted at least once within its half second
     int starts = 0;
     for (int i = 0; i < bench->device.log_count; i++)
         starts += is_start(&bench->device.log[i]) && bench->device.log[i].bytes[1] == 1;
     assert_in_range(starts, 7, 20);
 }
 
-// The process stood still and the effect ended by itself; the simulation stands too.
+// The process was paused and the effect ended by itself; the simulation is paused too.
 static void after_a_pause_no_stale_force_is_played(void **state)
 {
     Bench *bench = *state;
@@ -115,7 +115,7 @@ static void after_a_pause_no_stale_force_is_played(void **state)
     assert_int_equal(felt(bench), 0);
 }
 
-// The same, but the simulation made a step first: the force grows from zero by its slew, as the hand has let go.
+// The same, but the simulation made a step first: the force starts from zero at the slew rate, because the hand felt no force.
 static void after_a_pause_force_grows_from_zero(void **state)
 {
     Bench *bench = *state;
@@ -125,7 +125,7 @@ static void after_a_pause_force_grows_from_zero(void **state)
     bench->device.now_us += 3000000;
     for (int i = 0, before = 0; i < 100; i++) {
         tick(bench, 3, true);
-        // the time between two looks counts as 50 ms at most, but nothing was felt during it
+        // the time between two updates counts as 50 ms at most, but nothing was felt during it
         assert_in_range(felt(bench), 0, before + SLEW_COUNTS);
         before = felt(bench);
     }
@@ -145,7 +145,7 @@ static void a_paused_session_stops_the_effects(void **state)
     force_tick(&bench->force, &bench->port, bench->device.now_us, bench->device.now_us, true, &bench->transport, &bench->device);
     assert_true(!bench->device.plays[1] && !bench->device.plays[2] && bench->device.magnitude[1] == 0);
     int before = bench->device.log_count;
-    for (int i = 0; i < 2000; i++) {    // and stays so, in silence
+    for (int i = 0; i < 2000; i++) {    // and stays so, without reports
         bench->device.now_us += 1000;
         force_tick(&bench->force, &bench->port, bench->device.now_us, bench->device.now_us, true, &bench->transport, &bench->device);
     }
@@ -153,7 +153,7 @@ static void a_paused_session_stops_the_effects(void **state)
 }
 
 typedef struct Failing {
-    long count, each;    // every `each`th report fails
+    long count, each;    // each `each`th report fails
     DeviceAnswer how;
 } Failing;
 
@@ -177,7 +177,7 @@ static void a_failed_write_leaves_no_force(void **state)
         bench->device.answer_context = &failing;
         int first = bench->device.log_count;
         tick(bench, 2, true);
-        // the new force failed; in the same tick zero and stop are tried
+        // the new force failed; zero and stop are sent in the same tick
         bool zero = false, stop = false;
         for (int i = first; i < bench->device.log_count; i++) {
             const LyingReport *report = &bench->device.log[i];
@@ -187,7 +187,7 @@ static void a_failed_write_leaves_no_force(void **state)
         }
         assert_true(zero && stop);
         assert_true(bench->force.guard.sent[0] == 0);
-        // it takes reports again: the force comes back by its slew
+        // it accepts reports again: the force returns at the slew rate
         bench->device.answer = NULL;
         tick(bench, 2, true);
         assert_int_equal(felt(bench), 0);
@@ -199,7 +199,7 @@ static void a_failed_write_leaves_no_force(void **state)
     }
 }
 
-// Each 2nd to 9th report fails in one of three ways, for half a second: the force that is felt never jumps up and is gone soon after it should be.
+// Each 2nd to 9th report fails in one of three ways, for half a second: the force that is felt never jumps, and ends soon after it should.
 static void a_device_that_fails_now_and_then_never_jumps(void **state)
 {
     Bench *bench = *state;
@@ -217,7 +217,7 @@ static void a_device_that_fails_now_and_then_never_jumps(void **state)
                 fail_msg("each %ldth report fails: from %d to %d counts", failing.each, before, felt(bench));
         }
         int left = 0;
-        for (int i = 0; i < 60; i++) {    // the simulation stands
+        for (int i = 0; i < 60; i++) {    // the simulation stops
             tick(bench, 3, false);
             left = i >= 54 ? left + felt(bench) : 0;
         }
@@ -239,7 +239,7 @@ static void a_device_that_is_given_up_is_stopped_first(void **state)
         tick(bench, 2, true);
     assert_int_equal(bench->force.block[0], 0);
     assert_non_null(strstr(bench->force.text, "accepts no forces"));
-    // its last words: zero and stop of each effect, then stop all
+    // its last reports: zero and stop of each effect, then stop all
     const LyingReport *last = &bench->device.log[bench->device.log_count - 1];
     assert_true(last->bytes[0] == REPORT_CONTROL && last->bytes[1] == CONTROL_STOP_ALL);
     bool stopped[3] = {false};
@@ -268,7 +268,7 @@ static void what_is_no_number_is_no_force(void **state)
     }
 }
 
-// The stick's descriptor with some bytes replaced by as many others.
+// The stick's descriptor with some bytes replaced by the same number of others.
 static const char *with(const char *from, const char *to)
 {
     static char hex[sizeof sidewinder_2];
@@ -315,7 +315,7 @@ static void an_effect_that_would_not_end_is_refused(void **state)
     }
 }
 
-// All ones in the duration's field mean: without end.
+// All ones in the field of the duration mean an endless effect.
 static void the_longest_duration_is_not_endless(void **state)
 {
     Bench *bench = *state;

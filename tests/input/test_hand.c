@@ -1,5 +1,5 @@
-// The hands with their real threads and devices that exist only in fake_hid.h: found, read, unplugged, plugged in again, two at once, flooded, refused,
-// and given forces.
+// Hands with their real threads and simulated devices (fake_hid.h): detected, read, unplugged, plugged in again, two at once, flooded, refused, and with force
+// feedback.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -70,7 +70,7 @@ static bool heard(Session *session, const char *words)
     return strstr(session->said, words) != NULL;
 }
 
-// Waits until something is so, at most 10 s.
+// Waits until the condition holds, at most 10 s.
 #define wait_for(condition)                                                                                                                                    \
     do {                                                                                                                                                       \
         int64_t until_ = fake_now_us() + 10000000;                                                                                                             \
@@ -109,7 +109,7 @@ static void a_joystick_without_a_map_drives_the_tool(void **state)
     close_session(&session);
 }
 
-static void unplugged_it_stops_and_replugged_it_goes_on(void **state)
+static void unplugged_it_stops_and_replugged_it_continues(void **state)
 {
     (void)state;
     Session session;
@@ -117,7 +117,7 @@ static void unplugged_it_stops_and_replugged_it_goes_on(void **state)
     HandPort *port = hands_port(session.hands, 0);
     fake_plug(session.hid, 0, 0x1209, 1, "A", HID_USAGE(1, 2), roller, sizeof roller);
     wait_for(atomic_load(&port->state) == HAND_READY);
-    fake_report(session.hid, 0, (const uint8_t[]){0, 0, 10, 0, 0xf0, 0xff}, 6);    // 10 counts; the dial's first value counts nothing
+    fake_report(session.hid, 0, (const uint8_t[]){0, 0, 10, 0, 0xf0, 0xff}, 6);    // 10 counts; the dial's first value counts as zero
     fake_report(session.hid, 0, (const uint8_t[]){0, 0, 0xfe, 0xff, 0x10, 0}, 6);  // -2 counts; the dial continues by 32 over its end
     wait_for(atomic_load(&port->reports) == 2);
     assert_true(near(atomic_load(&port->advanced_mm), 0.5 * 8 + 0.01 * 32));
@@ -125,7 +125,7 @@ static void unplugged_it_stops_and_replugged_it_goes_on(void **state)
         fake_unplug(session.hid, 0);
         wait_for(atomic_load(&port->state) == HAND_LOST);
         assert_true(near(atomic_load(&port->advanced_mm), 0.5 * 8 + 0.01 * (32 + 5 * round)));
-        // it comes back at another path, and its counter has started again
+        // it returns at another path, and its counter starts again
         fake_plug(session.hid, 0, 0x1209, 1, "A", HID_USAGE(1, 2), roller, sizeof roller);
         wait_for(atomic_load(&port->state) == HAND_READY);
         fake_report(session.hid, 0, (const uint8_t[]){0, 0, 0, 0, 0x00, 0x40}, 6);
@@ -226,7 +226,7 @@ static void an_endless_flood_keeps_neither_rates_nor_the_end_waiting(void **stat
     assert_true(fake_now_us() - before < 2000000);
 }
 
-static void what_cannot_be_used_is_told_once(void **state)
+static void what_cannot_be_used_is_reported_once(void **state)
 {
     (void)state;
     Session session;
@@ -245,7 +245,7 @@ static void what_cannot_be_used_is_told_once(void **state)
     pthread_mutex_lock(&session.hid->lock);
     shut->may_not_open = false;
     pthread_mutex_unlock(&session.hid->lock);
-    wait_for(atomic_load(&hands_port(session.hands, 0)->state) == HAND_READY);    // as soon as it may be opened
+    wait_for(atomic_load(&hands_port(session.hands, 0)->state) == HAND_READY);    // as soon as it can be opened
     close_session(&session);
 }
 
@@ -267,7 +267,7 @@ static void short_reports_are_counted_and_change_nothing(void **state)
     close_session(&session);
 }
 
-// Two sticks, each with a tool of its own, which is known before the first report.
+// Two sticks, each with its own tool, which is known before the first report.
 static void each_device_has_its_tool(void **state)
 {
     (void)state;
@@ -318,12 +318,12 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_device_has_its_tool),
         cmocka_unit_test(a_joystick_without_a_map_drives_the_tool),
-        cmocka_unit_test(unplugged_it_stops_and_replugged_it_goes_on),
+        cmocka_unit_test(unplugged_it_stops_and_replugged_it_continues),
         cmocka_unit_test(a_held_stick_stops_when_it_is_unplugged),
         cmocka_unit_test(two_devices_have_two_ports),
         cmocka_unit_test(no_count_of_a_flood_is_lost),
         cmocka_unit_test(an_endless_flood_keeps_neither_rates_nor_the_end_waiting),
-        cmocka_unit_test(what_cannot_be_used_is_told_once),
+        cmocka_unit_test(what_cannot_be_used_is_reported_once),
         cmocka_unit_test(short_reports_are_counted_and_change_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

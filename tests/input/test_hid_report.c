@@ -1,4 +1,4 @@
-// Report descriptors of real devices and broken ones; values in and out at every bit.
+// Report descriptors of real and broken devices; values read and written at every bit offset.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@ static Faults faults;
 static HidDescriptor *parse(const uint8_t *bytes, size_t length)
 {
     faults_clear(&faults);
-    // an exact copy, so that a read past the end is seen
+    // an exact copy, so that a read past the end is detected
     uint8_t *copy = malloc(length ? length : 1);
     assert_non_null(copy);
     if (length)
@@ -232,7 +232,7 @@ static void limits_hold(void **state)
         bytes[i] = 0xa1, bytes[i + 1] = 1;
     assert_null(parse(bytes, HID_DESCRIPTOR_LIMIT));
     assert_non_null(strstr(faults.text[0], "nested more than"));
-    // 65,535 usages for as many one-bit fields: more fields than are kept, told and not stored
+    // 65,535 usages for as many one-bit fields: more fields than the limit are reported and not stored
     assert_null(parse_hex("05010904a10115002501750196ff7f1a01002affff8102c0"));
     assert_non_null(strstr(faults.text[0], "more than 1024 fields"));
 }
@@ -270,7 +270,7 @@ static void every_bit_offset_and_size_makes_the_round_trip(void **state)
             }
 }
 
-static void short_and_unknown_reports_are_told_apart(void **state)
+static void short_reports_and_unknown_ones_are_distinguished(void **state)
 {
     (void)state;
     HidDescriptor *d = parse_hex(xbox_one_s);
@@ -304,7 +304,7 @@ static void every_prefix_of_a_real_descriptor_is_whole_or_refused(void **state)
             good += part != NULL;
             free(part);
         }
-        // the outermost collection ends with the last item; only what some devices pad behind it may be cut
+        // the outermost collection ends with the last item; only padding, which some devices add, may be cut off
         if (good > 1)
             fail_msg("%s: %d prefixes were taken for whole", hid_recordings[i].name, good);
     }
@@ -337,7 +337,7 @@ int main(void)
         cmocka_unit_test(lies_are_refused_with_the_reason),
         cmocka_unit_test(limits_hold),
         cmocka_unit_test(every_bit_offset_and_size_makes_the_round_trip),
-        cmocka_unit_test(short_and_unknown_reports_are_told_apart),
+        cmocka_unit_test(short_reports_and_unknown_ones_are_distinguished),
         cmocka_unit_test(every_prefix_of_a_real_descriptor_is_whole_or_refused),
         cmocka_unit_test(usages_have_names_both_ways),
     };

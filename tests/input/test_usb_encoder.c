@@ -1,4 +1,4 @@
-// The FTDI chip's requests and stream: baud rates by the application note's own table, status bytes stripped at every cut, lines that are none.
+// Requests and data stream of the FTDI chip: baud rates by the table of the application note, status bytes removed wherever the data are split, invalid lines.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -31,7 +31,7 @@ static void baud_rates_are_coded_as_ftdi_says(void **state)
             fail_msg("%d baud gives 0x%x", cases[i].baud, (unsigned)divisor);
         assert_true(fabs(actual / cases[i].baud - 1) < 0.03);
     }
-    // what is coded decodes to what it says, for any rate; the seven fractions by their codes
+    // an encoded rate decodes to the same rate, for any rate; the seven fractions by their codes
     static const double fraction[] = {0, 0.5, 0.25, 0.125, 0.375, 0.625, 0.75, 0.875};
     for (int baud = 300; baud <= 1500000; baud += 37) {
         double actual;
@@ -50,7 +50,7 @@ static void a_chip_is_set_up_by_seven_requests(void **state)
     static const FtdiRequest expected[FTDI_SET_UP] = {{0, 0, 0}, {0, 1, 0}, {0, 2, 0}, {3, 0x4138, 0}, {4, 8, 0}, {2, 0, 0}, {9, 1, 0}};
     for (int i = 0; i < FTDI_SET_UP; i++)
         assert_true(request[i].request == expected[i].request && request[i].value == expected[i].value && request[i].index == expected[i].index);
-    // 57,692 baud is a divisor of 52; 0.375 has its code's high bit in the index: beside the port where there are several
+    // 57,692 baud has a divisor of 52; the high bit of the code of 0.375 is in the index, beside the port if there are several
     ftdi_set_up(57277, 1, request);
     assert_int_equal(request[3].value, 52);
     assert_int_equal(request[3].index, 0x101);
@@ -97,7 +97,7 @@ static void take(void *context, const EncoderLine *one)
         }
 }
 
-// `text` as a chip sends it: packets of 64 with two bytes of status, cut into transfers of `chunk` letters.
+// `text` as a chip sends it: packets of 64 bytes with two status bytes, split into transfers of `chunk` characters.
 static Taken stream_of(const char *text, size_t chunk, int64_t *bad_lines)
 {
     FtdiStream stream = {0};
@@ -123,7 +123,7 @@ static void a_stream_is_the_same_however_it_is_cut(void **state)
 {
     (void)state;
     static char text[20000];
-    size_t used = (size_t)sprintf(text, "34 R7\n");    // half a line first: what came before it was opened
+    size_t used = (size_t)sprintf(text, "34 R7\n");    // half a line first: its beginning was sent before the port was opened
     int64_t sum = 0, bad;
     for (int i = 0; i < 500; i++) {
         used += (size_t)sprintf(text + used, "A%d R%d\r\n", i * 7 - 1000, -i);
@@ -149,7 +149,7 @@ static void noise_overlong_lines_and_errors_lose_only_themselves(void **state)
     assert_int_equal(taken.count, 3);
     assert_int_equal(bad, 2);
     assert_true(taken.last[0] == 3 && taken.last[1] == 4);
-    // an overrun in the middle of a line: its rest is not a count
+    // an overrun within a line: the rest of the line is not a count
     FtdiStream stream = {0};
     taken = (Taken){0};
     ftdi_stream_take(&stream, &serial,
@@ -163,7 +163,7 @@ static void noise_overlong_lines_and_errors_lose_only_themselves(void **state)
     assert_int_equal(taken.count, 1);
     assert_int_equal(taken.last[0], 5);
     assert_int_equal(stream.errors, 1);
-    // status alone, a packet of one byte, nothing
+    // status bytes alone, a packet of one byte, an empty packet
     ftdi_stream_take(&stream, &serial, (const uint8_t *)"\x01\x60", 2, 64, take, &taken);
     ftdi_stream_take(&stream, &serial, (const uint8_t *)"\x01", 1, 64, take, &taken);
     ftdi_stream_take(&stream, &serial, NULL, 0, 64, take, &taken);

@@ -1,6 +1,6 @@
-// Prints what the live 3D view and angioscopy cost: median CPU time of a frame [ms]. Not a test: clocks are noisy. LP_NUM_THREADS=1 measure_views
+// Measures the live 3D view and angioscopy: median CPU time of a frame [ms]. Not a test, because clocks are noisy. LP_NUM_THREADS=1 measure_views
 //
-// The vessel is a coiled tube of some 93,000 triangles, the tool a wire of 200 nodes along it that moves at each frame.
+// The vessel is a coiled tube of about 93,000 triangles, the tool a wire of 200 nodes along it that moves at each frame.
 #include "geom/mesh_decimate.h"
 #include "geom/tube_mesh.h"
 #include "render/angioscope.h"

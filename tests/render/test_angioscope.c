@@ -1,11 +1,11 @@
-// Angioscopy, pixel by pixel: an exact tube is evenly round, its far end lies where its axis is seen, mirrored scenes give mirrored pictures, normals are the
-// vessel's, the eye stays inside; broken input.
+// Angioscopy, pixel by pixel: an exact tube is equally bright all around, its far end is where its axis is projected, mirrored scenes give mirrored pictures,
+// normals are those of the vessel, the eye stays inside; broken input.
 #include "geom/tube_mesh.h"
 #include "render/angioscope.h"
 #include "view_stage.h"
 #include "../geom/near.h"
 
-enum { SIDE = 300 };           // of a square port in the canvas' lower left corner
+enum { SIDE = 300 };           // of a square port in the lower left corner of the canvas
 
 static const double tool_radius = 0.18;
 
@@ -40,21 +40,21 @@ static void close_tube(TubeScene *scene)
 
 static ViewPort square(const ViewStage *stage) { return (ViewPort){stage->canvas.framebuffer, 0, 0, SIDE, SIDE}; }
 
-// Of the square port, from its upper left corner.
+// Pixel of the square port, from its upper left corner.
 static double brightness(StagePixels pixels, double x, double y)
 {
     const uint8_t *p = pixels[(int)y + STAGE_HEIGHT - SIDE][(int)x];
     return p[0] + p[1] + p[2];
 }
 
-// Where a direction is seen in the square port.
+// Position of a direction in the square port.
 static Vec3 seen_at(const AngioscopeView *view, Vec3 direction)
 {
     double z = vec3_dot(direction, view->forward) * view->half_angle_tan;
     return vec3(SIDE / 2.0 * (1 + vec3_dot(direction, view->right) / z), SIDE / 2.0 * (1 - vec3_dot(direction, view->up) / z), 0);
 }
 
-// A tool in the tube so that the eye lies on the tube's axis, looking along `look`.
+// Places a tool in the tube so that the eye lies on the tube's axis, looking along `look`.
 static Pose *pose_with_eye_at(const TubeScene *scene, Vec3 eye, Vec3 look, AngioscopeView *view)
 {
     Pose *pose = straight_pose(12, vec3_add_scaled(eye, -11, look), look, vec3_normal_to(look), 1, tool_radius);
@@ -96,9 +96,9 @@ static void a_straight_tube_is_evenly_round(void **state)
                 high = fmax(high, value);
                 sum += value;
             }
-            // a pixel's width of the falling light, and the mesh's sides: 3 percent and 4 grey levels
+            // the change of light over a pixel, and the sides of the mesh: 3 percent and 4 grey levels
             assert_true(high - low < 0.03 * high + 12);
-            assert_true(sum / count < last);   // the further, the darker
+            assert_true(sum / count < last);   // brightness falls with distance
             last = sum / count;
         }
         assert_true(last < 60);
@@ -197,7 +197,7 @@ static void a_mirrored_scene_gives_a_mirrored_picture(void **state)
             differ += pixel_difference(one[y][x], other[y][STAGE_WIDTH - 1 - x]) > 4;
             lopsided += pixel_difference(one[y][x], one[y][STAGE_WIDTH - 1 - x]) > 4;
         }
-    assert_true(lopsided > 20000);                               // it would show if it were not mirrored
+    assert_true(lopsided > 20000);                               // a picture that is not mirrored would be detected
     assert_true(differ < STAGE_WIDTH * STAGE_HEIGHT / 200);      // pixels on edges of triangles
     pose_free(pose);
     triangle_mesh_free(mesh);
@@ -251,7 +251,7 @@ static void the_eye_stays_inside_and_sees_the_tip(void **state)
         AngioscopeView before = {0};
         double furthest = 0;
         for (int turn = 0; turn <= 720; turn++) {
-            // the tool lies on the wall and turns: the eye must not sink into the wall
+            // the tool lies on the wall and rotates: the eye must stay out of the wall
             double a = turn * PI / 360, off = lumen[k] - tool_radius - 0.01;
             Pose *pose = straight_pose(20, vec3(off, 10, 0), vec3(0, 1, 0), vec3(cos(a), 0, sin(a)), 1, tool_radius);
             AngioscopeView view;
@@ -268,7 +268,7 @@ static void the_eye_stays_inside_and_sees_the_tip(void **state)
             before = view;
             pose_free(pose);
         }
-        assert_true(furthest < 0.1);   // half a degree of turn never makes it leap
+        assert_true(furthest < 0.1);   // half a degree of rotation causes no jump
         close_tube(&scene);
     }
     stage_close(&stage);
@@ -298,10 +298,10 @@ static void the_eye_goes_from_one_lumen_to_the_next(void **state)
         else
             assert_true(off > tool_radius + 0.03 && off < 2.5);
         if (view.eye.x > 22)
-            assert_near(off, 2.8 * tool_radius, 1e-6);       // as if there were no catheter
+            assert_near(off, 2.8 * tool_radius, 1e-6);       // as without a catheter
         most = k > 0 ? fmax(most, vec3_distance(view.eye, before.eye)) : 0;
         before = view;
-        // from the one that reaches furthest
+        // from the tool that reaches furthest
         AngioscopeView furthest;
         assert_true(angioscope_view(scene.scope, pose, -1, &furthest));
         AngioscopeView same;
@@ -329,7 +329,7 @@ static void tools_are_seen_from_in_each_other(void **state)
     coaxial_looks(&two, 0.5, 0.3, tool_radius);
     angioscope_set_tools(scene.scope, &two.looks);
     AngioscopeView view;
-    // within the catheter: its dark lumen all around, in its open end a vessel that runs across
+    // inside the catheter: its dark lumen all around, and in its open end a vessel that crosses
     TubeScene crossing = open_tube(vec3(11.5, -17.3, 0), vec3_unit(vec3(1, sqrt(3), 0)), 40, 2.5);
     angioscope_set_tools(crossing.scope, &two.looks);
     Pose *pose = wire_in_catheter(20, 17);
@@ -352,7 +352,7 @@ static void tools_are_seen_from_in_each_other(void **state)
     assert_int_equal(outside, 0);
     assert_true(dark > 0.5 * SIDE * SIDE);
     pose_free(pose);
-    // from the catheter, whose wire lies ahead: steel along the vessel's axis, and nothing without it
+    // from the catheter with a wire ahead: steel along the vessel's axis, and nothing without the wire
     static StagePixels without;
     pose = wire_in_catheter(20, 30);
     angioscope_draw(scene.scope, pose, 0, square(&stage));

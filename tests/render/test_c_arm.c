@@ -1,4 +1,4 @@
-// The C-arm's projection, without any GL.
+// The C-arm's projection, without GL.
 #include "render/c_arm.h"
 
 #include <setjmp.h>
@@ -24,25 +24,25 @@ static void views_are_those_of_the_angio_suite(void **state)
 {
     (void)state;
     PatientAxes lps = patient_axes_lps();
-    // LPS: x left, y posterior, z superior. Frontal: the patient's left on the right, head up, the front nearer to the detector
+    // LPS: x left, y posterior, z superior. Frontal view: the patient's left on the right, head up, the front nearer to the detector
     CArm c = place(0, 0, &lps);
     Vec3 left = c_arm_project(&c, vec3(10, 0, 0)), front = c_arm_project(&c, vec3(0, -10, 0)), head = c_arm_project(&c, vec3(0, 0, 10));
     assert_near(left.x, 10.0 / 160, 1e-12);
     assert_near(head.y, 10.0 / 160, 1e-12);
     assert_near(front.z, 10, 1e-12);
-    // LAO 90: the detector at the left side; the front is on the left of the picture
+    // LAO 90: the detector is at the left side; the front is on the left of the picture
     c = place(90, 0, &lps);
     assert_near(c_arm_project(&c, vec3(10, 0, 0)).z, 10, 1e-6);
     assert_near(c_arm_project(&c, vec3(0, -10, 0)).x, -10.0 / 160, 1e-8);
     assert_near(c_arm_project(&c, vec3(0, 0, 10)).y, 10.0 / 160, 1e-12);
-    // RAO 90 sees it from the other side; CRA: from the head, CAU from the feet
+    // RAO 90 is the view from the other side; CRA from the head, CAU from the feet
     c = place(-90, 0, &lps);
     assert_near(c_arm_project(&c, vec3(10, 0, 0)).z, -10, 1e-6);
     c = place(0, 45, &lps);
     assert_true(c_arm_project(&c, vec3(0, 0, 10)).z > 7 && c_arm_project(&c, vec3(0, -10, 0)).y < -0.04);
     c = place(0, -45, &lps);
     assert_true(c_arm_project(&c, vec3(0, 0, 10)).z < -7);
-    // out of range is cut, not a number is 0
+    // values out of range are clamped, NaN becomes 0
     CArm far = place(1000, 1000, &lps), most = place(90, 45, &lps);
     assert_near(vec3_distance(far.towards, most.towards), 0, 1e-12);
     CArm lost = place(NAN, 0, &lps), frontal = place(0, 0, &lps);
@@ -52,7 +52,7 @@ static void views_are_those_of_the_angio_suite(void **state)
 static void a_quarter_turn_is_the_other_plane(void **state)
 {
     (void)state;
-    // turning the C-arm by 90 degrees or the patient by -90 is the same
+    // rotating the C-arm by 90 degrees or the patient by -90 gives the same
     PatientAxes lps = patient_axes_lps();
     CArm frontal = place(0, 0, &lps), lateral = place(90, 0, &lps);
     uint64_t seed = 3;
@@ -97,7 +97,7 @@ static void rays_matrix_and_magnification_agree(void **state)
         XrayControl xray = {.lao_deg = lao, .cra_deg = cra, .field_mm = field, .table_mm = {300, -200, 100}};
         CArm c = c_arm_place(&xray, &lps);
         Vec3 p = vec3_add(vec3(300, -200, 100), random_in_box(&seed, 100)), q = c_arm_project(&c, p);
-        // the ray of where it lands goes through the point
+        // the ray of the projected position passes through the point
         Vec3 from = vec3_sub(p, c_arm_source(&c));
         assert_near(vec3_norm(vec3_cross(c_arm_ray(&c, q.x, q.y), from)), 0, 1e-9 * vec3_norm(from));
         // the matrix gives the same, in clip space of the square
@@ -111,7 +111,7 @@ static void rays_matrix_and_magnification_agree(void **state)
         assert_near(clip[1] / clip[3] / 2, q.y, 1e-5);
         assert_near(clip[3], C_ARM_SOURCE_MM + q.z, 1e-3);
     }
-    // what lies nearer to the source is larger by the ratio of distances
+    // magnification by the ratio of distances to the source
     CArm c = place(0, 0, &lps);
     double near = c_arm_project(&c, vec3(10, 100, 0)).x, far = c_arm_project(&c, vec3(10, -100, 0)).x;
     assert_near(near / far, (C_ARM_SOURCE_MM + 100) / (C_ARM_SOURCE_MM - 100), 1e-12);

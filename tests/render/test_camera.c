@@ -1,4 +1,4 @@
-// The parallel projection without any GL: axes, framing, and which way a tree is looked at.
+// The parallel projection without GL: axes, framing, and the view direction for a tree.
 #include "render/camera.h"
 
 #include <setjmp.h>
@@ -31,7 +31,7 @@ static void principal_axes_diagonalise(void **state)
     (void)state;
     random_state = 1;
     for (int round = 0; round < 200; round++) {
-        // a known spectrum, turned at random
+        // a known spectrum, rotated at random
         double value[3], known[3] = {draw_unit(), 1 + draw_unit(), 3 + draw_unit()};
         Quat q = quat_from_rotation_vector(vec3_scale(random_vector(), 3));
         Sym3 a = {0};
@@ -69,7 +69,7 @@ static void axes_are_a_right_handed_frame(void **state)
         if (vec3_norm(up) > 0)
             assert_true(vec3_dot(camera.up, up) > 0);
     }
-    // up along the view says nothing: another is taken
+    // an `up` along the view is undefined: another one is chosen
     Camera camera = {0};
     camera_orient(&camera, vec3(0, 0, -1), vec3(0, 0, 1), 50, point);
     assert_near(camera.up.y, 1, 1e-12);
@@ -89,7 +89,7 @@ static void flat_trees_are_seen_face_on(void **state)
         Camera camera = {0}, again = {0};
         camera_orient(&camera, vec3(0, 0, 0), vec3(0, 0, 0), 300, point);
         assert_true(fabs(vec3_dot(camera.back, normal)) > 0.999);
-        // a small shift of the points (a moving tool, another mesh) must not turn the picture over
+        // a small shift of the points (a moving tool, another mesh) must not flip the picture
         for (int i = 0; i < 300; i++)
             point[i] = vec3_add_scaled(point[i], 0.2, random_vector());
         camera_orient(&again, vec3(0, 0, 0), vec3(0, 0, 0), 300, point);
@@ -149,9 +149,9 @@ static void a_frame_holds_its_points(void **state)
             assert_true(p.z < camera.near_depth && p.z > camera.far_depth);
         }
         assert_true(low_x >= 20 - 1e-6 && high_x <= 380 + 1e-6 && low_y >= 20 - 1e-6 && high_y <= 280 + 1e-6);
-        // and no smaller than it need be
+        // and no larger than necessary
         assert_near(fmin(low_x - 20, low_y - 20), 0, 1e-6);
-        // looking closer at any of them cuts none off in depth
+        // zooming in on any of them cuts off none in depth
         Vec3 place = vec3_add_scaled(point[round % 40], 30, camera.back);
         camera_frame_sphere(&camera, 400, 300, 10, place, 7);
         for (int i = 0; i < 40; i++) {

@@ -1,4 +1,4 @@
-// What fluoroscopy adds up along its rays, against ray casters and exact solids in double precision. Skipped by name where no EGL is.
+// The integrals along the rays of fluoroscopy, compared with ray casters and exact solids in double precision. Skipped by name without EGL.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -23,7 +23,7 @@ typedef struct Deviation {
     int count;
 } Deviation;
 
-// Thickness of each `step`th pixel against the ray caster.
+// Thickness of each `step`th pixel compared with the ray caster.
 static Deviation compare_thickness(XrayRoom *s, const TriangleMesh *mesh, int step)
 {
     const CArm *c_arm = &s->view->c_arm;
@@ -47,7 +47,7 @@ static Deviation compare_thickness(XrayRoom *s, const TriangleMesh *mesh, int st
 static void thickness_is_that_of_a_ray_caster(void **state)
 {
     (void)state;
-    // far from the origin, so that depth not taken from the isocentre would show
+    // far from the origin, so that depths not relative to the isocentre would lose precision
     const Vec3 place = {900, -700, 1300};
     for (int round = 0; round < 4; round++) {
         TriangleMesh bead = sphere_mesh(10), mesh = mesh_and(torus_mesh(15, 3.5, 70, 30), bead, vec3(0, 0, 6), false);
@@ -67,7 +67,7 @@ static void thickness_is_that_of_a_ray_caster(void **state)
         room_draw(s);
         Deviation d = compare_thickness(s, &mesh, 5);
         print_message("torus and bead, view %d: rms %.6f mm, at most %.4f of %.2f mm, %d rays\n", round, d.rms, d.most, d.longest, d.count);
-        // GL lays vertices on 256ths of a pixel of 0.3 mm: by 0.0006 mm at a slope of 1. Half precision would leave 0.03 and more
+        // GL rounds vertices to 1/256 of a pixel of 0.3 mm: 0.0006 mm at a slope of 1. Half precision would leave 0.03 and more
         assert_true(d.longest > 8 && d.rms < 0.0007);
         room_close(s);
         mesh_clear(&mesh);
@@ -128,7 +128,7 @@ static VesselTree *tube_nodes(void)
     return tree;
 }
 
-// Concentration at a point: of its foot on the centreline, straight between nodes.
+// Concentration at a point: that of its foot on the centreline, linear between nodes.
 static double concentration_at(const VesselTree *tree, const float *c, Vec3 x)
 {
     double least = HUGE_VAL, value = 0;
@@ -143,7 +143,7 @@ static double concentration_at(const VesselTree *tree, const float *c, Vec3 x)
     return value;
 }
 
-// Integral of the concentration along a ray: where it is inside is asked of the tube itself.
+// Integral of the concentration along a ray; the tube itself decides what is inside.
 static double ray_contrast(const VesselTree *tree, const float *c, Vec3 from, Vec3 along)
 {
     const double step = 0.05;
@@ -189,7 +189,7 @@ static void contrast_follows_the_nodes(void **state)
         fluoroscope_forget(s->view);
         s->frame.contrast = even;
         room_draw(s);
-        // half of everywhere is half the thickness, the lids' closing flat ends included, whatever lies behind what
+        // a uniform concentration of one half gives half the thickness, including the lids of the flat ends, in any depth order
         float *depth = layer_read(&s->view->lumen_layer);
         fluoroscope_forget(s->view);
         s->frame.contrast = flow;
@@ -211,7 +211,7 @@ static void contrast_follows_the_nodes(void **state)
         double rms = sqrt(square / count), rms_even = sqrt(square_even / count);
         print_message("front in a bent tube, LAO %g CRA %g: rms %.4f mm of up to %.2f mm; even contrast %.4f mm\n", (double)lao[view], (double)cra[view], rms,
                       longest, rms_even);
-        // even: what polygon and lids differ from the tube by. A front of 2 mm over nodes of 1 mm: each ray's F is taken at its walls' nodes
+        // uniform: the difference of polygon and lids from the tube. A front of 2 mm over nodes of 1 mm: each ray's F is taken at its walls' nodes
         assert_true(longest > 2);
         assert_true(rms_even < 0.03);
         assert_true(rms < 0.02 * longest + 0.01);
@@ -225,7 +225,7 @@ static void contrast_follows_the_nodes(void **state)
 
 // --- the tool ---
 
-// Mean over a pixel, and the detector's kernel over three, of the chord of a circle of `radius` at `x` from its axis [pixel]; by the midpoint rule.
+// Mean over a pixel and over the detector's kernel of three, of the chord of a circle of `radius` at `x` from its axis [pixel]; by the midpoint rule.
 static double exact_chord(double x, double radius)
 {
     static const double kernel[3] = {0.25, 0.5, 0.25};
@@ -239,7 +239,7 @@ static double exact_chord(double x, double radius)
     return sum;
 }
 
-// Ten pixels a millimetre, seen from the front.
+// Ten pixels per millimetre, from the front.
 static CArm close_up(void)
 {
     XrayControl xray = {.field_mm = 40};
@@ -258,7 +258,7 @@ static RibbonPath path_of(int count, const Vec3 *position, int stretch_count, co
     return path;
 }
 
-// The attenuation of tools, of `count` nodes and one stretch each.
+// The attenuation of tools, with `count` nodes and one stretch each.
 static float *draw_ribbons(XrayRoom *s, Layer *layer, const CArm *c_arm, int tools, int count, const Vec3 *position, const TubeStretch *stretch, double filling)
 {
     Ribbon ribbon = {0};
@@ -312,8 +312,8 @@ static void the_ribbon_has_the_chord_of_a_cylinder(void **state)
     room_close(s);
 }
 
-// A catheter of R 1.0 and lumen 0.6 mm with a wire of 0.3 mm in it, ten pixels a millimetre, seen from the side: two dark lines, a fainter lumen, the wire
-// dark in it; each pixel is the exact integral, whatever the tools' sizes in pixels, and what fills the lumen adds up.
+// A catheter of R 1.0 and lumen 0.6 mm with a wire of 0.3 mm in it, ten pixels per millimetre, from the side: two dark lines, a fainter lumen, and the dark
+// wire in it; each pixel is the exact integral for any size in pixels, and the contents of the lumen add up.
 static void a_tube_is_its_wall_s_chord_and_tools_add_up(void **state)
 {
     (void)state;
@@ -348,7 +348,7 @@ static void a_tube_is_its_wall_s_chord_and_tools_add_up(void **state)
     room_close(s);
 }
 
-// Against the chord through a pixel's middle the error, which is the pixel's and the detector's width, falls with the pixel's square.
+// Compared with the chord through a pixel's middle, the error is due to the width of pixel and detector and falls with the square of the pixel.
 static void the_tube_converges_with_the_pixels(void **state)
 {
     (void)state;
@@ -385,7 +385,7 @@ static void the_tube_converges_with_the_pixels(void **state)
     assert_near(log2(error[1] / error[2]), 2, 0.2);
 }
 
-// A band of 1 mm on a tool with nodes every 2.5 mm, at any place between nodes, is as long and as dark as it is; seen from the side and at 50 degrees.
+// A marker band of 1 mm on a tool with nodes every 2.5 mm has its exact length and attenuation at any place between nodes; from the side and at 50 degrees.
 static void marker_bands_are_as_long_as_they_are(void **state)
 {
     (void)state;
@@ -425,7 +425,7 @@ static void marker_bands_are_as_long_as_they_are(void **state)
                     last = fmax(last, x + 1);
                 }
             }
-        // seen larger by its distance
+        // magnified by its distance
         double depth = c_arm_project(&c_arm, vec3_scale(along, begin + 0.5 - 25)).z, larger = C_ARM_SOURCE_MM / (C_ARM_SOURCE_MM + depth);
         assert_near(sum / (PI * (radius * radius - lumen * lumen) * larger * larger * (band - wall)), 1, 0.07);   // whole pixels of 10 or 6.4
         assert_near(last - first, 10 * larger * cos(slope), 1.01);
@@ -446,7 +446,7 @@ static void shadows_keep_what_the_tool_takes_away(void **state)
     Layer layer = {0};
     CArm c_arm = close_up();
     const double radius = 0.18, attenuation = 0.5, length = 15;
-    // straight ones at all slopes to the rays, up to end-on, and at all angles in the picture
+    // straight tools at all slopes to the rays, up to end-on, and at all angles in the picture
     for (int k = 0; k < 12; k++)
         for (int j = 0; j < 3; j++) {
             double slope = k * PI / 22, turn = 0.3 + 0.7 * j;
@@ -458,7 +458,7 @@ static void shadows_keep_what_the_tool_takes_away(void **state)
             for (int i = 0; i < s->side * s->side; i++)
                 sum += (double)drawn[i] * 0.1 * 0.1;
             double expected = attenuation * PI * radius * radius * length;
-            // an end begins and ends at pixel centres, which is a pixel of the shadow's length at most; a spot has only a few
+            // an end begins and ends at pixel centres, which is at most one pixel of the shadow's length; a spot has only a few
             assert_near(sum / expected, 1, k < 11 ? 0.02 + 0.1 / (length * cos(slope)) : 0.35);
             free(drawn);
         }
@@ -572,8 +572,8 @@ static void the_lumen_is_taken_out_of_the_volume(void **state)
         anatomy_free(&anatomy);
     }
     assert_near(along[0][0], 20 * 0.028, 0.03);
-    assert_near(along[1][0], 0, 1e-12);               // the lumen shows only by the contrast agent that flows
-    assert_near(along[1][1], along[0][1], 1e-12);     // what is not of the model stays
+    assert_near(along[1][0], 0, 1e-12);               // the lumen is visible only by the contrast agent that flows
+    assert_near(along[1][1], along[0][1], 1e-12);     // tissue outside the model stays
     assert_true(along[1][1] > 1);
     free(bright);
     mesh_clear(&ball);

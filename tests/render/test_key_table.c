@@ -1,4 +1,4 @@
-// The table of keys: no key twice, nothing undocumented; and what key events come to: hold, press, release, repeats, Alt, loss of focus.
+// The table of keys: no key twice, nothing undocumented; and the effect of key events: hold, press, release, repeats, Alt, loss of focus.
 #include "render/key_table.h"
 
 #include <setjmp.h>
@@ -37,7 +37,7 @@ static void every_action_has_one_row_a_key_and_help(void **unused)
 }
 
 // The list of keys: every action in one line, with its key, and few enough lines for 1024x600.
-static void the_list_of_keys_tells_of_every_action(void **unused)
+static void the_list_of_keys_has_every_action(void **unused)
 {
     (void)unused;
     int lines[2] = {0};
@@ -59,7 +59,7 @@ static void the_list_of_keys_tells_of_every_action(void **unused)
     assert_true(lines[0] + 3 <= 34 && lines[1] + 2 <= 34);
 }
 
-// Signs that are typed must not also be printable keys of the table: one press would do two things.
+// Typed signs must not also be printable keys of the table: one press would do two things.
 static void a_typed_sign_is_no_key_of_another_action(void **unused)
 {
     (void)unused;
@@ -89,7 +89,7 @@ static bool holds_nothing(const KeyState *state)
     return true;
 }
 
-// Every action by its own key alone: on at the press and nothing else with it, off at the release.
+// Every action by its own key alone: on at the press without any other action, off at the release.
 static void each_key_does_its_own_action_only(void **unused)
 {
     (void)unused;
@@ -129,7 +129,7 @@ static void two_keys_are_held_together(void **unused)
     assert_true(state.held[ACTION_FAST] && !state.held[ACTION_PUSH] && state.held[ACTION_PEDAL]);
 }
 
-// Letting go of Alt first must not turn an orbit into a push.
+// Releasing Alt first must not turn an orbit into a push.
 static void an_orbit_never_becomes_a_push(void **unused)
 {
     (void)unused;
@@ -165,7 +165,7 @@ static void loss_of_focus_lets_go_of_everything(void **unused)
             input.has_focus = false;
         feed(&state, &input, false);
         assert_true(holds_nothing(&state));
-        // back again, the key still down: its repeats begin nothing
+        // focus again with the key still down: its repeats start nothing
         input.has_focus = true;
         key(&input, true, WINDOW_KEY_UP, 0, true);
         feed(&state, &input, false);
@@ -198,7 +198,7 @@ static void a_sign_is_typed_wherever_it_lies(void **unused)
     (void)unused;
     KeyState state = {0};
     WindowInput input = {.has_focus = true};
-    // a German keyboard has ? on Shift and the key that an American one has - on
+    // a German keyboard has ? on Shift and the key that has - on an American one
     key(&input, true, '-', WINDOW_SHIFT, false);
     input.event[input.event_count++] = (WindowEvent){.kind = WINDOW_TEXT_EVENT, .character = '?'};
     input.event[input.event_count++] = (WindowEvent){.kind = WINDOW_TEXT_EVENT, .character = '?', .is_repeat = true};
@@ -219,7 +219,7 @@ static void a_sign_is_typed_wherever_it_lies(void **unused)
     assert_int_equal(state.pressed[ACTION_HELP], 2);
 }
 
-// Any events at all: nothing outside the table is touched, and focus lost always ends in silence.
+// For any events nothing outside the table is changed, and loss of focus always ends all actions.
 static void random_events_end_released(void **unused)
 {
     (void)unused;
@@ -246,7 +246,7 @@ static void random_events_end_released(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_action_has_one_row_a_key_and_help),
-                                       cmocka_unit_test(the_list_of_keys_tells_of_every_action),
+                                       cmocka_unit_test(the_list_of_keys_has_every_action),
                                        cmocka_unit_test(a_typed_sign_is_no_key_of_another_action),
                                        cmocka_unit_test(each_key_does_its_own_action_only),
                                        cmocka_unit_test(two_keys_are_held_together),

@@ -1,5 +1,5 @@
-// A recording as a film, end to end: `run --record`, X-ray settings of a session, `replay --movie`, and what ffmpeg reads back. Contrast agent is injected
-// into a straight vessel and seen to come and go in the middle of the picture; the last image holds once the pedal is up.
+// A recording as a video, end to end: `run --record`, X-ray settings of a session, `replay --movie`, and the frames that ffmpeg reads back. Contrast agent is
+// injected into a straight vessel, appears in the middle of the picture and is washed out; the last image holds once the pedal is up.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,7 +54,7 @@ __attribute__((format(printf, 1, 2))) static int command(const char *format, ...
     return system(text);
 }
 
-// What an operator would have set: fluoroscopy from the start to 1.6 s, 3 ml/s of contrast agent from 0.5 to 1 s.
+// The controls of an operator: fluoroscopy from the start to 1.6 s, 3 ml/s of contrast agent from 0.5 to 1 s.
 static void set_xray(const char *path)
 {
     static XrayControl xray[STEPS];
@@ -77,7 +77,7 @@ static void set_xray(const char *path)
     H5Fclose(file);
 }
 
-// Mean grey of a part of a frame, pixels.
+// Mean grey of a part of a frame, in pixels.
 static double mean_of(const uint8_t *frame, int x, int y, int width, int height)
 {
     double sum = 0;
@@ -119,7 +119,7 @@ static void contrast_comes_and_goes_in_a_film(void **state)
         assert_int_equal(command("'%s' replay '%s' --movie '%s/%d.mp4' --quiet --no-panels --size %dx%d --fps %d", SELDINGER_PROGRAM, recording, folder, i,
                                  WIDTH, HEIGHT, FPS),
                          0);
-    // the same recording is the same film
+    // the same recording gives the same video
     assert_int_equal(command("cmp -s '%s/0.mp4' '%s/1.mp4'", folder, folder), 0);
 
     snprintf(text, sizeof text, "ffmpeg -nostdin -loglevel error -i '%s/0.mp4' -f rawvideo -pix_fmt gray -", folder);
@@ -131,7 +131,7 @@ static void contrast_comes_and_goes_in_a_film(void **state)
     assert_int_equal(fread(text, 1, 1, decode), 0);
     pclose(decode);
 
-    // the vessel runs through the middle, 21 pixels wide; above it is none
+    // the vessel is in the middle, 21 pixels wide; above it there is none
     double before = 0, during = 0, after = 0, beside = 0;
     for (int i = 0; i < 9; i++)
         before += mean_of(frame[i], 150, 115, 20, 10) / 9;
@@ -153,7 +153,7 @@ static void contrast_comes_and_goes_in_a_film(void **state)
         assert_true(mean_change(frame[i - 1], frame[i]) < 1);
 }
 
-static void a_film_that_cannot_be_is_said(void **state)
+static void a_film_that_cannot_be_is_reported(void **state)
 {
     (void)state;
     need_everything();
@@ -161,14 +161,14 @@ static void a_film_that_cannot_be_is_said(void **state)
     record(recording, sizeof recording);
     assert_int_equal(command("'%s' replay '%s' --movie /nowhere/x.mp4 --quiet 2>'%s/said'; test $? = 2", SELDINGER_PROGRAM, recording, folder), 0);
     assert_int_equal(command("grep -q 'nowhere/x.mp4: ' '%s/said'", folder), 0);
-    // the program by its path, ffmpeg by a PATH that has none
+    // the program by its path, with a PATH that does not contain ffmpeg
     assert_int_equal(
         command("PATH=/nowhere '%s' replay '%s' --movie '%s/x.mp4' --quiet 2>'%s/said'; test $? = 2", SELDINGER_PROGRAM, recording, folder, folder), 0);
     assert_int_equal(command("grep -q 'install ffmpeg' '%s/said'", folder), 0);
     assert_int_equal(command("test -z \"$(find '%s' -name 'x.mp4*')\"", folder), 0);
 }
 
-// The middle of a close-up is the tool's tip: the picture of 60 mm is another than that of everything, and a close-up of nothing is refused.
+// The middle of a close-up is the tool's tip: the picture of 60 mm differs from that of the whole scene, and a close-up of nothing is refused.
 static void a_close_up_is_of_the_tips(void **state)
 {
     (void)state;
@@ -190,7 +190,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(contrast_comes_and_goes_in_a_film),
-        cmocka_unit_test(a_film_that_cannot_be_is_said),
+        cmocka_unit_test(a_film_that_cannot_be_is_reported),
         cmocka_unit_test(a_close_up_is_of_the_tips),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

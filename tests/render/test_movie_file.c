@@ -1,4 +1,4 @@
-// Movies: what ffmpeg reads back is what was drawn; what goes wrong is a message and leaves no file.
+// Movies: ffmpeg reads back what was drawn; a failure gives a message and leaves no file.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -47,7 +47,7 @@ static int files_there(void)
     return count;
 }
 
-// A bright square of a quarter of the height that moves to the right, on a dark ramp.
+// A bright square of a quarter of the height that moves to the right, on a dark gradient.
 static void draw(uint8_t *rgb, int width, int height, int frame)
 {
     int side = height / 4, left = 2 + frame * (width - side - 4) / 30, top = height / 3;
@@ -106,11 +106,11 @@ static void check_movie(const char *path, int width, int height, const char *rat
         for (int y = 0; y < height; y++)
             for (int x = 0; x < 3 * width; x++)
                 square += pow(got[y * even_width * 3 + x] - drawn[y * width * 3 + x], 2);
-        // chroma of half resolution costs most, at the square's rim
+        // the error is largest in chroma, which has half the resolution, at the square's rim
         assert_true(sqrt(square / (3 * width * height)) < 8);
         int middle = 3 * ((height / 3 + height / 8) * even_width + 2 + i * (width - height / 4 - 4) / 30 + height / 8);
         assert_true(abs(got[middle] - 230) < 12 && abs(got[middle + 1] - 200) < 12 && abs(got[middle + 2] - 60) < 16);
-        // what an odd size is filled up with continues with the edge
+        // the padding of an odd size repeats the edge
         for (int y = 0; y < even_height && even_width > width; y++)
             assert_true(abs(got[(y * even_width + width) * 3 + 1] - got[(y * even_width + width - 1) * 3 + 1]) < 12);
     }
@@ -128,7 +128,7 @@ static void what_is_read_is_what_was_drawn(void **state)
     check_movie(place("even.mp4"), 160, 120, "30/1");
     write_movie(place("odd.mp4"), 161, 121, 7.5);
     check_movie(place("odd.mp4"), 161, 121, "15/2");
-    write_movie(place("it's a.movie"), 64, 50, 12.5);   // no shell sees it
+    write_movie(place("it's a.movie"), 64, 50, 12.5);   // no shell interprets it
     assert_int_equal(files_there(), 3);
     for (int i = 0; i < 3; i++)
         unlink(place(i == 0 ? "even.mp4" : i == 1 ? "odd.mp4" : "it's a.movie"));
@@ -148,7 +148,7 @@ static void the_same_frames_are_the_same_bytes(void **state)
     unlink(place("b.mp4"));
 }
 
-static void what_cannot_be_is_said(void **state)
+static void what_cannot_be_is_reported(void **state)
 {
     (void)state;
     const struct {
@@ -167,7 +167,7 @@ static void what_cannot_be_is_said(void **state)
     assert_int_equal(files_there(), 0);
 }
 
-static void without_ffmpeg_it_says_so(void **state)
+static void a_missing_ffmpeg_is_reported(void **state)
 {
     (void)state;
     char *path = getenv("PATH"), *kept = path ? strdup(path) : NULL;
@@ -210,7 +210,7 @@ static void an_older_movie_stays_until_the_new_one_is_whole(void **state)
     unlink(place("old.mp4"));
 }
 
-// Stands for ffmpeg: whatever happens to it must reach the message. `script` is its text.
+// Replaces ffmpeg by a script: its failures must reach the message.
 static MovieFile *movie_by(const char *script)
 {
     char *path = strdup(getenv("PATH")), other[600];
@@ -248,7 +248,7 @@ static void an_encoder_that_dies_is_a_message(void **state)
             ;
         assert_false(movie_file_close(movie, message, sizeof message));
         if (!strstr(message, ends[i].says))
-            fail_msg("'%s' lacks '%s'", message, ends[i].says);
+            fail_msg("'%s' does not contain '%s'", message, ends[i].says);
         assert_int_equal(files_there(), 1);   // the script
     }
     unlink(place("ffmpeg"));
@@ -286,7 +286,7 @@ static void a_full_disk_is_a_message(void **state)
     assert_int_equal(files_there(), 0);
 }
 
-// Ended at any time, a program leaves neither a part of a file nor an encoder.
+// A program that is ended at any time leaves neither a temporary file nor an encoder.
 static void a_stop_leaves_nothing(void **state)
 {
     (void)state;
@@ -328,8 +328,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_read_is_what_was_drawn),
         cmocka_unit_test(the_same_frames_are_the_same_bytes),
-        cmocka_unit_test(what_cannot_be_is_said),
-        cmocka_unit_test(without_ffmpeg_it_says_so),
+        cmocka_unit_test(what_cannot_be_is_reported),
+        cmocka_unit_test(a_missing_ffmpeg_is_reported),
         cmocka_unit_test(an_older_movie_stays_until_the_new_one_is_whole),
         cmocka_unit_test(an_encoder_that_dies_is_a_message),
         cmocka_unit_test(a_full_disk_is_a_message),

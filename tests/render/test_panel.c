@@ -1,5 +1,5 @@
-// The panel off screen: layout at every size, what the mouse does on buttons and views, dialogues, names typed; what a frame costs.
-// SELDINGER_PICTURES=FOLDER keeps a picture of each size and state, to be looked at.
+// The panel off screen: layout at every size, mouse actions on buttons and views, dialogues, typed names, and the cost of a frame. SELDINGER_PICTURES=FOLDER
+// saves a picture of each size and state.
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "render/panel.h"
@@ -39,7 +39,7 @@ static int close_gl(void **state)
     return 0;
 }
 
-// ---- a made-up state
+// ---- an artificial state
 
 static const PanelFigure figures[] = {
     {"Time", 83.4, "s", 1, MARK_NONE},           {"Fluoroscopy", 41.2, "s", 1, MARK_GOOD},     {"Contrast", 12.5, "ml", 1, MARK_WARNING},
@@ -110,7 +110,7 @@ static Panel *new_panel(void)
     return panel;
 }
 
-// Views filled with greys as pictures would, then the panel.
+// Fills the views with grey as pictures would, then draws the panel.
 static void draw(Panel *panel, const GlCanvas *canvas, const WindowInput *input, const PanelState *state)
 {
     const float black[3] = {0, 0, 0};
@@ -187,7 +187,7 @@ static void pictures_at_all_sizes(void **unused)
 
 static bool overlap(PanelRect a, PanelRect b) { return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height; }
 
-// Any window, density and view: everything inside, nothing over anything else, the main view the largest, letters no smaller than 11 pixels.
+// Any window, density and view: everything inside, no overlaps, the main view is the largest, letters have at least 11 pixels.
 static void nothing_overlaps_at_any_size(void **unused)
 {
     (void)unused;
@@ -235,7 +235,7 @@ static void plots_keep_every_peak_and_forget_after_their_span(void **unused)
         plot_add(&plot, 0.01 * i, 1);
     assert_true(plot_range(&plot, &least, &most));
     assert_true(least == -4 && most == 1);
-    plot_add(&plot, 56, NAN);   // not a number: left out
+    plot_add(&plot, 56, NAN);   // NaN is left out
     plot_add(&plot, INFINITY, 1);
     assert_true(plot_range(&plot, &least, &most) && least == -4 && most == 1);
     plot_add(&plot, 5, 2);   // a restart
@@ -257,7 +257,7 @@ static void ticks_are_round(void **unused)
 
 // ---- the mouse
 
-typedef struct OperatorControls {            // a panel, what it is drawn into and what came out
+typedef struct OperatorControls {            // a panel, its canvas, and the resulting actions
     Panel *panel;
     GlCanvas canvas;
     WindowInput input;
@@ -295,7 +295,7 @@ static void tap(OperatorControls *controls, int key)
     frame(controls);
 }
 
-// Moves there, presses, lets go; adds what was asked for to `seen`, which has room for all actions.
+// Moves there, presses and releases; adds the requested actions to `seen`, which has an entry for each action.
 static void click(OperatorControls *controls, double x, double y, bool *seen)
 {
     controls->input.mouse_x = x;
@@ -305,13 +305,13 @@ static void click(OperatorControls *controls, double x, double y, bool *seen)
         frame(controls);
         for (int action = 0; action < ACTION_COUNT; action++)
             seen[action] = seen[action] || controls->actions.held[action] || controls->actions.pressed[action] > 0;
-        if (i == 2)   // let go: nothing is held, but for the speed that a click latches
+        if (i == 2)   // released: nothing is held except the speed, which a click latches
             for (int action = 0; action < ACTION_COUNT; action++)
                 assert_true(!controls->actions.held[action] || action == ACTION_FAST || action == ACTION_SLOW);
     }
 }
 
-// Clicks on every tab and then all over it: each action must come out by mouse alone.
+// Clicks on every tab and then at all its positions: every action must be reachable by mouse alone.
 static void every_action_has_a_button_that_works(void **unused)
 {
     (void)unused;
@@ -333,7 +333,7 @@ static void every_action_has_a_button_that_works(void **unused)
             for (float x = right.x + 14 * s; x < right.x + right.width - 8 * s; x += 40 * s) {
                 click(&controls, x, y, seen);
                 xray_sets += controls.actions.xray_set;
-                // what opened is closed again
+                // opened boxes are closed again
                 if (panel_is_asking(controls.panel)) {
                     dialogues |= 1 << controls.panel->dialogue;
                     tap(&controls, WINDOW_KEY_ESCAPE);
@@ -406,7 +406,7 @@ static void the_tray_fits_at_any_size(void **unused)
         snprintf(name, sizeof name, "tray-%dx%d", size[i].width, size[i].height);
         keep_picture(&controls.canvas, name);
         if (controls.panel->tray_over > 0)
-            fail_msg("%d x %d: the tray lacks %.0f pixels", size[i].width, size[i].height, (double)controls.panel->tray_over);
+            fail_msg("%d x %d: the tray is %.0f pixels too high", size[i].width, size[i].height, (double)controls.panel->tray_over);
         assert_int_equal(glGetError(), GL_NO_ERROR);
         end_controls(&controls);
     }
@@ -421,7 +421,7 @@ static void keys_choose_shape_and_take_from_the_tray(void **unused)
     OperatorControls controls = new_controls(1024, 600);
     controls.state.tray = &some_tray;
     tap(&controls, 'X');
-    assert_int_equal(controls.actions.pressed[ACTION_EXCHANGE], 1);      // the caller opens it, or says why not
+    assert_int_equal(controls.actions.pressed[ACTION_EXCHANGE], 1);      // the caller opens it, or gives the reason if it does not
     assert_false(panel_is_asking(controls.panel));
     panel_open_tray(controls.panel, 3, 0);
     tap(&controls, WINDOW_KEY_DOWN);
@@ -445,7 +445,7 @@ static void keys_choose_shape_and_take_from_the_tray(void **unused)
     frame(&controls);
     assert_false(controls.actions.tray.is_taken);
     tap(&controls, WINDOW_KEY_DOWN);
-    assert_false(controls.actions.tray.is_shaped);               // the other device is as it is
+    assert_false(controls.actions.tray.is_shaped);               // the other device is unchanged
     tap(&controls, 'S');
     frame(&controls);
     assert_false(controls.actions.tray.is_shaped);               // and cannot be shaped
@@ -503,12 +503,12 @@ static void words_do_not_lie_on_words(void **unused)
                             taken[j].x + taken[j].width <= taken[i].x);
         }
     }
-    // alone it stands where it wants to
+    // without others it has its preferred position
     const GuiRect far = {500, 500, 50, 15}, wanted = {10, 20, 30, 15};
     assert_true(panel_free_place(wanted, &far, 1).y == 20);
 }
 
-// The log shows its newest message, also with more of them than it has room for.
+// The log shows its newest message even if it has more of them than lines.
 static void the_newest_message_is_seen(void **unused)
 {
     (void)unused;
@@ -535,7 +535,7 @@ static void the_newest_message_is_seen(void **unused)
     free(rgb[1]);
 }
 
-// A tooltip names the key once the mouse has rested, and goes with the mouse.
+// A tooltip names the key once the mouse has rested, and disappears when the mouse moves.
 static void a_tooltip_names_the_key(void **unused)
 {
     (void)unused;
@@ -560,7 +560,7 @@ static void a_tooltip_names_the_key(void **unused)
     for (int i = 0; i < 5; i++)
         frame(&controls);
     gl_canvas_read(&controls.canvas, rgb[1]);
-    for (size_t i = 0; i < bytes; i++)   // the button is no longer hot: all else is as it was
+    for (size_t i = 0; i < bytes; i++)   // the button is no longer hot: everything else is unchanged
         if (rgb[0][i] != rgb[1][i]) {
             size_t x = i / 3 % 1280, y = i / 3 / 1280;
             assert_true((float)x >= right.x && (float)y >= right.y && (float)y < right.y + 70 * (float)controls.panel->layout.scale);
@@ -581,7 +581,7 @@ static void views_are_chosen_turned_and_scrolled_by_mouse(void **unused)
     click(&controls, inset.x + inset.width / 2, inset.y + inset.height / 2, seen);
     for (int i = 0; i < ACTION_COUNT; i++)
         assert_int_equal(seen[i], i == ACTION_VIEW_3D);
-    // a drag that begins in a view stays with it, beyond its edge too
+    // a drag that begins in a view stays with it, also beyond its edge
     controls.input.mouse_x = main.x + 0.25 * main.width;
     controls.input.mouse_y = main.y + 0.75 * main.height;
     controls.input.mouse_buttons = WINDOW_MOUSE_RIGHT;
@@ -689,7 +689,7 @@ static void instructions_are_shown_until_followed(void **unused)
     controls.state.instructions = "Bring the tip into the aneurysm.\n1. Hold the pedal.\n2. Push the wire past the bend, which lies\nabout 40 mm in.\n";
     Panel *panel = controls.panel;
     draw(panel, &controls.canvas, &controls.input, &controls.state);
-    assert_true(panel->briefing_at.width == 0);   // a film: nobody is there to close it
+    assert_true(panel->briefing_at.width == 0);   // a video: nobody can close it
     frame(&controls);
     assert_true(panel->briefing_at.width > 0);
     keep_picture(&controls.canvas, "briefing");
@@ -714,7 +714,7 @@ static void instructions_are_shown_until_followed(void **unused)
     end_controls(&controls);
 }
 
-// Doing what the hints say, one after the other, ends them; each names its keys and fits its place.
+// Following the hints one after the other ends them; each names its keys and fits its place.
 static void hints_lead_on_with_use(void **unused)
 {
     (void)unused;
@@ -776,7 +776,7 @@ static void strange_states_draw(void **unused)
     end_controls(&controls);
 }
 
-// Four tools are all listed, the chosen one with its own plots; nothing of it is lost in the smallest usual window.
+// Four tools are all listed, the selected one with its own plots; in the smallest usual window nothing is cut off.
 static void several_tools_are_listed(void **unused)
 {
     (void)unused;
@@ -823,7 +823,7 @@ static void several_tools_are_listed(void **unused)
     }
 }
 
-// Kept pixels must be the ones that a fresh panel draws.
+// Cached pixels must equal those of a newly created panel.
 static void kept_windows_show_what_a_new_panel_shows(void **unused)
 {
     (void)unused;
@@ -833,7 +833,7 @@ static void kept_windows_show_what_a_new_panel_shows(void **unused)
     size_t bytes = (size_t)1280 * 720 * 3;
     uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
     assert_true(rgb[0] && rgb[1]);
-    for (int i = 0; i < 40; i++) {   // things change, come and go
+    for (int i = 0; i < 40; i++) {   // things change, appear and disappear
         controls.state.view = (PanelView)(i / 10);
         controls.state.tool[0].inserted_mm += 1;
         controls.state.error_count = i % 3;
@@ -842,7 +842,7 @@ static void kept_windows_show_what_a_new_panel_shows(void **unused)
         frame(&controls);
     }
     controls.state.view = VIEW_FLUOROSCOPY;
-    for (int i = 0; i < 4; i++)   // the seldom ones catch up
+    for (int i = 0; i < 4; i++)   // parts that are drawn less often catch up
         frame(&controls);
     gl_canvas_read(&controls.canvas, rgb[0]);
     Panel *fresh = new_panel();
@@ -860,7 +860,7 @@ static void kept_windows_show_what_a_new_panel_shows(void **unused)
     end_controls(&controls);
 }
 
-// Process CPU, the driver's threads with it.
+// Process CPU time, including the driver's threads.
 static double cpu_ms(void)
 {
     struct timespec t;

@@ -1,4 +1,4 @@
-// Whole pictures: bytes, files, bad input, and things that must be where the numbers say. Skipped by name where no EGL is.
+// Whole pictures: bytes, files, bad input, and objects at the positions that the numbers give. Skipped by name without EGL.
 #include "geom/tube_mesh.h"
 #include "render/color_map.h"
 #include "render/picture.h"
@@ -22,7 +22,7 @@
 static char folder[] = "/tmp/seldinger_picture_XXXXXX";
 static bool is_available;
 
-// Whether a context can be made here.
+// Whether an EGL context can be created here.
 static bool picture_available(char *message, size_t capacity)
 {
     GlContext *context = gl_context_create(message, capacity);
@@ -43,7 +43,7 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     (void)state;
-    return rmdir(folder);   // fails where a test left something behind, a .part file among it
+    return rmdir(folder);   // fails if a test left a file, including .part files
 }
 
 static const char *in_folder(const char *name)
@@ -205,7 +205,7 @@ static void moments_share_one_picture(void **state)
 static bool is_blue(const uint8_t *p) { return p[2] > p[0] + 60; }
 static bool is_dark(const uint8_t *p) { return p[0] < 90 && p[1] < 90 && p[2] < 90; }
 
-// A catheter of 10 mm, cut open, with a wire of 16 in it: dark between two blue lines, then dark alone.
+// A catheter of 10 mm, cut open, with a wire of 16 mm in it: dark between two blue lines, then only dark.
 static void tools_are_cut_open_where_another_lies_in_them(void **state)
 {
     (void)state;
@@ -257,13 +257,13 @@ static void files_that_cannot_be_written_leave_nothing_behind(void **state)
     char message[256] = "";
     assert_false(picture_of_run("/nonexistent/folder/a.png", &run.options, &run.scene, &run.tool, message, sizeof message));
     assert_non_null(strstr(message, "/nonexistent/folder/a.png"));
-    // a folder where the file should be: written beside, but not renamed
+    // a folder at the file's path: a temporary file is written, but not renamed
     assert_false(picture_of_run(folder, &run.options, &run.scene, &run.tool, message, sizeof message));
     char beside[300];
     snprintf(beside, sizeof beside, "%s.part%ld", folder, (long)getpid());
     assert_int_equal(access(beside, F_OK), -1);
 
-    // a disk that fills up while writing: the older picture stays
+    // a disk that becomes full while writing: the older picture stays
     assert_true(picture_of_run(in_folder("old.png"), &run.options, &run.scene, &run.tool, message, sizeof message));
     size_t size, size_after;
     char *before = bytes_of(in_folder("old.png"), &size);
@@ -347,7 +347,7 @@ static void the_tube_drawn_is_the_tube_touched(void **state)
     assert_non_null(vessel);
     assert_non_null(mesh);
     for (int i = 0; i < mesh->vertex_count; i++) {
-        // from just inside: on the wall itself a gap of rounding size has either sign
+        // slightly inside: on the wall itself a gap of rounding size has either sign
         Vec3 inside = vec3_add_scaled(mesh->vertex[i], -0.5, mesh->normal[i]);
         VesselMemory memory = {.node = vessel->locate(vessel, inside, -1)};
         VesselHit hit;
@@ -358,7 +358,7 @@ static void the_tube_drawn_is_the_tube_touched(void **state)
     for (int t = 0; t < mesh->triangle_count; t++) {
         const int *c = mesh->triangle[t];
         Vec3 area = vec3_cross(vec3_sub(mesh->vertex[c[1]], mesh->vertex[c[0]]), vec3_sub(mesh->vertex[c[2]], mesh->vertex[c[0]]));
-        if (vec3_norm(area) > 1e-9)   // two pieces meet in two rings at one place
+        if (vec3_norm(area) > 1e-9)   // two parts meet in two rings at one place
             assert_true(vec3_dot(area, mesh->normal[c[0]]) > 0);
     }
     triangle_mesh_free(mesh);
@@ -373,7 +373,7 @@ static void the_tube_drawn_is_the_tube_touched(void **state)
     triangle_mesh_free(mesh);
 }
 
-// Middle of the pixels from column `first` to `last` that `wanted` picks; the count in *count.
+// Mean column of the pixels from column `first` to `last` that `wanted` selects; their number in *count.
 static void centroid(const Image *image, bool (*wanted)(const Image *, int, int), int first, int last, double *x, double *y, int *count)
 {
     double sx = 0, sy = 0;
@@ -400,7 +400,7 @@ static bool is_on_black(const Image *image, int x, int y)
 static bool is_voxel(const Image *image, int x, int y) { return pixel(image, x, y)[0] > 90 && is_on_black(image, x, y); }
 static bool is_mark(const Image *image, int x, int y) { return pixel(image, x, y)[0] > 250 && is_on_black(image, x, y); }
 
-// One bright voxel in an anisotropic, partly mirrored, oblique grid: the mark at its place must cover it in all three projections.
+// One bright voxel in an anisotropic, partly mirrored, oblique grid: the mark at its position must cover it in all three projections.
 static void marks_lie_on_the_voxels_that_they_name(void **state)
 {
     (void)state;
@@ -463,7 +463,7 @@ static void one_spike_among_many_samples_is_seen(void **state)
     if (!picture_of_series(in_folder("s.png"), &options, SAMPLES, time, 1, &panel, 0, NULL, message, sizeof message))
         fail_msg("%s", message);
     Image image = load(in_folder("s.png"));
-    // the columns where the line's colour stands in the upper half of the picture: the spike alone, at 61.8 % of the axis
+    // the columns with the line's colour in the upper half of the picture: only the peak, at 61.8 % of the axis
     int found = 0, x_low = 800, x_high = 0, axis_low = 800, axis_high = 0;
     for (int y = 0; y < image.height; y++)
         for (int x = 0; x < image.width; x++)
@@ -509,7 +509,7 @@ static VesselTree *made_up_model(void)
     return tree;
 }
 
-// Points all outside are blue, all inside red, in the large view and in the histogram.
+// Points that are all outside are blue, all inside red, in the large view and in the histogram.
 static void distances_choose_the_colour(void **state)
 {
     (void)state;
@@ -542,7 +542,7 @@ static void distances_choose_the_colour(void **state)
         free(image.rgb);
     }
     remove(in_folder("f.png"));
-    // a tree without a model is none
+    // a tree without a model is refused
     free(distance);
     vessel_tree_free(tree);
     tree = vessel_tree_create(2, 0, 0);
@@ -551,7 +551,7 @@ static void distances_choose_the_colour(void **state)
     vessel_tree_free(tree);
 }
 
-// Errors colour the surface where they are, and the classes' bars stand left of their borders.
+// Errors colour the surface at their places, and the bars of the classes are left of their borders.
 static void errors_colour_the_surface(void **state)
 {
     (void)state;
@@ -588,7 +588,7 @@ static void errors_colour_the_surface(void **state)
         assert_true(k ? red > 500 && blue == 0 : blue > 500 && red == 0);
         free(image.rgb);
     }
-    assert_true(bars[0][0] > 100 && bars[0][0] > 2 * bars[1][0]);   // the class's name in its colour stands there always
+    assert_true(bars[0][0] > 100 && bars[0][0] > 2 * bars[1][0]);   // the name of the class in its colour is always there
     assert_true(bars[1][1] > 100 && bars[1][1] > 2 * bars[0][1]);
     remove(in_folder("e.png"));
     assert_false(picture_of_error(in_folder("e.png"), &options, tree, mesh, error, 0, message, sizeof message));
@@ -625,7 +625,7 @@ static void contexts_come_and_go(void **state)
 static void colours_tell_order(void **state)
 {
     (void)state;
-    // brightness of the sequential map rises all the way, so that it reads in grey and for the colour-blind
+    // the brightness of the sequential map increases everywhere, so that it is readable in grey and for the colour-blind
     double last = -1;
     for (int i = 0; i <= 100; i++) {
         Color c = color_sequential(i / 100.0);

@@ -1,4 +1,4 @@
-// A recording as something to look at: whichever way a moment is come to, it is the same; and its score simulated again is the session's.
+// Playback of a recording: a moment is the same however it is reached; and the score of the repeated simulation is the session's.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@
 static char folder[] = "/tmp/seldinger-playback-XXXXXX";
 #include "tests/folder.h"
 
-// Longer than two of the places that a playback keeps.
+// Longer than two of the moments that a playback stores.
 enum { STEPS = 10430, EACH_S = 100 };
 
 static TrainerScene trainer;
@@ -145,7 +145,7 @@ static void a_moment_is_the_same_whichever_way_it_is_come_to(void **state)
     Playback *playback = playback_open(run, trainer.scene, trainer.open.tree, &none);
     assert_non_null(playback);
     assert_near(playback_end_s(playback), STEPS * 0.001, 1e-9);
-    // played through, step by step, beside a clock of its own
+    // played step by step, compared with a separate clock
     Seen through[MOMENTS];
     int64_t at[MOMENTS];
     uint64_t seed = 3;
@@ -170,8 +170,8 @@ static void a_moment_is_the_same_whichever_way_it_is_come_to(void **state)
         for (int i = 0; i < trainer.open.tree->node_count; i++)
             strongest = fmaxf(strongest, seen->concentration[i]);
     }
-    assert_true(clock.count > 100 && clock.pedal_s > 5 && strongest > 0.2F);   // there was something to see
-    // forwards, backwards, anyhow; in a playback that has seen it all, and in fresh ones
+    assert_true(clock.count > 100 && clock.pedal_s > 5 && strongest > 0.2F);   // the run has something to compare
+    // forwards, backwards, at random; in a playback that has seen everything, and in new ones
     for (int pass = 0; pass < 4; pass++) {
         if (pass % 2) {
             playback_close(playback);
@@ -198,13 +198,13 @@ static void what_was_injected_is_what_the_session_says(void **state)
     for (int i = STEPS / EACH_S; i > 0; i -= 7) {
         playback_seek(playback, i * EACH_S * 0.001);
         assert_near(playback_injected_ml(playback), live_injected_ml[i], 1e-9);
-        if (live[i].state != SCORE_REACHED)   // one counts steps, the other what lies between them
+        if (live[i].state != SCORE_REACHED)   // one counts steps, the other the intervals between them
             assert_near(playback_pulses(playback)->pedal_s, live[i].fluoroscopy_s, 0.01);
     }
     playback_close(playback);
 }
 
-static void times_outside_are_cut_and_jumps_told(void **state)
+static void times_outside_are_cut_and_jumps_reported(void **state)
 {
     (void)state;
     XrayControl none = {0};
@@ -254,7 +254,7 @@ static void a_recording_cut_by_a_kill_is_shown_as_far_as_it_goes(void **state)
         assert_non_null(playback);
         playback_seek(playback, 1e6);
         assert_int_equal(playback_pose(playback)->step, cut[i][0]);
-        size_t tip = (size_t)((cut[i][1] - 1) * run->node_count) + (size_t)run->node_count - 1;   // of the last frame there is
+        size_t tip = (size_t)((cut[i][1] - 1) * run->node_count) + (size_t)run->node_count - 1;   // of the last existing frame
         assert_memory_equal(&playback_pose(playback)->position[run->node_count - 1], &run->position[tip], sizeof(Vec3));
         playback_close(playback);
     }
@@ -284,7 +284,7 @@ static void what_nobody_watched_is_shown_with_the_controls_given(void **state)
         assert_memory_equal(&playback_pose(playback)->xray, &given, sizeof given);
         assert_int_equal(playback_pulses(playback)->count, 1);
         playback_close(playback);
-        free(unseen->xray);   // as from before there were controls
+        free(unseen->xray);   // as from versions without controls
         unseen->xray = NULL;
     }
     recorded_run_free(unseen);
@@ -302,7 +302,7 @@ static void the_score_is_the_sessions_at_each_tenth_of_a_second(void **state)
     assert_same_figures(rescore_at(rescore, 0), &live[0]);
     rescore_advance(rescore, 250, HUGE_VAL);
     assert_same_figures(rescore_at(rescore, 0.25), &live[2]);
-    assert_same_figures(rescore_at(rescore, 99), &live[2]);   // as far as it was gone
+    assert_same_figures(rescore_at(rescore, 99), &live[2]);   // up to the time reached
     rescore_advance(rescore, 5000, 0);                        // no time: no step
     assert_same_figures(rescore_at(rescore, 99), &live[2]);
     for (int i = 0; i < 5; i++)
@@ -340,7 +340,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_moment_is_the_same_whichever_way_it_is_come_to),
                                        cmocka_unit_test(what_was_injected_is_what_the_session_says),
-                                       cmocka_unit_test(times_outside_are_cut_and_jumps_told),
+                                       cmocka_unit_test(times_outside_are_cut_and_jumps_reported),
                                        cmocka_unit_test(bookmarks_are_where_they_were_set),
                                        cmocka_unit_test(a_recording_cut_by_a_kill_is_shown_as_far_as_it_goes),
                                        cmocka_unit_test(what_nobody_watched_is_shown_with_the_controls_given),

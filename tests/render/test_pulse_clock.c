@@ -1,4 +1,4 @@
-// X-ray pulses on simulated time: the first at once, then at the rate, however time is stepped; last image hold; the dose counts them all.
+// X-ray pulses in simulated time: the first at once, then at the rate, for any step of time; last image hold; the dose counts all pulses.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -41,7 +41,7 @@ static void pulses_come_at_their_rate(void **state)
     }
 }
 
-// Ten seconds looked at every 1, 7, 10, 33.3 or 100 ms are the same dose; a look that is late draws once and counts all.
+// Ten seconds in intervals of 1, 7, 10, 33.3 or 100 ms give the same dose; a late call draws once and counts all pulses.
 static void the_dose_does_not_depend_on_who_looks(void **state)
 {
     (void)state;

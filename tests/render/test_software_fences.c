@@ -1,7 +1,7 @@
 #define _GNU_SOURCE   // RTLD_NEXT
-// Looks for memory that a software driver's threads write after the main thread freed it: Mesa 22.3.6's llvmpipe frees a fence that it sees signalled
-// without taking the fence's lock, while the thread that signalled it is still about to unlock it. Draws many small pictures, fills what is freed in
-// the size of a fence with zeros, and counts the blocks that changed before they were given back (an unlock counts the lock's users down).
+// Detects memory that threads of a software driver write after the main thread freed it: Mesa 22.3.6's llvmpipe frees a fence that it sees signalled without
+// taking the fence's lock, while the thread that signalled it still has to unlock it. Draws many small pictures, fills freed blocks of the size of a fence with
+// zeros, and counts the blocks that changed before they were given back (an unlock decrements the number of the lock's users).
 //     test_software_fences [SECONDS]                      as the program draws: 0 changed
 //     LP_NUM_THREADS=1 test_software_fences [SECONDS]     with a thread of the driver's: thousands in ten seconds
 #include "render/gl_context.h"
@@ -25,7 +25,7 @@ static double now_s(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-// ---- freed blocks of a fence's size are kept for a while, filled with zeros, and looked at before they are given back
+// ---- freed blocks of a fence's size are kept for a while, filled with zeros, and checked before they are given back
 
 extern void __libc_free(void *block);   // NOLINT: glibc's own name
 
@@ -51,7 +51,7 @@ void free(void *block)
     __libc_free(oldest);
 }
 
-// ---- a driver's thread may be preempted before any unlock: some of them are made to wait there
+// ---- a driver's thread may be preempted before any unlock: some of them are delayed there
 
 static pthread_t main_thread;
 static bool is_drawing;
@@ -61,7 +61,7 @@ int pthread_mutex_unlock(pthread_mutex_t *mutex)
     static int (*unlock)(pthread_mutex_t *);
     static _Thread_local unsigned unlocked;
     if (!unlock)
-        *(void **)&unlock = dlsym(RTLD_NEXT, "pthread_mutex_unlock");   // POSIX has pointers of either kind in one form
+        *(void **)&unlock = dlsym(RTLD_NEXT, "pthread_mutex_unlock");   // POSIX requires that object and function pointers have the same representation
     if (is_drawing && !pthread_equal(pthread_self(), main_thread) && unlocked++ % 64 == 0)
         nanosleep(&(struct timespec){0, 100000}, NULL);
     return unlock(mutex);

@@ -1,4 +1,4 @@
-// The 3D passes, pixel by pixel: sizes, depth order, translucency. Skipped where no EGL is.
+// The 3D passes, pixel by pixel: sizes, depth order, translucency. Skipped without EGL.
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "render/surface_view.h"
@@ -125,7 +125,7 @@ static void balls_are_as_large_as_the_projection_says(void **state)
     ShellStyle style = shell_style_solid();
     for (int v = 0; v < 3; v++)
         for (int k = 0; k < 2; k++) {
-            // off centre by a known number of pixels, the ball 90 triangles round: its chord error is r (1 - cos(pi / 180)), below 0.02 px
+            // off centre by a known number of pixels; the ball has 90 triangles around: its chord error is r (1 - cos(pi / 180)), below 0.02 px
             Camera camera = camera_at(view[v], center, 0.1);
             camera.center = vec3_add_scaled(vec3_add_scaled(center, -1.55, camera.right), 0.72, camera.up);
             TriangleMesh mesh = ball(center, radius[k], 90);
@@ -146,7 +146,7 @@ static void balls_are_as_large_as_the_projection_says(void **state)
             assert_true(fabs(p.x - (WIDTH / 2.0 + 15.5)) < 1e-6);
             assert_true(fabs(p.y - (HEIGHT / 2.0 + 7.2)) < 1e-6);
             double r = radius[k] / 0.1;
-            // a pixel is lit where any of its samples is: its edge lies within one pixel of the outline
+            // a pixel is lit if any of its samples is: its edge lies within one pixel of the outline
             assert_true(fabs(left - (p.x - r)) < 1 && fabs(right + 1 - (p.x + r)) < 1 && fabs(top - (p.y - r)) < 1 && fabs(bottom + 1 - (p.y + r)) < 1);
             double rim = 2 * PI * r;
             assert_true(area > PI * r * r && area < PI * r * r + rim);
@@ -155,7 +155,7 @@ static void balls_are_as_large_as_the_projection_says(void **state)
     stage_close(stage);
 }
 
-// A short red bar across the view at `depth` towards the eye; returns how red the pixel in the middle is against its surroundings on the ball.
+// Draws a short red bar across the view at `depth` towards the eye; returns how red the middle pixel is compared with its surroundings on the ball.
 static double redness(Stage *stage, const Camera *camera, const ShellStyle *style, double depth)
 {
     Vec3 middle = vec3_add_scaled(camera->center, depth, camera->back);
@@ -188,13 +188,13 @@ static void a_tool_shows_through_exactly_the_walls_before_it(void **state)
         ShellStyle glass = shell_style_glass(), solid = shell_style_solid();
         double before = redness(stage, &camera, &glass, 15), inside = redness(stage, &camera, &glass, 0), behind = redness(stage, &camera, &glass, -15);
         assert_true(before > 1.1 * inside && inside > 1.1 * behind && behind > 20);
-        // face on each wall takes its opacity from what lies behind it
+        // each wall takes its opacity from what lies behind it
         assert_true(fabs(inside / before - (1 - glass.front_opacity)) < 0.12);
         before = redness(stage, &camera, &solid, 15);
         assert_true(before > 150);
         assert_true(fabs(redness(stage, &camera, &solid, 0)) < 10 && fabs(redness(stage, &camera, &solid, -15)) < 10);
     }
-    // a fading near wall: the tool inside is as red as without it, and the far wall still stands before one behind
+    // a fading near wall: the tool inside is as red as without it, and the far wall still hides a second one behind it
     Camera camera = camera_at(view[2], vec3(0, 0, 0), 0.1);
     ShellStyle glass = shell_style_glass();
     double before = redness(stage, &camera, &glass, 15);
@@ -212,7 +212,7 @@ static void translucency_does_not_depend_on_the_order_of_triangles(void **state)
     Stage *stage = stage_open(1);
     if (!stage)
         skip();
-    // two balls in one mesh, one before the other
+    // two balls in one mesh, one in front of the other
     TriangleMesh a = ball(vec3(0, -6, 0), 5, 30), b = ball(vec3(2, 7, 1), 4, 30), both = {0};
     both.vertex_count = a.vertex_count + b.vertex_count;
     both.triangle_count = a.triangle_count + b.triangle_count;
@@ -229,7 +229,7 @@ static void translucency_does_not_depend_on_the_order_of_triangles(void **state)
     char message[256];
     for (int order = 0; order < 3; order++) {
         for (int t = 0; t < both.triangle_count; t++) {
-            // as made; backwards; scattered (7919 is prime to the count)
+            // original order; reversed; permuted (7919 is coprime to the count)
             int from = order == 0 ? t : order == 1 ? both.triangle_count - 1 - t : (int)((long)t * 7919 % both.triangle_count);
             for (int c = 0; c < 3; c++)
                 both.triangle[t][c] = from < a.triangle_count ? a.triangle[from][c] : b.triangle[from - a.triangle_count][c] + a.vertex_count;
@@ -250,7 +250,7 @@ static void translucency_does_not_depend_on_the_order_of_triangles(void **state)
                     differ += abs(first[y][x][c] - stage->rgb[y][x][c]) > 1;
             }
         assert_true(lit > 7000);
-        assert_true(differ < lit / 1000);   // rims of the two walls may meet in one bucket of depth
+        assert_true(differ < lit / 1000);   // the rims of the two walls may fall into one bucket of depth
     }
     ball_free(&a), ball_free(&b), ball_free(&both);
     stage_close(stage);
@@ -288,7 +288,7 @@ static void primitives_are_closed_and_face_outwards(void **state)
             if (vec3_norm(area) > 1e-6)
                 assert_true(vec3_dot(area, n) > -1e-6 * vec3_norm(area));
         }
-        assert_true(volume > 0);   // a closed surface's volume is positive only if it faces outwards
+        assert_true(volume > 0);   // a closed surface has a positive volume only if its normals point outwards
         if (expected > 0)          // 14-gons in 16 rings: 14/(2 pi) sin(2 pi/14) = 0.967 and less
             assert_true(volume > 0.93 * expected && volume < expected);
         primitives_free(&primitives);

@@ -1,4 +1,4 @@
-// The strip of a recording off screen: every button is found by the mouse and does what it says, the bar leads to the moment under the mouse.
+// The timeline of a recording off screen: the mouse finds every button, each button has its effect, and the bar leads to the moment under the mouse.
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "render/timeline.h"
@@ -13,7 +13,7 @@
 
 enum { WIDTH = 1280, HEIGHT = 720 };
 
-static PanelRect strip;   // the layout's
+static PanelRect strip;   // of the layout
 
 typedef struct Strip {
     Timeline *timeline;
@@ -29,7 +29,7 @@ static TimelineActions frame(Strip *it, double x, double y, unsigned buttons)
     return timeline_draw(it->timeline, &input, &it->state, 1, strip, it->canvas.framebuffer);
 }
 
-// Comes, presses and lets go; what any of the frames asked for.
+// Moves there, presses and releases; returns the actions of all frames.
 static TimelineActions click(Strip *it, double x, double y)
 {
     TimelineActions all = frame(it, x, y, 0);
@@ -61,7 +61,7 @@ static void what_is_clicked_is_done(void **state)
     assert_non_null(it.timeline);
     assert_true(gl_canvas_create(&it.canvas, WIDTH, HEIGHT, 1, message, sizeof message));
     it.state = (TimelineState){.time_s = 40, .end_s = 100, .speed = 1, .mark_count = 2, .mark_s = {10, 90}, .note = "session.h5"};
-    for (int i = 0; i < 3; i++) {   // nobody touches it: it asks for nothing
+    for (int i = 0; i < 3; i++) {   // without input there is no action
         TimelineActions none = frame(&it, -1, -1, 0);
         assert_true(!none.seek && !none.toggle_play && !none.resume && none.speed == 1);
     }
@@ -80,7 +80,7 @@ static void what_is_clicked_is_done(void **state)
             before_s = x < (double)strip.x + 24 ? -1 : before_s;
             if (!asked.seek)
                 continue;
-            bool is_back = asked.seek_s == 35, is_on = asked.seek_s == 45;   // 5 s from where it stands; the bar gives no round times
+            bool is_back = asked.seek_s == 35, is_on = asked.seek_s == 45;   // 5 s from the current time; the bar gives no round times
             backs += is_back;
             ons += is_on;
             if (is_back || is_on)
@@ -97,7 +97,7 @@ static void what_is_clicked_is_done(void **state)
         }
     assert_true(plays > 1 && backs > 1 && ons > 1 && resumes > 1 && sought > 40);
     assert_true(leftmost_s < 2 && rightmost_s > 98);
-    // dragged beyond its end it stays within
+    // dragged beyond its end the time stays within
     frame(&it, bar_x, bar_y, 0);
     frame(&it, bar_x, bar_y, WINDOW_MOUSE_LEFT);
     TimelineActions asked = frame(&it, 5000, 50, WINDOW_MOUSE_LEFT);

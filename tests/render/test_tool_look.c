@@ -1,4 +1,4 @@
-// What the views know of a scene's tools: stretches between the borders of sections and markers, colours that differ.
+// The appearance of a scene's tools in the views: stretches between the borders of sections and markers, distinct colours.
 #include "render/tool_look.h"
 
 #include <setjmp.h>
@@ -42,7 +42,7 @@ static void stretches_end_where_sections_and_markers_do(void **state)
     assert_true(tool_looks_make(&looks, scene));
     assert_int_equal(looks.count, 2);
     const ToolLook *outer = &looks.tool[0], *wire = &looks.tool[1];
-    // the first two sections look the same; the marker cuts the third
+    // the first two sections look the same; the marker divides the third
     const TubeStretch expected[3] = {{60, 0.5, 0.4, 0.3}, {78.5, 0.45, 0.35, 0.2}, {80, 0.45, 0.35, 5}};
     assert_int_equal(outer->stretch_count, 3);
     for (int i = 0; i < 3; i++) {
@@ -56,7 +56,7 @@ static void stretches_end_where_sections_and_markers_do(void **state)
     assert_ptr_equal(tool_look_at(outer, -3), &outer->stretch[0]);
     assert_ptr_equal(tool_look_at(outer, 60.001), &outer->stretch[1]);
     assert_ptr_equal(tool_look_at(outer, 1000), &outer->stretch[2]);
-    // what may take the wire's place has its own section and marker, name and colours stay
+    // an alternative to the wire has its own section and marker; name and colours stay
     const ToolLook *other = tool_looks_of(&looks, 1, 1);
     assert_true(other != wire && other->stretch_count == 2 && other->name == wire->name && memcmp(&other->color, &wire->color, sizeof other->color) == 0);
     assert_near(other->stretch[0].radius, 0.3, 1e-12);
@@ -71,7 +71,7 @@ static void stretches_end_where_sections_and_markers_do(void **state)
 
 static double luminance(Color c) { return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b; }
 
-// As deuteranopes see them (Vienot 1999): red and green fall together.
+// As deuteranopes see them (Vienot 1999): red and green become equal.
 static void as_seen(Color c, double out[2])
 {
     out[0] = 0.29275 * c.r + 0.70725 * c.g;

@@ -1,4 +1,5 @@
-// The tray's devices: those of the scene and of the library that fit, their pictures, what stands in the way; and what is written into the scene.
+// The tray's devices: those of the scene and those of the library that fit, their pictures, the reasons against an exchange; and the text written into the
+// scene.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -44,7 +45,7 @@ static Scene *parse(void)
     return scene;
 }
 
-// The tools with so much beyond the sheath's mouth.
+// The tools with the given lengths beyond the sheath's mouth.
 static Pose *pose_with(const Scene *scene, double tube_mm, double thread_mm)
 {
     Simulator *simulator = simulator_create(scene, NULL, &faults);
@@ -85,7 +86,7 @@ static void the_scenes_devices_and_those_that_fit_are_there(void **state)
         assert_true(near(tray.device[i].end_mm[tray.device[i].step_count - 1], 400));
     }
     assert_true(tray.device[steel].can_be_shaped && !tray.device[find("0.014 inch wire, nitinol core")].can_be_shaped);
-    // a folder is not asked for where the scene says what there is, nor one that does not exist
+    // the library folder is not read if the scene lists its devices, and may be missing
     assert_true(trainer_tray_open(&tray, scene, 0, NULL, pose, &in));
     assert_int_equal(tray.devices.count, 2);
     assert_string_equal(tray.devices.device[1].title, "a longer one");
@@ -96,7 +97,7 @@ static void the_scenes_devices_and_those_that_fit_are_there(void **state)
     scene_free(scene);
 }
 
-// A quarter of a circle of 6 mm radius at an end, from its own points.
+// A quarter of a circle of 6 mm radius at an end, drawn from the device's points.
 static void the_picture_is_the_rest_shape(void **state)
 {
     (void)state;
@@ -126,7 +127,7 @@ static const char *obstacle(const Scene *scene, const Pose *pose, int tool, int 
     return trainer_tray_obstacle(&tray);
 }
 
-static void what_stands_in_the_way_is_told(void **state)
+static void what_stands_in_the_way_is_reported(void **state)
 {
     (void)state;
     Scene *scene = parse();
@@ -167,7 +168,7 @@ static void a_tip_is_shaped_where_its_core_keeps_it(void **state)
     assert_non_null(tray.shown.shaped);
     choice.mandrel_mm = 1;
     trainer_tray_show(&tray, scene, pose, &choice);
-    assert_null(trainer_tray_obstacle(&tray));       // though it is the tool that was there: shaped, it is another
+    assert_null(trainer_tray_obstacle(&tray));       // although it is the inserted tool: shaped, it is another device
     assert_non_null(strstr(tray.shown.shaped->remark, "springs back to 60"));
     const PanelTrayDevice *shown = tray.shown.shaped;
     const double *tip = shown->point[shown->point_count - 1], *before = shown->point[shown->point_count - 2];
@@ -182,7 +183,7 @@ static void a_tip_is_shaped_where_its_core_keeps_it(void **state)
     scene_free(scene);
 }
 
-// What is written is read again: the same device, in the scene's own text with all else as it was.
+// The written scene is read again: the same device, and the rest of the scene's text unchanged.
 static void a_device_is_written_into_the_scene(void **state)
 {
     (void)state;
@@ -212,7 +213,7 @@ static void a_device_is_written_into_the_scene(void **state)
     assert_string_equal(shaped->title, "thread, as the scene has it, tip shaped to 57\u00b0");
     assert_true(near(shaped->tip.length, 9) && near(shaped->tip.angle, 1) && near(shaped->tip.mandrel, 0.8));
     assert_true(shaped->wire.section[0].friction == 0.02);
-    // the tool of the scene is not touched
+    // the tool of the scene is unchanged
     assert_true(scene_tool_wire(two, 1).section_count == 2);
     trainer_tray_close(&tray);
     pose_free(pose);
@@ -224,7 +225,7 @@ static void a_device_is_written_into_the_scene(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_scenes_devices_and_those_that_fit_are_there), cmocka_unit_test(the_picture_is_the_rest_shape),
-                                       cmocka_unit_test(what_stands_in_the_way_is_told), cmocka_unit_test(a_tip_is_shaped_where_its_core_keeps_it),
+                                       cmocka_unit_test(what_stands_in_the_way_is_reported), cmocka_unit_test(a_tip_is_shaped_where_its_core_keeps_it),
                                        cmocka_unit_test(a_device_is_written_into_the_scene)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,4 @@
-// The live 3D view, pixel by pixel: what moves lies where the projection says, cached walls are those drawn from scratch, sections, arrows, broken
-// input.
+// The live 3D view, pixel by pixel: moving objects are at their projections, cached walls equal newly drawn ones, sections, arrows, broken input.
 #include "geom/blobby.h"
 #include "geom/tube_mesh.h"
 #include "render/vessel_scene.h"
@@ -117,8 +116,8 @@ static void cached_walls_are_those_drawn_afresh(void **state)
     look.camera = home;
     for (int k = 0; k < 5; k++)
         take(&stage, scene, pose, &look, cached);
-    assert_int_equal(vessel_scene_layer_draws(scene), 8);   // the turn back, and all of it once the camera stood still
-    // after another size in between, too
+    assert_int_equal(vessel_scene_layer_draws(scene), 8);   // rotated back, and the full mesh once the camera rests
+    // also after another size in between
     const ViewPort small = {stage.canvas.framebuffer, 10, 10, 120, 90};
     vessel_scene_draw(scene, pose, &look, small);
     for (int k = 0; k < 5; k++)
@@ -130,7 +129,7 @@ static void cached_walls_are_those_drawn_afresh(void **state)
     take(&stage, scene, pose, &look, fresh);
     assert_int_equal(count_different(cached, fresh, 0), 0);
     assert_true(count_different(cached, turned, 8) > 500);
-    // the thinner mesh was what turned
+    // while rotating, the coarser mesh was drawn
     look.full_detail = true;
     free_camera_orbit(&look.camera, 100, 35);
     for (int k = 0; k < 2; k++) {
@@ -182,7 +181,7 @@ static void a_section_takes_away_what_lies_before_its_plane(void **state)
             }
         assert_true(gone > 500 && kept > 500);
     }
-    // towards the eye: the near wall goes, the far one's inside stays, as wide as the tube
+    // towards the eye: the near wall disappears, the inside of the far one stays, as wide as the tube
     look.section_normal = vec3(0, 0, 0);
     look.section_offset_mm = 0;
     take(&stage, scene, NULL, &look, cut);
@@ -216,12 +215,12 @@ static void arrows_stand_only_where_there_is_force(void **state)
     VesselSceneLook look = vessel_scene_default_look(scene);
     free_camera_look_along(&look.camera, vec3(0, 1, 0), vec3(0, 0, 1));
     Pose *pose = straight_pose(21, vec3(-10, 0, 0), vec3(1, 0, 0), vec3(0, 1, 0), 1, 0.2);
-    // what lies in the sheath has no wall to push it
+    // nodes in the sheath have no wall that pushes them
     pose->first_free_node = 3;
     pose->node[1].force = vec3(0, 0, 0.5);
     for (int loaded = 0; loaded < 2; loaded++) {
         if (loaded)
-            pose->node[14].force = vec3(0, 0, 0.5);   // the wall pushes up: the arrow comes from below
+            pose->node[14].force = vec3(0, 0, 0.5);   // the wall pushes upwards: the arrow comes from below
         look.show_arrows = false;
         take(&stage, scene, pose, &look, without);
         look.show_arrows = true;
@@ -303,7 +302,7 @@ static void the_tip_s_own_model_is_a_wireframe(void **state)
                 lit += differs;
             }
         assert_true(furthest < radius + 1.5 && furthest > 0.95 * radius);
-        assert_true(lit > 0.15 * inside && lit < 0.8 * inside);   // lines, not a patch
+        assert_true(lit > 0.15 * inside && lit < 0.8 * inside);   // lines, not a filled area
     }
     pose_free(pose);
     vessel_scene_destroy(scene);
@@ -325,7 +324,7 @@ static void a_tool_is_dimmed_by_the_walls_before_it(void **state)
     for (int from = 1; from >= -1; from -= 2) {
         free_camera_look_along(&look.camera, vec3(0, from, 0), vec3(0, 0, 1));
         take(&stage, scene, NULL, &look, without);
-        const double depth[3] = {5, 0, -5};   // towards the eye: before, inside, behind
+        const double depth[3] = {5, 0, -5};   // towards the eye: in front, inside, behind
         double contrast[3];
         for (int k = 0; k < 3; k++) {
             Vec3 back = vessel_scene_projection(scene)->back;
@@ -396,19 +395,19 @@ static void the_free_camera_does_what_the_mouse_does(void **state)
         Vec3 p = camera_project(&view, point[i]);
         assert_true(p.x > 0 && p.x < width && p.y > 0 && p.y < height);
     }
-    // pan: what is under the mouse stays under it
+    // pan: the point under the mouse stays under it
     Vec3 before = camera_project(&view, point[2]);
     free_camera_pan(&camera, 31, -17, width, height);
     view = free_camera_projection(&camera, width, height, 100);
     Vec3 after = camera_project(&view, point[2]);
     assert_true(fabs(after.x - before.x - 31) < 1e-9 && fabs(after.y - before.y + 17) < 1e-9);
-    // zoom about a pixel: it stays, all else moves away from it by the factor
+    // zoom about a pixel: it stays, and all other points move away from it by the factor
     free_camera_zoom(&camera, 3, after.x, after.y, width, height);
     view = free_camera_projection(&camera, width, height, 100);
     Vec3 zoomed = camera_project(&view, point[2]);
     assert_true(fabs(zoomed.x - after.x) < 1e-9 && fabs(zoomed.y - after.y) < 1e-9);
     assert_true(fabs(home.width_mm / camera.width_mm - pow(1.15, 3)) < 1e-9);
-    // orbit: the focus stays, what is nearer than it follows the mouse, lengths stay
+    // orbit: the focus stays, nearer points follow the mouse, lengths stay
     Vec3 near = vec3_add_scaled(camera.focus, 5, view.back);
     free_camera_orbit(&camera, 10, 4);
     view = free_camera_projection(&camera, width, height, 100);
@@ -420,7 +419,7 @@ static void the_free_camera_does_what_the_mouse_does(void **state)
     view = free_camera_projection(&camera, width, height, 100);
     assert_true(fabs(vec3_norm(view.right) - 1) < 1e-12 && fabs(vec3_dot(view.right, view.up)) < 1e-12);
     assert_true(vec3_distance(vec3_cross(view.right, view.up), view.back) < 1e-12);
-    // zooming ends
+    // zooming has a limit
     for (int k = 0; k < 500; k++)
         free_camera_zoom(&camera, 5, 0, 0, width, height);
     assert_true(camera.width_mm > home.width_mm / 401 && camera.width_mm < home.width_mm / 399);
@@ -474,8 +473,8 @@ static bool is_white(const uint8_t *p) { return p[0] > 110 && p[1] > 110 && p[2]
 static bool is_blue(const uint8_t *p) { return p[2] > p[0] + 40 && p[2] > 80; }
 static bool is_dark(const uint8_t *p) { return p[0] < 70 && p[1] < 70 && p[2] < 110; }
 
-// A catheter of R 1.0 and lumen 0.6 with a wire of 0.25 mm, close up and from far away, from many sides: the wire is white along the axis up to its tip, between
-// blue walls, beside it the dark lumen; where there is no wire the catheter is whole; labels stand at both tips.
+// A catheter of R 1.0 and lumen 0.6 with a wire of 0.25 mm, close up and from far away, from many sides: the wire is white along the axis up to its tip,
+// between blue walls, with the dark lumen beside it; where there is no wire the catheter is not cut open; labels are at both tips.
 static void a_tool_is_seen_in_the_one_around_it(void **state)
 {
     (void)state;
@@ -494,7 +493,7 @@ static void a_tool_is_seen_in_the_one_around_it(void **state)
     for (int view = 0; view < 18; view++) {
         VesselSceneLook look = vessel_scene_default_look(scene);
         free_camera_orbit(&look.camera, 21.0 * view, -17.0 * view);
-        bool is_far = view % 2 == 1;         // all widths are the least there are
+        bool is_far = view % 2 == 1;         // all widths are the smallest ones
         look.camera.width_mm *= is_far ? 6 : 1;
         look.camera.height_mm *= is_far ? 6 : 1;
         Pose *pose = coaxial_pose(10, wire[view / 2 % 3], 0.7, 1, 0.25);
@@ -583,7 +582,7 @@ static void broken_input_is_refused_or_left_out(void **state)
         vessel_scene_draw(scene, pose, &look, none);
         assert_int_equal(glGetError(), GL_NO_ERROR);
         take(&stage, scene, pose, &look, pixels);
-        assert_true(pixels[0][0][0] < 60 && pixels[0][0][2] > 10);   // the calm ground is still there
+        assert_true(pixels[0][0][0] < 60 && pixels[0][0][2] > 10);   // the background is visible again
     }
     pose_free(pose);
     vessel_scene_destroy(scene);

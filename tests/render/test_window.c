@@ -1,5 +1,5 @@
-// The window under a virtual X server, driven from outside by xdotool as a user's keys and mouse would: what comes out of the window, the key table and
-// the panel together. Skipped by name where Xvfb or xdotool is not installed (packages xvfb, xdotool).
+// The window under a virtual X server, with keys and mouse by xdotool: the output of the window, the key table and the panel together. Skipped by name if Xvfb
+// or xdotool is not installed (packages xvfb, xdotool).
 #define _GNU_SOURCE   // dl_iterate_phdr
 #include "render/gl_canvas.h"
 #include "render/panel.h"
@@ -48,7 +48,7 @@ static double now_s(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-// ---- a server, and a hand
+// ---- a server and a user
 
 static pid_t start(char *const argv[])
 {
@@ -87,7 +87,7 @@ static bool start_server(void)
     bool is_started = posix_spawnp(&server, argv[0], &quiet, NULL, argv, environ) == 0;
     posix_spawn_file_actions_destroy(&quiet);
     close(end[1]);
-    // the number and its newline may come apart, and the server dies of a pipe that is closed too early
+    // the number and its newline may arrive separately, and the server ends if the pipe is closed too early
     char display[16] = ":";
     size_t length = 1;
     struct pollfd wait = {.fd = end[0], .events = POLLIN};
@@ -119,7 +119,7 @@ static void hand(const char *what)
     assert_int_equal(status, 0);
 }
 
-// LeakSanitizer takes what a driver keeps for leaked once the driver is unloaded: it stays.
+// LeakSanitizer reports the memory of a driver as leaked once the driver is unloaded: it stays loaded.
 static int keep_driver(struct dl_phdr_info *library, size_t size, void *unused)
 {
     (void)size, (void)unused;
@@ -148,7 +148,7 @@ static void frame(void)
     window_swap(controls.window);
 }
 
-// Frames until it is as expected; false after 5 s.
+// Draws frames until the condition holds; false after 5 s.
 static bool comes_to(bool (*is_so)(void))
 {
     for (double end = now_s() + 5; now_s() < end;) {
@@ -218,7 +218,7 @@ static int end_all(void **unused)
 
 // ---- tests
 
-static void without_a_display_it_says_so(void **unused)
+static void a_missing_display_is_reported(void **unused)
 {
     (void)unused;
     char *argv[] = {"/proc/self/exe", "--no-display", NULL};
@@ -328,13 +328,13 @@ static void loss_of_focus_stops_the_tool(void **unused)
         skip();
     hand("keydown Up keydown f");
     assert_true(comes_to(pushes));
-    // another window comes to the front, as a mail programme would
+    // another window comes to the front
     char *argv[] = {"/proc/self/exe", "--other-window", NULL};
     pid_t other = start(argv);
     assert_true(other > 0);
     assert_true(comes_to(lost_focus));
     assert_true(is_still());
-    for (int i = 0; i < 10; i++) {   // and stays, though the keys are still down
+    for (int i = 0; i < 10; i++) {   // and stays so, although the keys are still down
         frame();
         assert_true(is_still());
     }
@@ -369,7 +369,7 @@ static void a_name_is_typed(void **unused)
     assert_true(comes_to(asks_no_more));
 }
 
-// Process CPU, the driver's threads with it.
+// Process CPU time, including the driver's threads.
 static void print_cost(void)
 {
     struct timespec t[2];
@@ -401,7 +401,7 @@ static void draw_fresh(unsigned framebuffer, const WindowInput *input)
     panel_destroy(panel);
 }
 
-// A window's buffer is filled in another way than one off screen (rows, order of bytes): the same picture must come out.
+// A window's buffer is filled differently from one off screen (rows, byte order): the picture must be the same.
 static void the_window_shows_what_is_drawn_off_screen(void **unused)
 {
     (void)unused;
@@ -421,7 +421,7 @@ static void the_window_shows_what_is_drawn_off_screen(void **unused)
     draw_fresh(off_screen.framebuffer, &input);
     gl_canvas_read(&off_screen, canvas);
     size_t row = (size_t)input.width * 3;
-    for (int y = 0; y < input.height; y++)   // OpenGL's first row is the lowest, the canvas's the upper one
+    for (int y = 0; y < input.height; y++)   // OpenGL's first row is the lowest, the canvas's is the highest
         assert_memory_equal(window + (size_t)(input.height - 1 - y) * row, canvas + (size_t)y * row, row);
     gl_canvas_destroy(&off_screen);
     free(window);
@@ -473,7 +473,7 @@ static void quitting_is_asked_back_and_a_signal_is_not(void **unused)
     assert_false(asks());
 }
 
-// At 30 Hz by absolute deadlines: frames never come sooner, and one that is late leaves whole periods out instead of hurrying after them.
+// At 30 Hz with absolute deadlines: frames never come sooner, and a late frame skips whole periods instead of catching up.
 static void frames_are_paced(void **unused)
 {
     (void)unused;
@@ -520,7 +520,7 @@ static int other_window(void)
     dl_iterate_phdr(keep_driver, NULL);
     const WindowInput *input = NULL;
     double end = now_s() + 60;
-    window_swap(window);   // it is seen from its first picture on
+    window_swap(window);   // it is visible from its first picture on
     do {
         window_next_frame(window, &input);
     } while (input->close != WINDOW_ENDED && now_s() < end);
@@ -544,7 +544,7 @@ int main(int argc, char **argv)
         return no_display();
     if (argc == 2 && strcmp(argv[1], "--other-window") == 0)
         return other_window();
-    const struct CMUnitTest tests[] = {cmocka_unit_test(without_a_display_it_says_so),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_display_is_reported),
                                        cmocka_unit_test(keys_are_held_and_let_go),
                                        cmocka_unit_test(signs_and_function_keys_are_pressed_once),
                                        cmocka_unit_test(buttons_work_by_mouse),

@@ -1,4 +1,4 @@
-// Where EGL finds no driver, or there is no EGL at all (the environment set in CMakeLists.txt hides them), every picture reports it and the program continues.
+// If EGL finds no driver or there is no EGL (the environment set in CMakeLists.txt hides them), every picture reports it and the program continues.
 #include "render/gl_context.h"
 #include "render/picture.h"
 

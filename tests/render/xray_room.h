@@ -21,7 +21,7 @@ typedef struct XrayRoom {
     char message[300];
 } XrayRoom;
 
-// NULL if no EGL is. `options` NULL: an empty room.
+// NULL without EGL. `options` NULL: an empty room.
 static inline XrayRoom *room_open(const FluoroscopeOptions *options, int side)
 {
     XrayRoom *s = calloc(1, sizeof *s);
@@ -80,7 +80,7 @@ static inline PixelMoments room_moments(const XrayRoom *s, int x0, int y0, int x
     return (PixelMoments){sum / count, sqrt(fmax(square / count - sum / count * sum / count, 0))};
 }
 
-// A float layer, rows from the bottom; the caller's to free.
+// A float layer, rows from the bottom; the caller frees it.
 static inline float *layer_read(const Layer *layer)
 {
     float *value = malloc((size_t)layer->side * (size_t)layer->side * sizeof *value);
@@ -90,7 +90,7 @@ static inline float *layer_read(const Layer *layer)
     return value;
 }
 
-// Brightness of transmission in the live picture with no anatomy, 0 to 255: automatic exposure sets empty air to 0.27.
+// Brightness of a transmission in the live picture without anatomy, 0 to 255: automatic exposure sets empty air to 0.27.
 static inline double live_grey(double attenuation) { return 255 * 1.75 * pow(0.27 * exp(-attenuation), 0.72); }
 
 // Length of a ray from `from` inside the mesh, in double precision.

@@ -373,7 +373,7 @@ static void the_lumen_is_the_chosen_tool_s_or_the_next_around_it(void **state)
     scene_free(wire);
 }
 
-static void a_copy_goes_on_the_same_and_no_advance_allocates(void **state)
+static void a_copy_continues_the_same_and_no_advance_allocates(void **state)
 {
     (void)state;
     Scene *scene = scene_of(THREE);
@@ -455,7 +455,7 @@ int main(void)
         cmocka_unit_test(what_is_seen_in_a_lumen_is_what_is_in_it),
         cmocka_unit_test(it_comes_out_at_the_chosen_tool_s_tip),
         cmocka_unit_test(the_lumen_is_the_chosen_tool_s_or_the_next_around_it),
-        cmocka_unit_test(a_copy_goes_on_the_same_and_no_advance_allocates),
+        cmocka_unit_test(a_copy_continues_the_same_and_no_advance_allocates),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

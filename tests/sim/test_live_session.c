@@ -1,5 +1,4 @@
-// A session is recorded, continued from a moment and recorded again: the common part is bit-identical, and recordings that are not of this session are
-// rejected.
+// A session is recorded, continued from a moment and recorded again: the common part is bit-identical, and recordings of other sessions are refused.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -101,17 +100,17 @@ static void let_go(void)
     atomic_store(&port.twist_deg_s, 0);
 }
 
-static int told;
+static int progress_calls;
 
 static void take_note(void *context, double part)
 {
     double *before = context;
     assert_true(part > *before && part <= 1);
     *before = part;
-    told++;
+    progress_calls++;
 }
 
-static void a_session_goes_on_from_a_moment_of_it(void **state)
+static void a_session_continues_from_a_moment_of_it(void **state)
 {
     (void)state;
     char path[200], again[200];
@@ -148,7 +147,7 @@ static void a_session_goes_on_from_a_moment_of_it(void **state)
     options.progress_context = &part;
     atomic_store(&port.push_mm_s, -15);
     session = open_session(&options);
-    assert_true(told == 300 / 64 && part > 0.8);
+    assert_true(progress_calls == 300 / 64 && part > 0.8);
     assert_near(session.resumed_s, 0.3, 1e-9);
     const Moment *moment;
     while (!(moment = realtime_moment(session.realtime)) || moment->figures.state != REALTIME_PAUSED)
@@ -376,7 +375,7 @@ static void what_is_not_the_recording_of_a_session_is_refused(void **state)
     recorded_run_free(run);
 }
 
-static void a_place_where_nothing_can_be_written_is_told(void **state)
+static void a_place_where_nothing_can_be_written_is_reported(void **state)
 {
     (void)state;
     char path[250];
@@ -397,9 +396,9 @@ static void a_place_where_nothing_can_be_written_is_told(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_goes_on_from_a_moment_of_it),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_continues_from_a_moment_of_it),
                                        cmocka_unit_test(two_tools_are_moved_locked_let_go_and_replayed), cmocka_unit_test(a_tool_is_exchanged_and_replayed),
                                        cmocka_unit_test(what_is_not_the_recording_of_a_session_is_refused),
-                                       cmocka_unit_test(a_place_where_nothing_can_be_written_is_told)};
+                                       cmocka_unit_test(a_place_where_nothing_can_be_written_is_reported)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// cmocka's own compares in single precision
+// cmocka's own function compares in single precision
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
 
 static int by_value(const void *a, const void *b)

@@ -214,7 +214,7 @@ static void every_prefix_and_a_byte_more_are_refused(void **state)
 }
 
 // `from` replaced by `to` in the good file: one fault that has `words`.
-static void each_wrong_value_is_told(void **state)
+static void each_wrong_value_is_reported(void **state)
 {
     (void)state;
     static const struct {
@@ -244,10 +244,10 @@ static void each_wrong_value_is_told(void **state)
         char text[8192];
         snprintf(text, sizeof text, "%.*s%s%s", (int)(at - one_text), one_text, cases[i].to, at + strlen(cases[i].from));
         faults_clear(&faults);
-        bool good = session_parse(text, strlen(text), "x.json", &got, &faults), told = false;
+        bool good = session_parse(text, strlen(text), "x.json", &got, &faults), found = false;
         for (int k = 0; k < faults.count && k < FAULTS_CAPACITY; k++)
-            told = told || strstr(faults.text[k], cases[i].words);
-        if (good || !told)
+            found = found || strstr(faults.text[k], cases[i].words);
+        if (good || !found)
             wrong++, print_error("%s: expected %s; %d faults, the first: %s\n", cases[i].to, cases[i].words, faults.count, faults.text[0]);
     }
     assert_int_equal(wrong, 0);
@@ -310,7 +310,7 @@ int main(void)
         cmocka_unit_test(what_is_written_is_read_back),      cmocka_unit_test(long_names_end_with_a_whole_character),
         cmocka_unit_test(the_score_alone_is_json_too),       cmocka_unit_test(several_tools_are_read_back),
         cmocka_unit_test(an_older_session_is_read),          cmocka_unit_test(every_prefix_and_a_byte_more_are_refused),
-        cmocka_unit_test(each_wrong_value_is_told),          cmocka_unit_test(a_folder_gives_the_trainees_own_in_order),
+        cmocka_unit_test(each_wrong_value_is_reported),      cmocka_unit_test(a_folder_gives_the_trainees_own_in_order),
         cmocka_unit_test(long_names_are_cut_at_a_character),
     };
     return cmocka_run_group_tests(tests, make_one, remove_all);

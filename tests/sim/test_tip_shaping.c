@@ -123,7 +123,7 @@ static void bends_before_are_pressed_straight(void **state)
     free(out);
 }
 
-static void what_a_wire_does_not_keep_is_told(void **state)
+static void what_a_wire_does_not_keep_is_reported(void **state)
 {
     (void)state;
     const WireSection wire = piece(20, 0.3556, 0.637);
@@ -147,6 +147,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_moment_is_that_of_the_stresses), cmocka_unit_test(a_core_springs_back_by_the_moment_it_was_held_with),
         cmocka_unit_test(a_core_is_as_stiff_as_its_section),  cmocka_unit_test(the_tip_keeps_the_angle_at_its_place),
-        cmocka_unit_test(bends_before_are_pressed_straight),  cmocka_unit_test(what_a_wire_does_not_keep_is_told)};
+        cmocka_unit_test(bends_before_are_pressed_straight),  cmocka_unit_test(what_a_wire_does_not_keep_is_reported)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
