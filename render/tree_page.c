@@ -232,8 +232,8 @@ bool tree_page_write(const char *path, const char *name, const VesselTree *tree,
     FILE *out = finding ? open_memstream(&bytes, &length) : NULL;
     bool good = out != NULL;
     if (good) {
-        double said = tree_file_number(info, "voxel_mm", 0);
-        Report report = {out, name, tree, info, branches, finding, count, said > 0 ? said : 0.2, said > 0};
+        double stated = tree_file_number(info, "voxel_mm", 0);
+        Report report = {out, name, tree, info, branches, finding, count, stated > 0 ? stated : 0.2, stated > 0};
         print_page(&report);
         good = !ferror(out);
         good = fclose(out) == 0 && good;

@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 // Runs `breaks` in its own process; returns its standard error and its signal (0: none).
-static int dies_of(void (*breaks)(void), char *said, size_t capacity)
+static int dies_of(void (*breaks)(void), char *message_text, size_t capacity)
 {
     int ends[2];
     assert_int_equal(pipe(ends), 0);
@@ -32,9 +32,9 @@ static int dies_of(void (*breaks)(void), char *said, size_t capacity)
     }
     close(ends[1]);
     size_t used = 0;
-    for (ssize_t part; used + 1 < capacity && (part = read(ends[0], said + used, capacity - 1 - used)) > 0;)
+    for (ssize_t part; used + 1 < capacity && (part = read(ends[0], message_text + used, capacity - 1 - used)) > 0;)
         used += (size_t)part;
-    said[used] = '\0';
+    message_text[used] = '\0';
     close(ends[0]);
     int status;
     assert_int_equal(waitpid(child, &status, 0), child);
@@ -48,22 +48,22 @@ static void asserts_what_is_false(void) { SEL_ASSERT(1 + 1 == 3, "sums are wrong
 static void a_message_says_where_and_what(void **state)
 {
     (void)state;
-    char said[2000], expected[200];
-    assert_int_equal(dies_of(requires_what_is_false, said, sizeof said), SIGABRT);
+    char message_text[2000], expected[200];
+    assert_int_equal(dies_of(requires_what_is_false, message_text, sizeof message_text), SIGABRT);
     snprintf(expected, sizeof expected, "tests/base/test_assert.c:%d: assertion failed: 1 + 1 == 3; assumed: sums are wrong\n", __LINE__ - 9);
-    if (!strstr(said, expected))
-        fail_msg("said '%s', not '%s'", said, expected);
-    assert_int_equal(dies_of(requires_what_is_true, said, sizeof said), 0);
-    assert_string_equal(said, "");
+    if (!strstr(message_text, expected))
+        fail_msg("the message is '%s', not '%s'", message_text, expected);
+    assert_int_equal(dies_of(requires_what_is_true, message_text, sizeof message_text), 0);
+    assert_string_equal(message_text, "");
 }
 
 // In a build without assertions the condition is not evaluated.
 static void assertions_are_on_where_the_build_says(void **state)
 {
     (void)state;
-    char said[2000];
+    char message_text[2000];
     int looked = 0;
-    assert_int_equal(dies_of(asserts_what_is_false, said, sizeof said), SELDINGER_ASSERTS ? SIGABRT : 0);
+    assert_int_equal(dies_of(asserts_what_is_false, message_text, sizeof message_text), SELDINGER_ASSERTS ? SIGABRT : 0);
     SEL_ASSERT(++looked == 1, "conditions are looked at once");
     assert_int_equal(looked, SELDINGER_ASSERTS);
 }
@@ -87,13 +87,13 @@ static void walks_on_an_unlinked_tree(void)
 static void borders_are_guarded(void **state)
 {
     (void)state;
-    char said[2000];
-    assert_int_equal(dies_of(factors_too_long_a_chain, said, sizeof said), SIGABRT);
-    assert_non_null(strstr(said, "solver/block_chain.c:"));
-    assert_non_null(strstr(said, "a factor has room for the nodes of its chain"));
+    char message_text[2000];
+    assert_int_equal(dies_of(factors_too_long_a_chain, message_text, sizeof message_text), SIGABRT);
+    assert_non_null(strstr(message_text, "solver/block_chain.c:"));
+    assert_non_null(strstr(message_text, "a factor has room for the nodes of its chain"));
     if (SELDINGER_ASSERTS) {
-        assert_int_equal(dies_of(walks_on_an_unlinked_tree, said, sizeof said), SIGABRT);
-        assert_non_null(strstr(said, "the tree is linked"));
+        assert_int_equal(dies_of(walks_on_an_unlinked_tree, message_text, sizeof message_text), SIGABRT);
+        assert_non_null(strstr(message_text, "the tree is linked"));
     }
 }
 

@@ -68,9 +68,9 @@ static const OptionTable table = {.program = "seldinger try",
                                   .missing = "missing the scene",
                                   .too_many = "one scene at a time, not also "};
 
-static char said[4096];
+static char message[4096];
 
-// Splits `line` at blanks and parses it; standard error goes to `said`.
+// Splits `line` at blanks and parses it; standard error goes to `message`.
 static int parse(const OptionTable *of, const char *line, void *values)
 {
     static char copy[400];
@@ -86,7 +86,7 @@ static int parse(const OptionTable *of, const char *line, void *values)
     dup2(kept, 2);
     close(kept);
     rewind(file);
-    said[fread(said, 1, sizeof said - 1, file)] = 0;
+    message[fread(message, 1, sizeof message - 1, file)] = 0;
     fclose(file);
     return code;
 }
@@ -149,8 +149,8 @@ static void what_is_wrong_is_named(void **state)
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
         Values v;
         int code = parse(&table, lines[i][0], &v);
-        if (code != (*lines[i][1] ? 2 : -1) || !strstr(said, lines[i][1]))
-            fail_msg("`%s` ended with %d and said: %s", lines[i][0], code, said);
+        if (code != (*lines[i][1] ? 2 : -1) || !strstr(message, lines[i][1]))
+            fail_msg("`%s` ended with %d and printed: %s", lines[i][0], code, message);
     }
 }
 
@@ -182,7 +182,7 @@ static void any_number_of_arguments(void **state)
     many.takes_argument = false;
     many.too_many = "takes no file";
     assert_int_equal(parse(&many, "a", &p), 2);
-    assert_non_null(strstr(said, "seldinger many: takes no file; see"));
+    assert_non_null(strstr(message, "seldinger many: takes no file; see"));
 }
 
 static char *printed(void (*print)(FILE *))

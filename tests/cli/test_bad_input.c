@@ -37,7 +37,7 @@ static void refused(const char *arguments, const char *words)
 {
     int code = run_in("", arguments);
     if (code != 2 || !strstr(output, words))
-        fail_msg("`%s` ended with %d and said: %s(expected 2 and '%s')", arguments, code, output, words);
+        fail_msg("`%s` ended with %d and printed: %s(expected 2 and '%s')", arguments, code, output, words);
     nothing_is_left(arguments);
 }
 
@@ -294,7 +294,7 @@ static void a_full_disk(void **state)
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         int code = run_in("ulimit -f 8;", lines[i]);
         if (code != 2 || !strstr(output, ": cannot be written: File too large"))
-            fail_msg("`%s` on a full disk ended with %d and said: %s", lines[i], code, output);
+            fail_msg("`%s` on a full disk ended with %d and printed: %s", lines[i], code, output);
         nothing_is_left(lines[i]);
     }
     // /dev/full also fails printed output
@@ -357,13 +357,13 @@ static void a_stop_by_the_user(void **state)
         nothing_is_left("export, stopped");
     }
     // while it computes: the signal ends it with a message; the delay is doubled until the program has started, also on a busy machine
-    bool said = false;
-    for (double wait = 0.2; !said && wait < 30; wait *= 2) {
+    bool is_reported = false;
+    for (double wait = 0.2; !is_reported && wait < 30; wait *= 2) {
         int status = stopped("bench fit --table3 --threads 2", is_past, wait);
         assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT);
-        said = run_in("grep -q '^stopped; no unfinished file is left$' stop.txt &&", "--version") == 0;
+        is_reported = run_in("grep -q '^stopped; no unfinished file is left$' stop.txt &&", "--version") == 0;
     }
-    assert_true(said);
+    assert_true(is_reported);
 }
 
 // Renaming would replace a device or pipe: text is written directly into it; HDF5 files and volumes are refused.

@@ -108,7 +108,7 @@ static void run_reports(const char *words, double tip[3])
 {
     assert_int_equal(run("run scene.yaml --quiet --summary s.json"), 0);
     if (*words && !strstr(output, words))
-        fail_msg("said: %s\n(expected '%s')", output, words);
+        fail_msg("printed: %s\n(expected '%s')", output, words);
     tip_of(tip);
 }
 
@@ -116,7 +116,7 @@ static void refused(const char *words)
 {
     int code = run("run scene.yaml --quiet --summary out.json");
     if (code != 2 || !strstr(output, words))
-        fail_msg("ended with %d and said: %s\n(expected 2 and '%s')", code, output, words);
+        fail_msg("ended with %d and printed: %s\n(expected 2 and '%s')", code, output, words);
     assert_null(fopen(in_folder("out.json"), "r"));
 }
 

@@ -61,12 +61,12 @@ static void all_formats_hold_the_same_surface(void **state)
         area = check.area, volume = check.volume, triangles = check.triangle_count;
         surface_free(mesh);
     }
-    char *said = text_of(in_folder("said.txt")), expected[100];
+    char *message = text_of(in_folder("said.txt")), expected[100];
     snprintf(expected, sizeof expected, "%d triangles", triangles);
-    assert_non_null(strstr(said, expected));
-    assert_non_null(strstr(said, "parts          1, Euler characteristic 2"));
-    assert_non_null(strstr(said, "0 open, 0 non-manifold"));
-    free(said);
+    assert_non_null(strstr(message, expected));
+    assert_non_null(strstr(message, "parts          1, Euler characteristic 2"));
+    assert_non_null(strstr(message, "0 open, 0 non-manifold"));
+    free(message);
 }
 
 static void vertices_carry_their_errors(void **state)
@@ -76,8 +76,8 @@ static void vertices_carry_their_errors(void **state)
     VesselTree *tree = tree_file_load(in_folder("model.h5"), NULL, &faults);
     assert_non_null(tree);
     assert_int_equal(seldinger("export", in_folder("model.h5"), "--cell-mm 0.3 --open-inlet", in_folder("o.ply")), 0);
-    char *said = text_of(in_folder("said.txt")), *text = text_of(in_folder("o.ply"));
-    assert_non_null(strstr(said, "Euler characteristic 1"));   // a closed tree with one opening
+    char *message = text_of(in_folder("said.txt")), *text = text_of(in_folder("o.ply"));
+    assert_non_null(strstr(message, "Euler characteristic 1")); // a closed tree with one opening
     assert_non_null(strstr(text, "property int node\nproperty float error_mm\nproperty float data_mm\nelement face"));
     int vertices = 0, close = 0;
     assert_int_equal(sscanf(strstr(text, "element vertex"), "element vertex %d", &vertices), 1);
@@ -99,7 +99,7 @@ static void vertices_carry_their_errors(void **state)
     }
     assert_true(close > 0.9 * vertices);   // fitted to a tenth of a mm
     free(text);
-    free(said);
+    free(message);
     assert_int_equal(seldinger("export", in_folder("model.h5"), "--cell-mm 0.3", in_folder("o.vtp")), 0);
     text = text_of(in_folder("o.vtp"));
     XML_Parser parser = XML_ParserCreate(NULL);

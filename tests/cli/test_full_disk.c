@@ -47,7 +47,7 @@ static void failed(const char *arguments, int expected, const char *words)
 {
     int code = run_in("", arguments);
     if (code != expected || !strstr(output, words))
-        fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", arguments, code, output, expected, words);
+        fail_msg("`%s` ended with %d and printed: %s(expected %d and '%s')", arguments, code, output, expected, words);
 }
 
 // Collects standard error; standard output is full.
@@ -81,7 +81,7 @@ static void standard_output_that_is_full(void **state)
     for (size_t i = 0; i < sizeof arguments / sizeof *arguments; i++) {
         int code = run_full(arguments[i]);
         if (code == 0 || (!strstr(output, "cannot be written") && !strstr(output, "cannot write to standard output")))
-            fail_msg("`%s` to a full device ended with %d and said: %s", arguments[i], code, output);
+            fail_msg("`%s` to a full device ended with %d and printed: %s", arguments[i], code, output);
     }
     // closed standard output: allowed if nothing is printed; printed text must not go into another file
     char command[1000];

@@ -62,7 +62,7 @@ static void refused(const char *arguments, const char *name)
     if (code == 124 || code == 137)
         fail_msg("`%s` hangs", arguments);
     if (code != 2 || !strstr(output, name))
-        fail_msg("`%s` ended with %d and said: %s(expected 2 and '%s')", arguments, code, output, name);
+        fail_msg("`%s` ended with %d and printed: %s(expected 2 and '%s')", arguments, code, output, name);
 }
 
 static void what_is_no_file_is_refused(void **state)
@@ -148,7 +148,7 @@ static void ends_in_little_memory(const char *arguments, int expected, const cha
     // the shadow memory of a sanitizer is larger
     int code = run_in(WHOLE_RUN ? "ulimit -v 400000 && timeout -k 1 60" : "timeout -k 1 60", arguments);
     if (code != expected || !strstr(output, words))
-        fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", arguments, code, output, expected, words);
+        fail_msg("`%s` ended with %d and printed: %s(expected %d and '%s')", arguments, code, output, expected, words);
 }
 
 static void a_stream_is_read_as_far_as_its_header_says(void **state)

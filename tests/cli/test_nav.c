@@ -51,7 +51,7 @@ static bool is_installed(const char *program)
 // Xvfb finds a free display number and prints it.
 static int open_display(void **state)
 {
-    int said[2];
+    int message[2];
     char number[16] = ":", display[32] = "-displayfd";
     assert_int_equal(make_folder(state), 0);
     put("scene.yaml", scene);
@@ -63,19 +63,19 @@ static int open_display(void **state)
 #endif
     if (!is_installed("Xvfb") || !is_installed("xdotool"))
         return 0;
-    assert_int_equal(pipe(said), 0);
+    assert_int_equal(pipe(message), 0);
     server = fork();
     if (server == 0) {
         char descriptor[16];
-        snprintf(descriptor, sizeof descriptor, "%d", said[1]);
+        snprintf(descriptor, sizeof descriptor, "%d", message[1]);
         if (!freopen("/dev/null", "w", stderr))
             _exit(1);
         execlp("Xvfb", "Xvfb", display, descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", (char *)NULL);
         _exit(1);
     }
-    close(said[1]);
-    ssize_t length = read(said[0], number + 1, sizeof number - 2);
-    close(said[0]);
+    close(message[1]);
+    ssize_t length = read(message[0], number + 1, sizeof number - 2);
+    close(message[0]);
     assert_true(length > 0);
     number[strcspn(number, "\n")] = 0;
     return setenv("DISPLAY", number, 1);
@@ -237,9 +237,9 @@ static void a_session_continues_from_a_moment_of_another(void **state)
     // not in another scene
     RUNS(2, "sed 's/friction: 0.05/friction: 0.06/' scene.yaml > other.yaml; %s nav other.yaml --resume '%s' --duration-s 1 >out.txt 2>&1", SELDINGER_PROGRAM,
          path);
-    char *said = text_of(in_folder("out.txt"));
-    assert_non_null(strstr(said, "is a recording of another scene"));
-    free(said);
+    char *message = text_of(in_folder("out.txt"));
+    assert_non_null(strstr(message, "is a recording of another scene"));
+    free(message);
 }
 
 // Moves the thread by the arrow keys, then both tools by two hands, then both locked, then releases them, while the window draws.
@@ -357,9 +357,9 @@ static void a_missing_display_is_reported(void **state)
 {
     (void)state;
     RUNS(2, "DISPLAY= WAYLAND_DISPLAY= %s nav scene.yaml --no-record >out.txt 2>&1", SELDINGER_PROGRAM);
-    char *said = text_of(in_folder("out.txt"));
-    assert_non_null(strstr(said, "no display"));
-    free(said);
+    char *message = text_of(in_folder("out.txt"));
+    assert_non_null(strstr(message, "no display"));
+    free(message);
 }
 
 int main(int argc, char **argv)

@@ -70,7 +70,7 @@ static void refused(const char *arguments, const char *words)
         pclose(pipe);
     }
     if (code != 2 || !strstr(output, words))
-        fail_msg("`%s` ended with %d and said: %s(expected 2 and '%s')", arguments, code, output, words);
+        fail_msg("`%s` ended with %d and printed: %s(expected 2 and '%s')", arguments, code, output, words);
     if (strcmp(before, after) != 0)
         fail_msg("`%s` changed files", arguments);
 }

@@ -18,7 +18,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/seldinger-replay-XXXXXX", said[1 << 14];
+static char folder[] = "/tmp/seldinger-replay-XXXXXX", message_text[1 << 14];
 #include "tests/folder.h"
 
 static const char tube_scene[] = "seldinger: 1\n"
@@ -33,7 +33,7 @@ static const char model_scene[] = "seldinger: 1\n"
                                   "sheath: {entry_mm: [0, 0, 0], direction: [0, 0, 1], inserted_mm: 1}\n"
                                   "script: [[0, 10, 0], [0.2, 0, 90], [0.25, 0, 0]]\n";
 
-// The output goes to `said`; $S in a command is the program.
+// The output goes to `message_text`; $S in a command is the program.
 static int run(const char *format, ...)
 {
     char command[2000], text[1500];
@@ -44,7 +44,7 @@ static int run(const char *format, ...)
     snprintf(command, sizeof command, "cd '%s' && S='%s' && { %s ; } 2>&1", folder, SELDINGER_PROGRAM, text);
     FILE *pipe = popen(command, "r");
     assert_non_null(pipe);
-    said[fread(said, 1, sizeof said - 1, pipe)] = 0;
+    message_text[fread(message_text, 1, sizeof message_text - 1, pipe)] = 0;
     int status = pclose(pipe);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
@@ -52,8 +52,8 @@ static int run(const char *format, ...)
 static void ends(int code, const char *words, const char *command)
 {
     int ended = run("%s", command);
-    if (ended != code || !strstr(said, words))
-        fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", command, ended, said, code, words);
+    if (ended != code || !strstr(message_text, words))
+        fail_msg("`%s` ended with %d and printed: %s(expected %d and '%s')", command, ended, message_text, code, words);
 }
 
 static int set_up(void **state)
@@ -107,7 +107,7 @@ static void a_run_is_simulated_again(void **state)
     (void)state;
     ends(0, "300 steps (0.300 s) simulated again, the same state at each", "$S replay bend.h5 --verify");
     ends(0, "", "$S replay bend.h5 --verify --quiet");
-    assert_string_equal(said, "");
+    assert_string_equal(message_text, "");
     // from any folder, even if the scene's own file was changed since
     ends(0, "250 steps", "mkdir -p elsewhere/deep && cd elsewhere/deep && $S replay ../../capsule.h5 --verify");
     ends(0, "250 steps", "cd / && $S replay \"$OLDPWD/capsule.h5\" --verify");
@@ -137,8 +137,8 @@ static void a_model_that_is_no_longer_the_same_is_named(void **state)
     ends(1, "models/capsule.h5: is not what the recording was made with; its sha256 was ",
          "cp models/capsule.h5 kept.h5 && $S synth capsule --radius-mm 0.8 -o models/tree.h5 --quiet && $S fit models/tree.h5 -o models/capsule.h5 --quiet && "
          "$S replay capsule.h5 --verify");
-    assert_non_null(strstr(said, "differs from step"));
-    assert_null(strstr(said, "capsule.yaml"));
+    assert_non_null(strstr(message_text, "differs from step"));
+    assert_null(strstr(message_text, "capsule.yaml"));
     ends(2, "models/capsule.h5: cannot be opened", "rm models/capsule.h5 && $S replay capsule.h5 --verify");
     ends(0, "250 steps", "mv kept.h5 models/capsule.h5 && $S replay capsule.h5 --verify");
 }

@@ -154,9 +154,9 @@ static void the_page_of_a_model_is_whole(void **state)
     char arguments[500];
     snprintf(arguments, sizeof arguments, "'%s' --report '%s'", in_folder("model.h5"), in_folder("model.html"));
     assert_int_equal(info(arguments), 0);
-    char *said = text_of(in_folder("out.txt"));
-    assert_non_null(strstr(said, "nodes"));   // also the figures
-    free(said);
+    char *message = text_of(in_folder("out.txt"));
+    assert_non_null(strstr(message, "nodes")); // also the figures
+    free(message);
     Seen *seen = read_page(in_folder("model.html"));
     check_page(seen, 2 + branch_count);
     assert_int_equal(seen->svg, 3 + branch_count + 1);

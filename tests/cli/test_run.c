@@ -65,7 +65,7 @@ static void expect_bad(const char *scene, const char *arguments, const char *wor
     snprintf(all, sizeof all, "%s --summary left.json --final left.csv --record left.h5", arguments);
     int code = run(all);
     if (code != 2 || !strstr(output, words))
-        fail_msg("`%s` ended with %d and said: %s(expected 2 and '%s')", arguments, code, output, words);
+        fail_msg("`%s` ended with %d and printed: %s(expected 2 and '%s')", arguments, code, output, words);
     assert_false(exists("left.json") || exists("left.csv") || exists("left.h5"));
 }
 
@@ -314,9 +314,9 @@ static void a_full_disk_ends_with_3(void **state)
     int status = system(command);
     assert_true(WIFEXITED(status));
     assert_true(WEXITSTATUS(status) == 3 || WEXITSTATUS(status) == 2);
-    char *said = text_of(in_folder("full.txt"));
-    assert_non_null(strstr(said, "full.h5"));
-    free(said);
+    char *message_text = text_of(in_folder("full.txt"));
+    assert_non_null(strstr(message_text, "full.h5"));
+    free(message_text);
     assert_false(exists("full.h5"));
     assert_int_equal(run("run good.yaml --summary /dev/full"), 3);
     assert_non_null(strstr(output, "/dev/full: cannot be written: No space left"));

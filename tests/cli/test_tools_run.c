@@ -95,7 +95,7 @@ static void ends(int code, const char *words, const char *arguments)
     int ended = run(line);
     char *text = text_of(in_folder("output.txt"));
     if (ended != code || !strstr(text, words))
-        fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", line, ended, text, code, words);
+        fail_msg("`%s` ended with %d and printed: %s(expected %d and '%s')", line, ended, text, code, words);
     free(text);
 }
 

@@ -141,7 +141,7 @@ static void tools_are_found_in_the_scene(void **state)
         free(map);
     }
     static const struct {
-        const char *tool, *said;
+        const char *tool, *message;
     } bad[] = {{"4", "the scene has no such tool; write guide, micro, thread, outermost"},
                {"microcatheter", "no such tool"},
                {"catheter", "2 of that kind; choose one: guide, micro, thread"}};
@@ -151,8 +151,8 @@ static void tools_are_found_in_the_scene(void **state)
         faults_clear(&faults);
         assert_false(device_map_find_tools(map, &three, &faults));
         assert_int_equal(faults.count, 1);
-        if (!strstr(faults.text[0], bad[i].said) || strncmp(faults.text[0], "m.yaml:3:", 9))
-            fail_msg("said: %s", faults.text[0]);
+        if (!strstr(faults.text[0], bad[i].message) || strncmp(faults.text[0], "m.yaml:3:", 9))
+            fail_msg("first fault: %s", faults.text[0]);
         free(map);
     }
     // with one tool, both ends and outer and inner are that tool

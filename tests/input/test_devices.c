@@ -19,37 +19,37 @@
 #include <unistd.h>
 
 // Puts both outputs of the program into the buffer; returns its exit code.
-static int run(const char *arguments, char *said, size_t capacity)
+static int run(const char *arguments, char *message, size_t capacity)
 {
     char command[1024];
     snprintf(command, sizeof command, "'%s' devices %s 2>&1", SELDINGER_PROGRAM, arguments);
     FILE *pipe = popen(command, "r");
     assert_non_null(pipe);
-    size_t used = fread(said, 1, capacity - 1, pipe);
-    said[used] = 0;
+    size_t used = fread(message, 1, capacity - 1, pipe);
+    message[used] = 0;
     int status = pclose(pipe);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-static char said[1 << 18];
+static char message[1 << 18];
 
 static void the_list_names_all_kinds(void **state)
 {
     (void)state;
-    assert_int_equal(run("", said, sizeof said), 0);
-    assert_true(strstr(said, "HID devices") && strstr(said, "USB serial encoders"));
-    assert_int_equal(run("--map scenes/devices/roller.yaml --map scenes/devices/serial_encoder.yaml --quiet", said, sizeof said), 0);
-    assert_string_equal(said, "");
-    assert_int_equal(run("--map scenes/devices/roller.yaml", said, sizeof said), 0);
-    assert_non_null(strstr(said, "scenes/devices/roller.yaml: '"));
-    assert_int_equal(run("--watch --duration-s 0.05", said, sizeof said), 0);
+    assert_int_equal(run("", message, sizeof message), 0);
+    assert_true(strstr(message, "HID devices") && strstr(message, "USB serial encoders"));
+    assert_int_equal(run("--map scenes/devices/roller.yaml --map scenes/devices/serial_encoder.yaml --quiet", message, sizeof message), 0);
+    assert_string_equal(message, "");
+    assert_int_equal(run("--map scenes/devices/roller.yaml", message, sizeof message), 0);
+    assert_non_null(strstr(message, "scenes/devices/roller.yaml: '"));
+    assert_int_equal(run("--watch --duration-s 0.05", message, sizeof message), 0);
 }
 
 static void the_json_is_whole(void **state)
 {
     (void)state;
-    assert_int_equal(run("--map scenes/devices/roller.yaml --json -", said, sizeof said), 0);
-    cJSON *object = cJSON_Parse(said);
+    assert_int_equal(run("--map scenes/devices/roller.yaml --json -", message, sizeof message), 0);
+    cJSON *object = cJSON_Parse(message);
     assert_non_null(object);
     const cJSON *map = cJSON_GetArrayItem(cJSON_GetObjectItem(object, "maps"), 0);
     assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(map, "file")), "scenes/devices/roller.yaml");
@@ -70,17 +70,17 @@ static void wrong_use_and_wrong_maps_are_reported(void **state)
     assert_int_equal(write(file, text, sizeof text - 1), (long)sizeof text - 1);
     close(file);
     snprintf(arguments, sizeof arguments, "--map %s", path);
-    assert_int_equal(run(arguments, said, sizeof said), 2);
-    assert_non_null(strstr(said, ":3:"));
-    assert_null(strstr(said, "HID devices"));
+    assert_int_equal(run(arguments, message, sizeof message), 2);
+    assert_non_null(strstr(message, ":3:"));
+    assert_null(strstr(message, "HID devices"));
     unlink(path);
     static const char *const wrong[] = {
         "--nothing", "file.yaml", "--map", "--map /nowhere.yaml", "--duration-s 3", "--watch --duration-s -1", "--json /nowhere/f.json"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
-        if (run(wrong[i], said, sizeof said) != 2 || !said[0])
-            fail_msg("devices %s said '%s'", wrong[i], said);
-    assert_int_equal(run("--help", said, sizeof said), 0);
-    assert_non_null(strstr(said, "--watch"));
+        if (run(wrong[i], message, sizeof message) != 2 || !message[0])
+            fail_msg("devices %s printed '%s'", wrong[i], message);
+    assert_int_equal(run("--help", message, sizeof message), 0);
+    assert_non_null(strstr(message, "--watch"));
 }
 
 // The list and the output of --watch for a simulated device (fake_hid.h).
@@ -107,7 +107,7 @@ static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **stat
     bool watched = devices_watch(&transport, &listing, 1, 0.2), none = devices_watch(&transport, NULL, 0, 0.2);
     fflush(stdout);
     dup2(kept, STDOUT_FILENO);
-    said[pread(file, said, sizeof said - 1, 0)] = 0;
+    message[pread(file, message, sizeof message - 1, 0)] = 0;
     close(file);
     close(kept);
     unlink(path);
@@ -115,8 +115,8 @@ static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **stat
     static const char *const words[] = {"2 reports, 1 not described by the descriptor", "logical_min -512, logical_max 496 so far", "twist 240.0 deg/s",
                                         "push 40.00 mm/s", ", pedal"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (!strstr(said, words[i]))
-            fail_msg("'%s' is not in <<%s>>", words[i], said);
+        if (!strstr(message, words[i]))
+            fail_msg("'%s' is not in <<%s>>", words[i], message);
     free(listing.descriptor);
     free((void *)(uintptr_t)listing.map);
     free(hid);

@@ -27,7 +27,7 @@ typedef struct Session {
     Hands *hands;
     HidTransport transport;
     DeviceMap *map;
-    char said[4000];
+    char message[4000];
 } Session;
 
 static void open_session(Session *session, const char *map_text)
@@ -65,9 +65,9 @@ static bool heard(Session *session, const char *words)
 {
     char text[400];
     while (hands_message(session->hands, text, sizeof text))
-        if (strlen(session->said) + strlen(text) + 2 < sizeof session->said)
-            strcat(strcat(session->said, text), "\n");
-    return strstr(session->said, words) != NULL;
+        if (strlen(session->message) + strlen(text) + 2 < sizeof session->message)
+            strcat(strcat(session->message, text), "\n");
+    return strstr(session->message, words) != NULL;
 }
 
 // Waits until the condition holds, at most 10 s.
@@ -240,7 +240,7 @@ static void what_cannot_be_used_is_reported_once(void **state)
     wait_for(heard(&session, "logical range from 10 to 5") && heard(&session, "no permission"));
     fake_sleep_us(100000);
     heard(&session, "");
-    const char *first = strstr(session.said, "logical range");
+    const char *first = strstr(session.message, "logical range");
     assert_null(strstr(first + 1, "logical range"));
     pthread_mutex_lock(&session.hid->lock);
     shut->may_not_open = false;

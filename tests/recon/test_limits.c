@@ -89,10 +89,10 @@ static void the_tree_ends_at_until(void **state)
             assert_true(nearest_to(tree, placed(vec3(10, 10, 15), variant)) > 1.5);
             assert_true(nearest_to(tree, placed(vec3(10, 17, 20.8), variant)) > 3);
             assert_true(nearest_to(tree, placed(vec3(4, 10, 13.3), variant)) < 0.8);
-            bool said = false;
+            bool is_reported = false;
             for (int b = 0; b < report.branch_count; b++)
-                said = said || strstr(report.branch[b].end, "until");
-            assert_true(said);
+                is_reported = is_reported || strstr(report.branch[b].end, "until");
+            assert_true(is_reported);
             rbt_report_free(&report);
             vessel_tree_free(tree);
             volume_free(v);

@@ -161,10 +161,10 @@ static void a_vessel_in_noise_is_found(void **state)
                 const RbtStartCheck *c = &report.check;
                 length = report.branch[0].length;
                 right += off_axis(&a, c->cylinder.center) < 0.5 * radius && fabs(c->cylinder.radius / radius - 1) < 0.3 && length > 4 * radius;
-                bool said = false;
+                bool warns = false;
                 for (int i = 0; i < c->warning_count; i++)
-                    said = said || c->warning[i].kind == RBT_NOISE;
-                assert_true(said && c->smoothing_mm > 0 && fabs(c->noise / 16 - 1) < 0.1);
+                    warns = warns || c->warning[i].kind == RBT_NOISE;
+                assert_true(warns && c->smoothing_mm > 0 && fabs(c->noise / 16 - 1) < 0.1);
             }
             print_message("seed %d, band %d: %s, start %.2f radii off the axis, radius %.2f of the true, first branch %.0f mm\n", seed, k,
                           tree ? "tracked" : faults.text[0], off_axis(&a, report.check.cylinder.center) / radius, report.check.cylinder.radius / radius,
