@@ -32,4 +32,7 @@
 #include "geom/vessel_branches.h"
 #include "geom/vessel_findings.h"
 
+// swept models
+#include "geom/section.h"
+
 #endif
