@@ -121,8 +121,8 @@ static bool options_are_valid(const SectionOptions *o)
 
 Section *section_create(const SectionOptions *options, int count, const SectionPoint *contour)
 {
-    static Section *(*const create[SECTION_KINDS])(const SectionOptions *, int, const SectionPoint *, double) = {
-        section_polar_create, section_raster_create, section_rbf_create, section_pas_create};
+    static Section *(*const create[SECTION_KINDS])(const SectionOptions *, int, const SectionPoint *, double) = {section_polar_create, section_raster_create,
+                                                                                                                 section_rbf_create, section_pas_create};
     if ((unsigned)options->kind >= SECTION_KINDS || !options_are_valid(options) || count < 3 || count > CONTOUR_MOST)
         return NULL;
     for (int i = 0; i < count; i++)

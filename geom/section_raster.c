@@ -53,8 +53,8 @@ static void chamfer_distances(const bool *inside, double h, double *t)
     static const double FAR = 1e6, SIDEWAYS = 1, DIAGONAL = 1.4;
     for (int at = 0; at < SIDE * SIDE; at++) {
         int i = at % SIDE, j = at / SIDE;
-        bool beside = (i > 0 && inside[at] != inside[at - 1]) || (i < SIDE - 1 && inside[at] != inside[at + 1]) ||
-                      (j > 0 && inside[at] != inside[at - SIDE]) || (j < SIDE - 1 && inside[at] != inside[at + SIDE]);
+        bool beside = (i > 0 && inside[at] != inside[at - 1]) || (i < SIDE - 1 && inside[at] != inside[at + 1]) || (j > 0 && inside[at] != inside[at - SIDE]) ||
+                      (j < SIDE - 1 && inside[at] != inside[at + SIDE]);
         t[at] = beside ? 0.5 : FAR;
     }
     for (int sweep = 0; sweep < 2; sweep++)

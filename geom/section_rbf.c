@@ -55,7 +55,8 @@ static void positive_eigenvector(double m[3][3], double vector[3])
             for (int j = i + 1; j < 3; j++) {
                 if (m[i][j] == 0)
                     continue;
-                double theta = 0.5 * (m[j][j] - m[i][i]) / m[i][j], t = (theta >= 0 ? 1 : -1) / (fabs(theta) + sqrt(theta * theta + 1)), c = 1 / sqrt(t * t + 1), s = t * c;
+                double theta = 0.5 * (m[j][j] - m[i][i]) / m[i][j], t = (theta >= 0 ? 1 : -1) / (fabs(theta) + sqrt(theta * theta + 1)),
+                       c = 1 / sqrt(t * t + 1), s = t * c;
                 for (int k = 0; k < 3; k++) {
                     double a = m[k][i], b = m[k][j];
                     m[k][i] = c * a - s * b, m[k][j] = s * a + c * b;

@@ -62,7 +62,8 @@ static void derivatives_agree_with_differences(void **state)
             if (!smooth)     // a knot of the kernel or a line of the raster lies between
                 continue;
             worst_first = fmax(worst_first, fmax(fabs((e.value - w.value) / (2 * h) - j.n), fabs((u.value - d.value) / (2 * h) - j.b)));
-            worst_second = fmax(worst_second, fmax(fabs((e.n - w.n) / (2 * h) - j.nn), fmax(fabs((u.b - d.b) / (2 * h) - j.bb), fabs((u.n - d.n) / (2 * h) - j.nb))));
+            worst_second =
+                fmax(worst_second, fmax(fabs((e.n - w.n) / (2 * h) - j.nn), fmax(fabs((u.b - d.b) / (2 * h) - j.bb), fabs((u.n - d.n) / (2 * h) - j.nb))));
         }
         printf("%s%s: derivatives differ by %.1e and %.1e\n", section_kind_name[k / 2], k % 2 ? " as printed" : "", worst_first, worst_second);
         // differences of step h have an error of h^2 times the third derivative; kernels with knots one of h times its jump
@@ -278,16 +279,11 @@ static void invalid_contours_are_rejected(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(derivatives_agree_with_differences),
-        cmocka_unit_test(all_kinds_hold_a_star),
-        cmocka_unit_test(rbf_reproduces_an_ellipse),
-        cmocka_unit_test(rbf_as_printed_passes_through_its_points),
-        cmocka_unit_test(pas_as_printed_shrinks_by_its_law),
-        cmocka_unit_test(pas_is_an_indicator_away_from_its_contour),
-        cmocka_unit_test(pas_keeps_the_contours_area),
-        cmocka_unit_test(raster_gives_distances),
-        cmocka_unit_test(a_kidney_is_not_star_shaped),
-        cmocka_unit_test(direction_of_the_contour_does_not_matter),
+        cmocka_unit_test(derivatives_agree_with_differences), cmocka_unit_test(all_kinds_hold_a_star),
+        cmocka_unit_test(rbf_reproduces_an_ellipse),          cmocka_unit_test(rbf_as_printed_passes_through_its_points),
+        cmocka_unit_test(pas_as_printed_shrinks_by_its_law),  cmocka_unit_test(pas_is_an_indicator_away_from_its_contour),
+        cmocka_unit_test(pas_keeps_the_contours_area),        cmocka_unit_test(raster_gives_distances),
+        cmocka_unit_test(a_kidney_is_not_star_shaped),        cmocka_unit_test(direction_of_the_contour_does_not_matter),
         cmocka_unit_test(invalid_contours_are_rejected),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
