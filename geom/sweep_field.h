@@ -92,6 +92,10 @@ typedef struct SweepBlend {
 
 // One branch alone at x; Newton for t starts from `start`.
 void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part);
+// The same at a known t, which the segment holds; leaves `branch`, `share` and `sac` unset.
+void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, SweepPart *part);
+// A sac alone at x, from a node near x.
+void sweep_field_sac(const SweepField *field, int node, Vec3 x, SweepPart *part);
 // The blended field at x, as seen from a place.
 void sweep_field_blend(const SweepField *field, SweepPlace place, Vec3 x, SweepBlend *blend);
 
