@@ -60,8 +60,9 @@ static void set_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes
     SweepPartLanes *p = &b->part[k];
     for (int i = 0; i < FOOT_BLOCK; i++) {
         const SweepView *view = b->view[i];
-        bool is_there = (lanes >> i & 1) && k < view->count;
-        if (!is_there) {
+        if (!(lanes >> i & 1) && k < view->count)
+            continue;    // a lane that is done keeps its parts
+        if (k >= view->count) {
             p->absent[i] = 1;
             p->segment[i] = field->segment, p->t[i] = 0, p->longest[i] = 1, p->delta[i] = p->reach_inverse[i] = 0, p->away[i] = 0;
             continue;
@@ -98,14 +99,14 @@ static void evaluate_dome(const SweepBlock *b, SweepPartLanes *p, int i, bool ma
     p->hyy[i] = part.hessian.yy, p->hyz[i] = part.hessian.yz, p->hzz[i] = part.hessian.zz;
 }
 
-static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned needed)
+static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes, unsigned needed)
 {
     SweepPartLanes *p = &b->part[k];
     SweepLane own;
     bool any = false;
     for (int i = 0; i < FOOT_BLOCK; i++) {
-        own[i] = b->own[i] == k ? 1 : 0;
-        any |= b->own[i] == k;
+        own[i] = b->own[i] == k && (lanes >> i & 1) ? 1 : 0;
+        any |= own[i] > 0;
     }
     feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, feet->harmonics, any ? &b->ring : NULL, own);
     for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -181,7 +182,7 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
             own |= 1u << b->own[i];
     for (int k = 0; k < parts; k++)
         if (own >> k & 1) {
-            evaluate_part(feet, b, k, lanes);
+            evaluate_part(feet, b, k, lanes, lanes);
             evaluated |= 1u << k;
         }
     for (int i = 0; i < FOOT_BLOCK && parts > 1; i++) {
@@ -193,7 +194,7 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
     for (int k = 0; k < parts && parts > 1; k++) {
         unsigned needed = own >> k & 1 ? 0 : lanes_that_need(b, k, lanes, most);
         if (needed != 0) {
-            evaluate_part(feet, b, k, needed);
+            evaluate_part(feet, b, k, lanes, needed);
             evaluated |= 1u << k;
         }
     }
@@ -231,8 +232,8 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
         unsigned others = 0;
         set_part(feet, b, k, lanes);
         for (int i = 0; i < FOOT_BLOCK; i++) {
-            others |= b->part[k].absent[i] == 0 && k != b->own[i] ? 1u << i : 0;
-            if (k == b->own[i])
+            others |= (lanes >> i & 1) && b->part[k].absent[i] == 0 && k != b->own[i] ? 1u << i : 0;
+            if ((lanes >> i & 1) && k == b->own[i])
                 b->part[k].away[i] = first.away[i];
         }
         if (others != 0)
@@ -247,13 +248,13 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
             continue;
         feet->kernels->blend(&b->foot.at, &b->part[k], share);
         for (int i = 0; i < FOOT_BLOCK; i++)
-            if (share[i] > 0.5 && b->part[k].absent[i] == 0)
+            if ((lanes >> i & 1) && share[i] > 0.5 && b->part[k].absent[i] == 0)
                 b->owner[i] = k;
     }
     if (sacs != 0)
         blend_sacs(feet, b, lanes, sacs);
     for (int i = 0; i < FOOT_BLOCK; i++)
-        b->keeps_t[i] = true;
+        b->keeps_t[i] = b->keeps_t[i] || (lanes >> i & 1);
 }
 
 // --- Feet ---
@@ -338,7 +339,7 @@ int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int cou
         f->state[i] = FOOT_PENDING;
     }
     for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
-        sweep_block_sample(feet, &b, all & ~done);
+        sweep_block_sample(feet, &b, round == 0 ? FOOT_ALL : all & ~done);
         done = feet->kernels->newton(f, true);
     }
     if ((done & all) != all)
@@ -428,6 +429,47 @@ static void fill_ring(const SweepFeet *feet, Vec3 x, int branch, double t, Rings
     rings->radius = which == RINGS / 2 ? term[0] : rings->radius;
 }
 
+// Removes the points of a branch's rings that lie inside another branch, which is seen from t on it, or inside a sac: they are no wall.
+static void drop_inner(const SweepFeet *feet, Rings *rings, double limit, int branch, double t, int sac)
+{
+    SweepPartLanes p = {.absent = {0}};
+    SweepLane x, y, z;
+    for (int i = 0; i < RINGS; i++)
+        for (int k = 0; k < SWEEP_RING; k += FOOT_BLOCK) {
+            unsigned near = 0, outside;
+            for (int l = 0; l < FOOT_BLOCK; l++) {
+                Vec3 at = rings->at[i][k + l];
+                near |= rings->far2[i][k + l] < limit * limit ? 1u << l : 0;
+                x[l] = at.x, y[l] = at.y, z[l] = at.z;
+            }
+            if (near == 0)
+                continue;
+            for (int l = 0; l < FOOT_BLOCK && branch >= 0; l++) {
+                p.t[l] = t, p.longest[l] = 2 * feet->field->model->branch[branch].radius, p.settled[l] = near >> l & 1 ? 0 : 1;
+                p.segment[l] = feet->field->segment + sweep_field_segment(feet->field, branch, t);
+            }
+            for (int round = 0; round < 6 && branch >= 0; round++) {
+                unsigned again = feet->kernels->seek(&p, x, y, z, &outside) & near;
+                for (outside &= near; outside != 0; outside &= outside - 1) {
+                    int l = __builtin_ctz(outside);
+                    p.segment[l] = feet->field->segment + neighbour(feet->field, p.segment[l], p.t[l]);
+                }
+                if (again == 0)
+                    break;
+            }
+            if (branch >= 0)
+                feet->kernels->depth(&p, x, y, z, feet->harmonics);
+            for (; near != 0; near &= near - 1) {
+                int l = __builtin_ctz(near);
+                SweepPart part = {.f = p.f[l]};
+                if (branch < 0)
+                    sweep_field_sac(feet->field, sac, rings->at[i][k + l], &part);
+                if (part.f > 0)
+                    rings->far2[i][k + l] = HUGE_VAL;
+            }
+        }
+}
+
 // Returns whether no neighbour on the rings is nearer.
 static bool is_least(const Rings *r, int ring, int k)
 {
@@ -438,12 +480,24 @@ static bool is_least(const Rings *r, int ring, int k)
     return true;
 }
 
-static void add_rings(const SweepFeet *feet, Vec3 x, int branch, double t, double reach, double limit, SweepStart *start, int *count, int most)
+// The branches that are seen, with t of x on them.
+typedef struct Seen {
+    int count, sac;
+    int branch[SWEEP_CANDIDATES];
+    double t[SWEEP_CANDIDATES];
+} Seen;
+
+static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
     Rings rings;
     for (int i = 0; i < RINGS; i++)
-        fill_ring(feet, x, branch, t + ASIDE * (i - RINGS / 2) * reach, &rings, i);
+        fill_ring(feet, x, seen->branch[which], seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
+    for (int i = 0; i < seen->count; i++)
+        if (i != which)
+            drop_inner(feet, &rings, limit, seen->branch[i], seen->t[i], -1);
+    if (seen->sac >= 0)
+        drop_inner(feet, &rings, limit, -1, 0, seen->sac);
     for (int i = 0; i < RINGS; i++)
         for (int k = 0; k < SWEEP_RING; k++) {
             if (!(rings.far2[i][k] < limit * limit) || !is_least(&rings, i, k))
@@ -479,17 +533,22 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, double limit, 
     SEL_ASSERT(most > 0 && most <= SWEEP_FEET && limit > 0, "starts fit into a block");
     const SweepField *field = feet->field;
     const SweepView *view = view_of(field, place);
-    int count = 0, sac = place.branch >= 0 ? view->sac : place.sac;
+    Seen seen = {.count = view->count, .sac = place.branch >= 0 ? view->sac : place.sac};
+    int count = 0;
     for (int i = 0; i < view->count; i++) {
         const SweepCandidate *c = &view->of[i];
-        double from = c->branch == place.branch ? place.t : c->t + (place.branch >= 0 ? c->slope * fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0);
-        double radius = field->model->branch[c->branch].radius, t = sweep_curve_project(field->curve[c->branch], x, from, 2 * radius);
-        double largest = sweep_field_largest(field, c->branch, t);
-        if (vec3_distance(x, sweep_curve_at(field->curve[c->branch], t).s) - largest < limit)
-            add_rings(feet, x, c->branch, t, fmin(limit, largest), limit, start, &count, most);
+        double at = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
+        double from = c->branch == place.branch ? place.t : c->t + c->slope * at;
+        seen.branch[i] = c->branch;
+        seen.t[i] = sweep_curve_project(field->curve[c->branch], x, from, 2 * field->model->branch[c->branch].radius);
     }
-    if (sac >= 0)
-        add_sac(feet, x, sac, limit, start, &count, most);
+    for (int i = 0; i < seen.count; i++) {
+        double largest = sweep_field_largest(field, seen.branch[i], seen.t[i]);
+        if (vec3_distance(x, sweep_curve_at(field->curve[seen.branch[i]], seen.t[i]).s) - largest < limit)
+            add_rings(feet, x, &seen, i, fmin(limit, largest), limit, start, &count, most);
+    }
+    if (seen.sac >= 0)
+        add_sac(feet, x, seen.sac, limit, start, &count, most);
     return count;
 }
 

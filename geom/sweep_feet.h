@@ -31,7 +31,9 @@ typedef struct SweepBlock {
 
 // Sets a lane's place; the parts' t are found from it.
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int lane, int segment, int sac, double t);
-// F, gradient and Hessian at the feet of the lanes in `lanes` (bits); the others hold numbers.
+enum { FOOT_ALL = (1 << FOOT_BLOCK) - 1 };
+// F, gradient and Hessian at the feet of the lanes in `lanes` (bits). The first sample of a block is one of FOOT_ALL; lanes that are left out later keep their
+// parts and owners.
 void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes);
 
 typedef struct SweepFoot {

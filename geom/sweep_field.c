@@ -179,14 +179,14 @@ static double blend_width(const SweepField *field, const SweepPart *p, Vec3 *gra
     if (p->branch < 0)
         return field->sac[p->sac].delta;
     const SweepFork *fork = &field->fork[p->branch];
-    double s = p->t / fork->reach, left = 1 - s * s;
-    if (!(left > 0) || !(fork->delta > 0))
-        return 0;
-    double slope = -4 * fork->delta * left * s / fork->reach, bend = fork->delta * (8 * s * s - 4 * left) / (fork->reach * fork->reach);
+    double s = fork->reach > 0 ? p->t / fork->reach : 2, left = 1 - s * s, varied = (1 - SWEEP_LEAST_BLEND) * fork->delta;
+    if (!(left > 0))
+        return SWEEP_LEAST_BLEND * fork->delta;
+    double slope = -4 * varied * left * s / fork->reach, bend = varied * (8 * s * s - 4 * left) / (fork->reach * fork->reach);
     *gradient = vec3_scale(p->t_gradient, slope);
     sym3_add(hessian, slope, &p->t_hessian);
     sym3_add_outer(hessian, bend, p->t_gradient);
-    return fork->delta * left * left;
+    return SWEEP_LEAST_BLEND * fork->delta + varied * left * left;
 }
 
 // Blends a part into F; the parts before it are those below `count`.

@@ -33,9 +33,11 @@ typedef struct SweepView {
     SweepCandidate of[SWEEP_CANDIDATES];
 } SweepView;
 
+// Where two branches still overlap far from their fork, delta does not fall below this part of its value at the fork.
+#define SWEEP_LEAST_BLEND 0.2
 typedef struct SweepFork {   // delta of a branch with those before it
     double delta;            // [mm] at t = 0
-    double reach;            // [mm] t beyond which there is no blending
+    double reach;            // [mm] t beyond which delta is least
 } SweepFork;
 
 // The group of blobs of one sac, by node of the sacs' tree.

@@ -41,6 +41,8 @@ typedef struct SweepKernels {
     // f, gradient and Hessian at the points, for w = 0. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
     // stored to it.
     void (*evaluate)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics, SweepRingLanes *ring, const double *own);
+    // f alone, of domes too.
+    void (*depth)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics);
     // Blends a part into the sum; `share`: the part's share, for each lane.
     void (*blend)(FootSample *sum, SweepPartLanes *part, double *share);
     // Width of the blend at t.

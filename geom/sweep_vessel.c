@@ -246,7 +246,7 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
     }
     v->feet.kernels->predict(f, REST);
     for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
-        sweep_block_sample(&v->feet, &b, all & ~done);
+        sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
         done = v->feet.kernels->newton(f, false);
     }
     v->feet.kernels->finish(f);
