@@ -87,19 +87,7 @@ static void set_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes
 
 // --- Fields ---
 
-// A dome is not computed in lanes; one that does not matter counts as absent.
-static void evaluate_dome(const SweepBlock *b, SweepPartLanes *p, int i, bool matters)
-{
-    SweepPart part = {.f = -1e300};
-    if (matters)
-        sweep_segment_evaluate(p->segment[i], vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), p->t[i], &part);
-    p->f[i] = part.f;
-    p->gx[i] = part.gradient.x, p->gy[i] = part.gradient.y, p->gz[i] = part.gradient.z;
-    p->hxx[i] = part.hessian.xx, p->hxy[i] = part.hessian.xy, p->hxz[i] = part.hessian.xz;
-    p->hyy[i] = part.hessian.yy, p->hyz[i] = part.hessian.yz, p->hzz[i] = part.hessian.zz;
-}
-
-static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes, unsigned needed)
+static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes)
 {
     SweepPartLanes *p = &b->part[k];
     SweepLane own;
@@ -110,10 +98,6 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
     }
     feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, feet->harmonics, any ? &b->ring : NULL, own);
     for (int i = 0; i < FOOT_BLOCK; i++) {
-        if (p->absent[i] > 0)
-            continue;
-        if (p->segment[i]->rise != 0)
-            evaluate_dome(b, p, i, own[i] > 0 || needed >> i & 1);
         if (own[i] > 0) {
             b->is_flat[i] = p->segment[i]->rise == 0;
             b->own_t[i] = p->t[i];
@@ -147,10 +131,9 @@ static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, uns
             b->owner[i] = -1;
 }
 
-// Returns the bits of lanes for which a part other than their own may matter. Exact: see the head of the file.
-static unsigned lanes_that_need(const SweepBlock *b, int k, unsigned lanes, const double *most)
+// Returns whether a part other than the own one may matter in a lane. Exact: see the head of the file.
+static bool lanes_need(const SweepBlock *b, int k, unsigned lanes, const double *most)
 {
-    unsigned need = 0;
     const SweepPartLanes *p = &b->part[k];
     for (int i = 0; i < FOOT_BLOCK; i++) {
         if (!(lanes >> i & 1) || p->absent[i] > 0 || k == b->own[i])
@@ -158,9 +141,10 @@ static unsigned lanes_that_need(const SweepBlock *b, int k, unsigned lanes, cons
         const SweepSegment *s = p->segment[i];
         // N and B are unit vectors except for small terms
         double away = 0.998 * same_hypot(p->away[i], s->rise * (p->t[i] - s->origin)), slack = 1e-6 * p->longest[i];
-        need |= b->own[i] < 0 || s->largest - away + slack >= b->part[b->own[i]].f[i] - most[i] ? 1u << i : 0;
+        if (b->own[i] < 0 || s->largest - away + slack >= b->part[b->own[i]].f[i] - most[i])
+            return true;
     }
-    return need;
+    return false;
 }
 
 static void clear_sum(FootSample *s)
@@ -170,6 +154,14 @@ static void clear_sum(FootSample *s)
         s->gx[i] = s->gy[i] = s->gz[i] = 0;
         s->hxx[i] = s->hxy[i] = s->hxz[i] = s->hyy[i] = s->hyz[i] = s->hzz[i] = 0;
     }
+}
+
+static void copy_part(FootSample *s, const SweepPartLanes *p)
+{
+    memcpy(s->f, p->f, sizeof p->f);
+    memcpy(s->gx, p->gx, sizeof p->gx), memcpy(s->gy, p->gy, sizeof p->gy), memcpy(s->gz, p->gz, sizeof p->gz);
+    memcpy(s->hxx, p->hxx, sizeof p->hxx), memcpy(s->hxy, p->hxy, sizeof p->hxy), memcpy(s->hxz, p->hxz, sizeof p->hxz);
+    memcpy(s->hyy, p->hyy, sizeof p->hyy), memcpy(s->hyz, p->hyz, sizeof p->hyz), memcpy(s->hzz, p->hzz, sizeof p->hzz);
 }
 
 // The own parts of all lanes first, whose fields show which other parts matter.
@@ -182,19 +174,19 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
             own |= 1u << b->own[i];
     for (int k = 0; k < parts; k++)
         if (own >> k & 1) {
-            evaluate_part(feet, b, k, lanes, lanes);
+            evaluate_part(feet, b, k, lanes);
             evaluated |= 1u << k;
         }
     for (int i = 0; i < FOOT_BLOCK && parts > 1; i++) {
+        // of two parts, the later one's delta counts; of more, two of them may have blended before they meet the own one
         most[i] = 0;
-        for (int k = 0; k < parts; k++)
+        for (int k = 1; k < parts; k++)
             if (b->part[k].absent[i] == 0)
-                most[i] += 3 * b->part[k].width[i];
+                most[i] += (b->view[i]->count == 2 ? 2 : 3) * b->part[k].width[i];
     }
     for (int k = 0; k < parts && parts > 1; k++) {
-        unsigned needed = own >> k & 1 ? 0 : lanes_that_need(b, k, lanes, most);
-        if (needed != 0) {
-            evaluate_part(feet, b, k, lanes, needed);
+        if (!(own >> k & 1) && lanes_need(b, k, lanes, most)) {
+            evaluate_part(feet, b, k, lanes);
             evaluated |= 1u << k;
         }
     }
@@ -242,6 +234,13 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
             feet->kernels->width(&b->part[k]);
     }
     unsigned evaluated = evaluate_parts(feet, b, parts, lanes);
+    if (parts == 1 && sacs == 0) {
+        copy_part(&b->foot.at, &b->part[0]);
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            if (lanes >> i & 1)
+                b->owner[i] = 0, b->keeps_t[i] = true;
+        return;
+    }
     clear_sum(&b->foot.at);
     for (int k = 0; k < parts; k++) {
         if (!(evaluated >> k & 1))

@@ -38,7 +38,7 @@ typedef struct SweepKernels {
     // Up to three Newton steps of t for the lanes that are not settled, on their segments. Returns the bits of lanes that are not settled, or whose t lies
     // outside its segment (`outside`): these need another segment.
     unsigned (*seek)(SweepPartLanes *part, const double *x, const double *y, const double *z, unsigned *outside);
-    // f, gradient and Hessian at the points, for w = 0. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
+    // f, gradient and Hessian at the points. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
     // stored to it.
     void (*evaluate)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics, SweepRingLanes *ring, const double *own);
     // f alone, of domes too.
