@@ -34,5 +34,6 @@
 
 // swept models
 #include "geom/section.h"
+#include "geom/section_row.h"
 
 #endif

@@ -1,5 +1,5 @@
 // Cross-sections of each kind: derivatives, exact curves, the laws of the papers' forms, and invalid contours.
-#include "geom/section.h"
+#include "geom/section_row.h"
 #include "random_numbers.h"
 
 #include <setjmp.h>
@@ -276,15 +276,113 @@ static void invalid_contours_are_rejected(void **state)
     }
 }
 
+// --- Rows of sections ---
+
+enum { STATIONS = 9 };
+
+// Circles whose radius grows along the row: a cone.
+static void make_cone(SectionRow *row, Section **section, double *t, double slope, double uneven)
+{
+    for (int j = 0; j < STATIONS; j++) {
+        SectionPoint contour[24];
+        t[j] = j + uneven * same_sin(2.0 * j);
+        ellipse(24, 1 + slope * t[j], 1 + slope * t[j], 0, 0, 0, contour);
+        section[j] = make(SECTION_POLAR, SECTION_MENDED, 24, contour);
+    }
+    *row = (SectionRow){.count = STATIONS, .t = t, .section = section, .weights = SECTION_PSP, .tension = 0.7, .width = 0.5};
+}
+
+static void free_all(Section **section)
+{
+    for (int j = 0; j < STATIONS; j++)
+        section_free(section[j]);
+}
+
+static void weights_of_a_row_add_up_to_one(void **state)
+{
+    (void)state;
+    SectionRow row;
+    Section *section[STATIONS];
+    double t[STATIONS];
+    make_cone(&row, section, t, 0.1, 0.3);
+    for (int k = 0; k < 4; k++) {
+        row.weights = k < 3 ? SECTION_PSP : SECTION_CATMULL_ROM;
+        row.width = k == 0 ? 0.5 : k == 1 ? 0.25 : 0.1;
+        for (double x = -1; x < 9.5; x += 0.01) {
+            SectionShares s = section_row_shares(&row, x);
+            double sum = 0, sum1 = 0, sum2 = 0;
+            for (int i = 0; i < s.count; i++)
+                sum += s.w[i], sum1 += s.w1[i], sum2 += s.w2[i];
+            assert_true(s.first >= 0 && s.first + s.count <= STATIONS);
+            assert_true(fabs(sum - 1) < 1e-14 && fabs(sum1) < 1e-12 && fabs(sum2) < 1e-11);
+        }
+    }
+    free_all(section);
+}
+
+// Derivatives in all three coordinates against differences, and their continuity where a weight begins.
+static void derivatives_of_a_row_agree_with_differences(void **state)
+{
+    (void)state;
+    SectionRow row;
+    Section *section[STATIONS];
+    double t[STATIONS], worst = 0;
+    make_cone(&row, section, t, 0.1, 0.2);
+    uint64_t seed = 11;
+    for (int i = 0; i < 2000; i++) {
+        row.weights = i % 2 ? SECTION_PSP : SECTION_CATMULL_ROM;
+        const double h = 1e-5;
+        double n = random_in(&seed, -1.5, 1.5), b = random_in(&seed, -1.5, 1.5), x = random_in(&seed, 0.2, 7.8);
+        SectionRowJet j = section_row_evaluate(&row, n, b, x), u = section_row_evaluate(&row, n, b, x + h), d = section_row_evaluate(&row, n, b, x - h);
+        worst = fmax(worst, fabs((u.value - d.value) / (2 * h) - j.t));
+        worst = fmax(worst, fmax(fabs((u.n - d.n) / (2 * h) - j.nt), fabs((u.b - d.b) / (2 * h) - j.bt)));
+        if (fabs(u.tt - d.tt) < 1e-3)        // no station between: Catmull-Rom's second derivative jumps there
+            worst = fmax(worst, fabs((u.t - d.t) / (2 * h) - j.tt));
+    }
+    printf("row: derivatives differ by %.1e\n", worst);
+    assert_true(worst < 1e-4);       // h times the jump of the third derivative
+    free_all(section);
+}
+
+// B-splines on even stations hold a cone exactly; the printed Catmull-Rom curve leaves it by 0.0375 of a step's change (shared/rivals.md, section 6).
+static void tapers_along_a_row(void **state)
+{
+    (void)state;
+    SectionRow row;
+    Section *section[STATIONS];
+    double t[STATIONS], worst[4] = {0};
+    make_cone(&row, section, t, 0.1, 0);
+    for (int k = 0; k < 4; k++) {
+        row.weights = k < 2 ? SECTION_PSP : SECTION_CATMULL_ROM;
+        row.width = k == 0 ? 0.5 : 0.25;
+        row.tension = k == 2 ? 0.5 : 0.7;
+        for (double x = 2; x < 6; x += 0.01)
+            worst[k] = fmax(worst[k], fabs(section_row_evaluate(&row, 1.2, 0, x).value - (1 + 0.1 * x - 1.2)));
+    }
+    printf("cone: off by %.1e (B-spline), %.4f (delta a quarter), %.1e (Catmull-Rom 0.5), %.5f (0.7)\n", worst[0], worst[1], worst[2], worst[3]);
+    assert_true(worst[0] < 1e-9 && worst[2] < 1e-9);
+    assert_true(worst[1] > 1e-3);
+    assert_true(fabs(worst[3] / 0.1 - 0.0385) < 0.002);      // the largest of (2 tau - 1) u (1 - u) (1 - 2u): 0.4 times 0.0962
+    free_all(section);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(derivatives_agree_with_differences), cmocka_unit_test(all_kinds_hold_a_star),
-        cmocka_unit_test(rbf_reproduces_an_ellipse),          cmocka_unit_test(rbf_as_printed_passes_through_its_points),
-        cmocka_unit_test(pas_as_printed_shrinks_by_its_law),  cmocka_unit_test(pas_is_an_indicator_away_from_its_contour),
-        cmocka_unit_test(pas_keeps_the_contours_area),        cmocka_unit_test(raster_gives_distances),
-        cmocka_unit_test(a_kidney_is_not_star_shaped),        cmocka_unit_test(direction_of_the_contour_does_not_matter),
+        cmocka_unit_test(derivatives_agree_with_differences),
+        cmocka_unit_test(all_kinds_hold_a_star),
+        cmocka_unit_test(rbf_reproduces_an_ellipse),
+        cmocka_unit_test(rbf_as_printed_passes_through_its_points),
+        cmocka_unit_test(pas_as_printed_shrinks_by_its_law),
+        cmocka_unit_test(pas_is_an_indicator_away_from_its_contour),
+        cmocka_unit_test(pas_keeps_the_contours_area),
+        cmocka_unit_test(raster_gives_distances),
+        cmocka_unit_test(a_kidney_is_not_star_shaped),
+        cmocka_unit_test(direction_of_the_contour_does_not_matter),
         cmocka_unit_test(invalid_contours_are_rejected),
+        cmocka_unit_test(weights_of_a_row_add_up_to_one),
+        cmocka_unit_test(derivatives_of_a_row_agree_with_differences),
+        cmocka_unit_test(tapers_along_a_row),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
