@@ -32,4 +32,8 @@
 #include "geom/vessel_branches.h"
 #include "geom/vessel_findings.h"
 
+// swept models
+#include "geom/section.h"
+#include "geom/section_row.h"
+
 #endif

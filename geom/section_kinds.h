@@ -1,0 +1,28 @@
+// The kinds of sections, for section.c alone.
+#ifndef SELDINGER_GEOM_SECTION_KINDS_H
+#define SELDINGER_GEOM_SECTION_KINDS_H
+
+#include "geom/section.h"
+
+struct Section {
+    SectionKind kind;
+    double radius;           // [mm] mean distance of the contour from the origin
+    int numbers;             // that the kind stores
+    SectionJet (*evaluate)(const Section *section, double n, double b);
+    double values[];         // of the kind
+};
+
+// A section with room for `values` numbers; NULL if out of memory.
+Section *section_allocate(SectionKind kind, size_t values, double radius);
+// Each makes a section from a counter-clockwise contour; NULL if out of memory or if the contour determines no curve.
+Section *section_polar_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius);
+Section *section_raster_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius);
+Section *section_rbf_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius);
+Section *section_pas_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius);
+
+// Factors a symmetric positive definite matrix (size, size) in place, lower triangle; false if it is not positive definite.
+bool cholesky_factor(int size, double *matrix);
+// Solves with the factor, in place.
+void cholesky_solve(int size, const double *factor, double *vector);
+
+#endif
