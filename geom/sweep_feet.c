@@ -279,6 +279,7 @@ SweepFoot sweep_block_foot(const SweepFeet *feet, const SweepBlock *b, int i)
                       .normal = vec3(f->nx[i], f->ny[i], f->nz[i]),
                       .gap = f->gap[i],
                       .sure = true,
+                      .pure = b->owner[i] >= 0 && f->at.f[i] == b->part[b->owner[i]].f[i],
                       .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
     foot_place(feet, b, i, &foot);
     return foot;
@@ -490,6 +491,8 @@ static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
     Rings rings;
+    double half_angle = 0.2 * sweep_field_largest(feet->field, seen->branch[which], seen->t[which]), half_step = 0.5 * ASIDE * reach;
+    double slack2 = half_angle * half_angle + half_step * half_step;
     for (int i = 0; i < RINGS; i++)
         fill_ring(feet, x, seen->branch[which], seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
     for (int i = 0; i < seen->count; i++)
@@ -502,6 +505,7 @@ static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which
             if (!(rings.far2[i][k] < limit * limit) || !is_least(&rings, i, k))
                 continue;
             SweepStart more = {.at = rings.at[i][k], .far = sqrt(rings.far2[i][k]), .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
+            more.least = sqrt(fmax(0, rings.far2[i][k] - slack2));
             add_start(start, count, most, &more, 0.2 * rings.radius);
         }
 }
@@ -517,6 +521,7 @@ static void add_sac(const SweepFeet *feet, Vec3 x, int sac, double limit, SweepS
         Vec3 out = vec3_unit_or(vec3_sub(x, tree->center[i]), tree->direction[i]);
         SweepStart more = {.at = vec3_add_scaled(tree->center[i], tree->radius[i], out), .segment = -1, .sac = i};
         more.far = vec3_distance(x, more.at);
+        more.least = fmax(0, more.far - 0.5 * tree->radius[i]);      // a sac is no union of its nodes' spheres
         if (more.far < limit)
             add_start(start, count, most, &more, 0.4 * tree->radius[i]);
     }
@@ -527,14 +532,19 @@ static const SweepView *view_of(const SweepField *field, SweepPlace place)
     return place.branch >= 0 ? &field->view[sweep_field_segment(field, place.branch, place.t)] : &field->sac[place.sac].view;
 }
 
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, double limit, SweepStart *start, int most)
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most)
 {
     SEL_ASSERT(most > 0 && most <= SWEEP_FEET && limit > 0, "starts fit into a block");
     const SweepField *field = feet->field;
     const SweepView *view = view_of(field, place);
     Seen seen = {.count = view->count, .sac = place.branch >= 0 ? view->sac : place.sac};
     int count = 0;
-    for (int i = 0; i < view->count; i++) {
+    if (alone) {
+        SEL_ASSERT(place.branch >= 0, "a branch alone is one of the branches");
+        seen = (Seen){.count = 1, .sac = -1, .branch = {place.branch}};
+        seen.t[0] = sweep_curve_project(field->curve[place.branch], x, place.t, 2 * field->model->branch[place.branch].radius);
+    }
+    for (int i = 0; i < view->count && !alone; i++) {
         const SweepCandidate *c = &view->of[i];
         double at = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
         double from = c->branch == place.branch ? place.t : c->t + c->slope * at;

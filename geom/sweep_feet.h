@@ -43,6 +43,7 @@ typedef struct SweepFoot {
     int segment, sac;        // the place; segment -1: on the sac
     double t;
     bool sure;
+    bool pure;               // one branch alone: nothing is blended there
 } SweepFoot;
 
 // The foot of a lane after `finish`.
@@ -56,6 +57,7 @@ double sweep_place_radius(const SweepFeet *feet, int segment, int sac);
 typedef struct SweepStart {
     Vec3 at;
     double far;              // [mm] from X
+    double least;            // [mm] about the least distance of a foot near it
     int segment, sac;
     double t;
 } SweepStart;
@@ -63,8 +65,9 @@ typedef struct SweepStart {
 enum { SWEEP_FEET = 8 };
 // Careful Newton steps of x from up to eight starts. Returns the number of feet found, closest first; feet closer together than 1e-4 mm are one.
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot);
-// Starts for x on all walls that are seen from a place, the nearest first; at most `most` <= SWEEP_FEET, those further than `limit` mm left out.
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, double limit, SweepStart *start, int most);
+// Starts for x on all walls that are seen from a place, the nearest first; at most `most` <= SWEEP_FEET, those further than `limit` mm left out. `alone`: on the
+// wall of the place's own branch only, as if no other existed.
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most);
 // The place as seen from x: the branch or sac in which x lies deepest, from a place near it.
 SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f);
 // A foot on the line from the curve through x, by bisection. Always finds a wall point; `sure` is false.

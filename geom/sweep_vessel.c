@@ -29,8 +29,8 @@ _Static_assert((int)VESSEL_SEEN >= (int)SWEEP_CANDIDATES, "a memory holds t of a
 
 static const double REST = 1e-8;             // [mm] error of the gap that Newton may leave for a foot that is followed
 static const double FOLLOWED = 1;            // relative to the radius: a point that has moved further has no foot to follow
-static const double LOOK = 0.5;              // relative to the radius: how much further than the foot rivals are searched
-static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.3;    // relative to the radius: travel between two searches
+static const double LOOK = 1;                // relative to the radius: how much further than the foot rivals are searched
+static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;   // relative to the radius: travel between two searches
 
 // --- Nodes and places ---
 
@@ -108,34 +108,58 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
     return (SweepPlace){.branch = branch, .t = foot->t};
 }
 
-// Searches for rivals of a foot, and answers with the nearest.
-static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, VesselMemory *m, VesselHit *hit)
+// Divides starts into those that may lead to a foot nearer than `foot`, kept, and the others. Returns the number kept; `rival`: about the distance of the
+// nearest foot among the others.
+static int keep_starts(const SweepFoot *foot, double radius, SweepStart *start, int count, double *rival)
 {
     static const double OWN = 0.45;          // relative to the radius: a start closer to the foot leads to it
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        if (vec3_distance(start[i].at, foot->at) <= OWN * radius)
+            continue;
+        if (start[i].least < fabs(foot->gap))
+            start[kept++] = start[i];
+        else
+            *rival = fmin(*rival, start[i].least);
+    }
+    return kept;
+}
+
+// Searches for rivals of a foot, and answers with the nearest. A ball that lies inside one branch is lumen, whatever the other branches are: a foot on the wall
+// of one branch alone is compared only with the rest of that wall, and with other walls if that does not suffice. `nearer`: a ring has a point nearer than the
+// foot.
+static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nearer, VesselMemory *m, VesselHit *hit)
+{
     double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit;
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
-    int count = sweep_starts(&v->feet, x, place_of_foot(v, &foot), limit, start, SWEEP_FEET), kept = 0;
-    bool open = false;
-    for (int i = 0; i < count; i++) {
-        open |= start[i].far < fabs(foot.gap);
-        if (vec3_distance(start[i].at, foot.at) > OWN * radius)
-            start[kept++] = start[i];
+    SweepPlace place = place_of_foot(v, &foot);
+    int count = 0;
+    bool alone = foot.pure && foot.gap > 0 && !nearer;
+    if (alone) {
+        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET);
+        count = keep_starts(&foot, radius, start, count, &rival);
     }
-    count = kept > 0 ? sweep_settle(&v->feet, x, start, kept, found) : 0;
+    if (!alone || (count > 0 && (v->field->view[foot.segment].count > 1 || v->field->view[foot.segment].sac >= 0))) {
+        rival = limit;
+        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET);
+        count = keep_starts(&foot, radius, start, count, &rival);
+    }
+    count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
     for (int i = 0; i < count; i++) {
         if (vec3_distance(found[i].at, foot.at) < 1e-4)
             continue;
         if (fabs(found[i].gap) < fabs(foot.gap)) {
             rival = fmin(rival, fabs(foot.gap));
             foot = found[i];
+            nearer = false;
         } else {
             rival = fmin(rival, fabs(found[i].gap));
         }
     }
     answer(v, x, &foot, m, hit);
     trust(v, x, &foot, rival, m);
-    m->sweep.open = open;
+    m->sweep.open = nearer;
 }
 
 static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselHit *hit)
@@ -145,7 +169,7 @@ static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET], foot;
     side = f > 0 ? 1 : -1;
-    int count = sweep_starts(&v->feet, x, place, HUGE_VAL, start, SWEEP_FEET), best = -1;
+    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET), best = -1;
     count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
     for (int i = count - 1; i >= 0; i--)
         best = found[i].gap * side > -1e-9 ? i : best;
@@ -226,7 +250,7 @@ static void answer_sought(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
     SweepStart start = {.at = m->foot, .far = vec3_distance(x, m->foot), .segment = m->sweep.segment, .sac = m->sweep.sac, .t = m->sweep.own_t};
     SweepFoot found[SWEEP_FEET];
     if (sweep_settle(&v->feet, x, &start, 1, found) > 0)
-        answer_surely(v, x, found[0], m, hit);
+        answer_surely(v, x, found[0], false, m, hit);
     else
         answer_afresh(v, x, m, hit);
 }
@@ -262,7 +286,7 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
         bool nearer = b.own[i] >= 0 && b.is_flat[i] > 0 && size > 0 && b.ring.near2[i] < size * size;
         if ((nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(point[p], m->bound_at)) < travel * travel)) {
             SweepFoot foot = sweep_block_foot(&v->feet, &b, i);
-            answer_surely(v, point[p], foot, m, &hit[p]);
+            answer_surely(v, point[p], foot, nearer, m, &hit[p]);
             continue;
         }
         store_lane(v, &b, i, point[p], m, &hit[p]);
