@@ -389,103 +389,93 @@ static void add_start(SweepStart *start, int *count, int most, const SweepStart 
     *count = kept;
 }
 
+// The branches that are seen, with t of x on them, and the branch there.
+typedef struct Seen {
+    int count, sac;
+    int branch[SWEEP_CANDIDATES];
+    double t[SWEEP_CANDIDATES];
+    SweepNear near[SWEEP_CANDIDATES];
+} Seen;
+
 // Rings around a branch at several t: points of its wall and their distances from x.
-enum { RINGS = 5 };
+enum { RINGS = 5, RING_POINTS = RINGS * SWEEP_RING };
 typedef struct Rings {
-    Vec3 at[RINGS][SWEEP_RING];
-    double far2[RINGS][SWEEP_RING];
+    SweepRing of[RINGS];
     int segment[RINGS];
     double t[RINGS], radius;     // radius: c_0 of the middle ring
 } Rings;
 
+static Vec3 curve_part(const Vec3 c[4], double x) { return vec3_add_scaled(c[0], x, vec3_add_scaled(c[1], x, vec3_add_scaled(c[2], x, c[3]))); }
+static Vec3 curve_slope(const Vec3 c[4], double x) { return vec3_add_scaled(c[1], x, vec3_add_scaled(vec3_scale(c[2], 2), 3 * x, c[3])); }
+
 static void fill_ring(const SweepFeet *feet, Vec3 x, int branch, double t, Rings *rings, int which)
 {
-    const SweepField *field = feet->field;
-    int segment = sweep_field_segment(field, branch, t);
-    const SweepSegment *s = &field->segment[segment];
-    const SweepInterval line = {.origin = s->origin,
-                                .s = {s->s[0], s->s[1], s->s[2], s->s[3]},
-                                .n = {s->n[0], s->n[1], s->n[2], s->n[3]},
-                                .b = {s->b[0], s->b[1], s->b[2], s->b[3]}};
-    SweepJet j = sweep_interval_at(&line, s->rise != 0 ? s->origin : t);
-    double term[SWEEP_TERMS], radius[SWEEP_RING], at = t - s->origin, up = 0, out = 1;
+    int segment = sweep_field_segment(feet->field, branch, t);
+    const SweepSegment *s = &feet->field->segment[segment];
+    double term[SWEEP_TERMS], at = t - s->origin, up = 0, out = 1, foot = at;
     for (int k = 0; k <= 2 * feet->harmonics; k++)
         term[k] = s->section[k][0] + at * (s->section[k][1] + at * (s->section[k][2] + at * s->section[k][3]));
     if (s->rise != 0) {      // the direction of the ring: at its height over the end's plane, as far as the dome reaches
         double power = 1;
-        up = fmax(-0.98, fmin(0.98, s->rise * at / fmax(term[0], 1e-9))), out = sqrt(1 - up * up);
+        up = fmax(-0.98, fmin(0.98, s->rise * at / fmax(term[0], 1e-9))), out = sqrt(1 - up * up), foot = 0;
         for (int k = 1; k <= feet->harmonics; k++)
             power *= out, term[2 * k - 1] *= power, term[2 * k] *= power;
     }
-    Vec3 along = vec3_unit(j.s1), u = vec3_sub(x, j.s);
-    feet->kernels->ring_about(term, feet->harmonics, vec3_dot(u, j.n), vec3_dot(u, j.b), vec3_dot(u, along), radius, rings->far2[which]);
-    for (int k = 0; k < SWEEP_RING; k++) {
-        Vec3 way = vec3_add(vec3_scale(j.n, out * sweep_ring_cos[k]), vec3_scale(j.b, out * sweep_ring_sin[k]));
-        rings->at[which][k] = vec3_add_scaled(j.s, radius[k], vec3_add_scaled(way, up, along));
-        if (up != 0)
-            rings->far2[which][k] = vec3_norm2(vec3_sub(x, rings->at[which][k]));
-    }
+    Vec3 n = vec3_scale(curve_part(s->n, foot), out), b = vec3_scale(curve_part(s->b, foot), out), tip = {0, 0, 0};
+    if (up != 0)
+        tip = vec3_scale(vec3_unit(s->s[1]), up);
+    feet->kernels->ring_points(term, feet->harmonics, curve_part(s->s, foot), n, b, tip, x, &rings->of[which]);
     rings->segment[which] = segment, rings->t[which] = t;
     rings->radius = which == RINGS / 2 ? term[0] : rings->radius;
 }
 
-// Removes the points of a branch's rings that lie inside another branch, which is seen from t on it, or inside a sac: they are no wall.
-static void drop_inner(const SweepFeet *feet, Rings *rings, double limit, int branch, double t, int sac)
+static void fill_near(const SweepFeet *feet, int branch, double t, SweepNear *near)
 {
-    SweepPartLanes p = {.absent = {0}};
-    SweepLane x, y, z;
-    for (int i = 0; i < RINGS; i++)
-        for (int k = 0; k < SWEEP_RING; k += FOOT_BLOCK) {
-            unsigned near = 0, outside;
-            for (int l = 0; l < FOOT_BLOCK; l++) {
-                Vec3 at = rings->at[i][k + l];
-                near |= rings->far2[i][k + l] < limit * limit ? 1u << l : 0;
-                x[l] = at.x, y[l] = at.y, z[l] = at.z;
-            }
-            if (near == 0)
-                continue;
-            for (int l = 0; l < FOOT_BLOCK && branch >= 0; l++) {
-                p.t[l] = t, p.longest[l] = 2 * feet->field->model->branch[branch].radius, p.settled[l] = near >> l & 1 ? 0 : 1;
-                p.segment[l] = feet->field->segment + sweep_field_segment(feet->field, branch, t);
-            }
-            for (int round = 0; round < 6 && branch >= 0; round++) {
-                unsigned again = feet->kernels->seek(&p, x, y, z, &outside) & near;
-                for (outside &= near; outside != 0; outside &= outside - 1) {
-                    int l = __builtin_ctz(outside);
-                    p.segment[l] = feet->field->segment + neighbour(feet->field, p.segment[l], p.t[l]);
-                }
-                if (again == 0)
-                    break;
-            }
-            if (branch >= 0)
-                feet->kernels->depth(&p, x, y, z, feet->harmonics);
-            for (; near != 0; near &= near - 1) {
-                int l = __builtin_ctz(near);
-                SweepPart part = {.f = p.f[l]};
-                if (branch < 0)
-                    sweep_field_sac(feet->field, sac, rings->at[i][k + l], &part);
-                if (part.f > 0)
-                    rings->far2[i][k + l] = HUGE_VAL;
-            }
+    const SweepField *field = feet->field;
+    double length = field->curve[branch]->length, from = field->model->branch[branch].open_start ? -HUGE_VAL : 0, at = fmax(from, fmin(length, t));
+    const SweepSegment *s = &field->segment[sweep_field_segment(field, branch, at)];
+    double x = at - s->origin;
+    Vec3 s1 = curve_slope(s->s, x);
+    double speed = vec3_norm(s1), by = 1 / speed;
+    near->s = curve_part(s->s, x), near->tangent = vec3_scale(s1, by), near->bend = vec3_scale(vec3_add_scaled(s->s[2], 3 * x, s->s[3]), 2 * by * by);
+    near->n = curve_part(s->n, x), near->n1 = vec3_scale(curve_slope(s->n, x), by);
+    near->b = curve_part(s->b, x), near->b1 = vec3_scale(curve_slope(s->b, x), by);
+    near->from = (from - at) * speed, near->to = (length - at) * speed;
+    for (int k = 0; k <= 2 * feet->harmonics; k++) {
+        const double *c = s->section[k];
+        near->term[k] = c[0] + x * (c[1] + x * (c[2] + x * c[3])), near->term1[k] = by * (c[1] + x * (2 * c[2] + x * 3 * c[3]));
+    }
+}
+
+// Removes the points of a branch's rings that lie inside another branch or a sac: they are no wall.
+static void drop_inner(const SweepFeet *feet, Rings *rings, double limit, const SweepNear *other, int sac)
+{
+    for (int i = 0; i < RINGS; i++) {
+        SweepRing *r = &rings->of[i];
+        double f[SWEEP_RING];
+        if (other)
+            feet->kernels->near_field(other, feet->harmonics, SWEEP_RING, r->x, r->y, r->z, f);
+        for (int k = 0; k < SWEEP_RING; k++) {
+            SweepPart part = {.f = other ? f[k] : -1};
+            if (!other && r->far2[k] < limit * limit)
+                sweep_field_sac(feet->field, sac, vec3(r->x[k], r->y[k], r->z[k]), &part);
+            r->far2[k] = part.f > 0 ? HUGE_VAL : r->far2[k];
         }
+    }
 }
 
 // Returns whether no neighbour on the rings is nearer.
 static bool is_least(const Rings *r, int ring, int k)
 {
-    for (int i = -1; i <= 1; i++)
-        for (int j = -1; j <= 1; j++)
-            if (ring + i >= 0 && ring + i < RINGS && r->far2[ring + i][(k + j + SWEEP_RING) % SWEEP_RING] < r->far2[ring][k])
-                return false;
+    int before = (k + SWEEP_RING - 1) % SWEEP_RING, after = (k + 1) % SWEEP_RING;
+    double own = r->of[ring].far2[k];
+    for (int i = ring > 0 ? ring - 1 : 0; i <= ring + 1 && i < RINGS; i++) {
+        const double *far2 = r->of[i].far2;
+        if (far2[before] < own || far2[k] < own || far2[after] < own)
+            return false;
+    }
     return true;
 }
-
-// The branches that are seen, with t of x on them.
-typedef struct Seen {
-    int count, sac;
-    int branch[SWEEP_CANDIDATES];
-    double t[SWEEP_CANDIDATES];
-} Seen;
 
 static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most)
 {
@@ -497,15 +487,16 @@ static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which
         fill_ring(feet, x, seen->branch[which], seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
     for (int i = 0; i < seen->count; i++)
         if (i != which)
-            drop_inner(feet, &rings, limit, seen->branch[i], seen->t[i], -1);
+            drop_inner(feet, &rings, limit, &seen->near[i], -1);
     if (seen->sac >= 0)
-        drop_inner(feet, &rings, limit, -1, 0, seen->sac);
+        drop_inner(feet, &rings, limit, NULL, seen->sac);
     for (int i = 0; i < RINGS; i++)
         for (int k = 0; k < SWEEP_RING; k++) {
-            if (!(rings.far2[i][k] < limit * limit) || !is_least(&rings, i, k))
+            const SweepRing *r = &rings.of[i];
+            if (!(r->far2[k] < limit * limit) || !is_least(&rings, i, k))
                 continue;
-            SweepStart more = {.at = rings.at[i][k], .far = sqrt(rings.far2[i][k]), .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
-            more.least = sqrt(fmax(0, rings.far2[i][k] - slack2));
+            SweepStart more = {.at = {r->x[k], r->y[k], r->z[k]}, .far = sqrt(r->far2[k]), .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
+            more.least = sqrt(fmax(0, r->far2[k] - slack2));
             add_start(start, count, most, &more, 0.2 * rings.radius);
         }
 }
@@ -537,11 +528,12 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, do
     SEL_ASSERT(most > 0 && most <= SWEEP_FEET && limit > 0, "starts fit into a block");
     const SweepField *field = feet->field;
     const SweepView *view = view_of(field, place);
-    Seen seen = {.count = view->count, .sac = place.branch >= 0 ? view->sac : place.sac};
+    Seen seen;
     int count = 0;
+    seen.count = alone ? 1 : view->count, seen.sac = alone ? -1 : place.branch >= 0 ? view->sac : place.sac;
     if (alone) {
         SEL_ASSERT(place.branch >= 0, "a branch alone is one of the branches");
-        seen = (Seen){.count = 1, .sac = -1, .branch = {place.branch}};
+        seen.branch[0] = place.branch;
         seen.t[0] = sweep_curve_project(field->curve[place.branch], x, place.t, 2 * field->model->branch[place.branch].radius);
     }
     for (int i = 0; i < view->count && !alone; i++) {
@@ -551,6 +543,8 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, do
         seen.branch[i] = c->branch;
         seen.t[i] = sweep_curve_project(field->curve[c->branch], x, from, 2 * field->model->branch[c->branch].radius);
     }
+    for (int i = 0; i < seen.count && seen.count > 1; i++)
+        fill_near(feet, seen.branch[i], seen.t[i], &seen.near[i]);
     for (int i = 0; i < seen.count; i++) {
         double largest = sweep_field_largest(field, seen.branch[i], seen.t[i]);
         if (vec3_distance(x, sweep_curve_at(field->curve[seen.branch[i]], seen.t[i]).s) - largest < limit)
