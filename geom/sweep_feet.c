@@ -319,6 +319,50 @@ static void add_foot(SweepFoot *foot, int *count, const SweepFoot *more)
 
 static const double REST_FRESH = 1e-10;      // [mm] error of the gap that Newton may leave for a foot found from scratch
 
+// Prepares a block for careful steps; lanes beyond `count` repeat the first.
+static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, bool same_x, const SweepStart *start, int count)
+{
+    FootBatch *f = &b->foot;
+    memset(&b->ring, 0, sizeof b->ring);
+    for (int i = 0; i < FOOT_BLOCK; i++) {
+        int from = i < count ? i : 0;
+        const SweepStart *s = &start[from];
+        sweep_block_place(feet, b, i, s->segment, s->sac, s->t);
+        sweep_block_set_point(feet, b, i, x[same_x ? 0 : from]);
+        f->at.x[i] = s->at.x, f->at.y[i] = s->at.y, f->at.z[i] = s->at.z;
+        f->longest[i] = fmin(0.5 * f->radius[i], fmax(0.1 * f->radius[i], 0.4 * s->far));
+        f->allowed[i] = REST_FRESH;
+        f->state[i] = FOOT_PENDING;
+    }
+}
+
+static unsigned run_block(const SweepFeet *feet, SweepBlock *b, unsigned all, int rounds)
+{
+    unsigned done = 0;
+    for (int round = 0; round < rounds && (done & all) != all; round++) {
+        sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : all & ~done);
+        done = feet->kernels->newton(&b->foot, true);
+    }
+    return done & all;
+}
+
+static bool is_number(const SweepFoot *foot) { return vec3_is_finite(foot->at) && vec3_is_finite(foot->normal) && isfinite(foot->gap); }
+
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot)
+{
+    enum { ROUNDS = 6 };
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "points fit into a block");
+    SweepBlock b;
+    start_block(feet, &b, x, false, start, count);
+    unsigned done = run_block(feet, &b, (1u << count) - 1, ROUNDS), sound = 0;
+    feet->kernels->finish(&b.foot);
+    for (int i = 0; i < count; i++) {
+        foot[i] = sweep_block_foot(feet, &b, i);
+        sound |= (done >> i & 1) && is_number(&foot[i]) ? 1u << i : 0;
+    }
+    return sound;
+}
+
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot)
 {
     enum { ROUNDS = 24 };
@@ -326,23 +370,10 @@ int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int cou
     SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "starts fit into a block");
     SweepBlock b;
     FootBatch *f = &b.foot;
-    unsigned all = (1u << count) - 1, done = 0;
+    start_block(feet, &b, &x, true, start, count);
+    unsigned all = (1u << count) - 1, done = run_block(feet, &b, all, ROUNDS);
     int found = 0;
-    memset(&b.ring, 0, sizeof b.ring);
-    for (int i = 0; i < FOOT_BLOCK; i++) {
-        const SweepStart *s = &start[i < count ? i : 0];
-        sweep_block_place(feet, &b, i, s->segment, s->sac, s->t);
-        sweep_block_set_point(feet, &b, i, x);
-        f->at.x[i] = s->at.x, f->at.y[i] = s->at.y, f->at.z[i] = s->at.z;
-        f->longest[i] = fmin(0.5 * f->radius[i], fmax(0.1 * f->radius[i], 0.4 * s->far));
-        f->allowed[i] = REST_FRESH;
-        f->state[i] = FOOT_PENDING;
-    }
-    for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
-        sweep_block_sample(feet, &b, round == 0 ? FOOT_ALL : all & ~done);
-        done = feet->kernels->newton(f, true);
-    }
-    if ((done & all) != all)
+    if (done != all)
         sweep_block_sample(feet, &b, all & ~done);
     feet->kernels->finish(f);
     for (int i = 0; i < count; i++) {
@@ -355,7 +386,7 @@ int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int cou
                 continue;
             one.normal = n, one.gap = gap;
         }
-        if (vec3_is_finite(one.at) && vec3_is_finite(one.normal) && isfinite(one.gap))
+        if (is_number(&one))
             add_foot(foot, &found, &one);
     }
     return found;
@@ -477,7 +508,8 @@ static bool is_least(const Rings *r, int ring, int k)
     return true;
 }
 
-static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most)
+static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most, Vec3 from,
+                      double zone, double *beyond)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
     Rings rings;
@@ -493,7 +525,12 @@ static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which
     for (int i = 0; i < RINGS; i++)
         for (int k = 0; k < SWEEP_RING; k++) {
             const SweepRing *r = &rings.of[i];
-            if (!(r->far2[k] < limit * limit) || !is_least(&rings, i, k))
+            if (!(r->far2[k] < limit * limit))
+                continue;
+            double aside2 = vec3_norm2(vec3_sub(vec3(r->x[k], r->y[k], r->z[k]), from));
+            if (r->far2[k] < *beyond * *beyond && aside2 > zone * zone)
+                *beyond = sqrt(r->far2[k]);
+            if (!is_least(&rings, i, k))
                 continue;
             SweepStart more = {.at = {r->x[k], r->y[k], r->z[k]}, .far = sqrt(r->far2[k]), .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
             more.least = sqrt(fmax(0, r->far2[k] - slack2));
@@ -523,7 +560,7 @@ static const SweepView *view_of(const SweepField *field, SweepPlace place)
     return place.branch >= 0 ? &field->view[sweep_field_segment(field, place.branch, place.t)] : &field->sac[place.sac].view;
 }
 
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most)
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone, double *beyond)
 {
     SEL_ASSERT(most > 0 && most <= SWEEP_FEET && limit > 0, "starts fit into a block");
     const SweepField *field = feet->field;
@@ -539,16 +576,16 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, do
     for (int i = 0; i < view->count && !alone; i++) {
         const SweepCandidate *c = &view->of[i];
         double at = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
-        double from = c->branch == place.branch ? place.t : c->t + c->slope * at;
+        double near = c->branch == place.branch ? place.t : c->t + c->slope * at;
         seen.branch[i] = c->branch;
-        seen.t[i] = sweep_curve_project(field->curve[c->branch], x, from, 2 * field->model->branch[c->branch].radius);
+        seen.t[i] = sweep_curve_project(field->curve[c->branch], x, near, 2 * field->model->branch[c->branch].radius);
     }
     for (int i = 0; i < seen.count && seen.count > 1; i++)
         fill_near(feet, seen.branch[i], seen.t[i], &seen.near[i]);
     for (int i = 0; i < seen.count; i++) {
         double largest = sweep_field_largest(field, seen.branch[i], seen.t[i]);
         if (vec3_distance(x, sweep_curve_at(field->curve[seen.branch[i]], seen.t[i]).s) - largest < limit)
-            add_rings(feet, x, &seen, i, fmin(limit, largest), limit, start, &count, most);
+            add_rings(feet, x, &seen, i, fmin(limit, largest), limit, start, &count, most, from, zone, beyond);
     }
     if (seen.sac >= 0)
         add_sac(feet, x, seen.sac, limit, start, &count, most);

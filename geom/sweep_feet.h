@@ -66,8 +66,11 @@ enum { SWEEP_FEET = 8 };
 // Careful Newton steps of x from up to eight starts. Returns the number of feet found, closest first; feet closer together than 1e-4 mm are one.
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot);
 // Starts for x on all walls that are seen from a place, the nearest first; at most `most` <= SWEEP_FEET, those further than `limit` mm left out. `alone`: on the
-// wall of the place's own branch only, as if no other existed.
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most);
+// wall of the place's own branch only, as if no other existed. `beyond`: reduced to the distance of the nearest point of a wall that lies farther than `zone` mm
+// from `from`.
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone, double *beyond);
+// A few careful steps of up to eight points, each from its own start. Returns the bits of those that reach a foot.
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot);
 // The place as seen from x: the branch or sac in which x lies deepest, from a place near it.
 SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f);
 // A foot on the line from the curve through x, by bisection. Always finds a wall point; `sure` is false.

@@ -30,7 +30,10 @@ _Static_assert((int)VESSEL_SEEN >= (int)SWEEP_CANDIDATES, "a memory holds t of a
 static const double REST = 1e-8;             // [mm] error of the gap that Newton may leave for a foot that is followed
 static const double FOLLOWED = 1;            // relative to the radius: a point that has moved further has no foot to follow
 static const double LOOK = 1;                // relative to the radius: how much further than the foot rivals are searched
-static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;   // relative to the radius: travel between two searches
+static const double BESIDE = 0.25;           // relative to the radius: a rival that is no further than this behind the foot is followed
+static const double LOOK_BESIDE = 0.25;      // relative to the radius: with a rival, a third foot may be this near
+static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;    // relative to the radius: travel between two searches …
+static const double TRUST_AMONG = 0.25;      // … and at most this where several branches are seen
 
 // --- Nodes and places ---
 
@@ -92,8 +95,19 @@ static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMe
 static void trust(const SweepVessel *v, Vec3 x, const SweepFoot *foot, double rival, VesselMemory *m)
 {
     double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac);
+    bool alone = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
     m->bound_at = x;
-    m->trust = fmax(TRUST_LEAST * radius, fmin(TRUST_MOST * radius, 0.45 * (rival - fabs(foot->gap))));
+    m->trust = fmax(TRUST_LEAST * radius, fmin((alone ? TRUST_MOST : TRUST_AMONG) * radius, 0.45 * (rival - fabs(foot->gap))));
+}
+
+// Remembers the second nearest foot if it is nearer than `most`: it is followed, too.
+static void hold_rival(const SweepFoot *second, double most, VesselMemory *m)
+{
+    m->has_rival = fabs(second->gap) < most;
+    if (!m->has_rival)
+        return;
+    m->rival = second->at;
+    m->sweep.rival_segment = second->segment, m->sweep.rival_sac = second->sac, m->sweep.rival_t = second->t;
 }
 
 static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
@@ -108,16 +122,16 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
     return (SweepPlace){.branch = branch, .t = foot->t};
 }
 
-// Divides starts into those that may lead to a foot nearer than `foot`, kept, and the others. Returns the number kept; `rival`: about the distance of the
+// Divides starts into those that may lead to a foot nearer than `foot`, or up to `more` further, kept, and the others. Returns the number kept; `rival`: about the distance of the
 // nearest foot among the others.
-static int keep_starts(const SweepFoot *foot, double radius, SweepStart *start, int count, double *rival)
+static int keep_starts(const SweepFoot *foot, double radius, double more, SweepStart *start, int count, double *rival)
 {
     static const double OWN = 0.45;          // relative to the radius: a start closer to the foot leads to it
     int kept = 0;
     for (int i = 0; i < count; i++) {
         if (vec3_distance(start[i].at, foot->at) <= OWN * radius)
             continue;
-        if (start[i].least < fabs(foot->gap))
+        if (start[i].least < fabs(foot->gap) + more)
             start[kept++] = start[i];
         else
             *rival = fmin(*rival, start[i].least);
@@ -130,46 +144,57 @@ static int keep_starts(const SweepFoot *foot, double radius, SweepStart *start, 
 // foot.
 static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nearer, VesselMemory *m, VesselHit *hit)
 {
-    double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit;
+    static const double ZONE = 0.9;          // relative to the radius: a wall nearer to the foot than this belongs to it
+    double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit, beyond = limit;
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
     SweepPlace place = place_of_foot(v, &foot);
     int count = 0;
     bool alone = foot.pure && foot.gap > 0 && !nearer;
     if (alone) {
-        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET);
-        count = keep_starts(&foot, radius, start, count, &rival);
+        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET, foot.at, ZONE * radius, &beyond);
+        count = keep_starts(&foot, radius, 0, start, count, &rival);
     }
     if (!alone || (count > 0 && (v->field->view[foot.segment].count > 1 || v->field->view[foot.segment].sac >= 0))) {
-        rival = limit;
-        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET);
-        count = keep_starts(&foot, radius, start, count, &rival);
+        rival = beyond = limit;
+        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET, foot.at, ZONE * radius, &beyond);
+        count = keep_starts(&foot, radius, BESIDE * radius, start, count, &rival);
     }
     count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
+    // the nearest and the second nearest of all
+    SweepFoot second = {.gap = HUGE_VAL};
     for (int i = 0; i < count; i++) {
-        if (vec3_distance(found[i].at, foot.at) < 1e-4)
+        SweepFoot other = found[i];
+        if (vec3_distance(other.at, foot.at) < 1e-4)
             continue;
-        if (fabs(found[i].gap) < fabs(foot.gap)) {
-            rival = fmin(rival, fabs(foot.gap));
-            foot = found[i];
+        if (fabs(other.gap) < fabs(foot.gap)) {
+            other = foot, foot = found[i];
             nearer = false;
-        } else {
-            rival = fmin(rival, fabs(found[i].gap));
         }
+        if (fabs(other.gap) < fabs(second.gap)) {
+            SweepFoot third = second;
+            second = other, other = third;
+        }
+        rival = fmin(rival, fabs(other.gap));
     }
     answer(v, x, &foot, m, hit);
+    hold_rival(&second, fabs(foot.gap) + BESIDE * radius, m);
+    if (!m->has_rival)
+        rival = fmin(rival, fmin(beyond, fabs(second.gap)));
+    else
+        rival = fmin(rival, fabs(foot.gap) + LOOK_BESIDE * radius);
     trust(v, x, &foot, rival, m);
     m->sweep.open = nearer;
 }
 
 static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
-    double f, side;
+    double f, side, beyond = HUGE_VAL;
     SweepPlace place = sweep_descend(&v->feet, x, v->place[m->node], &f);
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET], foot;
     side = f > 0 ? 1 : -1;
-    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET), best = -1;
+    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET, x, 0, &beyond), best = -1;
     count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
     for (int i = count - 1; i >= 0; i--)
         best = found[i].gap * side > -1e-9 ? i : best;
@@ -182,17 +207,19 @@ static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
         else
             foot.gap = side * fabs(foot.gap);
         answer(v, x, &foot, m, hit);
+        m->has_rival = false;
         trust(v, x, &foot, 0, m);
         m->sweep.open = 1;
         return;
     }
     foot = found[best];
-    double rival = HUGE_VAL;
+    double rival = fabs(foot.gap) + 0.2 * sweep_place_radius(&v->feet, foot.segment, foot.sac);
     for (int i = best + 1; i < count; i++)
         rival = fmin(rival, fabs(found[i].gap));
     answer(v, x, &foot, m, hit);
-    trust(v, x, &foot, fmin(rival, fabs(foot.gap) + 0.2 * sweep_place_radius(&v->feet, foot.segment, foot.sac)), m);
-    m->sweep.open = start[0].far < fabs(foot.gap);
+    m->has_rival = false;
+    trust(v, x, &foot, rival, m);
+    m->sweep.open = 1;
 }
 
 // Returns true if the hit can be filled without evaluating the field.
@@ -255,6 +282,36 @@ static void answer_sought(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
         answer_afresh(v, x, m, hit);
 }
 
+// Follows the rivals of feet that were found. A rival that has become nearer is the foot, and the foot its rival.
+static void follow_rivals(const SweepVessel *v, const Vec3 *point, VesselMemory *memory, VesselHit *hit, const int *which, int count)
+{
+    SweepStart start[SWEEP_FEET];
+    SweepFoot rival[SWEEP_FEET];
+    Vec3 x[SWEEP_FEET];
+    for (int i = 0; i < count; i++) {
+        const VesselMemory *m = &memory[which[i]];
+        x[i] = point[which[i]];
+        start[i] = (SweepStart){.at = m->rival, .far = vec3_distance(x[i], m->rival), .segment = m->sweep.rival_segment, .sac = m->sweep.rival_sac, .t = m->sweep.rival_t};
+    }
+    unsigned done = sweep_follow(&v->feet, x, start, count, rival);
+    for (int i = 0; i < count; i++) {
+        VesselMemory *m = &memory[which[i]];
+        VesselHit *h = &hit[which[i]];
+        SweepFoot foot = {.at = m->foot, .normal = m->normal, .hessian = m->hessian, .gap = h->gap, .sure = true};
+        foot.segment = m->sweep.segment, foot.sac = m->sweep.sac, foot.t = m->sweep.own_t;
+        if (!(done >> i & 1) || vec3_distance(rival[i].at, foot.at) < 1e-4) {
+            answer_surely(v, x[i], foot, m->sweep.open != 0, m, h);
+            continue;
+        }
+        if (fabs(rival[i].gap) < fabs(foot.gap)) {
+            answer(v, x[i], &rival[i], m, h);
+            hold_rival(&foot, HUGE_VAL, m);
+        } else {
+            hold_rival(&rival[i], HUGE_VAL, m);
+        }
+    }
+}
+
 static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *memory, VesselHit *hit, const int *which, int count)
 {
     enum { ROUNDS = 2 };
@@ -273,6 +330,7 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
         sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
         done = v->feet.kernels->newton(f, false);
     }
+    int beside[FOOT_BLOCK], rivals = 0;
     v->feet.kernels->finish(f);
     v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, v->feet.harmonics);
     for (int i = 0; i < count; i++) {
@@ -290,7 +348,11 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
             continue;
         }
         store_lane(v, &b, i, point[p], m, &hit[p]);
+        if (m->has_rival)
+            beside[rivals++] = p;
     }
+    if (rivals > 0)
+        follow_rivals(v, point, memory, hit, beside, rivals);
 }
 
 static void query_batch(const SweepVessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
