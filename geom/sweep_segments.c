@@ -225,6 +225,7 @@ SweepField *sweep_field_create(const SweepModel *model)
         return NULL;
     size_t branches = (size_t)model->branch_count;
     field->model = model;
+    field->branch_count = model->branch_count;
     field->curve = calloc(branches, sizeof(SweepCurve *));
     field->first_segment = calloc(branches + 1, sizeof *field->first_segment);
     field->fork = calloc(branches, sizeof *field->fork);
@@ -265,7 +266,7 @@ void sweep_field_free(SweepField *field)
 {
     if (!field)
         return;
-    for (int i = 0; field->curve && i < field->model->branch_count; i++)
+    for (int i = 0; field->curve && i < field->branch_count; i++)
         sweep_curve_free(field->curve[i]);
     free(field->curve);
     free(field->first_segment);

@@ -126,10 +126,11 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
 // nearest foot among the others.
 static int keep_starts(const SweepFoot *foot, double radius, double more, SweepStart *start, int count, double *rival)
 {
-    static const double OWN = 0.45;          // relative to the radius: a start closer to the foot leads to it
+    // a start closer to the foot leads to it; outside, in the groove between two tubes, feet on both sides are as near to each other as to x
+    double own = foot->gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot->gap);
     int kept = 0;
     for (int i = 0; i < count; i++) {
-        if (vec3_distance(start[i].at, foot->at) <= OWN * radius)
+        if (vec3_distance(start[i].at, foot->at) <= own)
             continue;
         if (start[i].least < fabs(foot->gap) + more)
             start[kept++] = start[i];
@@ -144,20 +145,20 @@ static int keep_starts(const SweepFoot *foot, double radius, double more, SweepS
 // foot.
 static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nearer, VesselMemory *m, VesselHit *hit)
 {
-    static const double ZONE = 0.9;          // relative to the radius: a wall nearer to the foot than this belongs to it
     double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit, beyond = limit;
+    double zone = foot.gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot.gap);     // a wall nearer to the foot than this belongs to it
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
     SweepPlace place = place_of_foot(v, &foot);
     int count = 0;
     bool alone = foot.pure && foot.gap > 0 && !nearer;
     if (alone) {
-        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET, foot.at, ZONE * radius, &beyond);
+        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET, foot.at, zone, &beyond);
         count = keep_starts(&foot, radius, 0, start, count, &rival);
     }
     if (!alone || (count > 0 && (v->field->view[foot.segment].count > 1 || v->field->view[foot.segment].sac >= 0))) {
         rival = beyond = limit;
-        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET, foot.at, ZONE * radius, &beyond);
+        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET, foot.at, zone, &beyond);
         count = keep_starts(&foot, radius, BESIDE * radius, start, count, &rival);
     }
     count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
@@ -212,14 +213,8 @@ static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
         m->sweep.open = 1;
         return;
     }
-    foot = found[best];
-    double rival = fabs(foot.gap) + 0.2 * sweep_place_radius(&v->feet, foot.segment, foot.sac);
-    for (int i = best + 1; i < count; i++)
-        rival = fmin(rival, fabs(found[i].gap));
-    answer(v, x, &foot, m, hit);
-    m->has_rival = false;
-    trust(v, x, &foot, rival, m);
-    m->sweep.open = 1;
+    // rings about a foot that is known are closer to each other than those of the first search
+    answer_surely(v, x, found[best], true, m, hit);
 }
 
 // Returns true if the hit can be filled without evaluating the field.
