@@ -336,12 +336,25 @@ static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, boo
     }
 }
 
+// On a ridge that is narrower than a step, Newton leaps from one flank to the other: a lane whose step turns back takes shorter ones.
 static unsigned run_block(const SweepFeet *feet, SweepBlock *b, unsigned all, int rounds)
 {
+    static const double BACK = -0.25;        // of the last step's square: the next one leads back
+    FootBatch *f = &b->foot;
     unsigned done = 0;
+    Vec3 last[FOOT_BLOCK] = {{0, 0, 0}};
     for (int round = 0; round < rounds && (done & all) != all; round++) {
+        Vec3 from[FOOT_BLOCK];
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            from[i] = lane_foot(f, i);
         sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : all & ~done);
-        done = feet->kernels->newton(&b->foot, true);
+        done = feet->kernels->newton(f, true);
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            Vec3 step = vec3_sub(lane_foot(f, i), from[i]);
+            if (vec3_dot(step, last[i]) < BACK * vec3_norm2(last[i]))
+                f->longest[i] = fmin(f->longest[i], 0.5 * vec3_norm(step));
+            last[i] = step;
+        }
     }
     return done & all;
 }
@@ -594,7 +607,7 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, do
 
 // --- Places ---
 
-SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f)
+SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f, Vec3 *gradient)
 {
     enum { MOVES = 6 };
     SweepBlend blend;
@@ -608,7 +621,7 @@ SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double
         if (same)
             break;
     }
-    *f = blend.f;
+    *f = blend.f, *gradient = blend.gradient;
     return place;
 }
 

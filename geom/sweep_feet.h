@@ -71,8 +71,8 @@ int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int cou
 int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone, double *beyond);
 // A few careful steps of up to eight points, each from its own start. Returns the bits of those that reach a foot.
 unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot);
-// The place as seen from x: the branch or sac in which x lies deepest, from a place near it.
-SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f);
+// The place as seen from x: the branch or sac in which x lies deepest, from a place near it; F at x and its gradient.
+SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f, Vec3 *gradient);
 // A foot on the line from the curve through x, by bisection. Always finds a wall point; `sure` is false.
 SweepFoot sweep_bisect(const SweepFeet *feet, Vec3 x, SweepPlace place);
 

@@ -191,12 +191,16 @@ static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nea
 static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     double f, side, beyond = HUGE_VAL;
-    SweepPlace place = sweep_descend(&v->feet, x, v->place[m->node], &f);
+    Vec3 g;
+    SweepPlace place = sweep_descend(&v->feet, x, v->place[m->node], &f, &g);
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET], foot;
     side = f > 0 ? 1 : -1;
-    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET, x, 0, &beyond), best = -1;
-    count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
+    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET - 1, x, 0, &beyond), best = -1;
+    // where F would be 0 if it were linear
+    start[count] = (SweepStart){.at = vec3_add_scaled(x, -f / fmax(vec3_norm2(g), 0.25), g), .far = fabs(f), .sac = place.sac, .t = place.t};
+    start[count++].segment = place.branch >= 0 ? sweep_field_segment(v->field, place.branch, place.t) : -1;
+    count = sweep_settle(&v->feet, x, start, count, found);
     for (int i = count - 1; i >= 0; i--)
         best = found[i].gap * side > -1e-9 ? i : best;
     if (best < 0) {
