@@ -4,8 +4,11 @@
 // 2 delta. The result is the same to the bit.
 #include "geom/sweep_feet.h"
 
+#include "geom/field_lanes.h"
+#include "geom/power_walk.h"
 #include "geom/sweep_views.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int i, int segment, int sac, double t)
@@ -521,8 +524,8 @@ static bool is_least(const Rings *r, int ring, int k)
     return true;
 }
 
-static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most, Vec3 from,
-                      double zone, double *beyond)
+static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most,
+                      Vec3 from, double zone, double *beyond)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
     Rings rings;
@@ -551,21 +554,101 @@ static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which
         }
 }
 
-// Points of the spheres of a sac's nodes.
-static void add_sac(const SweepFeet *feet, Vec3 x, int sac, double limit, SweepStart *start, int *count, int most)
+// Points of a sac's wall that lie in no branch.
+static void add_sac(const SweepFeet *feet, Vec3 x, const Seen *seen, double limit, SweepStart *start, int *count, int most, Vec3 from, double zone, double *beyond)
 {
+    static const double HALF = 0.27;         // half the distance between neighbouring points, relative to the radius
+    const SweepSacPoints *all = &feet->sacs;
     const VesselTree *tree = feet->field->model->sac;
-    int group = feet->field->sac_group[sac];
-    for (int i = 0; i < tree->node_count; i++) {
-        if (feet->field->sac_group[i] != group)
+    int group = feet->field->sac_group[seen->sac];
+    for (int first = 0; first < all->count; first += FOOT_BLOCK) {
+        double far2[FOOT_BLOCK], f[FOOT_BLOCK], least2 = HUGE_VAL;
+        for (int l = 0; l < FOOT_BLOCK; l++) {
+            far2[l] = vec3_norm2(vec3_sub(vec3(all->x[first + l], all->y[first + l], all->z[first + l]), x));
+            least2 = fmin(least2, far2[l]);
+        }
+        if (!(least2 < limit * limit))
             continue;
-        Vec3 out = vec3_unit_or(vec3_sub(x, tree->center[i]), tree->direction[i]);
-        SweepStart more = {.at = vec3_add_scaled(tree->center[i], tree->radius[i], out), .segment = -1, .sac = i};
-        more.far = vec3_distance(x, more.at);
-        more.least = fmax(0, more.far - 0.5 * tree->radius[i]);      // a sac is no union of its nodes' spheres
-        if (more.far < limit)
-            add_start(start, count, most, &more, 0.4 * tree->radius[i]);
+        for (int k = 0; k < seen->count; k++) {
+            feet->kernels->near_field(&seen->near[k], feet->harmonics, FOOT_BLOCK, all->x + first, all->y + first, all->z + first, f);
+            for (int l = 0; l < FOOT_BLOCK; l++)
+                far2[l] = f[l] > 0 ? HUGE_VAL : far2[l];
+        }
+        for (int l = 0; l < FOOT_BLOCK; l++) {
+            int node = all->node[first + l];
+            if (!(far2[l] < limit * limit) || feet->field->sac_group[node] != group)
+                continue;
+            SweepStart more = {.at = {all->x[first + l], all->y[first + l], all->z[first + l]}, .far = sqrt(far2[l]), .segment = -1, .sac = node};
+            more.least = sqrt(fmax(0, far2[l] - HALF * HALF * tree->radius[node] * tree->radius[node]));
+            if (vec3_norm2(vec3_sub(more.at, from)) > zone * zone)
+                *beyond = fmin(*beyond, more.far);
+            add_start(start, count, most, &more, 0.5 * tree->radius[node]);
+        }
     }
+}
+
+enum { RAYS = 96 };
+
+// The distance from a node's centre at which a ray leaves the sac's blobs; 0: the centre is outside.
+static double leave_sac(const SweepField *field, int node, Vec3 way)
+{
+    enum { STEPS = 60, HALVINGS = 30 };
+    const VesselTree *tree = field->model->sac;
+    double step = 0.1 * tree->radius[node], low = 0, high = 0;
+    SweepPart part;
+    for (int i = 0; i < STEPS; i++, low = high, high += step) {
+        sweep_field_sac(field, node, vec3_add_scaled(tree->center[node], high, way), &part);
+        if (!(part.f > 0))
+            break;
+    }
+    for (int i = 0; i < HALVINGS; i++) {
+        double middle = 0.5 * (low + high);
+        sweep_field_sac(field, node, vec3_add_scaled(tree->center[node], middle, way), &part);
+        if (part.f > 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+// A point belongs to the node in whose power cell it lies.
+bool sweep_sac_points_create(const SweepField *field, SweepSacPoints *points)
+{
+    *points = (SweepSacPoints){0};
+    const VesselTree *tree = field->model->sac;
+    if (!tree)
+        return true;
+    size_t room = (size_t)tree->node_count * RAYS + FOOT_BLOCK;
+    points->x = calloc(3 * room, sizeof *points->x);
+    points->node = calloc(room, sizeof *points->node);
+    if (!points->x || !points->node)
+        return false;
+    points->y = points->x + room, points->z = points->y + room;
+    Vec3 way[RAYS];
+    field_directions(way, RAYS);
+    for (int i = 0; i < tree->node_count; i++)
+        for (int k = 0; k < RAYS && tree->kind[i] == NODE_ANEURYSM; k++) {
+            double far = leave_sac(field, i, way[k]);
+            Vec3 at = vec3_add_scaled(tree->center[i], far, way[k]);
+            if (!(far > 0) || power_walk(tree, at, i, 1 << 20) != i)
+                continue;
+            points->x[points->count] = at.x, points->y[points->count] = at.y, points->z[points->count] = at.z;
+            points->node[points->count++] = i;
+        }
+    for (; points->count % FOOT_BLOCK != 0; points->count++) {
+        int last = points->count - 1;
+        points->x[points->count] = points->x[last], points->y[points->count] = points->y[last], points->z[points->count] = points->z[last];
+        points->node[points->count] = points->node[last];
+    }
+    return true;
+}
+
+void sweep_sac_points_free(SweepSacPoints *points)
+{
+    free(points->x);
+    free(points->node);
+    *points = (SweepSacPoints){0};
 }
 
 static const SweepView *view_of(const SweepField *field, SweepPlace place)
@@ -593,7 +676,7 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, do
         seen.branch[i] = c->branch;
         seen.t[i] = sweep_curve_project(field->curve[c->branch], x, near, 2 * field->model->branch[c->branch].radius);
     }
-    for (int i = 0; i < seen.count && seen.count > 1; i++)
+    for (int i = 0; i < seen.count && (seen.count > 1 || seen.sac >= 0); i++)
         fill_near(feet, seen.branch[i], seen.t[i], &seen.near[i]);
     for (int i = 0; i < seen.count; i++) {
         double largest = sweep_field_largest(field, seen.branch[i], seen.t[i]);
@@ -601,7 +684,7 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, do
             add_rings(feet, x, &seen, i, fmin(limit, largest), limit, start, &count, most, from, zone, beyond);
     }
     if (seen.sac >= 0)
-        add_sac(feet, x, seen.sac, limit, start, &count, most);
+        add_sac(feet, x, &seen, limit, start, &count, most, from, zone, beyond);
     return count;
 }
 
@@ -614,9 +697,9 @@ SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double
     for (int move = 0; move < MOVES; move++) {
         sweep_field_blend(feet->field, place, x, &blend);
         const SweepPart *best = &blend.part[blend.largest];
-        bool same = best->branch == place.branch && (best->branch >= 0 ? sweep_field_segment(feet->field, place.branch, place.t) ==
-                                                                             sweep_field_segment(feet->field, place.branch, best->t)
-                                                                       : best->sac == place.sac);
+        bool same = best->branch == place.branch &&
+                    (best->branch >= 0 ? sweep_field_segment(feet->field, place.branch, place.t) == sweep_field_segment(feet->field, place.branch, best->t)
+                                       : best->sac == place.sac);
         place = (SweepPlace){.branch = best->branch, .t = best->t, .sac = best->sac};
         if (same)
             break;

@@ -5,11 +5,23 @@
 #include "geom/sweep_lanes.h"
 #include "geom/vessel.h"
 
+// Points of the sacs' walls, as if there were no branches: where rays from each node leave the blobs.
+typedef struct SweepSacPoints {
+    int count;               // a multiple of FOOT_BLOCK, the last ones repeated
+    double *x, *y, *z;       // one allocation, owned by x
+    int *node;               // of the sacs' tree
+} SweepSacPoints;
+
 typedef struct SweepFeet {
     const SweepField *field;
     const SweepKernels *kernels;
     int harmonics;           // highest harmonic that any row uses
+    SweepSacPoints sacs;
 } SweepFeet;
+
+// Returns false if out of memory; sweep_sac_points_free must be called in either case.
+bool sweep_sac_points_create(const SweepField *field, SweepSacPoints *points);
+void sweep_sac_points_free(SweepSacPoints *points);
 
 enum { SWEEP_PARTS = SWEEP_CANDIDATES };
 
@@ -68,7 +80,8 @@ int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int cou
 // Starts for x on all walls that are seen from a place, the nearest first; at most `most` <= SWEEP_FEET, those further than `limit` mm left out. `alone`: on the
 // wall of the place's own branch only, as if no other existed. `beyond`: reduced to the distance of the nearest point of a wall that lies farther than `zone` mm
 // from `from`.
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone, double *beyond);
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone,
+                 double *beyond);
 // A few careful steps of up to eight points, each from its own start. Returns the bits of those that reach a foot.
 unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot);
 // The place as seen from x: the branch or sac in which x lies deepest, from a place near it; F at x and its gradient.

@@ -290,7 +290,8 @@ static void follow_rivals(const SweepVessel *v, const Vec3 *point, VesselMemory 
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &memory[which[i]];
         x[i] = point[which[i]];
-        start[i] = (SweepStart){.at = m->rival, .far = vec3_distance(x[i], m->rival), .segment = m->sweep.rival_segment, .sac = m->sweep.rival_sac, .t = m->sweep.rival_t};
+        start[i] = (SweepStart){
+            .at = m->rival, .far = vec3_distance(x[i], m->rival), .segment = m->sweep.rival_segment, .sac = m->sweep.rival_sac, .t = m->sweep.rival_t};
     }
     unsigned done = sweep_follow(&v->feet, x, start, count, rival);
     for (int i = 0; i < count; i++) {
@@ -458,6 +459,7 @@ static void sweep_destroy(Vessel *vessel)
     if (!v)
         return;
     sweep_field_free(v->field);
+    sweep_sac_points_free(&v->feet.sacs);
     power_blocks_free(&v->blocks);
     vessel_tree_free(v->knots);
     free(v->place);
@@ -534,9 +536,9 @@ Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
         sweep_destroy(&v->vessel);
         return NULL;
     }
-    v->feet = (SweepFeet){v->field, sweep_kernels(isa), highest_harmonic(model)};
+    v->feet = (SweepFeet){.field = v->field, .kernels = sweep_kernels(isa), .harmonics = highest_harmonic(model)};
     fill_places(v);
-    if (!power_blocks_create(&v->blocks, v->knots)) {
+    if (!power_blocks_create(&v->blocks, v->knots) || !sweep_sac_points_create(v->field, &v->feet.sacs)) {
         sweep_destroy(&v->vessel);
         return NULL;
     }

@@ -177,7 +177,7 @@ static void lanes_are_the_plain_field(void **state)
     double worst = 0;
     int forks = 0, domes = 0;
     for (int isa = 1; isa <= 3; isa++) {
-        SweepFeet feet = {f, sweep_kernels(isa), 5};
+        SweepFeet feet = {.field = f, .kernels = sweep_kernels(isa), .harmonics = 5};
         for (int trial = 0; trial < 600; trial++) {
             static SweepBlock b;
             SweepPlace place[FOOT_BLOCK];
@@ -388,11 +388,82 @@ static void feet_are_nearest(void **state)
     }
 }
 
+// A sac at the side of a tube: points walk between both. The wall is where F = 0 from either side.
+static void sac_beside_a_tube(void **state)
+{
+    (void)state;
+    enum { POINTS = 24, STEPS = 600 };
+    static Cloud cloud;
+    SweepShape s = {.pitch = 1.3, .parent = -1, .radius = 1, .section = star, .open_start = true};
+    sweep_shape_line(&s, vec3(-6, 0, 0), vec3(6, 0, 0.5), 25);
+    SweepModel *m = sweep_model_of(&s, 1);
+    sweep_add_sac(m, 12, vec3(0.2, 1.7, 0.3), 1.4);
+    SweepField *f = sweep_field_create(m);
+    Vessel *v = make(m, 0);
+    cloud.count = 0;
+    fill_cloud(f, 0, 2, 10, &cloud);
+    uint64_t seed = 10;
+    for (int k = 0; k < 12000; k++) {
+        Vec3 x = vec3_add_scaled(m->sac->center[1], 1.4, random_unit_vector(&seed));
+        SweepBlend blend;
+        for (int i = 0; i < 12; i++) {
+            sweep_field_blend(f, (SweepPlace){.branch = -1, .sac = 1}, x, &blend);
+            if (fabs(blend.f) < 1e-10)
+                cloud.at[cloud.count++] = x;
+            if (fabs(blend.f) < 1e-10 || blend.f > 0.35)
+                break;
+            x = vec3_add_scaled(x, -blend.f / vec3_norm2(blend.gradient), blend.gradient);
+        }
+    }
+    Vec3 x[POINTS], last_x[POINTS];
+    VesselMemory memory[POINTS];
+    VesselHit hit[POINTS], last[POINTS];
+    int unsure = 0, on_sac = 0, compared = 0, off = 0;
+    double worst = 0, jump = 0;
+    for (int i = 0; i < POINTS; i++) {
+        x[i] = vec3(-2 + 4.0 * i / POINTS, i % 2 ? 1.7 : 0.2, 0.2);
+        memory[i] = (VesselMemory){.node = -1};
+    }
+    for (int step = 0; step < STEPS; step++) {
+        for (int i = 0; i < POINTS && step > 0; i++) {
+            Vec3 y = vec3_add_scaled(x[i], 0.06, random_unit_vector(&seed));
+            SweepBlend blend;
+            sweep_field_blend(f, (SweepPlace){.branch = 0, .t = 6 + y.x}, y, &blend);
+            last_x[i] = x[i], last[i] = hit[i];
+            if (blend.f > -0.2 && fabs(y.x) < 3)
+                x[i] = y;
+        }
+        vessel_query(v, POINTS, x, 10, memory, hit);
+        for (int i = 0; i < POINTS; i++) {
+            unsure += (hit[i].flags & VESSEL_UNSURE) != 0;
+            on_sac += hit[i].node == m->sac_node[1];
+            if (step > 0)
+                jump = fmax(jump, fabs(hit[i].gap - last[i].gap) - vec3_distance(x[i], last_x[i]));
+            if ((step + i) % 41 != 0 || fabs(hit[i].gap) > 0.9)
+                continue;
+            double more = fabs(hit[i].gap) - nearest_in(&cloud, x[i]);
+            compared++;
+            off += more > 0.02;
+            worst = fmax(worst, more);
+        }
+    }
+    print_message("sac: %d answers, %d on it, %d unsure; %d compared, %d farther than the cloud by 0.02 mm, %.4f at most; jump %.4f\n", POINTS * STEPS, on_sac,
+                  unsure, compared, off, worst, jump);
+    assert_true(on_sac > 2000 && unsure == 0 && compared > 100 && off == 0);
+    assert_int_equal(v->locate(v, m->sac->center[1], 12), m->sac_node[1]);
+    assert_int_equal(v->locate(v, m->sac->center[1], -1), m->sac_node[1]);
+    assert_int_equal(v->locate(v, vec3(3, 0, 0), m->sac_node[1]), 18);
+    v->destroy(v);
+    sweep_field_free(f);
+    sweep_model_free(m);
+}
+
 // Two branches that spring from one parent and touch farther on: there, each is as if the other did not exist.
 static void kissing_tubes_keep_apart(void **state)
 {
     (void)state;
-    SweepShape s[3] = {{.pitch = 2, .parent = -1, .radius = 1, .open_start = true}, {.pitch = 1.5, .parent = 0, .radius = 0.8}, {.pitch = 1.5, .parent = 0, .radius = 0.8}};
+    SweepShape s[3] = {
+        {.pitch = 2, .parent = -1, .radius = 1, .open_start = true}, {.pitch = 1.5, .parent = 0, .radius = 0.8}, {.pitch = 1.5, .parent = 0, .radius = 0.8}};
     sweep_shape_line(&s[0], vec3(-6, 0, 0), vec3(12, 0, 0), 19);
     for (int side = 0; side < 2; side++) {
         SweepShape *c = &s[1 + side];
@@ -444,7 +515,8 @@ static void inlet_is_open(void **state)
         last = hit;
     }
     // far upstream it is a cylinder
-    VesselHit near = ask(v, vec3_add_scaled(vec3_add_scaled(p, -5, d), 0.5, j.b), &memory), far = ask(v, vec3_add_scaled(vec3_add_scaled(p, -9, d), 0.5, j.b), NULL);
+    VesselHit near = ask(v, vec3_add_scaled(vec3_add_scaled(p, -5, d), 0.5, j.b), &memory),
+              far = ask(v, vec3_add_scaled(vec3_add_scaled(p, -9, d), 0.5, j.b), NULL);
     assert_near(near.gap, far.gap, 1e-9);
     assert_near(vec3_dot(far.normal, d), 0, 1e-9);
     sweep_curve_free(c);
@@ -587,17 +659,12 @@ static void bad_points_and_no_heap(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cylinder_with_domes),
-        cmocka_unit_test(cone),
-        cmocka_unit_test(torus_converges),
-        cmocka_unit_test(lanes_are_the_plain_field),
-        cmocka_unit_test(derivatives_of_the_gap),
-        cmocka_unit_test(feet_are_nearest),
-        cmocka_unit_test(kissing_tubes_keep_apart),
-        cmocka_unit_test(inlet_is_open),
-        cmocka_unit_test(same_bits),
-        cmocka_unit_test(moved_and_mirrored),
-        cmocka_unit_test(bad_points_and_no_heap),
+        cmocka_unit_test(cylinder_with_domes),    cmocka_unit_test(cone),
+        cmocka_unit_test(torus_converges),        cmocka_unit_test(lanes_are_the_plain_field),
+        cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(feet_are_nearest),
+        cmocka_unit_test(sac_beside_a_tube),      cmocka_unit_test(kissing_tubes_keep_apart),
+        cmocka_unit_test(inlet_is_open),          cmocka_unit_test(same_bits),
+        cmocka_unit_test(moved_and_mirrored),     cmocka_unit_test(bad_points_and_no_heap),
         cmocka_unit_test(the_counter_counts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
