@@ -180,14 +180,14 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
             evaluate_part(feet, b, k, lanes);
             evaluated |= 1u << k;
         }
-    for (int i = 0; i < FOOT_BLOCK && parts > 1; i++) {
+    for (int i = 0; i < FOOT_BLOCK; i++) {
         // of two parts, the later one's delta counts; of more, two of them may have blended before they meet the own one
         most[i] = 0;
         for (int k = 1; k < parts; k++)
             if (b->part[k].absent[i] == 0)
                 most[i] += (b->view[i]->count == 2 ? 2 : 3) * b->part[k].width[i];
     }
-    for (int k = 0; k < parts && parts > 1; k++) {
+    for (int k = 0; k < parts; k++) {
         if (!(own >> k & 1) && lanes_need(b, k, lanes, most)) {
             evaluate_part(feet, b, k, lanes);
             evaluated |= 1u << k;
