@@ -439,7 +439,7 @@ static void add_start(SweepStart *start, int *count, int most, const SweepStart 
 // The branches that are seen, with t of x on them, and the branch there.
 typedef struct Seen {
     int count, sac;
-    int branch[SWEEP_CANDIDATES];
+    int branch[SWEEP_CANDIDATES], segment[SWEEP_CANDIDATES];
     double t[SWEEP_CANDIDATES];
     SweepNear near[SWEEP_CANDIDATES];
 } Seen;
@@ -455,9 +455,9 @@ typedef struct Rings {
 static Vec3 curve_part(const Vec3 c[4], double x) { return vec3_add_scaled(c[0], x, vec3_add_scaled(c[1], x, vec3_add_scaled(c[2], x, c[3]))); }
 static Vec3 curve_slope(const Vec3 c[4], double x) { return vec3_add_scaled(c[1], x, vec3_add_scaled(vec3_scale(c[2], 2), 3 * x, c[3])); }
 
-static void fill_ring(const SweepFeet *feet, Vec3 x, int branch, double t, Rings *rings, int which)
+static void fill_ring(const SweepFeet *feet, Vec3 x, const SweepSegment *near, double t, Rings *rings, int which)
 {
-    int segment = sweep_field_segment(feet->field, branch, t);
+    int segment = neighbour(feet->field, near, t);
     const SweepSegment *s = &feet->field->segment[segment];
     double term[SWEEP_TERMS], at = t - s->origin, up = 0, out = 1, foot = at;
     for (int k = 0; k <= 2 * feet->harmonics; k++)
@@ -476,11 +476,11 @@ static void fill_ring(const SweepFeet *feet, Vec3 x, int branch, double t, Rings
     rings->radius = which == RINGS / 2 ? term[0] : rings->radius;
 }
 
-static void fill_near(const SweepFeet *feet, int branch, double t, SweepNear *near)
+static void fill_near(const SweepFeet *feet, int branch, int segment, double t, SweepNear *near)
 {
     const SweepField *field = feet->field;
     double length = field->curve[branch]->length, from = field->model->branch[branch].open_start ? -HUGE_VAL : 0, at = fmax(from, fmin(length, t));
-    const SweepSegment *s = &field->segment[sweep_field_segment(field, branch, at)];
+    const SweepSegment *s = &field->segment[neighbour(field, &field->segment[segment], at)];
     double x = at - s->origin;
     Vec3 s1 = curve_slope(s->s, x);
     double speed = vec3_norm(s1), by = 1 / speed;
@@ -495,7 +495,7 @@ static void fill_near(const SweepFeet *feet, int branch, double t, SweepNear *ne
 }
 
 // Removes the points of a branch's rings that lie inside another branch or a sac: they are no wall.
-static void drop_inner(const SweepFeet *feet, Rings *rings, double limit, const SweepNear *other, int sac)
+static void drop_inner(const SweepFeet *feet, Rings *rings, double limit2, const SweepNear *other, int sac)
 {
     for (int i = 0; i < RINGS; i++) {
         SweepRing *r = &rings->of[i];
@@ -504,63 +504,76 @@ static void drop_inner(const SweepFeet *feet, Rings *rings, double limit, const 
             feet->kernels->near_field(other, feet->harmonics, SWEEP_RING, r->x, r->y, r->z, f);
         for (int k = 0; k < SWEEP_RING; k++) {
             SweepPart part = {.f = other ? f[k] : -1};
-            if (!other && r->far2[k] < limit * limit)
+            if (!other && r->far2[k] < limit2)
                 sweep_field_sac(feet->field, sac, vec3(r->x[k], r->y[k], r->z[k]), &part);
             r->far2[k] = part.f > 0 ? HUGE_VAL : r->far2[k];
         }
     }
 }
 
-// Returns whether no neighbour on the rings is nearer.
-static bool is_least(const Rings *r, int ring, int k)
+// For each point of the rings, the square of the distance of the nearest of its neighbours and itself.
+static void least_around(const Rings *r, double least[RINGS][SWEEP_RING])
 {
-    int before = (k + SWEEP_RING - 1) % SWEEP_RING, after = (k + 1) % SWEEP_RING;
-    double own = r->of[ring].far2[k];
-    for (int i = ring > 0 ? ring - 1 : 0; i <= ring + 1 && i < RINGS; i++) {
-        const double *far2 = r->of[i].far2;
-        if (far2[before] < own || far2[k] < own || far2[after] < own)
-            return false;
+    double along[RINGS][SWEEP_RING];
+    for (int i = 0; i < RINGS; i++) {
+        double f[SWEEP_RING + 2];
+        memcpy(f + 1, r->of[i].far2, sizeof r->of[i].far2);
+        f[0] = f[SWEEP_RING], f[SWEEP_RING + 1] = f[1];
+        for (int k = 0; k < SWEEP_RING; k++) {
+            double two = f[k] < f[k + 1] ? f[k] : f[k + 1];
+            along[i][k] = two < f[k + 2] ? two : f[k + 2];
+        }
     }
-    return true;
+    for (int i = 0; i < RINGS; i++) {
+        const double *before = along[i > 0 ? i - 1 : 0], *after = along[i + 1 < RINGS ? i + 1 : i];
+        for (int k = 0; k < SWEEP_RING; k++) {
+            double two = before[k] < along[i][k] ? before[k] : along[i][k];
+            least[i][k] = two < after[k] ? two : after[k];
+        }
+    }
 }
 
-static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most,
-                      Vec3 from, double zone, double *beyond)
+static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, const SweepSearch *search, SweepStart *start, int *count)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
     Rings rings;
-    double half_angle = 0.2 * sweep_field_largest(feet->field, seen->branch[which], seen->t[which]), half_step = 0.5 * ASIDE * reach;
-    double slack2 = half_angle * half_angle + half_step * half_step;
+    double least[RINGS][SWEEP_RING], limit2 = search->limit * search->limit, own2 = search->own * search->own, zone2 = search->zone * search->zone;
+    const SweepSegment *near = &feet->field->segment[seen->segment[which]];
+    double half_angle = 0.2 * near->largest, half_step = 0.5 * ASIDE * reach, slack2 = half_angle * half_angle + half_step * half_step;
+    double beyond2 = search->beyond * search->beyond;
     for (int i = 0; i < RINGS; i++)
-        fill_ring(feet, x, seen->branch[which], seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
+        fill_ring(feet, x, near, seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
     for (int i = 0; i < seen->count; i++)
         if (i != which)
-            drop_inner(feet, &rings, limit, &seen->near[i], -1);
+            drop_inner(feet, &rings, limit2, &seen->near[i], -1);
     if (seen->sac >= 0)
-        drop_inner(feet, &rings, limit, NULL, seen->sac);
+        drop_inner(feet, &rings, limit2, NULL, seen->sac);
+    least_around(&rings, least);
     for (int i = 0; i < RINGS; i++)
         for (int k = 0; k < SWEEP_RING; k++) {
             const SweepRing *r = &rings.of[i];
-            if (!(r->far2[k] < limit * limit))
+            if (!(r->far2[k] < limit2) || (r->far2[k] > least[i][k] && r->far2[k] >= beyond2))
                 continue;
-            double aside2 = vec3_norm2(vec3_sub(vec3(r->x[k], r->y[k], r->z[k]), from));
-            if (r->far2[k] < *beyond * *beyond && aside2 > zone * zone)
-                *beyond = sqrt(r->far2[k]);
-            if (!is_least(&rings, i, k))
+            SweepStart more = {.at = {r->x[k], r->y[k], r->z[k]}, .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
+            double aside2 = vec3_norm2(vec3_sub(more.at, search->from));
+            if (r->far2[k] < beyond2 && aside2 > zone2)
+                beyond2 = r->far2[k];
+            if (r->far2[k] > least[i][k] || aside2 <= own2)
                 continue;
-            SweepStart more = {.at = {r->x[k], r->y[k], r->z[k]}, .far = sqrt(r->far2[k]), .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
-            more.least = sqrt(fmax(0, r->far2[k] - slack2));
-            add_start(start, count, most, &more, 0.2 * rings.radius);
+            more.far = sqrt(r->far2[k]), more.least = sqrt(fmax(0, r->far2[k] - slack2));
+            add_start(start, count, search->most, &more, 0.2 * rings.radius);
         }
+    *search->nearest_beyond = fmin(*search->nearest_beyond, sqrt(beyond2));
 }
 
 // Points of a sac's wall that lie in no branch.
-static void add_sac(const SweepFeet *feet, Vec3 x, const Seen *seen, double limit, SweepStart *start, int *count, int most, Vec3 from, double zone, double *beyond)
+static void add_sac(const SweepFeet *feet, Vec3 x, const Seen *seen, const SweepSearch *search, SweepStart *start, int *count)
 {
     static const double HALF = 0.27;         // half the distance between neighbouring points, relative to the radius
     const SweepSacPoints *all = &feet->sacs;
     const VesselTree *tree = feet->field->model->sac;
     int group = feet->field->sac_group[seen->sac];
+    double limit = search->limit;
     for (int first = 0; first < all->count; first += FOOT_BLOCK) {
         double far2[FOOT_BLOCK], f[FOOT_BLOCK], least2 = HUGE_VAL;
         for (int l = 0; l < FOOT_BLOCK; l++) {
@@ -580,9 +593,11 @@ static void add_sac(const SweepFeet *feet, Vec3 x, const Seen *seen, double limi
                 continue;
             SweepStart more = {.at = {all->x[first + l], all->y[first + l], all->z[first + l]}, .far = sqrt(far2[l]), .segment = -1, .sac = node};
             more.least = sqrt(fmax(0, far2[l] - HALF * HALF * tree->radius[node] * tree->radius[node]));
-            if (vec3_norm2(vec3_sub(more.at, from)) > zone * zone)
-                *beyond = fmin(*beyond, more.far);
-            add_start(start, count, most, &more, 0.5 * tree->radius[node]);
+            double aside = vec3_distance(more.at, search->from);
+            if (aside > search->zone)
+                *search->nearest_beyond = fmin(*search->nearest_beyond, more.far);
+            if (aside > search->own)
+                add_start(start, count, search->most, &more, 0.5 * tree->radius[node]);
         }
     }
 }
@@ -651,40 +666,53 @@ void sweep_sac_points_free(SweepSacPoints *points)
     *points = (SweepSacPoints){0};
 }
 
-static const SweepView *view_of(const SweepField *field, SweepPlace place)
+// t of x on a branch, to about a hundredth of the radius: for starts.
+static double near_t(const SweepField *field, Vec3 x, double t, double longest, int *segment)
 {
-    return place.branch >= 0 ? &field->view[sweep_field_segment(field, place.branch, place.t)] : &field->sac[place.sac].view;
+    enum { ROUNDS = 12 };
+    for (int round = 0; round < ROUNDS; round++) {
+        const SweepSegment *s = &field->segment[*segment];
+        double at = t - s->origin;
+        Vec3 u = vec3_sub(x, curve_part(s->s, at)), s1 = curve_slope(s->s, at), s2 = vec3_add_scaled(vec3_scale(s->s[2], 2), 6 * at, s->s[3]);
+        double speed2 = vec3_norm2(s1), d = speed2 - vec3_dot(u, s2), step = vec3_dot(u, s1) / (d > SWEEP_LEAST_D * speed2 ? d : SWEEP_LEAST_D * speed2);
+        step = step > longest ? longest : step < -longest ? -longest : step;
+        t += step;
+        *segment = neighbour(field, s, t);
+        if (fabs(step) < 0.02 * longest)
+            break;
+    }
+    return t;
 }
 
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone, double *beyond)
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, const SweepSearch *search, SweepStart *start)
 {
-    SEL_ASSERT(most > 0 && most <= SWEEP_FEET && limit > 0, "starts fit into a block");
+    SEL_ASSERT(search->most > 0 && search->most <= SWEEP_FEET && search->limit > 0, "starts fit into a block");
     const SweepField *field = feet->field;
-    const SweepView *view = view_of(field, place);
+    const SweepView *view = place.branch >= 0 ? &field->view[segment] : &field->sac[place.sac].view;
+    double own_t = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
     Seen seen;
     int count = 0;
-    seen.count = alone ? 1 : view->count, seen.sac = alone ? -1 : place.branch >= 0 ? view->sac : place.sac;
-    if (alone) {
-        SEL_ASSERT(place.branch >= 0, "a branch alone is one of the branches");
-        seen.branch[0] = place.branch;
-        seen.t[0] = sweep_curve_project(field->curve[place.branch], x, place.t, 2 * field->model->branch[place.branch].radius);
-    }
-    for (int i = 0; i < view->count && !alone; i++) {
+    seen.count = 0, seen.sac = search->alone ? -1 : place.branch >= 0 ? view->sac : place.sac;
+    for (int i = 0; i < view->count; i++) {
         const SweepCandidate *c = &view->of[i];
-        double at = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
-        double near = c->branch == place.branch ? place.t : c->t + c->slope * at;
-        seen.branch[i] = c->branch;
-        seen.t[i] = sweep_curve_project(field->curve[c->branch], x, near, 2 * field->model->branch[c->branch].radius);
+        bool own = c->branch == place.branch;
+        if (search->alone && !own)
+            continue;
+        double t = own ? place.t : c->t + c->slope * own_t;
+        int k = seen.count++;
+        seen.branch[k] = c->branch;
+        seen.segment[k] = own ? segment : sweep_field_segment(field, c->branch, t);
+        seen.t[k] = near_t(field, x, t, 2 * field->model->branch[c->branch].radius, &seen.segment[k]);
     }
     for (int i = 0; i < seen.count && (seen.count > 1 || seen.sac >= 0); i++)
-        fill_near(feet, seen.branch[i], seen.t[i], &seen.near[i]);
+        fill_near(feet, seen.branch[i], seen.segment[i], seen.t[i], &seen.near[i]);
     for (int i = 0; i < seen.count; i++) {
-        double largest = sweep_field_largest(field, seen.branch[i], seen.t[i]);
-        if (vec3_distance(x, sweep_curve_at(field->curve[seen.branch[i]], seen.t[i]).s) - largest < limit)
-            add_rings(feet, x, &seen, i, fmin(limit, largest), limit, start, &count, most, from, zone, beyond);
+        const SweepSegment *s = &field->segment[seen.segment[i]];
+        if (vec3_distance(x, curve_part(s->s, seen.t[i] - s->origin)) - s->largest < search->limit)
+            add_rings(feet, x, &seen, i, fmin(search->limit, s->largest), search, start, &count);
     }
     if (seen.sac >= 0)
-        add_sac(feet, x, &seen, limit, start, &count, most, from, zone, beyond);
+        add_sac(feet, x, &seen, search, start, &count);
     return count;
 }
 

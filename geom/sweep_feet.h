@@ -77,11 +77,19 @@ typedef struct SweepStart {
 enum { SWEEP_FEET = 8 };
 // Careful Newton steps of x from up to eight starts. Returns the number of feet found, closest first; feet closer together than 1e-4 mm are one.
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot);
-// Starts for x on all walls that are seen from a place, the nearest first; at most `most` <= SWEEP_FEET, those further than `limit` mm left out. `alone`: on the
-// wall of the place's own branch only, as if no other existed. `beyond`: reduced to the distance of the nearest point of a wall that lies farther than `zone` mm
-// from `from`.
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most, Vec3 from, double zone,
-                 double *beyond);
+// What a search for starts leaves out, and what it reports.
+typedef struct SweepSearch {
+    bool alone;              // only the wall of the place's own branch, as if no other existed
+    int most;                // starts, <= SWEEP_FEET
+    double limit;            // [mm] starts further from x than this
+    Vec3 from;               // the foot that is known; starts nearer to it than …
+    double own;              // … this [mm]; 0: none is known
+    double zone;             // [mm] the nearest point of a wall that lies farther from `from` than this, …
+    double beyond;           // … if nearer to x than this, …
+    double *nearest_beyond;  // … reduces this distance
+} SweepSearch;
+// Starts for x on all walls that are seen from a place (`segment`: its segment), the nearest first.
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, const SweepSearch *search, SweepStart *start);
 // A few careful steps of up to eight points, each from its own start. Returns the bits of those that reach a foot.
 unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot);
 // The place as seen from x: the branch or sac in which x lies deepest, from a place near it; F at x and its gradient.

@@ -13,6 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+// The nodes of the knots before and after a segment, and t between them.
+typedef struct SegmentNodes {
+    double middle;
+    int before, after;
+} SegmentNodes;
+
 typedef struct SweepVessel {
     Vessel vessel;           // first: a Vessel * points to its SweepVessel
     const SweepModel *model;
@@ -20,6 +26,7 @@ typedef struct SweepVessel {
     SweepFeet feet;
     int node_count;          // one more than the highest node of a knot or of a sac
     SweepPlace *place;       // (nodes) branch -2: none
+    SegmentNodes *nodes;     // (segments)
     int *first_child, *next_child;   // (branches) those that spring from a branch; -1: none
     VesselTree *knots;       // centres and radii of knots, then of the sacs' nodes, for the first location
     PowerBlocks blocks;
@@ -37,10 +44,8 @@ static const double TRUST_AMONG = 0.25;      // … and at most this where sever
 
 // --- Nodes and places ---
 
-static int node_of(const SweepVessel *v, int segment, int sac, double t)
+static int find_node(const SweepVessel *v, int segment, double t)
 {
-    if (segment < 0)
-        return v->model->sac_node[sac];
     int branch = 0, high = v->model->branch_count - 1;
     while (branch < high) {
         int middle = (branch + high + 1) / 2;
@@ -56,6 +61,14 @@ static int node_of(const SweepVessel *v, int segment, int sac, double t)
     else if (after < curve->knot_count && curve->knot_t[after] - t < t - curve->knot_t[after - 1])
         knot = after;
     return v->model->knot_node[v->model->branch[branch].first_knot + knot];
+}
+
+static int node_of(const SweepVessel *v, int segment, int sac, double t)
+{
+    if (segment < 0)
+        return v->model->sac_node[sac];
+    const SegmentNodes *nodes = &v->nodes[segment];
+    return t < nodes->middle ? nodes->before : nodes->after;
 }
 
 static bool has_place(const SweepVessel *v, int node) { return node >= 0 && node < v->node_count && v->place[node].branch != -2; }
@@ -122,17 +135,13 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
     return (SweepPlace){.branch = branch, .t = foot->t};
 }
 
-// Divides starts into those that may lead to a foot nearer than `foot`, or up to `more` further, kept, and the others. Returns the number kept; `rival`: about the distance of the
+// Divides starts into those that may lead to a foot nearer than `most`, kept, and the others. Returns the number kept; `rival`: about the distance of the
 // nearest foot among the others.
-static int keep_starts(const SweepFoot *foot, double radius, double more, SweepStart *start, int count, double *rival)
+static int keep_starts(double most, SweepStart *start, int count, double *rival)
 {
-    // a start closer to the foot leads to it; outside, in the groove between two tubes, feet on both sides are as near to each other as to x
-    double own = foot->gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot->gap);
     int kept = 0;
     for (int i = 0; i < count; i++) {
-        if (vec3_distance(start[i].at, foot->at) <= own)
-            continue;
-        if (start[i].least < fabs(foot->gap) + more)
+        if (start[i].least < most)
             start[kept++] = start[i];
         else
             *rival = fmin(*rival, start[i].least);
@@ -146,20 +155,27 @@ static int keep_starts(const SweepFoot *foot, double radius, double more, SweepS
 static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nearer, VesselMemory *m, VesselHit *hit)
 {
     double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit, beyond = limit;
-    double zone = foot.gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot.gap);     // a wall nearer to the foot than this belongs to it
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
     SweepPlace place = place_of_foot(v, &foot);
+    SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot.at, .beyond = limit, .nearest_beyond = &beyond};
+    // a start closer to the foot than this leads to it, and a wall closer than `zone` belongs to it; outside, in the groove between two tubes, feet on both sides
+    // are as near to each other as to x
+    search.own = foot.gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot.gap);
+    search.zone = foot.gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot.gap);
     int count = 0;
-    bool alone = foot.pure && foot.gap > 0 && !nearer;
-    if (alone) {
-        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET, foot.at, zone, &beyond);
-        count = keep_starts(&foot, radius, 0, start, count, &rival);
+    bool single = foot.segment >= 0 && v->field->view[foot.segment].count == 1 && v->field->view[foot.segment].sac < 0;
+    search.alone = foot.pure && foot.gap > 0 && !nearer;
+    if (search.alone || single) {
+        search.alone = true;
+        count = sweep_starts(&v->feet, x, place, foot.segment, &search, start);
+        count = keep_starts(fabs(foot.gap), start, count, &rival);
     }
-    if (!alone || (count > 0 && (v->field->view[foot.segment].count > 1 || v->field->view[foot.segment].sac >= 0))) {
+    if (!single && (!search.alone || count > 0)) {
         rival = beyond = limit;
-        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET, foot.at, zone, &beyond);
-        count = keep_starts(&foot, radius, BESIDE * radius, start, count, &rival);
+        search.alone = false;
+        count = sweep_starts(&v->feet, x, place, foot.segment, &search, start);
+        count = keep_starts(fabs(foot.gap) + BESIDE * radius, start, count, &rival);
     }
     count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
     // the nearest and the second nearest of all
@@ -196,10 +212,12 @@ static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET], foot;
     side = f > 0 ? 1 : -1;
-    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET - 1, x, 0, &beyond), best = -1;
+    const SweepSearch search = {.most = SWEEP_FEET - 1, .limit = HUGE_VAL, .from = x, .own = 0, .nearest_beyond = &beyond};
+    int segment = place.branch >= 0 ? sweep_field_segment(v->field, place.branch, place.t) : -1;
+    int count = sweep_starts(&v->feet, x, place, segment, &search, start), best = -1;
     // where F would be 0 if it were linear
     start[count] = (SweepStart){.at = vec3_add_scaled(x, -f / fmax(vec3_norm2(g), 0.25), g), .far = fabs(f), .sac = place.sac, .t = place.t};
-    start[count++].segment = place.branch >= 0 ? sweep_field_segment(v->field, place.branch, place.t) : -1;
+    start[count++].segment = segment;
     count = sweep_settle(&v->feet, x, start, count, found);
     for (int i = count - 1; i >= 0; i--)
         best = found[i].gap * side > -1e-9 ? i : best;
@@ -463,6 +481,7 @@ static void sweep_destroy(Vessel *vessel)
     power_blocks_free(&v->blocks);
     vessel_tree_free(v->knots);
     free(v->place);
+    free(v->nodes);
     free(v->first_child);
     free(v->next_child);
     free(v);
@@ -497,6 +516,14 @@ static void fill_places(SweepVessel *v)
                 v->place[node] = (SweepPlace){.branch = i, .t = t};
         }
     }
+    for (int i = 0; i < m->branch_count; i++)
+        for (int s = v->field->first_segment[i]; s < v->field->first_segment[i + 1]; s++) {
+            const SweepInterval *interval = &v->field->curve[i]->interval[0];
+            double from = v->field->segment[s].from, to = v->field->segment[s].to, t = from < 0 ? 0 : isfinite(to) ? 0.5 * (from + to) : from;
+            interval += sweep_curve_interval(v->field->curve[i], t);
+            double low = fmax(interval->from, 0), high = fmin(interval->to, v->field->curve[i]->length);
+            v->nodes[s] = (SegmentNodes){0.5 * (low + high), find_node(v, s, low), find_node(v, s, high)};
+        }
     for (int i = m->branch_count - 1; i > 0; i--) {
         int parent = m->branch[i].parent;
         v->next_child[i] = v->first_child[parent];
@@ -523,7 +550,8 @@ static bool allocate(SweepVessel *v)
     v->first_child = calloc((size_t)m->branch_count, sizeof *v->first_child);
     v->next_child = calloc((size_t)m->branch_count, sizeof *v->next_child);
     v->knots = vessel_tree_create(m->knot_count + sacs, 0, 0);
-    return v->field && v->place && v->first_child && v->next_child && v->knots;
+    v->nodes = v->field ? calloc((size_t)v->field->first_segment[m->branch_count], sizeof *v->nodes) : NULL;
+    return v->field && v->nodes && v->place && v->first_child && v->next_child && v->knots;
 }
 
 Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
