@@ -67,6 +67,7 @@ static int node_of(const SweepVessel *v, int segment, int sac, double t)
 {
     if (segment < 0)
         return v->model->sac_node[sac];
+    SEL_ASSERT(segment < v->field->first_segment[v->model->branch_count], "a foot lies on a segment of the model");
     const SegmentNodes *nodes = &v->nodes[segment];
     return t < nodes->middle ? nodes->before : nodes->after;
 }
@@ -94,6 +95,7 @@ static void set_flags(const SweepVessel *v, Vec3 x, const SweepFoot *foot, Vesse
 // Fills memory and hit outside the lanes.
 static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMemory *m, VesselHit *hit)
 {
+    SEL_ASSERT(isfinite(foot->gap) && vec3_is_finite(foot->at), "a foot that was found has a distance and a place");
     *hit = (VesselHit){.gap = foot->gap, .normal = foot->normal, .hessian = foot->hessian, .flags = foot->sure ? 0 : VESSEL_UNSURE};
     m->node = hit->node = node_of(v, foot->segment, foot->sac, foot->t);
     m->has_foot = foot->sure;
@@ -107,6 +109,7 @@ static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMe
 // Trusts a foot for half the distance to its nearest rival.
 static void trust(const SweepVessel *v, Vec3 x, const SweepFoot *foot, double rival, VesselMemory *m)
 {
+    SEL_ASSERT(!isnan(rival), "the distance of a rival is a number, or infinite");
     double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac);
     bool alone = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
     m->bound_at = x;
@@ -119,6 +122,7 @@ static void hold_rival(const SweepFoot *second, double most, VesselMemory *m)
     m->has_rival = fabs(second->gap) < most;
     if (!m->has_rival)
         return;
+    SEL_ASSERT(second->segment >= 0 || second->sac >= 0, "a rival has a place");
     m->rival = second->at;
     m->sweep.rival_segment = second->segment, m->sweep.rival_sac = second->sac, m->sweep.rival_t = second->t;
 }
@@ -260,6 +264,7 @@ static bool answer_cheaply(const SweepVessel *v, Vec3 x, double reach, VesselMem
 static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const VesselMemory *m)
 {
     FootBatch *f = &b->foot;
+    SEL_ASSERT(m->has_foot && m->sweep.segment < v->field->first_segment[v->model->branch_count], "a foot that is followed lies on the model");
     sweep_block_place(&v->feet, b, i, m->sweep.segment, m->sweep.sac, m->sweep.own_t);
     sweep_block_set_point(&v->feet, b, i, x);
     f->at.x[i] = m->foot.x, f->at.y[i] = m->foot.y, f->at.z[i] = m->foot.z;
@@ -305,6 +310,7 @@ static void follow_rivals(const SweepVessel *v, const Vec3 *point, VesselMemory 
     SweepStart start[SWEEP_FEET];
     SweepFoot rival[SWEEP_FEET];
     Vec3 x[SWEEP_FEET];
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "rivals come in blocks");
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &memory[which[i]];
         x[i] = point[which[i]];
@@ -375,6 +381,7 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
 
 static void query_batch(const SweepVessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
+    SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
     Queue alone = {0}, among = {0};          // feet that see one branch, and those that see several
     for (int i = 0; i < count; i++) {
         VesselMemory *m = &memory[i];
@@ -416,6 +423,7 @@ typedef struct Walk {
 static void walk_branch(Walk *w, int branch, double t, double far, int except)
 {
     const SweepVessel *v = w->vessel;
+    SEL_ASSERT(branch >= 0 && branch < v->model->branch_count && far >= 0, "a walk goes along branches of the model, forwards");
     const SweepCurve *curve = v->field->curve[branch];
     const SweepBranch *b = &v->model->branch[branch];
     for (int k = 0; k < curve->knot_count && w->steps > 0; k++) {
@@ -556,6 +564,7 @@ static bool allocate(SweepVessel *v)
 
 Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
 {
+    SEL_ASSERT(model->branch_count > 0 && model->branch[0].parent == -1, "the model is valid (sweep_model_validate)");
     SweepVessel *v = calloc(1, sizeof *v);
     if (!v)
         return NULL;
