@@ -241,7 +241,7 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
         copy_part(&b->foot.at, &b->part[0]);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if (lanes >> i & 1)
-                b->owner[i] = 0, b->keeps_t[i] = true;
+                b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true;
         return;
     }
     clear_sum(&b->foot.at);
@@ -256,7 +256,10 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
     if (sacs != 0)
         blend_sacs(feet, b, lanes, sacs);
     for (int i = 0; i < FOOT_BLOCK; i++)
-        b->keeps_t[i] = b->keeps_t[i] || (lanes >> i & 1);
+        if (lanes >> i & 1) {
+            b->keeps_t[i] = true;
+            b->pure[i] = b->owner[i] >= 0 && b->foot.at.f[i] == b->part[b->owner[i]].f[i];
+        }
 }
 
 // --- Feet ---
@@ -282,7 +285,7 @@ SweepFoot sweep_block_foot(const SweepFeet *feet, const SweepBlock *b, int i)
                       .normal = vec3(f->nx[i], f->ny[i], f->nz[i]),
                       .gap = f->gap[i],
                       .sure = true,
-                      .pure = b->owner[i] >= 0 && f->at.f[i] == b->part[b->owner[i]].f[i],
+                      .pure = b->pure[i],
                       .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
     foot_place(feet, b, i, &foot);
     return foot;
@@ -323,7 +326,7 @@ static void add_foot(SweepFoot *foot, int *count, const SweepFoot *more)
 static const double REST_FRESH = 1e-10;      // [mm] error of the gap that Newton may leave for a foot found from scratch
 
 // Prepares a block for careful steps; lanes beyond `count` repeat the first.
-static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, bool same_x, const SweepStart *start, int count)
+static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, const SweepStart *start, int count)
 {
     FootBatch *f = &b->foot;
     memset(&b->ring, 0, sizeof b->ring);
@@ -331,7 +334,7 @@ static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, boo
         int from = i < count ? i : 0;
         const SweepStart *s = &start[from];
         sweep_block_place(feet, b, i, s->segment, s->sac, s->t);
-        sweep_block_set_point(feet, b, i, x[same_x ? 0 : from]);
+        sweep_block_set_point(feet, b, i, x[from]);
         f->at.x[i] = s->at.x, f->at.y[i] = s->at.y, f->at.z[i] = s->at.z;
         f->longest[i] = fmin(0.5 * f->radius[i], fmax(0.1 * f->radius[i], 0.4 * s->far));
         f->allowed[i] = REST_FRESH;
@@ -364,47 +367,45 @@ static unsigned run_block(const SweepFeet *feet, SweepBlock *b, unsigned all, in
 
 static bool is_number(const SweepFoot *foot) { return vec3_is_finite(foot->at) && vec3_is_finite(foot->normal) && isfinite(foot->gap); }
 
-unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot)
+// A lane that has not converged may still hold a foot: on the axis of a round vessel all feet around are equally near, and the tangential step never ends.
+static bool is_one_of_many(const SweepBlock *b, int i, Vec3 x, SweepFoot *foot)
 {
-    enum { ROUNDS = 6 };
-    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "points fit into a block");
+    static const double LEFT = 1e-4, OFF = 1e-6;     // relative to the radius: tangential and normal residual
+    const FootBatch *f = &b->foot;
+    Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(foot->at, x);
+    double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
+    foot->normal = n, foot->gap = gap;
+    return slope > 0.1 && gap > 0.3 * radius && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius;
+}
+
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, int rounds, SweepFoot *foot)
+{
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET && rounds > 0, "points fit into a block");
     SweepBlock b;
-    start_block(feet, &b, x, false, start, count);
-    unsigned done = run_block(feet, &b, (1u << count) - 1, ROUNDS), sound = 0;
+    start_block(feet, &b, x, start, count);
+    unsigned all = (1u << count) - 1, done = run_block(feet, &b, all, rounds), sound = 0;
+    if (done != all)
+        sweep_block_sample(feet, &b, all & ~done);
     feet->kernels->finish(&b.foot);
     for (int i = 0; i < count; i++) {
         foot[i] = sweep_block_foot(feet, &b, i);
-        sound |= (done >> i & 1) && is_number(&foot[i]) ? 1u << i : 0;
+        if ((done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])) && is_number(&foot[i]))
+            sound |= 1u << i;
     }
     return sound;
 }
 
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot)
 {
-    enum { ROUNDS = 24 };
-    static const double LEFT = 1e-4, OFF = 1e-6;     // relative to the radius: tangential and normal residual of a foot that is one of many on a circle
-    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "starts fit into a block");
-    SweepBlock b;
-    FootBatch *f = &b.foot;
-    start_block(feet, &b, &x, true, start, count);
-    unsigned all = (1u << count) - 1, done = run_block(feet, &b, all, ROUNDS);
+    Vec3 same[SWEEP_FEET];
+    SweepFoot one[SWEEP_FEET];
     int found = 0;
-    if (done != all)
-        sweep_block_sample(feet, &b, all & ~done);
-    feet->kernels->finish(f);
-    for (int i = 0; i < count; i++) {
-        SweepFoot one = sweep_block_foot(feet, &b, i);
-        if (!(done >> i & 1)) {
-            // on the axis of a round vessel all feet around are equally near, and the tangential step never ends
-            Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(one.at, x);
-            double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
-            if (!(slope > 0.1 && gap > 0.3 * radius && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius))
-                continue;
-            one.normal = n, one.gap = gap;
-        }
-        if (is_number(&one))
-            add_foot(foot, &found, &one);
-    }
+    for (int i = 0; i < SWEEP_FEET; i++)
+        same[i] = x;
+    unsigned sound = sweep_follow(feet, same, start, count, SWEEP_ROUNDS, one);
+    for (int i = 0; i < count; i++)
+        if (sound >> i & 1)
+            add_foot(foot, &found, &one[i]);
     return found;
 }
 

@@ -33,6 +33,7 @@ typedef struct SweepBlock {
     const SweepView *view[FOOT_BLOCK];
     int own[FOOT_BLOCK];                 // index of the own branch in the view; -1: on a sac
     int owner[FOOT_BLOCK];               // after a sample: index of the part of largest share in the view; -1: the sac
+    bool pure[FOOT_BLOCK];               // after a sample: the owner alone, nothing is blended
     bool keeps_t[FOOT_BLOCK];            // the parts' t are near the feet; else they start from the view
     SweepLane own_t;                     // t on the own branch
     SweepLane is_flat;                   // 1: the ring holds (the own segment is no dome)
@@ -90,8 +91,9 @@ typedef struct SweepSearch {
 } SweepSearch;
 // Starts for x on all walls that are seen from a place (`segment`: its segment), the nearest first.
 int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, const SweepSearch *search, SweepStart *start);
-// A few careful steps of up to eight points, each from its own start. Returns the bits of those that reach a foot.
-unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, SweepFoot *foot);
+// Careful Newton steps of up to eight points, each from its own start; at most `rounds`. Returns the bits of those that reach a foot.
+enum { SWEEP_ROUNDS = 24 };
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, int rounds, SweepFoot *foot);
 // The place as seen from x: the branch or sac in which x lies deepest, from a place near it; F at x and its gradient.
 SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f, Vec3 *gradient);
 // A foot on the line from the curve through x, by bisection. Always finds a wall point; `sure` is false.

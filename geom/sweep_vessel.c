@@ -139,57 +139,98 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
     return (SweepPlace){.branch = branch, .t = foot->t};
 }
 
-// Divides starts into those that may lead to a foot nearer than `most`, kept, and the others. Returns the number kept; `rival`: about the distance of the
-// nearest foot among the others.
-static int keep_starts(double most, SweepStart *start, int count, double *rival)
+// --- Checks ---
+
+// A foot that may not be the nearest: its rivals' starts, and the feet that Newton finds from them.
+enum { CHECK_STARTS = 4 };
+typedef struct Check {
+    int point, count;        // index in the query; number of starts
+    bool nearer;             // a ring has a point nearer than the foot
+    SweepFoot foot, found[CHECK_STARTS];
+    SweepStart start[CHECK_STARTS];
+    unsigned sound;          // bits of the feet that were found
+    double radius, rival, beyond;    // [mm] rival: about the distance of the nearest wall without a start; beyond: see SweepSearch
+} Check;
+
+// Keeps the starts that may lead to a foot nearer than `most`.
+static void keep_starts(double most, const SweepStart *start, int count, Check *check)
 {
-    int kept = 0;
+    check->count = 0;
     for (int i = 0; i < count; i++) {
-        if (start[i].least < most)
-            start[kept++] = start[i];
+        if (start[i].least < most && check->count < CHECK_STARTS)
+            check->start[check->count++] = start[i];
         else
-            *rival = fmin(*rival, start[i].least);
+            check->rival = fmin(check->rival, start[i].least);
     }
-    return kept;
 }
 
-// Searches for rivals of a foot, and answers with the nearest. A ball that lies inside one branch is lumen, whatever the other branches are: a foot on the wall
-// of one branch alone is compared only with the rest of that wall, and with other walls if that does not suffice. `nearer`: a ring has a point nearer than the
-// foot.
-static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nearer, VesselMemory *m, VesselHit *hit)
+// Searches for rivals of check->foot. A ball that lies inside one branch is lumen, whatever the other branches are: a foot on the wall of one branch alone is
+// compared only with the rest of that wall, and with other walls if that does not suffice.
+static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
 {
-    double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit, beyond = limit;
+    const SweepFoot *foot = &check->foot;
+    double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac), limit = fabs(foot->gap) + LOOK * radius;
     SweepStart start[SWEEP_FEET];
-    SweepFoot found[SWEEP_FEET];
-    SweepPlace place = place_of_foot(v, &foot);
-    SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot.at, .beyond = limit, .nearest_beyond = &beyond};
+    SweepPlace place = place_of_foot(v, foot);
+    SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot->at, .beyond = limit, .nearest_beyond = &check->beyond};
     // a start closer to the foot than this leads to it, and a wall closer than `zone` belongs to it; outside, in the groove between two tubes, feet on both sides
     // are as near to each other as to x
-    search.own = foot.gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot.gap);
-    search.zone = foot.gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot.gap);
-    int count = 0;
-    bool single = foot.segment >= 0 && v->field->view[foot.segment].count == 1 && v->field->view[foot.segment].sac < 0;
-    search.alone = foot.pure && foot.gap > 0 && !nearer;
-    if (search.alone || single) {
-        search.alone = true;
-        count = sweep_starts(&v->feet, x, place, foot.segment, &search, start);
-        count = keep_starts(fabs(foot.gap), start, count, &rival);
+    search.own = foot->gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot->gap);
+    search.zone = foot->gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot->gap);
+    bool single = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
+    check->radius = radius, check->rival = check->beyond = limit, check->count = 0, check->sound = 0;
+    search.alone = single || (foot->pure && foot->gap > 0 && !check->nearer);
+    if (search.alone) {
+        int count = sweep_starts(&v->feet, x, place, foot->segment, &search, start);
+        keep_starts(fabs(foot->gap), start, count, check);
     }
-    if (!single && (!search.alone || count > 0)) {
-        rival = beyond = limit;
+    if (!single && (!search.alone || check->count > 0)) {
+        check->rival = check->beyond = limit;
         search.alone = false;
-        count = sweep_starts(&v->feet, x, place, foot.segment, &search, start);
-        count = keep_starts(fabs(foot.gap) + BESIDE * radius, start, count, &rival);
+        int count = sweep_starts(&v->feet, x, place, foot->segment, &search, start);
+        keep_starts(fabs(foot->gap) + BESIDE * radius, start, count, check);
     }
-    count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
-    // the nearest and the second nearest of all
-    SweepFoot second = {.gap = HUGE_VAL};
-    for (int i = 0; i < count; i++) {
-        SweepFoot other = found[i];
-        if (vec3_distance(other.at, foot.at) < 1e-4)
+}
+
+// Finds feet from the starts of several checks, eight at a time.
+static void run_checks(const SweepVessel *v, const Vec3 *point, Check *check, int count)
+{
+    Vec3 x[SWEEP_FEET];
+    SweepStart start[SWEEP_FEET];
+    SweepFoot found[SWEEP_FEET];
+    int which[SWEEP_FEET], index[SWEEP_FEET], filled = 0;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < check[i].count; k++) {
+            x[filled] = point[check[i].point], start[filled] = check[i].start[k];
+            which[filled] = i, index[filled++] = k;
+            bool last = true;
+            for (int j = i + (k + 1 == check[i].count); j < count && last; j++)
+                last = check[j].count == 0;
+            if (filled < SWEEP_FEET && !last)
+                continue;
+            unsigned sound = sweep_follow(&v->feet, x, start, filled, SWEEP_ROUNDS, found);
+            for (int j = 0; j < filled; j++)
+                if (sound >> j & 1) {
+                    check[which[j]].found[index[j]] = found[j];
+                    check[which[j]].sound |= 1u << index[j];
+                }
+            filled = 0;
+        }
+}
+
+// Answers with the nearest foot of a check.
+static void end_check(const SweepVessel *v, Vec3 x, const Check *check, VesselMemory *m, VesselHit *hit)
+{
+    static const double SAME = 1e-4;         // [mm] feet closer together are one
+    SweepFoot foot = check->foot, second = {.gap = HUGE_VAL};
+    double rival = check->rival;
+    bool nearer = check->nearer;
+    for (int i = 0; i < check->count; i++) {
+        SweepFoot other = check->found[i];
+        if (!(check->sound >> i & 1) || vec3_distance(other.at, foot.at) < SAME || (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
             continue;
         if (fabs(other.gap) < fabs(foot.gap)) {
-            other = foot, foot = found[i];
+            other = foot, foot = check->found[i];
             nearer = false;
         }
         if (fabs(other.gap) < fabs(second.gap)) {
@@ -199,11 +240,11 @@ static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nea
         rival = fmin(rival, fabs(other.gap));
     }
     answer(v, x, &foot, m, hit);
-    hold_rival(&second, fabs(foot.gap) + BESIDE * radius, m);
+    hold_rival(&second, fabs(foot.gap) + BESIDE * check->radius, m);
     if (!m->has_rival)
-        rival = fmin(rival, fmin(beyond, fabs(second.gap)));
+        rival = fmin(rival, fmin(check->beyond, fabs(second.gap)));
     else
-        rival = fmin(rival, fabs(foot.gap) + LOOK_BESIDE * radius);
+        rival = fmin(rival, fabs(foot.gap) + LOOK_BESIDE * check->radius);
     trust(v, x, &foot, rival, m);
     m->sweep.open = nearer;
 }
@@ -240,7 +281,10 @@ static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
         return;
     }
     // rings about a foot that is known are closer to each other than those of the first search
-    answer_surely(v, x, found[best], true, m, hit);
+    Check check = {.foot = found[best], .nearer = true};
+    begin_check(v, x, &check);
+    run_checks(v, &x, &check, 1);
+    end_check(v, x, &check, m, hit);
 }
 
 // Returns true if the hit can be filled without evaluating the field.
@@ -288,43 +332,117 @@ static void store_lane(const SweepVessel *v, const SweepBlock *b, int i, Vec3 x,
         m->sweep.t[k] = b->part[k].t[i];
 }
 
-// Points of a batch whose feet are followed, and those that are found by other means.
+// Points of a batch that wait for the same treatment.
 typedef struct Queue {
     int count, point[FOOT_BATCH];
 } Queue;
 
-// A foot that was followed but not reached in a few steps: careful steps from where it was.
-static void answer_sought(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselHit *hit)
+typedef struct Batch {
+    const Vec3 *point;
+    VesselMemory *memory;
+    VesselHit *hit;
+    Queue alone, among;      // feet that are followed: those that see one branch, and those that see several
+    Queue sought;            // feet that are not reached by one or two steps: careful steps from where they were
+    Queue beside;            // feet whose rivals are followed, too
+    int checks;              // feet that may not be the nearest
+    Check check[FOOT_BATCH];
+} Batch;
+
+static void put(Queue *queue, int point)
 {
-    SweepStart start = {.at = m->foot, .far = vec3_distance(x, m->foot), .segment = m->sweep.segment, .sac = m->sweep.sac, .t = m->sweep.own_t};
+    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point is in a queue at most once");
+    queue->point[queue->count++] = point;
+}
+
+static void put_check(const SweepVessel *v, Batch *batch, int point, const SweepFoot *foot, bool nearer)
+{
+    SEL_REQUIRE(batch->checks < FOOT_BATCH, "a point is checked at most once");
+    Check *check = &batch->check[batch->checks++];
+    check->point = point, check->foot = *foot, check->nearer = nearer;
+    begin_check(v, batch->point[point], check);
+}
+
+static void follow_block(const SweepVessel *v, Batch *batch, const int *which, int count)
+{
+    enum { ROUNDS = 2 };
+    static const double NEARER = 1e-6;       // [mm]
+    SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "a block has a point, and no more than lanes");
+    SweepBlock b;
+    FootBatch *f = &b.foot;
+    unsigned all = (1u << count) - 1, done = 0;
+    memset(&b.ring, 0, sizeof b.ring);
+    for (int i = 0; i < FOOT_BLOCK; i++) {
+        int p = which[i < count ? i : 0];
+        load_lane(v, &b, i, batch->point[p], &batch->memory[p]);
+    }
+    v->feet.kernels->predict(f, REST);
+    for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
+        sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
+        done = v->feet.kernels->newton(f, false);
+    }
+    v->feet.kernels->finish(f);
+    v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, v->feet.harmonics);
+    for (int i = 0; i < count; i++) {
+        int p = which[i];
+        VesselMemory *m = &batch->memory[p];
+        if (!(done >> i & 1)) {
+            put(&batch->sought, p);
+            continue;
+        }
+        double size = fabs(f->gap[i]) - NEARER, travel = m->trust;
+        bool nearer = b.own[i] >= 0 && b.is_flat[i] > 0 && size > 0 && b.ring.near2[i] < size * size;
+        if ((nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(batch->point[p], m->bound_at)) < travel * travel)) {
+            SweepFoot foot = sweep_block_foot(&v->feet, &b, i);
+            put_check(v, batch, p, &foot, nearer);
+            continue;
+        }
+        store_lane(v, &b, i, batch->point[p], m, &batch->hit[p]);
+        if (m->has_rival)
+            put(&batch->beside, p);
+    }
+}
+
+static void seek_block(const SweepVessel *v, Batch *batch, const int *which, int count)
+{
+    SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
-    if (sweep_settle(&v->feet, x, &start, 1, found) > 0)
-        answer_surely(v, x, found[0], false, m, hit);
-    else
-        answer_afresh(v, x, m, hit);
+    Vec3 x[SWEEP_FEET];
+    for (int i = 0; i < count; i++) {
+        const VesselMemory *m = &batch->memory[which[i]];
+        x[i] = batch->point[which[i]];
+        start[i] = (SweepStart){.at = m->foot, .far = vec3_distance(x[i], m->foot), .segment = m->sweep.segment, .sac = m->sweep.sac, .t = m->sweep.own_t};
+    }
+    unsigned sound = sweep_follow(&v->feet, x, start, count, SWEEP_ROUNDS, found);
+    for (int i = 0; i < count; i++) {
+        if (sound >> i & 1)
+            put_check(v, batch, which[i], &found[i], false);
+        else
+            answer_afresh(v, x[i], &batch->memory[which[i]], &batch->hit[which[i]]);
+    }
 }
 
 // Follows the rivals of feet that were found. A rival that has become nearer is the foot, and the foot its rival.
-static void follow_rivals(const SweepVessel *v, const Vec3 *point, VesselMemory *memory, VesselHit *hit, const int *which, int count)
+static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, int count)
 {
+    enum { ROUNDS = 6 };
     SweepStart start[SWEEP_FEET];
     SweepFoot rival[SWEEP_FEET];
     Vec3 x[SWEEP_FEET];
     SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "rivals come in blocks");
     for (int i = 0; i < count; i++) {
-        const VesselMemory *m = &memory[which[i]];
-        x[i] = point[which[i]];
+        const VesselMemory *m = &batch->memory[which[i]];
+        x[i] = batch->point[which[i]];
         start[i] = (SweepStart){
             .at = m->rival, .far = vec3_distance(x[i], m->rival), .segment = m->sweep.rival_segment, .sac = m->sweep.rival_sac, .t = m->sweep.rival_t};
     }
-    unsigned done = sweep_follow(&v->feet, x, start, count, rival);
+    unsigned done = sweep_follow(&v->feet, x, start, count, ROUNDS, rival);
     for (int i = 0; i < count; i++) {
-        VesselMemory *m = &memory[which[i]];
-        VesselHit *h = &hit[which[i]];
+        VesselMemory *m = &batch->memory[which[i]];
+        VesselHit *h = &batch->hit[which[i]];
         SweepFoot foot = {.at = m->foot, .normal = m->normal, .hessian = m->hessian, .gap = h->gap, .sure = true};
         foot.segment = m->sweep.segment, foot.sac = m->sweep.sac, foot.t = m->sweep.own_t;
         if (!(done >> i & 1) || vec3_distance(rival[i].at, foot.at) < 1e-4) {
-            answer_surely(v, x[i], foot, m->sweep.open != 0, m, h);
+            put_check(v, batch, which[i], &foot, m->sweep.open != 0);
             continue;
         }
         if (fabs(rival[i].gap) < fabs(foot.gap)) {
@@ -336,69 +454,39 @@ static void follow_rivals(const SweepVessel *v, const Vec3 *point, VesselMemory 
     }
 }
 
-static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *memory, VesselHit *hit, const int *which, int count)
+static void in_blocks(const SweepVessel *v, Batch *batch, const Queue *queue, void (*treat)(const SweepVessel *v, Batch *batch, const int *which, int count))
 {
-    enum { ROUNDS = 2 };
-    static const double NEARER = 1e-6;       // [mm]
-    SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "a block has a point, and no more than lanes");
-    SweepBlock b;
-    FootBatch *f = &b.foot;
-    unsigned all = (1u << count) - 1, done = 0;
-    memset(&b.ring, 0, sizeof b.ring);
-    for (int i = 0; i < FOOT_BLOCK; i++) {
-        int p = which[i < count ? i : 0];
-        load_lane(v, &b, i, point[p], &memory[p]);
-    }
-    v->feet.kernels->predict(f, REST);
-    for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
-        sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
-        done = v->feet.kernels->newton(f, false);
-    }
-    int beside[FOOT_BLOCK], rivals = 0;
-    v->feet.kernels->finish(f);
-    v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, v->feet.harmonics);
-    for (int i = 0; i < count; i++) {
-        int p = which[i];
-        VesselMemory *m = &memory[p];
-        if (!(done >> i & 1)) {
-            answer_sought(v, point[p], m, &hit[p]);
-            continue;
-        }
-        double size = fabs(f->gap[i]) - NEARER, travel = m->trust;
-        bool nearer = b.own[i] >= 0 && b.is_flat[i] > 0 && size > 0 && b.ring.near2[i] < size * size;
-        if ((nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(point[p], m->bound_at)) < travel * travel)) {
-            SweepFoot foot = sweep_block_foot(&v->feet, &b, i);
-            answer_surely(v, point[p], foot, nearer, m, &hit[p]);
-            continue;
-        }
-        store_lane(v, &b, i, point[p], m, &hit[p]);
-        if (m->has_rival)
-            beside[rivals++] = p;
-    }
-    if (rivals > 0)
-        follow_rivals(v, point, memory, hit, beside, rivals);
+    for (int i = 0; i < queue->count; i += FOOT_BLOCK)
+        treat(v, batch, queue->point + i, queue->count - i < FOOT_BLOCK ? queue->count - i : FOOT_BLOCK);
 }
 
 static void query_batch(const SweepVessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
     SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
-    Queue alone = {0}, among = {0};          // feet that see one branch, and those that see several
+    Batch batch;
+    batch.point = point, batch.memory = memory, batch.hit = hit;
+    batch.alone.count = batch.among.count = batch.sought.count = batch.beside.count = batch.checks = 0;
     for (int i = 0; i < count; i++) {
         VesselMemory *m = &memory[i];
         if (answer_cheaply(v, point[i], reach, m, &hit[i]))
             continue;
         double far = m->has_foot ? FOLLOWED * sweep_place_radius(&v->feet, m->sweep.segment, m->sweep.sac) : 0;
-        if (!(vec3_norm2(vec3_sub(point[i], m->place)) < far * far)) {
+        if (!(vec3_norm2(vec3_sub(point[i], m->place)) < far * far))
             answer_afresh(v, point[i], m, &hit[i]);
-            continue;
-        }
-        Queue *queue = m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0 ? &alone : &among;
-        queue->point[queue->count++] = i;
+        else if (m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0)
+            put(&batch.alone, i);
+        else
+            put(&batch.among, i);
     }
-    for (int i = 0; i < alone.count; i += FOOT_BLOCK)
-        follow_block(v, point, memory, hit, alone.point + i, alone.count - i < FOOT_BLOCK ? alone.count - i : FOOT_BLOCK);
-    for (int i = 0; i < among.count; i += FOOT_BLOCK)
-        follow_block(v, point, memory, hit, among.point + i, among.count - i < FOOT_BLOCK ? among.count - i : FOOT_BLOCK);
+    in_blocks(v, &batch, &batch.alone, follow_block);
+    in_blocks(v, &batch, &batch.among, follow_block);
+    in_blocks(v, &batch, &batch.sought, seek_block);
+    in_blocks(v, &batch, &batch.beside, follow_rivals);
+    run_checks(v, point, batch.check, batch.checks);
+    for (int i = 0; i < batch.checks; i++) {
+        int p = batch.check[i].point;
+        end_check(v, point[p], &batch.check[i], &memory[p], &hit[p]);
+    }
 }
 
 static void sweep_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
