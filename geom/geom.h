@@ -13,10 +13,15 @@
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 
+// the swept model: branches with cross-sections along them
+#include "geom/sweep_model.h"
+#include "geom/sweep_field.h"
+
 // vessels: the wall as the solver queries it
 #include "geom/vessel.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
+#include "geom/sweep_vessel.h"
 #include "geom/tube_mesh.h"
 
 // surfaces as triangles
