@@ -24,7 +24,10 @@
 
 #include "geom/vessel_tree.h"
 
-enum { SWEEP_HARMONICS = 8, SWEEP_TERMS = 2 * SWEEP_HARMONICS + 1 };   // terms of a row: c_0, then Re c_1, -Im c_1, Re c_2, … (factors of cos k theta, sin k theta)
+enum {
+    SWEEP_HARMONICS = 8,
+    SWEEP_TERMS = 2 * SWEEP_HARMONICS + 1
+};                             // terms of a row: c_0, then Re c_1, -Im c_1, Re c_2, … (factors of cos k theta, sin k theta)
 enum { SWEEP_CANDIDATES = 6 };       // most branches and sacs that are blended at one place
 
 typedef struct SweepBranch {

@@ -1,0 +1,46 @@
+// The state of the swept model's fit (sweep_fit.h): curves, breaks, wall points. Internal to recon. Lengths mm.
+#ifndef SELDINGER_RECON_FIT_SWEEP_DRAFT_H
+#define SELDINGER_RECON_FIT_SWEEP_DRAFT_H
+
+#include "geom/geom.h"
+#include "geom/sweep_curve.h"
+#include "geom/sweep_model.h"
+#include "recon/fit/sweep_fit.h"
+
+typedef struct SweepDraft {
+    const VesselTree *tree;
+    const SweepFitOptions *options;
+    VesselBranches *branches;
+    int count;               // branches
+    Vec3 **knot;             // (count) knots …
+    int *knot_count;         // … and their numbers
+    SweepCurve **curve;      // (count)
+    double *node_t;          // (N) place of each vessel node on its branch's curve
+    SweepModel *model;       // breaks and rows; made by sweep_draft_divide
+    double *scale;           // (breaks) local radius of the interval that begins there
+    uint8_t *is_fork;        // (breaks) whether it lies at a fork
+    double *prior_radius;    // (rows) mean radius by the tree's nodes
+    uint8_t *harmonics;      // (rows) highest harmonic that is not held at 0
+
+    int64_t point_count;     // wall points of vessel nodes, branch by branch
+    Vec3 *point;
+    int *owner;              // (points) branch
+    int *node;               // (points) node
+    double *t;               // (points) [mm] foot on the branch's curve
+} SweepDraft;
+
+// Lays the curves of all branches through the smoothed and thinned centres. Returns false if out of memory.
+bool sweep_draft_create(SweepDraft *draft, const VesselTree *tree, const SweepFitOptions *options);
+void sweep_draft_free(SweepDraft *draft);
+// Makes curves anew after knots have moved, and places nodes on them.
+bool sweep_draft_curves(SweepDraft *draft);
+// Divides the curves into intervals, `spacing` [radii] on tubes and the option's at forks, and makes an empty model.
+bool sweep_draft_divide(SweepDraft *draft, double spacing);
+// Radius of the tree at t, from its nodes.
+double sweep_draft_radius(const SweepDraft *draft, int branch, double t);
+// Feet of all points on their own branch: `t`. Returns false if out of memory.
+bool sweep_draft_project(SweepDraft *draft);
+// Value of a term of a branch at t.
+double sweep_draft_term(const SweepDraft *draft, int branch, int term, double t);
+
+#endif

@@ -1,0 +1,338 @@
+#include "recon/fit/sweep_fit.h"
+
+#include "geom/sweep_field.h"
+#include "recon/fit/sweep_draft.h"
+#include "recon/fit/sweep_rows.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { CENTRINGS = 2, SECTION_ROUNDS = 6, MOST_SIGHTS = 4 };
+static const double SKIP = 0.7;              // [parent's radii] of a child's start whose points its sections leave out
+static const double KNEE_NOISE = 2.5;        // distance at which a point's trust has fallen to a half, in standard deviations of the noise …
+// … and at least, in radii, round by round: from far away, a sharp knee would take the wall for outliers
+static const double section_knee[SECTION_ROUNDS] = {0.5, 0.25, 0.12, 0.06, 0.06, 0.06}, round_knee[] = {0.12, 0.08, 0.05, 0.03};
+static const double FIRST_NOISE = 0.03;      // [radii]
+static const double LEAST_SLOPE = 0.5;       // of the blended field, in distances
+static const double OUT = 0.5;               // [radii] points further from the wall are left out of the figures
+
+SweepFitOptions sweep_fit_default_options(void) { return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = 5, .rounds = 4, .blend = 0.6}; }
+
+static bool check_options(const SweepFitOptions *o, Faults *faults)
+{
+    int before = faults->count;
+    const struct {
+        const char *name;
+        double value, least, most;
+    } range[] = {{"spacing", o->spacing, 0.1, 10},
+                 {"fork spacing", o->fork_spacing, 0.1, 10},
+                 {"harmonics", o->harmonics, 1, SWEEP_HARMONICS},
+                 {"rounds", o->rounds, 0, 100},
+                 {"blend", o->blend, 0, 2}};
+    for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
+        if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
+            faults_add(faults, "fit", 0, 0, "%s is %g; expected %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
+    return faults->count == before;
+}
+
+static double now_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+// --- Sections ---
+
+typedef struct Sections {
+    SweepDraft *draft;
+    SweepSystem *system;
+    SweepField *field;
+    double *rho;             // (points)
+} Sections;
+
+static SweepSight sight_of(const SweepField *field, const SweepPart *part, double share)
+{
+    SweepBasis basis = sweep_field_basis(field, part->branch, part->t);
+    double rho = fmax(part->rho, 1e-12);
+    SweepSight sight = {
+        .branch = part->branch, .first = basis.first - field->model->branch[part->branch].first_row, .zeta = {part->n / rho, part->b / rho}, .share = share};
+    memcpy(sight.weight, basis.weight, sizeof sight.weight);
+    return sight;
+}
+
+static void see_own_branch(void *context, long p)
+{
+    Sections *s = context;
+    SweepPart part;
+    sweep_field_branch(s->field, s->draft->owner[p], s->draft->point[p], s->draft->t[p], &part);
+    s->rho[p] = part.rho;
+    s->system->sight[p] = sight_of(s->field, &part, 1);
+    s->system->first[p] = p;
+}
+
+static double radius_at(const SweepDraft *d, const SweepSight *sight)
+{
+    const SweepBranch *b = &d->model->branch[sight->branch];
+    double re = 1, im = 0, sum = 0;
+    const double *row = d->model->row + (size_t)(b->first_row + sight->first) * SWEEP_TERMS;
+    for (int k = 0; k <= SWEEP_HARMONICS; k++) {
+        for (int j = 0; j < 4; j++) {
+            const double *c = row + j * SWEEP_TERMS;
+            sum += sight->weight[j] * (k == 0 ? c[0] : c[2 * k - 1] * re + c[2 * k] * im);
+        }
+        double next = re * sight->zeta[0] - im * sight->zeta[1];
+        im = re * sight->zeta[1] + im * sight->zeta[0];
+        re = next;
+    }
+    return sum;
+}
+
+static double trust_of(double e, double noise, double least) { return 1 / (1 + same_square(same_square(e / fmax(KNEE_NOISE * noise, least)))); }
+
+static void measure_sections(Sections *s, double knee)
+{
+    SweepDraft *d = s->draft;
+    SweepSystem *y = s->system;
+    for (int64_t p = 0; p < d->point_count; p++) {
+        int parent = d->model->branch[d->owner[p]].parent;
+        double skipped = parent < 0 ? -HUGE_VAL : SKIP * sweep_draft_radius(d, parent, d->model->branch[d->owner[p]].parent_t);
+        y->distance[p] = radius_at(d, &y->sight[p]) - s->rho[p];
+        y->trust[p] = d->t[p] < skipped ? 0 : trust_of(y->distance[p], y->noise, knee * d->tree->radius[d->node[p]]);
+    }
+}
+
+// Fits all rows to the branches' own points. `system` is created here.
+static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
+{
+    double noise = system->noise, strength[PENALTIES][SWEEP_HARMONICS + 1];
+    memcpy(strength, system->strength, sizeof strength);
+    sweep_system_free(system);
+    bool good = sweep_system_create(system, d) && sweep_draft_project(d);
+    if (noise > 0)
+        memcpy(system->strength, strength, sizeof strength);
+    system->noise = noise > 0 ? noise : FIRST_NOISE * d->branches->branch[0].radius_mean;
+    Sections s = {d, system, good ? sweep_field_create(d->model) : NULL, calloc((size_t)d->point_count + 1, sizeof *s.rho)};
+    good = good && s.field && s.rho;
+    if (good) {
+        parallel_for(d->options->threads, (long)d->point_count, see_own_branch, &s, NULL);
+        system->first[d->point_count] = d->point_count;
+    }
+    for (int k = 0; good && k < SECTION_ROUNDS; k++) {
+        measure_sections(&s, section_knee[k]);
+        good = sweep_system_sum(system) && sweep_system_step(system, false);
+        if (good && tuned && k >= 2) {
+            measure_sections(&s, section_knee[k]);
+            good = sweep_system_tune(system);
+        }
+    }
+    sweep_field_free(s.field);
+    free(s.rho);
+    return good;
+}
+
+// --- Knots to the middle of their sections ---
+
+// A closed end is moved along its tangent by what its dome's points say.
+static double end_shift(const SweepDraft *d, const SweepSystem *system, int branch)
+{
+    const SweepCurve *curve = d->curve[branch];
+    SweepJet end = sweep_curve_at(curve, curve->length);
+    Vec3 out = vec3_unit(end.s1);
+    double product = 0, square = 0, r = sweep_draft_radius(d, branch, curve->length);
+    for (int64_t p = 0; p < d->point_count; p++)
+        if (d->owner[p] == branch && d->t[p] > curve->length) {
+            Vec3 u = vec3_sub(d->point[p], end.s);
+            double steep = vec3_dot(u, out) / fmax(vec3_norm(u), 1e-9 * r);
+            product -= system->trust[p] * steep * system->distance[p], square += system->trust[p] * steep * steep;
+        }
+    return square > 2 ? fmax(-0.5 * r, fmin(0.5 * r, product / square)) : 0;
+}
+
+static void centre_knots(SweepDraft *d, const SweepSystem *system, int branch)
+{
+    const SweepCurve *curve = d->curve[branch];
+    const SweepBranch *b = &d->model->branch[branch];
+    double hidden = b->parent >= 0 ? sweep_draft_radius(d, b->parent, b->parent_t) : -1;
+    for (int k = 0; k < b->knot_count; k++) {
+        double t = curve->knot_t[k], r = sweep_draft_radius(d, branch, t);
+        if (t <= hidden)
+            continue;
+        SweepJet jet = sweep_curve_at(curve, t);
+        Vec3 shift = vec3_add(vec3_scale(jet.n, sweep_draft_term(d, branch, 1, t)), vec3_scale(jet.b, sweep_draft_term(d, branch, 2, t)));
+        if (k == b->knot_count - 1)
+            shift = vec3_add_scaled(shift, end_shift(d, system, branch), vec3_unit(jet.s1));
+        double size = vec3_norm(shift), most = 0.5 * r;
+        d->knot[branch][k] = vec3_add_scaled(d->knot[branch][k], size > most ? most / size : 1, shift);
+    }
+}
+
+// Knots that have come too close to each other are left out.
+static void space_knots(SweepDraft *d, int branch)
+{
+    Vec3 *knot = d->knot[branch];
+    int kept = 1, count = d->knot_count[branch];
+    for (int k = 1; k < count; k++) {
+        double r = d->branches->branch[branch].radius_least;
+        if (vec3_distance(knot[k], knot[kept - 1]) > 0.1 * r || (k == count - 1 && kept == 1))
+            knot[kept++] = knot[k];
+        else if (k == count - 1)
+            knot[kept - 1] = knot[k];
+    }
+    d->knot_count[branch] = kept;
+}
+
+static bool lay_curves(SweepDraft *d, SweepSystem *system)
+{
+    bool good = true;
+    for (int k = 0; k < CENTRINGS && good; k++) {
+        good = sweep_draft_divide(d, d->options->spacing) && fit_sections(d, system, false);
+        for (int i = 0; i < d->count && good; i++) {
+            centre_knots(d, system, i);
+            space_knots(d, i);
+        }
+        good = good && sweep_draft_curves(d);
+    }
+    return good;
+}
+
+// --- Refinement ---
+
+typedef struct Refinement {
+    SweepDraft *draft;
+    SweepSystem *system;
+    SweepField *field;
+    SweepSight (*sight)[MOST_SIGHTS];        // (points)
+    int *count;              // (points)
+    double knee;
+} Refinement;
+
+static void see_blend(void *context, long p)
+{
+    Refinement *r = context;
+    SweepDraft *d = r->draft;
+    SweepBlend blend;
+    sweep_field_blend(r->field, (SweepPlace){.branch = d->owner[p], .t = d->t[p], .sac = -1}, d->point[p], &blend);
+    double slope = fmax(vec3_norm(blend.gradient), LEAST_SLOPE);
+    r->system->distance[p] = blend.f / slope;
+    r->system->trust[p] = trust_of(blend.f / slope, r->system->noise, r->knee * d->tree->radius[d->node[p]]);
+    r->count[p] = 0;
+    for (int i = 0; i < blend.count && r->count[p] < MOST_SIGHTS; i++)
+        if (blend.part[i].branch >= 0 && fabs(blend.part[i].share) > 1e-4)
+            r->sight[p][r->count[p]++] = sight_of(r->field, &blend.part[i], blend.part[i].share / slope);
+}
+
+static bool look_at_blend(Refinement *r, double knee)
+{
+    SweepDraft *d = r->draft;
+    r->knee = knee;
+    sweep_field_free(r->field);
+    if (!(r->field = sweep_field_create(d->model)))
+        return false;
+    parallel_for(d->options->threads, (long)d->point_count, see_blend, r, NULL);
+    int64_t sum = 0;
+    for (int64_t p = 0; p < d->point_count; p++)
+        sum += r->count[p];
+    if (!sweep_system_reserve(r->system, sum))
+        return false;
+    sum = 0;
+    for (int64_t p = 0; p < d->point_count; p++) {
+        r->system->first[p] = sum;
+        memcpy(r->system->sight + sum, r->sight[p], (size_t)r->count[p] * sizeof(SweepSight));
+        sum += r->count[p];
+    }
+    r->system->first[d->point_count] = sum;
+    return true;
+}
+
+static bool refine(SweepDraft *d, SweepSystem *system)
+{
+    enum { KNEES = sizeof round_knee / sizeof round_knee[0] };
+    size_t points = (size_t)d->point_count + 1;
+    Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), 0};
+    bool good = r.sight && r.count;
+    for (int k = 0; k < d->options->rounds && good; k++) {
+        good = look_at_blend(&r, round_knee[k < KNEES ? k : KNEES - 1]) && sweep_system_sum(system);
+        if (good && k > 0)
+            good = sweep_system_tune(system);
+        good = good && sweep_system_step(system, true);
+    }
+    good = good && look_at_blend(&r, round_knee[KNEES - 1]);
+    sweep_field_free(r.field);
+    free(r.sight);
+    free(r.count);
+    return good;
+}
+
+// --- Figures ---
+
+static void count_numbers(const SweepDraft *d, SweepFitFigures *figures)
+{
+    const SweepModel *m = d->model;
+    figures->numbers = 3 * (int64_t)m->knot_count + m->break_count;
+    for (int64_t i = 0; i < (int64_t)m->row_count * SWEEP_TERMS; i++)
+        figures->numbers += m->row[i] != 0;
+    if (m->sac)
+        figures->numbers += 5 * m->sac->blob_count;
+}
+
+static bool take_figures(const SweepDraft *d, const SweepSystem *system, SweepFitFigures *figures)
+{
+    double *value = malloc(((size_t)d->point_count + 1) * sizeof *value), sum = 0;
+    if (!value)
+        return false;
+    for (int64_t p = 0; p < d->point_count; p++) {
+        double e = fabs(system->distance[p]);
+        if (!(e < OUT * d->tree->radius[d->node[p]])) {
+            figures->left_out++;
+            continue;
+        }
+        value[figures->points++] = e;
+        sum += e;
+    }
+    if (figures->points > 0) {
+        sort_doubles(value, (size_t)figures->points);
+        figures->mean = sum / (double)figures->points;
+        figures->p99 = value[(int64_t)(0.99 * (double)(figures->points - 1))];
+        figures->most = value[figures->points - 1];
+    }
+    figures->noise = system->noise;
+    count_numbers(d, figures);
+    free(value);
+    return true;
+}
+
+static bool fit(SweepDraft *d, SweepSystem *system)
+{
+    bool good = lay_curves(d, system) && sweep_draft_divide(d, d->options->spacing);
+    return good && fit_sections(d, system, true) && refine(d, system);
+}
+
+SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, SweepFitFigures *figures, Faults *faults)
+{
+    SweepFitFigures found = {0};
+    SweepDraft draft;
+    SweepSystem system = {0};
+    SweepModel *model = NULL;
+    double begin = now_seconds();
+    if (!check_options(options, faults))
+        return NULL;
+    if (tree->point_count < 4 || tree->kind[0] != NODE_VESSEL) {
+        faults_add(faults, "fit", 0, 0, "the tree has %lld points and its root is %s; expected at least 4 points on the wall, and a vessel",
+                   (long long)tree->point_count, tree->kind[0] == NODE_VESSEL ? "a vessel" : "an aneurysm");
+        return NULL;
+    }
+    if (sweep_draft_create(&draft, tree, options) && fit(&draft, &system) && take_figures(&draft, &system, &found)) {
+        model = draft.model;
+        draft.model = NULL;
+    } else {
+        faults_add(faults, "fit", 0, 0, "not enough memory");
+    }
+    sweep_system_free(&system);
+    sweep_draft_free(&draft);
+    found.seconds = now_seconds() - begin;
+    if (figures)
+        *figures = found;
+    return model;
+}
