@@ -9,16 +9,22 @@
 //   grad t = S'/D,   Hess t = (S''S'^T + S'S''^T)/D^2 - (3 S'.S'' - u.S''') S'S'^T/D^3,
 //   grad n = N + a grad t,   Hess n = N' grad t^T + grad t N'^T + c grad t grad t^T + a Hess t;   the same for b with B.
 // Section. R(theta, t) = Re sum_k c_k(t) zeta^k, zeta = (n + i b)/rho, rho = |(n, b, w)|, k = 0 ... H. The branch's field is f = R - rho [mm], > 0 inside.
-// w = 0 along the branch. Beyond a closed end, t > length or t < 0, the curve continues as a straight line, the coefficients are those of the end, and w is the
-// height over the end's plane: a dome, smooth at its pole, because zeta^k vanishes there. Upstream of an open inlet w = 0: a cylinder without end.
-// c_k(t) are cubic B-splines over the branch's breaks (not uniform); each row of coefficients is one section of the field's terms.
+// w = 0 along the branch. Beyond a closed end, t > length or t < 0, the curve continues as a straight line and w is the height over the end's plane: a dome,
+// smooth at its pole, because zeta^k vanishes there. Upstream of an open inlet w = 0: a cylinder without end. Beyond either end, the section continues with the
+// slope that it has there and becomes constant within h, half its mean radius: c_k = c_k(end) + c_k'(end) (s - s^2/h + s^3/(3 h^2)), s = the height over the
+// end's plane up to h. So the wall has no crease at an end, however the vessel tapers.
+// c_k(t) are cubic B-splines over the branch's breaks (not uniform; the first and the last break are knots of multiplicity four, so the first and the last row
+// are the sections at the ends); each row of coefficients is one section of the field's terms.
 // Blends. F = M(... M(f_1, f_2) ...) over the candidates of a place, M(x, y) = (x + y + A(x - y))/2, A(d) = delta (2/3 + q^2/2 - q^3/12) for q = |d|/delta <= 2,
-// else |d|: C2, and F is the plain maximum where the fields differ by more than 2 delta. delta = blend * (radius of the child at the fork) *
-// (1 - (t_c/(3 r_p))^2)^2 with t_c the child's t and r_p the parent's radius at the fork, and 0 beyond: no blending away from forks.
+// else |d|: C2, and F is the plain maximum where the fields differ by more than 2 delta. Branches are taken in the order of their indices. delta = blend * (radius of the child at the fork) *
+// (1 - (t_c/(3 r_p))^2)^2 with t_c the child's t and r_p the parent's radius at the fork, and 0 beyond: no blending away from forks. (Radii at a fork are mean
+// radii: the parent's at parent_t, the child's one r_p from its start.)
+// Sacs are taken last: f = (r/2) (sum a u^3 - 1), r the radius of the sac's largest node, and delta = blend/2 times the smaller of r and the mean radius of the
+// vessel's nodes beside the neck.
 // Candidates are given by topology: a place on a branch sees only the branches that meet it within a few radii along the tree, so that vessels that touch
 // elsewhere are never blended.
 //
-// Lengths mm. A model owns its arrays; it is immutable after sweep_model_compile and may be shared by threads.
+// Lengths mm. A model owns its arrays. It is evaluated through a SweepField (sweep_field.h), which is made from it and borrows it.
 #ifndef SELDINGER_GEOM_SWEEP_MODEL_H
 #define SELDINGER_GEOM_SWEEP_MODEL_H
 
@@ -54,5 +60,16 @@ typedef struct SweepModel {
     VesselTree *sac;         // shared blobs of the sacs and the vessels beside their necks; NULL: the tree has no sacs
     int32_t *sac_node;       // (nodes of `sac`) the node of the tree that each one is
 } SweepModel;
+
+// Allocates all arrays for the counts, zeroed, and sets blend to its default. Returns NULL if a count is out of range (branches, knots and breaks at least one)
+// or if out of memory. `sac` and `sac_node` are NULL; a model that is given them owns them.
+SweepModel *sweep_model_create(int branch_count, int knot_count, int break_count, int row_count);
+void sweep_model_free(SweepModel *model);
+// Checks the properties stated above: ranges of branches follow each other and cover the arrays, parents come before children, places on parents exist, knots
+// are apart, breaks increase from 0 to the curve's length (to 1e-6 of it), numbers are finite, radii positive, sac nodes linked. Adds one fault per broken rule,
+// with the first offending index.
+bool sweep_model_validate(const SweepModel *model, const char *file, Faults *faults);
+// [mm] length of a branch's curve: t of its last knot.
+double sweep_model_length(const SweepModel *model, int branch);
 
 #endif

@@ -1,0 +1,108 @@
+// The swept model (sweep_model.h) made ready for evaluation: branches cut into segments on which curve, frame and section are cubic polynomials, each with the
+// list of the branches that can be seen there; and the plain evaluation of single branches and of the blended field, with exact first and second derivatives.
+// The lanes of sweep_lanes.h compute the same faster.
+//
+// Borrows the model, whose rows, knots and breaks must not change. Immutable after creation, may be shared by threads. Lengths mm.
+#ifndef SELDINGER_GEOM_SWEEP_FIELD_H
+#define SELDINGER_GEOM_SWEEP_FIELD_H
+
+#include "geom/sweep_curve.h"
+#include "geom/sweep_model.h"
+
+// Polynomials of t - origin on from <= t <= to. A branch has two segments before its start and two beyond its end, the outer ones without end.
+typedef struct SweepSegment {
+    Vec3 s[4], n[4], b[4];               // as in SweepInterval
+    double origin, rise, from, to;       // rise: w = rise (t - origin); 0: w = 0
+    double section[SWEEP_TERMS][4];      // the terms' polynomials
+    double largest;                      // [mm] upper bound of R on the segment
+    double unused[3];
+} __attribute__((aligned(64))) SweepSegment;
+
+enum { SWEEP_SEGMENT_ROW = sizeof(SweepSegment) / sizeof(double) };
+
+// A branch that is seen from a segment of another: its t near a place t' of the segment is about t + slope t', t' limited to 0 ... length of its own branch.
+typedef struct SweepCandidate {
+    int branch;
+    double t, slope;
+} SweepCandidate;
+
+// What is seen from a segment: branches in ascending order, among them its own (t = 0, slope = 1), and a node of the sacs' tree, -1: none.
+typedef struct SweepView {
+    int count;
+    int sac;
+    SweepCandidate of[SWEEP_CANDIDATES];
+} SweepView;
+
+typedef struct SweepFork {   // delta of a branch with those before it
+    double delta;            // [mm] at t = 0
+    double reach;            // [mm] t beyond which there is no blending
+} SweepFork;
+
+// The group of blobs of one sac, by node of the sacs' tree.
+typedef struct SweepSac {
+    double scale;            // f = scale (sum a u^3 - 1) [mm]
+    double delta;            // [mm]
+    SweepView view;          // branches seen from the node
+} SweepSac;
+
+typedef struct SweepField {
+    const SweepModel *model;
+    SweepCurve **curve;      // (branches)
+    int *first_segment;      // (branches + 1)
+    SweepSegment *segment;   // by branch and t
+    SweepView *view;         // (segments)
+    SweepFork *fork;         // (branches)
+    SweepSac *sac;           // (nodes of model->sac)
+    int *sac_group;          // (nodes of model->sac) the first node of the node's sac
+    double *level_from, *level_to;       // (branches) [mm] h before the start and beyond the end
+    int crowded;             // views that lack candidates because there are too many
+} SweepField;
+
+// Returns NULL if out of memory. The model is valid (sweep_model_validate).
+SweepField *sweep_field_create(const SweepModel *model);
+void sweep_field_free(SweepField *field);
+// Index of the branch's segment that holds t.
+int sweep_field_segment(const SweepField *field, int branch, double t);
+
+// Where on the model a wall point is sought: it determines the candidates and where Newton for their t starts.
+typedef struct SweepPlace {
+    int branch;              // -1: on a sac
+    double t;                // on the branch [mm], near the point's own
+    int sac;                 // on a sac: a node of model->sac near the point
+} SweepPlace;
+
+// One branch or sac at X.
+typedef struct SweepPart {
+    int branch;              // -1: a sac
+    double t, n, b, w, rho;  // coordinates of X, see sweep_model.h
+    double f;                // [mm]
+    Vec3 gradient, t_gradient;
+    Sym3 hessian, t_hessian;
+    double share;            // dF/df of this part; the shares add up to 1
+    int sac;                 // of a sac: the node whose blobs were added
+} SweepPart;
+
+typedef struct SweepBlend {
+    int count, largest;      // parts, and the one of largest share
+    SweepPart part[SWEEP_CANDIDATES + 1];
+    double f;                // F [mm]
+    Vec3 gradient;
+    Sym3 hessian;
+} SweepBlend;
+
+// One branch alone at x; Newton for t starts from `start`.
+void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part);
+// The blended field at x, as seen from a place.
+void sweep_field_blend(const SweepField *field, SweepPlace place, Vec3 x, SweepBlend *blend);
+
+// The rows that determine the section at t, and the weights: c_k(t) = sum_j weight[j] row[first + j][k], slope[j] = d weight[j]/dt. Holds beyond the ends, too.
+typedef struct SweepBasis {
+    int first;
+    double weight[4], slope[4];
+} SweepBasis;
+SweepBasis sweep_field_basis(const SweepField *field, int branch, double t);
+// The factors of a row's terms at a part's angle: R = sum_k term[k] c_k: 1, rho'^1 cos theta, rho'^1 sin theta, ..., with rho' = |(n, b)| / |(n, b, w)|. So
+// dF/d row[first + j][k] = share weight[j] term[k].
+void sweep_part_terms(const SweepPart *part, double term[SWEEP_TERMS]);
+
+#endif

@@ -1,0 +1,246 @@
+// Which branches and sacs are seen from where. A child is followed from its start along each branch that is seen at its fork, as long as the two tubes,
+// enlarged by the width of the blend, overlap: over this length each sees the other. Where two vessels come together elsewhere, nothing leads from one to the
+// other, and they are never blended.
+#include "geom/sweep_views.h"
+
+#include "geom/power_walk.h"
+
+static const double STEP = 0.25;             // of a walk, relative to the narrower tube
+static const double MARGIN = 0.25;           // relative to the narrower tube's radius: what is further apart is not seen
+static const double ASIDE = 1.5;             // how much longer the overlap may be on the parent's curve, on the inner side of a bend
+
+static void add_candidate(SweepField *field, int segment, int branch, double t, double slope)
+{
+    SweepView *view = &field->view[segment];
+    int at = 0;
+    while (at < view->count && view->of[at].branch < branch)
+        at++;
+    if (at < view->count && view->of[at].branch == branch)
+        return;
+    if (view->count == SWEEP_CANDIDATES) {
+        field->crowded++;
+        return;
+    }
+    for (int i = view->count; i > at; i--)
+        view->of[i] = view->of[i - 1];
+    view->of[at] = (SweepCandidate){branch, t, slope};
+    view->count++;
+}
+
+static double width_at(const SweepField *field, int branch, double t)
+{
+    const SweepFork *fork = &field->fork[branch];
+    double s = fork->reach > 0 ? t / fork->reach : 2, left = 1 - s * s;
+    return left > 0 ? fork->delta * left * left : 0;
+}
+
+// Follows `child` from its start along `other`, from t = start there.
+static void follow(SweepField *field, int child, int other, double start)
+{
+    const SweepCurve *curve = field->curve[child], *along = field->curve[other];
+    int last = field->first_segment[child] - 1, end = field->first_segment[child + 1];
+    double t_other = start, longest = 2 * field->model->branch[other].radius;
+    for (double t = 0;;) {
+        Vec3 x = sweep_curve_at(curve, t).s;
+        t_other = sweep_curve_project(along, x, t_other, longest);
+        double own = sweep_field_largest(field, child, t), their = sweep_field_largest(field, other, t_other), least = fmin(own, their);
+        double blend = 2 * width_at(field, child, t) + MARGIN * least;
+        if (!(vec3_distance(x, sweep_curve_at(along, t_other).s) < own + their + blend))
+            break;
+        int here = sweep_field_segment(field, child, t);
+        for (int s = last + 1; s <= here; s++)
+            add_candidate(field, s, other, t_other, 0);
+        last = here > last ? here : last;
+        double aside = ASIDE * (own + blend);
+        int from = sweep_field_segment(field, other, t_other - aside), to = sweep_field_segment(field, other, t_other + aside);
+        for (int s = from; s <= to; s++)
+            add_candidate(field, s, child, t, 0);
+        if (t >= curve->length) {
+            for (int s = last + 1; s < end; s++)
+                add_candidate(field, s, other, t_other, 0);
+            break;
+        }
+        t = fmin(t + STEP * fmax(least, 0.02 * field->model->branch[child].radius), curve->length);
+    }
+}
+
+// The middle of a segment, or its finite end.
+static double middle_of(const SweepSegment *s)
+{
+    if (!isfinite(s->from))
+        return s->to;
+    return isfinite(s->to) ? 0.5 * (s->from + s->to) : s->from;
+}
+
+// Where Newton starts on each candidate: the curve's point nearest to that of the place.
+static void refine_starts(SweepField *field, int branch)
+{
+    for (int s = field->first_segment[branch]; s < field->first_segment[branch + 1]; s++) {
+        double middle = middle_of(&field->segment[s]), length = field->curve[branch]->length, at = fmax(0, fmin(length, middle));
+        SweepJet here = sweep_curve_at(field->curve[branch], at);
+        for (int i = 0; i < field->view[s].count; i++) {
+            SweepCandidate *c = &field->view[s].of[i];
+            if (c->branch == branch)
+                continue;
+            double t = sweep_curve_project(field->curve[c->branch], here.s, c->t, field->model->branch[c->branch].radius);
+            Vec3 s1 = sweep_curve_at(field->curve[c->branch], t).s1;
+            c->slope = vec3_dot(here.s1, s1) / vec3_norm2(s1);
+            c->t = t - c->slope * at;
+        }
+    }
+}
+
+// --- Sacs ---
+
+// The sac to which a node of the sacs' tree belongs, as the first node of its group: an aneurysm's nodes are linked, a vessel's belong to the nearest
+// aneurysm's.
+static int group_of(const VesselTree *sac, int node)
+{
+    if (sac->kind[node] != NODE_ANEURYSM) {
+        int best = -1;
+        for (int i = 0; i < sac->node_count; i++)
+            if (sac->kind[i] == NODE_ANEURYSM &&
+                (best < 0 || vec3_distance(sac->center[i], sac->center[node]) < vec3_distance(sac->center[best], sac->center[node])))
+                best = i;
+        if (best < 0)
+            return 0;
+        node = best;
+    }
+    while (sac->parent[node] >= 0 && sac->kind[sac->parent[node]] == NODE_ANEURYSM)
+        node = sac->parent[node];
+    return node;
+}
+
+// The place on a branch of the tree's node to which a node of the sacs' tree corresponds; the nearest knot if no knot does.
+static SweepPlace place_of(const SweepField *field, int node)
+{
+    const SweepModel *m = field->model;
+    SweepPlace place = {0};
+    double best = HUGE_VAL;
+    for (int i = 0; i < m->branch_count; i++)
+        for (int k = 0; k < m->branch[i].knot_count; k++) {
+            int knot = m->branch[i].first_knot + k;
+            bool same = m->sac->kind[node] == NODE_VESSEL && m->knot_node[knot] == m->sac_node[node];
+            double far = vec3_distance(m->knot[knot], m->sac->center[node]) - (same ? 1e6 : 0);
+            if (far < best)
+                best = far, place = (SweepPlace){.branch = i, .t = field->curve[i]->knot_t[k]};
+        }
+    return place;
+}
+
+// Returns whether a blob of the sac reaches the tube at t.
+static bool is_reached(const SweepField *field, int group, const int *group_of_node, int branch, double t)
+{
+    const VesselTree *sac = field->model->sac;
+    Vec3 x = sweep_curve_at(field->curve[branch], t).s;
+    double largest = sweep_field_largest(field, branch, t);
+    for (int i = 0; i < sac->node_count; i++)
+        for (int64_t k = sac->blob_offset[i]; group_of_node[i] == group && k < sac->blob_offset[i + 1]; k++)
+            if (vec3_distance(x, sac->blob_center[k]) < sac->blob_width[k] + largest)
+                return true;
+    return false;
+}
+
+static void mark_sac(SweepField *field, int group, const int *group_of_node, int branch, double start)
+{
+    const SweepCurve *curve = field->curve[branch];
+    const VesselTree *sac = field->model->sac;
+    double step = STEP * field->model->branch[branch].radius;
+    for (int side = -1; side <= 1; side += 2)
+        for (double t = fmax(0, fmin(curve->length, start)); is_reached(field, group, group_of_node, branch, t);) {
+            int from = sweep_field_segment(field, branch, t - step), to = sweep_field_segment(field, branch, t + step);
+            for (int s = from; s <= to; s++) {
+                SweepView *view = &field->view[s];
+                if (view->sac < 0)
+                    view->sac = power_walk(sac, sweep_curve_at(curve, fmax(0, fmin(curve->length, middle_of(&field->segment[s])))).s, group, 1 << 20);
+                else if (group_of_node[view->sac] != group)
+                    field->crowded++;
+            }
+            if (t == (side > 0 ? curve->length : 0))
+                break;
+            t = fmax(0, fmin(curve->length, t + side * step));
+        }
+}
+
+static void see_from_sac(SweepField *field, int node, int branch, double start)
+{
+    SweepView *view = &field->sac[node].view;
+    double t = sweep_curve_project(field->curve[branch], field->model->sac->center[node], start, field->model->branch[branch].radius);
+    int at = 0;
+    while (at < view->count && view->of[at].branch < branch)
+        at++;
+    if (at < view->count && view->of[at].branch == branch)
+        return;
+    if (view->count == SWEEP_CANDIDATES) {
+        field->crowded++;
+        return;
+    }
+    for (int i = view->count; i > at; i--)
+        view->of[i] = view->of[i - 1];
+    view->of[at] = (SweepCandidate){branch, t, 0};
+    view->count++;
+}
+
+static void fill_sac(SweepField *field, int group, const int *group_of_node)
+{
+    const VesselTree *sac = field->model->sac;
+    double largest = 0, vessel = 0;
+    int vessels = 0, places = 0;
+    for (int i = 0; i < sac->node_count; i++) {
+        if (group_of_node[i] != group)
+            continue;
+        if (sac->kind[i] == NODE_VESSEL)
+            vessel += sac->radius[i], vessels++;
+        else
+            largest = fmax(largest, sac->radius[i]);
+    }
+    largest = largest > 0 ? largest : vessel / vessels;
+    double width = field->model->blend * 0.5 * (vessels > 0 ? fmin(largest, vessel / vessels) : largest);
+    for (int i = 0; i < sac->node_count; i++) {
+        if (group_of_node[i] != group)
+            continue;
+        field->sac[i].scale = 0.5 * largest, field->sac[i].delta = width;
+        // a sac without vessel nodes hangs on the branch nearest to its first node
+        if (sac->kind[i] != NODE_VESSEL && (vessels > 0 || places > 0))
+            continue;
+        SweepPlace place = place_of(field, i);
+        SweepView view = field->view[sweep_field_segment(field, place.branch, place.t)];
+        places++;
+        for (int k = 0; k < view.count; k++) {
+            double t = view.of[k].branch == place.branch ? place.t : view.of[k].t + view.of[k].slope * place.t;
+            mark_sac(field, group, group_of_node, view.of[k].branch, t);
+            for (int j = 0; j < sac->node_count; j++)
+                if (group_of_node[j] == group)
+                    see_from_sac(field, j, view.of[k].branch, t);
+        }
+    }
+}
+
+void sweep_field_fill_views(SweepField *field)
+{
+    const SweepModel *m = field->model;
+    for (int i = 0; i < m->branch_count; i++) {
+        for (int s = field->first_segment[i]; s < field->first_segment[i + 1]; s++) {
+            field->view[s].sac = -1;
+            add_candidate(field, s, i, 0, 1);
+        }
+        if (i == 0)
+            continue;
+        const SweepBranch *b = &m->branch[i];
+        SweepView fork = field->view[sweep_field_segment(field, b->parent, b->parent_t)];
+        for (int k = 0; k < fork.count; k++)
+            follow(field, i, fork.of[k].branch, fork.of[k].branch == b->parent ? b->parent_t : fork.of[k].t);
+    }
+    for (int i = 0; i < m->branch_count; i++)
+        refine_starts(field, i);
+    if (!m->sac)
+        return;
+    int *group = field->sac_group;
+    for (int i = 0; i < m->sac->node_count; i++)
+        group[i] = group_of(m->sac, i);
+    for (int i = 0; i < m->sac->node_count; i++) {
+        field->sac[i].view.sac = i;
+        if (group[i] == i)
+            fill_sac(field, i, group);
+    }
+}
