@@ -12,6 +12,7 @@
 #include "geom/blob_flood.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
+#include "geom/sweep_field.h"
 
 // vessels: the wall as the solver queries it
 #include "geom/vessel.h"

@@ -114,7 +114,7 @@ bool sweep_draft_curves(SweepDraft *d)
         if (!(d->curve[i] = sweep_curve_create(d->knot_count[i], d->knot[i])))
             return false;
         const VesselBranch *b = &d->branches->branch[i];
-        double t = 0, length = d->curve[i]->length, whole = b->along[b->count - 1];
+        double t = 0, length = d->curve[i]->length, whole = b->length;
         for (int k = 0; k < b->count; k++) {
             int node = d->branches->node[b->first + k];
             double share = whole > 0 ? d->branches->along[b->first + k] / whole : 1;

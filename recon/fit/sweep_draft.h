@@ -3,8 +3,6 @@
 #define SELDINGER_RECON_FIT_SWEEP_DRAFT_H
 
 #include "geom/geom.h"
-#include "geom/sweep_curve.h"
-#include "geom/sweep_model.h"
 #include "recon/fit/sweep_fit.h"
 
 typedef struct SweepDraft {

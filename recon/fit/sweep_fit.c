@@ -1,6 +1,5 @@
 #include "recon/fit/sweep_fit.h"
 
-#include "geom/sweep_field.h"
 #include "recon/fit/sweep_draft.h"
 #include "recon/fit/sweep_rows.h"
 

@@ -1,4 +1,3 @@
-// Fits the swept model (geom/sweep_model.h) to the wall points of a tree.
 //
 // 1. Curves: the branches' node centres (vessel_branches.h), smoothed and thinned; each knot is then moved to the middle of its section.
 // 2. Sections: R(theta, t) of each branch by linear least squares from its own points: cubic B-splines along t, Fourier terms around. Penalties on the second
@@ -11,7 +10,6 @@
 
 #include "base/base.h"
 #include "geom/geom.h"
-#include "geom/sweep_model.h"
 
 typedef struct SweepFitOptions {
     double spacing;          // of sections along a tube, in local radii; default 1
