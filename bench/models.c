@@ -100,7 +100,8 @@ static bool sample_shape(const Case *c, Subject *out, Faults *faults)
     for (int i = 0; i < c->options; i++)
         if (strcmp(c->option[i][0], "noise_mm"))
             memcpy(option[n++], c->option[i], sizeof option[i]);
-    memcpy(option[n++], (char[2][64]){"seed", "7"}, sizeof option[0]);
+    if (strcmp(c->shape, "tree"))            // whose seed also decides its course
+        memcpy(option[n++], (char[2][64]){"seed", "7"}, sizeof option[0]);
     memcpy(option[n++], (char[2][64]){"spacing", "0.25"}, sizeof option[0]);
     shape = shape_create(c->shape, n, (const char(*)[2][64])option, c->name, faults);
     VesselTree *truth = shape ? shape_sample(shape, faults) : NULL;
@@ -185,6 +186,7 @@ static bool fit_model(const ModelsBench *bench, int model, const Subject *subjec
     } else {
         SweepFitOptions options = bench->sweep;
         options.threads = bench->common.threads;
+        options.voxel_mm = subject->voxel;
         out->sweep = sweep_fit(subject->tree, &options, &out->figures, faults);
         out->field = out->sweep ? sweep_field_create(out->sweep) : NULL;
         out->numbers = out->figures.numbers;
@@ -209,13 +211,14 @@ static SweepPlace place_of(const SweepModel *model, const VesselTree *tree, int 
 {
     SweepPlace place = {.branch = 0, .sac = -1};
     double least = HUGE_VAL;
+    for (int i = 0; model->sac && tree->kind[node] != NODE_VESSEL && i < model->sac->node_count; i++)
+        if (model->sac_node[i] == node)
+            return (SweepPlace){.branch = -1, .sac = i};
     for (int i = 0; i < model->branch_count; i++) {
         double t = 0;
         const SweepBranch *b = &model->branch[i];
         for (int k = b->first_knot; k < b->first_knot + b->knot_count; k++) {
             t += k > b->first_knot ? vec3_distance(model->knot[k], model->knot[k - 1]) : 0;
-            if (model->knot_node[k] < 0 || tree->kind[node] != NODE_VESSEL)
-                continue;
             double far = vec3_distance(model->knot[k], x) / tree->radius[model->knot_node[k]];
             if (far < least)
                 least = far, place.branch = i, place.t = t;

@@ -144,6 +144,13 @@ static bool gather_points(SweepDraft *d)
                 d->node[d->point_count++] = node;
             }
         }
+    d->vessel_point_count = d->point_count;
+    for (int i = 0; i < tree->node_count; i++)
+        for (int64_t p = tree->point_offset[i]; p < tree->point_offset[i + 1] && tree->kind[i] == NODE_ANEURYSM; p++) {
+            d->point[d->point_count] = tree->point[p];
+            d->owner[d->point_count] = -1;
+            d->node[d->point_count++] = i;
+        }
     return true;
 }
 
@@ -384,6 +391,6 @@ bool sweep_draft_project(SweepDraft *d)
     free(d->t);
     d->t = malloc(((size_t)d->point_count + 1) * sizeof *d->t);
     if (d->t)
-        parallel_for(d->options->threads, (long)d->point_count, project, d, NULL);
+        parallel_for(d->options->threads, (long)d->vessel_point_count, project, d, NULL);
     return d->t != NULL;
 }

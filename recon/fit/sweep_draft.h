@@ -20,11 +20,11 @@ typedef struct SweepDraft {
     double *prior_radius;    // (rows) mean radius by the tree's nodes
     uint8_t *harmonics;      // (rows) highest harmonic that is not held at 0
 
-    int64_t point_count;     // wall points of vessel nodes, branch by branch
+    int64_t point_count, vessel_point_count;     // wall points: first those of vessel nodes, branch by branch, then those of sacs
     Vec3 *point;
-    int *owner;              // (points) branch
+    int *owner;              // (points) branch, -1: a sac
     int *node;               // (points) node
-    double *t;               // (points) [mm] foot on the branch's curve
+    double *t;               // (vessel points) [mm] foot on the branch's curve
 } SweepDraft;
 
 // Lays the curves of all branches through the smoothed and thinned centres. Returns false if out of memory.

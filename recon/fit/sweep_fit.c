@@ -2,6 +2,7 @@
 
 #include "recon/fit/sweep_draft.h"
 #include "recon/fit/sweep_rows.h"
+#include "recon/fit/sweep_sacs.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -11,12 +12,12 @@ enum { CENTRINGS = 2, SECTION_ROUNDS = 6, MOST_SIGHTS = 4 };
 static const double SKIP = 0.7;              // [parent's radii] of a child's start whose points its sections leave out
 static const double KNEE_NOISE = 2.5;        // distance at which a point's trust has fallen to a half, in standard deviations of the noise …
 // … and at least, in radii, round by round: from far away, a sharp knee would take the wall for outliers
-static const double section_knee[SECTION_ROUNDS] = {0.5, 0.25, 0.12, 0.06, 0.06, 0.06}, round_knee[] = {0.12, 0.08, 0.05, 0.03};
+static const double section_knee[SECTION_ROUNDS] = {0.5, 0.25, 0.12, 0.06, 0.06, 0.06}, round_knee[] = {0.6, 0.4, 0.2, 0.1, 0.05, 0.03};
 static const double FIRST_NOISE = 0.03;      // [radii]
 static const double LEAST_SLOPE = 0.5;       // of the blended field, in distances
 static const double OUT = 0.5;               // [radii] points further from the wall are left out of the figures
 
-SweepFitOptions sweep_fit_default_options(void) { return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = 5, .rounds = 4, .blend = 0.6}; }
+SweepFitOptions sweep_fit_default_options(void) { return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = 5, .rounds = 6, .blend = 0.6}; }
 
 static bool check_options(const SweepFitOptions *o, Faults *faults)
 {
@@ -24,11 +25,8 @@ static bool check_options(const SweepFitOptions *o, Faults *faults)
     const struct {
         const char *name;
         double value, least, most;
-    } range[] = {{"spacing", o->spacing, 0.1, 10},
-                 {"fork spacing", o->fork_spacing, 0.1, 10},
-                 {"harmonics", o->harmonics, 1, SWEEP_HARMONICS},
-                 {"rounds", o->rounds, 0, 100},
-                 {"blend", o->blend, 0, 2}};
+    } range[] = {{"spacing", o->spacing, 0.1, 10}, {"fork spacing", o->fork_spacing, 0.1, 10}, {"harmonics", o->harmonics, 1, SWEEP_HARMONICS},
+                 {"rounds", o->rounds, 0, 100},    {"voxel-mm", o->voxel_mm, 0, 100},          {"blend", o->blend, 0, 2}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
             faults_add(faults, "fit", 0, 0, "%s is %g; expected %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
@@ -94,7 +92,7 @@ static void measure_sections(Sections *s, double knee)
 {
     SweepDraft *d = s->draft;
     SweepSystem *y = s->system;
-    for (int64_t p = 0; p < d->point_count; p++) {
+    for (int64_t p = 0; p < d->vessel_point_count; p++) {
         int parent = d->model->branch[d->owner[p]].parent;
         double skipped = parent < 0 ? -HUGE_VAL : SKIP * sweep_draft_radius(d, parent, d->model->branch[d->owner[p]].parent_t);
         y->distance[p] = radius_at(d, &y->sight[p]) - s->rho[p];
@@ -115,8 +113,9 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
     Sections s = {d, system, good ? sweep_field_create(d->model) : NULL, calloc((size_t)d->point_count + 1, sizeof *s.rho)};
     good = good && s.field && s.rho;
     if (good) {
-        parallel_for(d->options->threads, (long)d->point_count, see_own_branch, &s, NULL);
-        system->first[d->point_count] = d->point_count;
+        parallel_for(d->options->threads, (long)d->vessel_point_count, see_own_branch, &s, NULL);
+        for (int64_t p = d->vessel_point_count; p <= d->point_count; p++)
+            system->first[p] = d->vessel_point_count;
     }
     for (int k = 0; good && k < SECTION_ROUNDS; k++) {
         measure_sections(&s, section_knee[k]);
@@ -140,7 +139,7 @@ static double end_shift(const SweepDraft *d, const SweepSystem *system, int bran
     SweepJet end = sweep_curve_at(curve, curve->length);
     Vec3 out = vec3_unit(end.s1);
     double product = 0, square = 0, r = sweep_draft_radius(d, branch, curve->length);
-    for (int64_t p = 0; p < d->point_count; p++)
+    for (int64_t p = 0; p < d->vessel_point_count; p++)
         if (d->owner[p] == branch && d->t[p] > curve->length) {
             Vec3 u = vec3_sub(d->point[p], end.s);
             double steep = vec3_dot(u, out) / fmax(vec3_norm(u), 1e-9 * r);
@@ -204,6 +203,7 @@ typedef struct Refinement {
     SweepField *field;
     SweepSight (*sight)[MOST_SIGHTS];        // (points)
     int *count;              // (points)
+    int *sac_of;             // (N) node of the sacs' tree, -1: none
     double knee;
 } Refinement;
 
@@ -212,7 +212,12 @@ static void see_blend(void *context, long p)
     Refinement *r = context;
     SweepDraft *d = r->draft;
     SweepBlend blend;
-    sweep_field_blend(r->field, (SweepPlace){.branch = d->owner[p], .t = d->t[p], .sac = -1}, d->point[p], &blend);
+    SweepPlace place = {.branch = d->owner[p], .sac = -1};
+    if (place.branch >= 0)
+        place.t = d->t[p];
+    else
+        place.sac = r->sac_of[d->node[p]];
+    sweep_field_blend(r->field, place, d->point[p], &blend);
     double slope = fmax(vec3_norm(blend.gradient), LEAST_SLOPE);
     r->system->distance[p] = blend.f / slope;
     r->system->trust[p] = trust_of(blend.f / slope, r->system->noise, r->knee * d->tree->radius[d->node[p]]);
@@ -249,8 +254,11 @@ static bool refine(SweepDraft *d, SweepSystem *system)
 {
     enum { KNEES = sizeof round_knee / sizeof round_knee[0] };
     size_t points = (size_t)d->point_count + 1;
-    Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), 0};
-    bool good = r.sight && r.count;
+    Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), malloc((size_t)d->tree->node_count * sizeof *r.sac_of),
+                    0};
+    bool good = r.sight && r.count && r.sac_of;
+    for (int i = 0; good && d->model->sac && i < d->model->sac->node_count; i++)
+        r.sac_of[d->model->sac_node[i]] = i;
     for (int k = 0; k < d->options->rounds && good; k++) {
         good = look_at_blend(&r, round_knee[k < KNEES ? k : KNEES - 1]) && sweep_system_sum(system);
         if (good && k > 0)
@@ -261,6 +269,7 @@ static bool refine(SweepDraft *d, SweepSystem *system)
     sweep_field_free(r.field);
     free(r.sight);
     free(r.count);
+    free(r.sac_of);
     return good;
 }
 
@@ -302,10 +311,10 @@ static bool take_figures(const SweepDraft *d, const SweepSystem *system, SweepFi
     return true;
 }
 
-static bool fit(SweepDraft *d, SweepSystem *system)
+static bool fit(SweepDraft *d, SweepSystem *system, Faults *faults)
 {
-    bool good = lay_curves(d, system) && sweep_draft_divide(d, d->options->spacing);
-    return good && fit_sections(d, system, true) && refine(d, system);
+    bool good = lay_curves(d, system) && sweep_draft_divide(d, d->options->spacing) && fit_sections(d, system, true);
+    return good && sweep_sacs_fit(d->tree, d->options, d->model, faults) && refine(d, system);
 }
 
 SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, SweepFitFigures *figures, Faults *faults)
@@ -315,6 +324,7 @@ SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, Sw
     SweepSystem system = {0};
     SweepModel *model = NULL;
     double begin = now_seconds();
+    int before = faults->count;
     if (!check_options(options, faults))
         return NULL;
     if (tree->point_count < 4 || tree->kind[0] != NODE_VESSEL) {
@@ -322,10 +332,10 @@ SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, Sw
                    (long long)tree->point_count, tree->kind[0] == NODE_VESSEL ? "a vessel" : "an aneurysm");
         return NULL;
     }
-    if (sweep_draft_create(&draft, tree, options) && fit(&draft, &system) && take_figures(&draft, &system, &found)) {
+    if (sweep_draft_create(&draft, tree, options) && fit(&draft, &system, faults) && take_figures(&draft, &system, &found)) {
         model = draft.model;
         draft.model = NULL;
-    } else {
+    } else if (faults->count == before) {
         faults_add(faults, "fit", 0, 0, "not enough memory");
     }
     sweep_system_free(&system);

@@ -351,7 +351,7 @@ bool sweep_system_tune(SweepSystem *s)
             for (int k = 0; k <= SWEEP_HARMONICS; k++)
                 if (kept[g][k] > 0)
                     s->strength[g][k] = fmax(LEAST_STRENGTH[g], fmin(MOST_STRENGTH, kept[g][k] / fmax(size[g][k], 1e-30)));
-        double least = 1e-6 * s->draft->branches->branch[0].radius_mean;
+        double least = 1e-4 * s->draft->branches->branch[0].radius_mean;
         s->noise = fmax(least, measure_noise(s, s->freedom));
     }
     free(tuning.kept);
