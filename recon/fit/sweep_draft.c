@@ -34,6 +34,7 @@ void sweep_draft_free(SweepDraft *d)
     free(d->is_fork);
     free(d->harmonics);
     free(d->prior_radius);
+    free(d->is_hidden);
     free(d->point);
     free(d->owner);
     free(d->node);
@@ -279,7 +280,7 @@ static void mark_intervals(SweepDraft *d, const Zone *zone, int zones, int branc
 }
 
 // Rows of round sections with the tree's radii, each at the mean of the three breaks inside its support (Greville's abscissa).
-static void fill_round_rows(SweepDraft *d, int branch)
+static void fill_round_rows(SweepDraft *d, int branch, double hidden)
 {
     const SweepBranch *b = &d->model->branch[branch];
     const double *at = d->model->break_t + b->first_break;
@@ -288,6 +289,7 @@ static void fill_round_rows(SweepDraft *d, int branch)
         for (int i = k - 2; i <= k; i++)
             sum += at[i < 0 ? 0 : i < b->break_count ? i : b->break_count - 1] / 3;
         d->prior_radius[b->first_row + k] = d->model->row[(size_t)(b->first_row + k) * SWEEP_TERMS] = sweep_draft_radius(d, branch, sum);
+        d->is_hidden[b->first_row + k] = sum <= hidden;
     }
 }
 
@@ -304,12 +306,14 @@ static bool make_model(SweepDraft *d, const Zone *zone, int zones, double spacin
     free(d->is_fork);
     free(d->harmonics);
     free(d->prior_radius);
+    free(d->is_hidden);
     d->model = sweep_model_create(d->count, knots, breaks, rows);
     d->scale = calloc((size_t)breaks, sizeof *d->scale);
     d->is_fork = calloc((size_t)breaks, sizeof *d->is_fork);
     d->harmonics = calloc((size_t)rows, sizeof *d->harmonics);
     d->prior_radius = calloc((size_t)rows, sizeof *d->prior_radius);
-    if (!d->model || !d->scale || !d->is_fork || !d->harmonics || !d->prior_radius)
+    d->is_hidden = calloc((size_t)rows, sizeof *d->is_hidden);
+    if (!d->model || !d->scale || !d->is_fork || !d->harmonics || !d->prior_radius || !d->is_hidden)
         return false;
     d->model->blend = d->options->blend;
     knots = breaks = 0;
@@ -335,7 +339,7 @@ static bool make_model(SweepDraft *d, const Zone *zone, int zones, double spacin
             d->model->knot_node[knots + k] = node[near];
         }
         mark_intervals(d, zone, zones, i);
-        fill_round_rows(d, i);
+        fill_round_rows(d, i, i > 0 ? zone[2 * i - 1].low : -1);
         knots += b->knot_count, breaks += count;
     }
     return true;

@@ -18,6 +18,7 @@ typedef struct SweepDraft {
     double *scale;           // (breaks) local radius of the interval that begins there
     uint8_t *is_fork;        // (breaks) whether it lies at a fork
     double *prior_radius;    // (rows) mean radius by the tree's nodes
+    bool *is_hidden;         // (rows) within the parent's lumen, where no point is
     uint8_t *harmonics;      // (rows) highest harmonic that is not held at 0
 
     int64_t point_count, vessel_point_count;     // wall points: first those of vessel nodes, branch by branch, then those of sacs

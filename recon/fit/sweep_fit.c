@@ -14,6 +14,8 @@ static const double KNEE_NOISE = 2.5;        // distance at which a point's trus
 // … and at least, in radii, round by round: from far away, a sharp knee would take the wall for outliers
 static const double section_knee[SECTION_ROUNDS] = {0.5, 0.25, 0.12, 0.06, 0.06, 0.06}, round_knee[] = {0.6, 0.4, 0.2, 0.1, 0.05, 0.03};
 static const double FIRST_NOISE = 0.03;      // [radii]
+// Least noise of each round, in radii: while the blends are far from the wall, exact points must not be followed closely.
+static const double round_noise[] = {0.02, 0.01, 0.004, 0.002, 0.001, 0.0005};
 static const double LEAST_SLOPE = 0.5;       // of the blended field, in distances
 static const double OUT = 0.5;               // [radii] points further from the wall are left out of the figures
 
@@ -263,7 +265,10 @@ static bool refine(SweepDraft *d, SweepSystem *system)
         good = look_at_blend(&r, round_knee[k < KNEES ? k : KNEES - 1]) && sweep_system_sum(system);
         if (good && k > 0)
             good = sweep_system_tune(system);
+        double found = system->noise;
+        system->noise = fmax(found, round_noise[k < KNEES ? k : KNEES - 1] * d->branches->branch[0].radius_mean);
         good = good && sweep_system_step(system, true);
+        system->noise = found;
     }
     good = good && look_at_blend(&r, round_knee[KNEES - 1]);
     sweep_field_free(r.field);

@@ -12,7 +12,9 @@
 
 enum { T = SWEEP_TERMS, WIDTH = 4 * SWEEP_TERMS - 1, GRADIENTS = 60 };
 static const double HELD = 1e30;             // stiffness of coefficients that are held at 0
-static const double PRIOR = 4;               // [1/r^2] of the mean radius, towards the tree's: decides only where there are no points
+// [1/r^2] of the mean radius, towards the tree's: decides only where there are no points; of all terms of rows in the parent's lumen
+static const double PRIOR = 4, PRIOR_HIDDEN = 100;
+static const double LONGEST = 0.25;          // [radii] step of a coefficient
 static const double LEAST_STRENGTH[PENALTIES] = {1e-2, 1e-2, 1}, MOST_STRENGTH = 1e10;
 static const double CLOSE = 1e-8;            // of the gradients' residual
 
@@ -192,11 +194,12 @@ static bool make_penalties(const SweepSystem *s, int branch, BranchPenalties *p)
 
 static bool is_held(const SweepSystem *s, int branch, int row, int harmonic) { return harmonic > s->draft->harmonics[branch_of(s, branch)->first_row + row]; }
 
-static double prior_of(const SweepSystem *s, int branch, int row)
+static double prior_of(const SweepSystem *s, int branch, int row, int term)
 {
     const SweepBranch *b = branch_of(s, branch);
     int q = row - 1 < 0 ? 0 : row - 1 > b->break_count - 2 ? b->break_count - 2 : row - 1;
-    return PRIOR / same_square(s->draft->scale[b->first_break + q]);
+    double prior = s->draft->is_hidden[b->first_row + row] ? PRIOR_HIDDEN : term == 0 ? PRIOR : 0;
+    return prior / same_square(s->draft->scale[b->first_break + q]);
 }
 
 // All penalties of a harmonic, with their strengths.
@@ -227,8 +230,8 @@ static void fill_stiffness(const SweepSystem *s, int branch, const BranchPenalti
             for (int d = 0; d <= NARROW && row + d < rows; d++)
                 v[(size_t)(row * T + term) * (WIDTH + 1) + (size_t)(d * T)] += p->all[row * (NARROW + 1) + d];
     }
-    for (int row = 0; row < rows; row++)
-        v[(size_t)(row * T) * (WIDTH + 1)] += prior_of(s, branch, row);
+    for (int i = 0; i < rows * T; i++)
+        v[(size_t)i * (WIDTH + 1)] += prior_of(s, branch, i / T, i % T);
 }
 
 // --- Noise and strengths ---
@@ -400,10 +403,12 @@ static void prepare_branch(void *context, long index)
                 }
         }
         for (int j = 0; j < rows; j++) {
-            right[j * T] -= prior_of(s, branch, j) * (row[j * T] - s->draft->prior_radius[branch_of(s, branch)->first_row + j]);
-            for (int term = 0; term < T; term++)
+            for (int term = 0; term < T; term++) {
+                double target = term == 0 ? s->draft->prior_radius[branch_of(s, branch)->first_row + j] : 0;
+                right[j * T + term] -= prior_of(s, branch, j, term) * (row[j * T + term] - target);
                 if (is_held(s, branch, j, harmonic_of(term)))
                     right[j * T + term] = 0;
+            }
         }
     }
     free(p.band[0]);
@@ -489,10 +494,11 @@ static void take_step(const SweepSystem *s, const double *x)
         for (int j = 0; j < rows_of(s, i); j++) {
             double *row = row_of(s, i) + j * T;
             const double *step = x + (size_t)(branch_of(s, i)->first_row + j) * T;
+            double radius = d->prior_radius[branch_of(s, i)->first_row + j], most = LONGEST * radius;
             for (int a = 0; a < T; a++)
                 if (!is_held(s, i, j, harmonic_of(a)))
-                    row[a] += step[a];
-            row[0] = fmax(row[0], 0.05 * d->prior_radius[branch_of(s, i)->first_row + j]);
+                    row[a] += fmax(-most, fmin(most, step[a]));
+            row[0] = fmax(row[0], 0.05 * radius);
         }
 }
 
