@@ -8,18 +8,22 @@
 #include <string.h>
 #include <time.h>
 
-enum { CENTRINGS = 2, SECTION_ROUNDS = 6, MOST_SIGHTS = 4 };
+enum { CENTRINGS = 2, SECTION_ROUNDS = 4, TUNINGS = 6, THINNED_ROUNDS = 3, THINNED = 3, MOST_SIGHTS = 4 };
 static const double SKIP = 0.7;              // [parent's radii] of a child's start whose points its sections leave out
 static const double KNEE_NOISE = 2.5;        // distance at which a point's trust has fallen to a half, in standard deviations of the noise …
 // … and at least, in radii, round by round: from far away, a sharp knee would take the wall for outliers
-static const double section_knee[SECTION_ROUNDS] = {0.5, 0.25, 0.12, 0.06, 0.06, 0.06}, round_knee[] = {0.6, 0.4, 0.2, 0.1, 0.05, 0.03};
+static const double section_knee[SECTION_ROUNDS] = {0.5, 0.2, 0.1, 0.06}, round_knee[] = {0.6, 0.4, 0.2, 0.1, 0.05, 0.03};
 static const double FIRST_NOISE = 0.03;      // [radii]
 // Least noise of each round, in radii: while the blends are far from the wall, exact points must not be followed closely.
 static const double round_noise[] = {0.02, 0.01, 0.004, 0.002, 0.001, 0.0005};
 static const double LEAST_SLOPE = 0.5;       // of the blended field, in distances
+static const double TRIM_NOISE = 0.2, TRIM_RADIUS = 3e-4;
 static const double OUT = 0.5;               // [radii] points further from the wall are left out of the figures
 
-SweepFitOptions sweep_fit_default_options(void) { return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = 5, .rounds = 6, .blend = 0.6}; }
+SweepFitOptions sweep_fit_default_options(void)
+{
+    return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = SWEEP_HARMONICS, .rounds = 6, .blend = 0.6};
+}
 
 static bool check_options(const SweepFitOptions *o, Faults *faults)
 {
@@ -90,7 +94,7 @@ static double radius_at(const SweepDraft *d, const SweepSight *sight)
 
 static double trust_of(double e, double noise, double least) { return 1 / (1 + same_square(same_square(e / fmax(KNEE_NOISE * noise, least)))); }
 
-static void measure_sections(Sections *s, double knee)
+static void measure_sections(Sections *s, double knee, int every)
 {
     SweepDraft *d = s->draft;
     SweepSystem *y = s->system;
@@ -98,11 +102,11 @@ static void measure_sections(Sections *s, double knee)
         int parent = d->model->branch[d->owner[p]].parent;
         double skipped = parent < 0 ? -HUGE_VAL : SKIP * sweep_draft_radius(d, parent, d->model->branch[d->owner[p]].parent_t);
         y->distance[p] = radius_at(d, &y->sight[p]) - s->rho[p];
-        y->trust[p] = d->t[p] < skipped ? 0 : trust_of(y->distance[p], y->noise, knee * d->tree->radius[d->node[p]]);
+        y->trust[p] = d->t[p] < skipped || p % every != 0 ? 0 : trust_of(y->distance[p], y->noise, knee * d->tree->radius[d->node[p]]);
     }
 }
 
-// Fits all rows to the branches' own points. `system` is created here.
+// Fits all rows to the branches' own points; if not `tuned`, roughly, with every third point and the strengths of the start. `system` is created here.
 static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
 {
     double noise = system->noise, strength[PENALTIES][SWEEP_HARMONICS + 1];
@@ -119,13 +123,13 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
         for (int64_t p = d->vessel_point_count; p <= d->point_count; p++)
             system->first[p] = d->vessel_point_count;
     }
-    for (int k = 0; good && k < SECTION_ROUNDS; k++) {
-        measure_sections(&s, section_knee[k]);
+    for (int k = 0; good && k < (tuned ? SECTION_ROUNDS : THINNED_ROUNDS); k++) {
+        measure_sections(&s, section_knee[k], tuned ? 1 : THINNED);
         good = sweep_system_sum(system) && sweep_system_step(system, false);
-        if (good && tuned && k >= 2) {
-            measure_sections(&s, section_knee[k]);
-            good = sweep_system_tune(system);
-        }
+    }
+    for (int k = 0; good && tuned && k < TUNINGS; k++) {
+        measure_sections(&s, section_knee[SECTION_ROUNDS - 1], 1);
+        good = sweep_system_tune(system) && sweep_system_step(system, false);
     }
     sweep_field_free(s.field);
     free(s.rho);
@@ -252,6 +256,18 @@ static bool look_at_blend(Refinement *r, double knee)
     return true;
 }
 
+// Holds at 0 the highest harmonics of rows where all of them together are less than a part of the noise and of the radius.
+static void trim_harmonics(SweepDraft *d, double noise)
+{
+    for (int i = 0; i < d->model->row_count; i++) {
+        double *row = d->model->row + (size_t)i * SWEEP_TERMS, most = fmax(TRIM_NOISE * noise, TRIM_RADIUS * d->prior_radius[i]), sum = 0;
+        int k = d->harmonics[i];
+        for (; k > 1 && (sum += same_hypot(row[2 * k - 1], row[2 * k])) < most; k--)
+            row[2 * k - 1] = row[2 * k] = 0;
+        d->harmonics[i] = (uint8_t)k;
+    }
+}
+
 static bool refine(SweepDraft *d, SweepSystem *system)
 {
     enum { KNEES = sizeof round_knee / sizeof round_knee[0] };
@@ -261,7 +277,7 @@ static bool refine(SweepDraft *d, SweepSystem *system)
     bool good = r.sight && r.count && r.sac_of;
     for (int i = 0; good && d->model->sac && i < d->model->sac->node_count; i++)
         r.sac_of[d->model->sac_node[i]] = i;
-    for (int k = 0; k < d->options->rounds && good; k++) {
+    for (int k = 0; k <= d->options->rounds && good && d->options->rounds > 0; k++) {
         good = look_at_blend(&r, round_knee[k < KNEES ? k : KNEES - 1]) && sweep_system_sum(system);
         if (good && k > 0)
             good = sweep_system_tune(system);
@@ -269,6 +285,8 @@ static bool refine(SweepDraft *d, SweepSystem *system)
         system->noise = fmax(found, round_noise[k < KNEES ? k : KNEES - 1] * d->branches->branch[0].radius_mean);
         good = good && sweep_system_step(system, true);
         system->noise = found;
+        if (k == d->options->rounds - 1)     // one round more for the rest
+            trim_harmonics(d, system->noise);
     }
     good = good && look_at_blend(&r, round_knee[KNEES - 1]);
     sweep_field_free(r.field);

@@ -16,7 +16,7 @@ static const double HELD = 1e30;             // stiffness of coefficients that a
 static const double PRIOR = 4, PRIOR_HIDDEN = 100;
 static const double LONGEST = 0.25;          // [radii] step of a coefficient
 static const double LEAST_STRENGTH[PENALTIES] = {1e-2, 1e-2, 1}, MOST_STRENGTH = 1e10;
-static const double CLOSE = 1e-8;            // of the gradients' residual
+static const double CLOSE = 1e-4;            // of the gradients' residual
 
 static int harmonic_of(int term) { return (term + 1) / 2; }
 static const SweepBranch *branch_of(const SweepSystem *s, int branch) { return &s->draft->model->branch[branch]; }
@@ -91,65 +91,100 @@ static void expand_terms(const SweepSight *sight, double term[T])
 
 // --- Sums ---
 
-static void order_sights(SweepSystem *s)
+// Sorts sights by their first row.
+static bool order_sights(SweepSystem *s)
 {
-    int64_t sights = s->first[s->draft->point_count];
-    memset(s->order_first, 0, ((size_t)s->draft->count + 1) * sizeof *s->order_first);
-    for (int64_t i = 0; i < sights; i++)
-        s->order_first[s->sight[i].branch + 1]++;
+    int rows = s->draft->model->row_count;
+    int64_t *start = calloc((size_t)rows + 1, sizeof *start);
+    if (!start)
+        return false;
+    for (int64_t i = 0; i < s->first[s->draft->point_count]; i++)
+        start[branch_of(s, s->sight[i].branch)->first_row + s->sight[i].first + 1]++;
+    for (int i = 0; i < rows; i++)
+        start[i + 1] += start[i];
     for (int i = 0; i < s->draft->count; i++)
-        s->order_first[i + 1] += s->order_first[i];
+        s->order_first[i] = start[branch_of(s, i)->first_row];
+    s->order_first[s->draft->count] = start[rows];
     for (int64_t p = 0; p < s->draft->point_count; p++)
         for (int64_t i = s->first[p]; i < s->first[p + 1]; i++) {
-            int64_t at = s->order_first[s->sight[i].branch]++;
+            int64_t at = start[branch_of(s, s->sight[i].branch)->first_row + s->sight[i].first]++;
             s->order[at] = i;
             s->order_point[at] = p;
         }
-    for (int i = s->draft->count; i > 0; i--)
-        s->order_first[i] = s->order_first[i - 1];
-    s->order_first[0] = 0;
+    free(start);
+    return true;
 }
 
-// Adds the block of two rows, `gap` rows apart, to the band.
-static void add_block(double *matrix, int row, int gap, double factor, const double product[T][T])
+enum { PAIRS = 10, PACKED = SWEEP_TERMS * (SWEEP_TERMS + 1) / 2 };
+
+typedef struct Sums {        // of the points whose first row is the same
+    double product[PAIRS][PACKED];   // pairs of rows, and of terms: both upper triangles
+    double slope[4][T];
+} Sums;
+
+// Adds the sums to the band and clears them.
+static void flush_sums(Sums *sums, int first, double *matrix, double *slope)
 {
-    for (int a = 0; a < T; a++) {
-        double *column = matrix + (size_t)(row * T + a) * (WIDTH + 1);
-        for (int b = gap == 0 ? a : 0; b < T; b++)
-            column[gap * T + b - a] += factor * product[a][b];
+    for (int j = 0, pair = 0; j < 4; j++)
+        for (int k = j; k < 4; k++, pair++) {
+            const double *product = sums->product[pair];
+            for (int a = 0; a < T; a++)
+                for (int b = a; b < T; b++, product++) {
+                    matrix[(size_t)((first + j) * T + a) * (WIDTH + 1) + (size_t)((k - j) * T + b - a)] += *product;
+                    if (k > j && b > a)
+                        matrix[(size_t)((first + j) * T + b) * (WIDTH + 1) + (size_t)((k - j) * T + a - b)] += *product;
+                }
+        }
+    for (int j = 0; j < 4; j++)
+        for (int a = 0; a < T; a++)
+            slope[(first + j) * T + a] += sums->slope[j][a];
+    memset(sums, 0, sizeof *sums);
+}
+
+static void add_sight(Sums *sums, const SweepSight *sight, double trust, double e)
+{
+    double term[T], product[PACKED];
+    expand_terms(sight, term);
+    for (int a = 0, at = 0; a < T; at += T - a, a++)
+        for (int b = a; b < T; b++)
+            product[at + b - a] = term[a] * term[b];
+    for (int j = 0, pair = 0; j < 4; j++) {
+        double wj = trust * sight->share * sight->weight[j];
+        for (int k = j; k < 4; k++, pair++) {
+            double factor = wj * sight->share * sight->weight[k], *to = sums->product[pair];
+            for (int i = 0; i < PACKED; i++)
+                to[i] += factor * product[i];
+        }
+        for (int a = 0; a < T; a++)
+            sums->slope[j][a] += wj * e * term[a];
     }
 }
 
 static void sum_branch(void *context, long index)
 {
     SweepSystem *s = context;
-    int branch = (int)index;
+    int branch = (int)index, first = 0;
     size_t n = (size_t)rows_of(s, branch) * T;
-    double *matrix = s->matrix[branch], *slope = s->slope[branch], product[T][T], term[T];
+    double *matrix = s->matrix[branch], *slope = s->slope[branch];
+    Sums sums = {0};
     memset(matrix, 0, n * (WIDTH + 1) * sizeof *matrix);
     memset(slope, 0, n * sizeof *slope);
     for (int64_t i = s->order_first[branch]; i < s->order_first[branch + 1]; i++) {
         const SweepSight *sight = &s->sight[s->order[i]];
-        double trust = s->trust[s->order_point[i]], e = s->distance[s->order_point[i]];
-        if (trust * sight->share * sight->share < 1e-9)
-            continue;
-        expand_terms(sight, term);
-        for (int a = 0; a < T; a++)
-            for (int b = 0; b < T; b++)
-                product[a][b] = term[a] * term[b];
-        for (int j = 0; j < 4; j++) {
-            double wj = trust * sight->share * sight->weight[j];
-            for (int k = j; k < 4; k++)
-                add_block(matrix, sight->first + j, k - j, wj * sight->share * sight->weight[k], (const double(*)[T])product);
-            for (int a = 0; a < T; a++)
-                slope[(sight->first + j) * T + a] += wj * e * term[a];
-        }
+        double trust = s->trust[s->order_point[i]];
+        if (sight->first != first)
+            flush_sums(&sums, first, matrix, slope);
+        first = sight->first;
+        if (trust * sight->share * sight->share > 1e-9)
+            add_sight(&sums, sight, trust, s->distance[s->order_point[i]]);
     }
+    flush_sums(&sums, first, matrix, slope);
 }
 
 bool sweep_system_sum(SweepSystem *s)
 {
-    order_sights(s);
+    if (!order_sights(s))
+        return false;
     parallel_for(s->draft->options->threads, s->draft->count, sum_branch, s, NULL);
     return true;
 }
@@ -352,8 +387,10 @@ bool sweep_system_tune(SweepSystem *s)
         }
         for (int g = 0; g < PENALTIES; g++)
             for (int k = 0; k <= SWEEP_HARMONICS; k++)
-                if (kept[g][k] > 0)
-                    s->strength[g][k] = fmax(LEAST_STRENGTH[g], fmin(MOST_STRENGTH, kept[g][k] / fmax(size[g][k], 1e-30)));
+                if (kept[g][k] > 0) {
+                    double ratio = kept[g][k] / fmax(size[g][k], 1e-30) / s->strength[g][k];
+                    s->strength[g][k] = fmax(LEAST_STRENGTH[g], fmin(MOST_STRENGTH, s->strength[g][k] * ratio * sqrt(fmax(0.1, fmin(10, ratio)))));
+                }
         double least = 1e-4 * s->draft->branches->branch[0].radius_mean;
         s->noise = fmax(least, measure_noise(s, s->freedom));
     }
@@ -487,18 +524,23 @@ static void solve(Stepper *t, size_t n, bool coupled)
     }
 }
 
-static void take_step(const SweepSystem *s, const double *x)
+// Adds the step, as far as it is allowed, and leaves what was added in x.
+static void take_step(const SweepSystem *s, double *x)
 {
     const SweepDraft *d = s->draft;
     for (int i = 0; i < d->count; i++)
         for (int j = 0; j < rows_of(s, i); j++) {
             double *row = row_of(s, i) + j * T;
-            const double *step = x + (size_t)(branch_of(s, i)->first_row + j) * T;
+            double *step = x + (size_t)(branch_of(s, i)->first_row + j) * T;
             double radius = d->prior_radius[branch_of(s, i)->first_row + j], most = LONGEST * radius;
-            for (int a = 0; a < T; a++)
+            for (int a = 0; a < T; a++) {
+                double before = row[a];
                 if (!is_held(s, i, j, harmonic_of(a)))
                     row[a] += fmax(-most, fmin(most, step[a]));
-            row[0] = fmax(row[0], 0.05 * radius);
+                if (a == 0)
+                    row[a] = fmax(row[a], 0.05 * radius);
+                step[a] = row[a] - before;
+            }
         }
 }
 
@@ -519,6 +561,12 @@ bool sweep_system_step(SweepSystem *s, bool coupled)
         if (good) {
             solve(&t, n, coupled);
             take_step(s, t.x);
+            for (int i = 0; i < s->draft->count && !coupled; i++) {
+                int unknowns = rows_of(s, i) * T;
+                band_multiply(s->matrix[i], unknowns, WIDTH, part_of(&t, t.x, i), part_of(&t, t.image, i));
+                for (int k = 0; k < unknowns; k++)
+                    s->slope[i][k] += part_of(&t, t.image, i)[k];
+            }
         }
     }
     for (int i = 0; i < s->draft->count; i++) {

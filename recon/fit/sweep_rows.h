@@ -28,7 +28,7 @@ typedef struct SweepSystem {
     double strength[PENALTIES][SWEEP_HARMONICS + 1];
     double freedom;          // number of effectively free coefficients, as sweep_system_tune found it
 
-    int64_t *order_first;    // (branches + 1): sights by branch …
+    int64_t *order_first;    // (branches + 1): sights by branch and first row …
     int64_t *order;          // … and the points that they belong to
     int64_t *order_point;
     double **matrix;         // (branches) J' w J as a band, see band_matrix.h
@@ -44,7 +44,8 @@ bool sweep_system_reserve(SweepSystem *system, int64_t sights);
 bool sweep_system_sum(SweepSystem *system);
 // One iteration of noise and strengths, from the model's rows. Returns false if out of memory.
 bool sweep_system_tune(SweepSystem *system);
-// Adds the step to the model's rows. `coupled`: points that depend on several branches couple these. Returns false if out of memory.
+// Adds the step to the model's rows. `coupled`: points that depend on several branches couple these; else the distances are linear, and the slopes are brought
+// up to date. Returns false if out of memory.
 bool sweep_system_step(SweepSystem *system, bool coupled);
 
 #endif
