@@ -154,14 +154,24 @@ static double end_shift(const SweepDraft *d, const SweepSystem *system, int bran
     return square > 2 ? fmax(-0.5 * r, fmin(0.5 * r, product / square)) : 0;
 }
 
-static void centre_knots(SweepDraft *d, const SweepSystem *system, int branch)
+// Returns whether t lies at a fork, where sections alone lean towards the other vessel.
+static bool is_at_fork(const SweepDraft *d, int branch, double t)
+{
+    const SweepBranch *b = &d->model->branch[branch];
+    int q = 0;
+    while (q + 2 < b->break_count && d->model->break_t[b->first_break + q + 1] <= t)
+        q++;
+    return d->is_fork[b->first_break + q];
+}
+
+static void centre_knots(SweepDraft *d, const SweepSystem *system, int branch, bool forks)
 {
     const SweepCurve *curve = d->curve[branch];
     const SweepBranch *b = &d->model->branch[branch];
     double hidden = b->parent >= 0 ? sweep_draft_radius(d, b->parent, b->parent_t) : -1;
     for (int k = 0; k < b->knot_count; k++) {
         double t = curve->knot_t[k], r = sweep_draft_radius(d, branch, t);
-        if (t <= hidden)
+        if (t <= hidden || (!forks && is_at_fork(d, branch, t)))
             continue;
         SweepJet jet = sweep_curve_at(curve, t);
         Vec3 shift = vec3_add(vec3_scale(jet.n, sweep_draft_term(d, branch, 1, t)), vec3_scale(jet.b, sweep_draft_term(d, branch, 2, t)));
@@ -191,9 +201,9 @@ static bool lay_curves(SweepDraft *d, SweepSystem *system)
 {
     bool good = true;
     for (int k = 0; k < CENTRINGS && good; k++) {
-        good = sweep_draft_divide(d, d->options->spacing) && fit_sections(d, system, false);
+        good = sweep_draft_divide(d, d->options->spacing) && fit_sections(d, system, k > 0);
         for (int i = 0; i < d->count && good; i++) {
-            centre_knots(d, system, i);
+            centre_knots(d, system, i, k == 0);
             space_knots(d, i);
         }
         good = good && sweep_draft_curves(d);
@@ -275,6 +285,7 @@ static bool refine(SweepDraft *d, SweepSystem *system)
     Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), malloc((size_t)d->tree->node_count * sizeof *r.sac_of),
                     0};
     bool good = r.sight && r.count && r.sac_of;
+    sweep_system_soften_forks(system);
     for (int i = 0; good && d->model->sac && i < d->model->sac->node_count; i++)
         r.sac_of[d->model->sac_node[i]] = i;
     for (int k = 0; k <= d->options->rounds && good && d->options->rounds > 0; k++) {

@@ -34,7 +34,8 @@ bool sweep_system_create(SweepSystem *s, const SweepDraft *draft)
                        .matrix = calloc(branches, sizeof *s->matrix),
                        .slope = calloc(branches, sizeof *s->slope)};
     for (int k = 0; k <= SWEEP_HARMONICS; k++)
-        s->strength[ROUGH_TUBE][k] = 100, s->strength[ROUGH_FORK][k] = 10, s->strength[SIZE][k] = 100;
+        s->strength[ROUGH_TUBE][k] = 100, s->strength[SIZE][k] = 100;
+    sweep_system_soften_forks(s);
     bool good = s->distance && s->trust && s->first && s->order_first && s->matrix && s->slope;
     for (int i = 0; good && i < draft->count; i++) {
         size_t n = (size_t)rows_of(s, i) * T;
@@ -43,6 +44,12 @@ bool sweep_system_create(SweepSystem *s, const SweepDraft *draft)
         good = s->matrix[i] && s->slope[i];
     }
     return good && sweep_system_reserve(s, draft->point_count);
+}
+
+void sweep_system_soften_forks(SweepSystem *s)
+{
+    for (int k = 0; k <= SWEEP_HARMONICS; k++)
+        s->strength[ROUGH_FORK][k] = 10;
 }
 
 void sweep_system_free(SweepSystem *s)

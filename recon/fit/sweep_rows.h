@@ -37,6 +37,8 @@ typedef struct SweepSystem {
 } SweepSystem;
 
 bool sweep_system_create(SweepSystem *system, const SweepDraft *draft);
+// Resets the strengths at forks: what sections alone find there is the misfit of tubes to a fork.
+void sweep_system_soften_forks(SweepSystem *system);
 void sweep_system_free(SweepSystem *system);
 // Makes room for `sights`. Returns false if out of memory.
 bool sweep_system_reserve(SweepSystem *system, int64_t sights);
