@@ -173,7 +173,8 @@ double sweep_curve_project(const SweepCurve *c, Vec3 x, double from, double long
 {
     enum { ROUNDS = 60 };
     SEL_ASSERT(longest > 0 && !isnan(from), "a step has a bound, and the start is a number");
-    double t = from, far2 = HUGE_VAL, least = 1e-15 * (longest + c->length), step = 0;
+    // Newton converges by squares: after a step this small, only rounding is left
+    double t = from, far2 = HUGE_VAL, least = 1e-9 * longest, step = 0;
     for (int round = 0; round < ROUNDS; round++) {
         const SweepInterval *i = &c->interval[sweep_curve_interval(c, t)];
         double at = t - i->origin;

@@ -93,7 +93,7 @@ static void sym3_add_pair(Sym3 *s, double factor, Vec3 a, Vec3 b)
 }
 
 // f, gradient and Hessian at a known t on a segment.
-static void evaluate_branch(const SweepSegment *segment, Vec3 x, double t, SweepPart *p)
+void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, SweepPart *p)
 {
     static const double LEAST = 1e-12;       // [mm] rho: on the curve itself f has no gradient
     const SweepInterval interval = {.origin = segment->origin,
@@ -153,12 +153,12 @@ void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double star
 {
     double t = sweep_curve_project(field->curve[branch], x, start, 2 * field->model->branch[branch].radius);
     *part = (SweepPart){.branch = branch, .share = 1, .sac = -1};
-    evaluate_branch(&field->segment[sweep_field_segment(field, branch, t)], x, t, part);
+    sweep_segment_evaluate(&field->segment[sweep_field_segment(field, branch, t)], x, t, part);
 }
 
 // --- Blends ---
 
-static void evaluate_sac(const SweepField *field, int node, Vec3 x, SweepPart *p)
+void sweep_field_sac(const SweepField *field, int node, Vec3 x, SweepPart *p)
 {
     const VesselTree *tree = field->model->sac;
     SEL_ASSERT(tree && node >= 0 && node < tree->node_count, "a sac's node is one of the sacs' tree");
@@ -179,14 +179,14 @@ static double blend_width(const SweepField *field, const SweepPart *p, Vec3 *gra
     if (p->branch < 0)
         return field->sac[p->sac].delta;
     const SweepFork *fork = &field->fork[p->branch];
-    double s = p->t / fork->reach, left = 1 - s * s;
-    if (!(left > 0) || !(fork->delta > 0))
-        return 0;
-    double slope = -4 * fork->delta * left * s / fork->reach, bend = fork->delta * (8 * s * s - 4 * left) / (fork->reach * fork->reach);
+    double s = fork->reach > 0 ? p->t / fork->reach : 2, left = 1 - s * s, varied = (1 - SWEEP_LEAST_BLEND) * fork->delta;
+    if (!(left > 0))
+        return SWEEP_LEAST_BLEND * fork->delta;
+    double slope = -4 * varied * left * s / fork->reach, bend = varied * (8 * s * s - 4 * left) / (fork->reach * fork->reach);
     *gradient = vec3_scale(p->t_gradient, slope);
     sym3_add(hessian, slope, &p->t_hessian);
     sym3_add_outer(hessian, bend, p->t_gradient);
-    return fork->delta * left * left;
+    return SWEEP_LEAST_BLEND * fork->delta + varied * left * left;
 }
 
 // Blends a part into F; the parts before it are those below `count`.
@@ -238,7 +238,7 @@ void sweep_field_blend(const SweepField *field, SweepPlace place, Vec3 x, SweepB
     }
     int sac = place.branch >= 0 ? view->sac : place.sac;
     if (sac >= 0)
-        evaluate_sac(field, sac, x, &blend->part[blend->count++]);
+        sweep_field_sac(field, sac, x, &blend->part[blend->count++]);
     SEL_ASSERT(blend->count > 0, "a place sees a branch or a sac");
     blend->f = blend->part[0].f, blend->gradient = blend->part[0].gradient, blend->hessian = blend->part[0].hessian;
     for (int i = 1; i < blend->count; i++)

@@ -33,9 +33,11 @@ typedef struct SweepView {
     SweepCandidate of[SWEEP_CANDIDATES];
 } SweepView;
 
+// Where two branches still overlap far from their fork, delta does not fall below this part of its value at the fork.
+#define SWEEP_LEAST_BLEND 0.2
 typedef struct SweepFork {   // delta of a branch with those before it
     double delta;            // [mm] at t = 0
-    double reach;            // [mm] t beyond which there is no blending
+    double reach;            // [mm] t beyond which delta is least
 } SweepFork;
 
 // The group of blobs of one sac, by node of the sacs' tree.
@@ -92,6 +94,10 @@ typedef struct SweepBlend {
 
 // One branch alone at x; Newton for t starts from `start`.
 void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part);
+// The same at a known t, which the segment holds; leaves `branch`, `share` and `sac` unset.
+void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, SweepPart *part);
+// A sac alone at x, from a node near x.
+void sweep_field_sac(const SweepField *field, int node, Vec3 x, SweepPart *part);
 // The blended field at x, as seen from a place.
 void sweep_field_blend(const SweepField *field, SweepPlace place, Vec3 x, SweepBlend *blend);
 

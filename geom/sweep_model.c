@@ -139,6 +139,15 @@ static void check_branches(const SweepModel *m, const char *file, Faults *faults
     }
 }
 
+static void check_nodes(const int32_t *node, int count, const char *name, const char *file, Faults *faults)
+{
+    for (int i = 0; i < count; i++)
+        if (node[i] < 0 || node[i] > COUNT_MAX) {
+            faults_add(faults, file, 0, 0, "sweep/%s[%d] is %d; expected the index of a node", name, i, node[i]);
+            return;
+        }
+}
+
 // The mean radius, c_0, of every row is positive: otherwise the branch has no inside there.
 static void check_rows(const SweepModel *m, const char *file, Faults *faults)
 {
@@ -168,11 +177,12 @@ bool sweep_model_validate(const SweepModel *m, const char *file, Faults *faults)
         if (breaks)
             check_breaks(m, file, faults);
     }
+    check_nodes(m->knot_node, m->knot_count, "knot_node", file, faults);
     if (!(m->blend >= 0 && m->blend <= 2))
         faults_add(faults, file, 0, 0, "sweep/blend is %g; expected 0 to 2", m->blend);
     if (m->sac && (!m->sac_node || !vessel_tree_is_shared(m->sac) || !m->sac->seen || !m->sac->near))
         faults_add(faults, file, 0, 0, "sweep/sac is no field of shared blobs, is not linked, or has no sac_node; expected all three");
-    else if (m->sac)
-        vessel_tree_validate(m->sac, file, faults);
+    else if (m->sac && vessel_tree_validate(m->sac, file, faults))
+        check_nodes(m->sac_node, m->sac->node_count, "sac_node", file, faults);
     return faults->count == before;
 }

@@ -17,7 +17,8 @@
 // are the sections at the ends); each row of coefficients is one section of the field's terms.
 // Blends. F = M(... M(f_1, f_2) ...) over the candidates of a place, M(x, y) = (x + y + A(x - y))/2, A(d) = delta (2/3 + q^2/2 - q^3/12) for q = |d|/delta <= 2,
 // else |d|: C2, and F is the plain maximum where the fields differ by more than 2 delta. Branches are taken in the order of their indices. delta = blend * (radius of the child at the fork) *
-// (1 - (t_c/(3 r_p))^2)^2 with t_c the child's t and r_p the parent's radius at the fork, and 0 beyond: no blending away from forks. (Radii at a fork are mean
+// (0.2 + 0.8 (1 - (t_c/(3 r_p))^2)^2) with t_c the child's t and r_p the parent's radius at the fork, 0.2 beyond: where branches part at a small angle, their
+// walls still meet there, and an edge without any blending has no foot that Newton finds. (Radii at a fork are mean
 // radii: the parent's at parent_t, the child's one r_p from its start.)
 // Sacs are taken last: f = (r/2) (sum a u^3 - 1), r the radius of the sac's largest node, and delta = blend/2 times the smaller of r and the mean radius of the
 // vessel's nodes beside the neck.

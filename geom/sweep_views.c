@@ -31,7 +31,7 @@ static double width_at(const SweepField *field, int branch, double t)
 {
     const SweepFork *fork = &field->fork[branch];
     double s = fork->reach > 0 ? t / fork->reach : 2, left = 1 - s * s;
-    return left > 0 ? fork->delta * left * left : 0;
+    return fork->delta * (SWEEP_LEAST_BLEND + (left > 0 ? (1 - SWEEP_LEAST_BLEND) * left * left : 0));
 }
 
 // Follows `child` from its start along `other`, from t = start there.

@@ -1,5 +1,6 @@
 // The interface through which the solver queries a vessel: for tool points with their last node, the gap to the wall, the wall's normal and the Hessian of the
-// gap. Implemented by the fitted tree (LIM or shared blobs), mesh, grid, exact tube and plane.
+// gap. Implemented by the fitted tree (LIM or shared blobs), the swept model, mesh, grid, exact
+// tube and plane.
 //
 // gap: signed distance from the point to the wall [mm], > 0 inside the lumen (the caller subtracts the tool's radius).
 // normal: unit, gradient of the gap, pointing into the lumen. hessian: second derivative of the gap AT THE POINT [1/mm]: with S the
@@ -12,7 +13,17 @@
 #include "geom/linear.h"
 #include "geom/vessel_tree.h"
 
-enum { VESSEL_BLOBS = 24 };
+enum { VESSEL_BLOBS = 24, VESSEL_SEEN = 6 };
+// Where on a swept model a foot lies.
+typedef struct VesselSweepMemory {
+    int32_t segment;         // of the branch; -1: on a sac
+    int32_t sac;             // on a sac: the node of the sacs' tree
+    double t[VESSEL_SEEN];   // on the branches that the segment, or the sac's node, sees [mm]
+    double own_t;            // on the own branch
+    int32_t is_known;        // 0: t are not set
+    int32_t open;            // 1: points of the rings are nearer than the foot, but are no wall
+} VesselSweepMemory;
+
 // What is stored for a tool point between steps. The closest point on the wall is called the foot.
 typedef struct VesselMemory {
     Vec3 foot;               // last foot, where Newton starts
@@ -37,7 +48,10 @@ typedef struct VesselMemory {
     int trusted;             // number of queries for which the foot need not be compared with other walls
     bool has_foot;
     int blobs;               // number held; -1: more than VESSEL_BLOBS
-    int32_t blob[VESSEL_BLOBS];      // rows of the field; beyond `blobs`, the row of the blob of amplitude 0
+    union {
+        int32_t blob[VESSEL_BLOBS];  // rows of the field; beyond `blobs`, the row of the blob of amplitude 0
+        VesselSweepMemory sweep;     // of a swept vessel
+    };
 } VesselMemory;              // initial value: {.node = -1}
 
 enum {
@@ -58,7 +72,7 @@ typedef struct VesselHit {
 
 typedef struct Vessel Vessel;
 struct Vessel {
-    const char *kind;        // "field", "lim", "mesh", "grid", "tube", "plane"
+    const char *kind;        // "field", "lim", "sweep", "mesh", "grid", "tube", "plane"
     // Fills hit[i] for `count` points and updates memory[i]. reach [mm]: a gap beyond it may be returned as VESSEL_FAR.
     void (*query)(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit);
     // First location of a point: the best node overall if `from` is -1, else the best node reached by walking from node `from` (Kerrien et al. 2017, 6.2.1: the

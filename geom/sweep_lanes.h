@@ -1,0 +1,63 @@
+// The swept model at points, in lanes: a block is eight points, each with a segment of its own (sweep_field.h). A lane does the same operations in the same
+// order whatever the other lanes hold, so neither the block nor the instruction set changes a bit. The arithmetic between two evaluations is that of
+// foot_lanes.h, on the first block of a FootBatch.
+//
+// A part is one of the branches that a lane sees, at the same index of its view for all lanes; a lane that has no such branch is `absent` there.
+#ifndef SELDINGER_GEOM_SWEEP_LANES_H
+#define SELDINGER_GEOM_SWEEP_LANES_H
+
+#include "geom/foot_lanes.h"
+#include "geom/sweep_field.h"
+
+typedef double SweepLane[FOOT_BLOCK];
+
+enum { SWEEP_RING = 16 };                // points of a ring: a section's contour at equal angles
+
+typedef struct SweepPartLanes {
+    const SweepSegment *segment[FOOT_BLOCK];     // the one that holds t
+    SweepLane t, longest;                // longest: bound of a step of t [mm]
+    SweepLane settled;                   // 1: t is the foot on the curve
+    SweepLane away;                      // distance of the point from the curve [mm]
+    SweepLane absent;                    // 1: f is -1e300 and the derivatives are 0
+    SweepLane delta, reach_inverse;      // the blend with the parts before, see SweepFork; reach_inverse 0: delta everywhere
+    // results
+    SweepLane f, gx, gy, gz, hxx, hxy, hxz, hyy, hyz, hzz;
+    SweepLane tx, ty, tz, vx, vy, vz;    // grad t = (tx, ty, tz); Hess t = grad t v' + v grad t'
+    SweepLane width;                     // delta at the point
+} SweepPartLanes;
+
+// What the ring of a lane's own branch needs, kept by `evaluate`.
+typedef struct SweepRingLanes {
+    SweepLane term[SWEEP_TERMS];         // the section's coefficients at t
+    SweepLane n, b;                      // coordinates of the point
+    SweepLane nx, ny, nz, bx, by, bz, sx, sy, sz;    // N, B and S'/|S'|
+    SweepLane near2, at_n, at_b;         // result: the square of X's distance to the nearest point of the ring, and that point's coordinates
+} SweepRingLanes;
+
+typedef struct SweepKernels {
+    // Up to three Newton steps of t for the lanes that are not settled, on their segments. Returns the bits of lanes that are not settled, or whose t lies
+    // outside its segment (`outside`): these need another segment.
+    unsigned (*seek)(SweepPartLanes *part, const double *x, const double *y, const double *z, unsigned *outside);
+    // f, gradient and Hessian at the points. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
+    // stored to it.
+    void (*evaluate)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics, SweepRingLanes *ring, const double *own);
+    // f alone, of domes too.
+    void (*depth)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics);
+    // Blends a part into the sum; `share`: the part's share, for each lane.
+    void (*blend)(FootSample *sum, SweepPartLanes *part, double *share);
+    // Width of the blend at t.
+    void (*width)(SweepPartLanes *part);
+    // The nearest point of the ring at the foot's t to X.
+    void (*ring)(SweepRingLanes *ring, const FootBatch *foot, const double *foot_x, const double *foot_y, const double *foot_z, int harmonics);
+    // The squares of a ring's distances from a point with coordinates (n, b, w): at the angles of sweep_ring_angle. `term`: SWEEP_TERMS coefficients.
+    void (*ring_about)(const double *term, int harmonics, double n, double b, double w, double *radius, double *far2);
+    void (*predict)(FootBatch *foot, double allowed);
+    unsigned (*newton)(FootBatch *foot, bool careful);
+    void (*finish)(FootBatch *foot);
+} SweepKernels;
+// Cosine and sine of the angles of a ring.
+extern const double sweep_ring_cos[SWEEP_RING], sweep_ring_sin[SWEEP_RING];
+// isa: as for lane_kernels.
+const SweepKernels *sweep_kernels(int isa);
+
+#endif
