@@ -18,6 +18,7 @@
 #include "geom/vessel.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
+#include "geom/sweep_vessel.h"
 #include "geom/tube_mesh.h"
 
 // surfaces as triangles

@@ -403,10 +403,8 @@ static void fill_ring(const SweepFeet *feet, Vec3 x, int branch, double t, Rings
     const SweepField *field = feet->field;
     int segment = sweep_field_segment(field, branch, t);
     const SweepSegment *s = &field->segment[segment];
-    const SweepInterval line = {.origin = s->origin,
-                                .s = {s->s[0], s->s[1], s->s[2], s->s[3]},
-                                .n = {s->n[0], s->n[1], s->n[2], s->n[3]},
-                                .b = {s->b[0], s->b[1], s->b[2], s->b[3]}};
+    const SweepInterval line = {
+        .origin = s->origin, .s = {s->s[0], s->s[1], s->s[2], s->s[3]}, .n = {s->n[0], s->n[1], s->n[2], s->n[3]}, .b = {s->b[0], s->b[1], s->b[2], s->b[3]}};
     SweepJet j = sweep_interval_at(&line, s->rise != 0 ? s->origin : t);
     double term[SWEEP_TERMS], radius[SWEEP_RING], at = t - s->origin, up = 0, out = 1;
     for (int k = 0; k <= 2 * feet->harmonics; k++)
@@ -570,9 +568,9 @@ SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double
     for (int move = 0; move < MOVES; move++) {
         sweep_field_blend(feet->field, place, x, &blend);
         const SweepPart *best = &blend.part[blend.largest];
-        bool same = best->branch == place.branch && (best->branch >= 0 ? sweep_field_segment(feet->field, place.branch, place.t) ==
-                                                                             sweep_field_segment(feet->field, place.branch, best->t)
-                                                                       : best->sac == place.sac);
+        bool same = best->branch == place.branch &&
+                    (best->branch >= 0 ? sweep_field_segment(feet->field, place.branch, place.t) == sweep_field_segment(feet->field, place.branch, best->t)
+                                       : best->sac == place.sac);
         place = (SweepPlace){.branch = best->branch, .t = best->t, .sac = best->sac};
         if (same)
             break;

@@ -99,9 +99,13 @@ bool sweep_sacs_fit(const VesselTree *tree, const SweepFitOptions *options, Swee
         good = (model->sac = fit_blobs(e.sac, options, faults)) != NULL;
     vessel_tree_free(e.sac);
     free(e.at);
-    if (good)
+    if (good) {
         model->sac_node = e.node;
-    else
+        model->sac->point_count = 0;         // they are the tree's
+        memset(model->sac->point_offset, 0, ((size_t)nodes + 1) * sizeof *model->sac->point_offset);
+        memset(model->sac->error, 0, (size_t)nodes * sizeof *model->sac->error);
+    } else {
         free(e.node);
+    }
     return good;
 }
