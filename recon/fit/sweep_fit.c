@@ -12,7 +12,7 @@ enum { CENTRINGS = 2, SECTION_ROUNDS = 4, TUNINGS = 6, THINNED_ROUNDS = 3, THINN
 static const double SKIP = 0.7;              // [parent's radii] of a child's start whose points its sections leave out
 static const double KNEE_NOISE = 2.5;        // distance at which a point's trust has fallen to a half, in standard deviations of the noise …
 // … and at least, in radii, round by round: from far away, a sharp knee would take the wall for outliers
-static const double section_knee[SECTION_ROUNDS] = {0.5, 0.2, 0.1, 0.06}, round_knee[] = {0.6, 0.4, 0.2, 0.1, 0.05, 0.03};
+static const double section_knee[SECTION_ROUNDS] = {0.5, 0.2, 0.1, 0.06}, round_knee[] = {0.6, 0.4, 0.3, 0.2, 0.1, 0.1};
 static const double FIRST_NOISE = 0.03;      // [radii]
 // Least noise of each round, in radii: while the blends are far from the wall, exact points must not be followed closely.
 static const double round_noise[] = {0.02, 0.01, 0.004, 0.002, 0.001, 0.0005};
@@ -106,6 +106,57 @@ static void measure_sections(Sections *s, double knee, int every)
     }
 }
 
+// Returns whether t lies at a fork, where sections alone lean towards the other vessel.
+static bool is_at_fork(const SweepDraft *d, int branch, double t)
+{
+    const SweepBranch *b = &d->model->branch[branch];
+    int q = 0;
+    while (q + 2 < b->break_count && d->model->break_t[b->first_break + q + 1] <= t)
+        q++;
+    return d->is_fork[b->first_break + q];
+}
+
+typedef struct Bin {
+    int64_t key;             // of the place along a branch and around it
+    double rho;              // [radii]
+} Bin;
+
+static int compare_bins(const void *a, const void *b)
+{
+    const Bin *p = a, *q = b;
+    return p->key != q->key ? (p->key > q->key) - (p->key < q->key) : (p->rho > q->rho) - (p->rho < q->rho);
+}
+
+// Points on tubes where the wall has two sheets: seen from the curve, in one direction, some are much further than the others. At forks that is no finding.
+static int64_t count_second_sheets(const Sections *s)
+{
+    static const double ALONG = 0.3, APART = 0.35;   // [radii]
+    enum { AROUND = 16 };
+    const SweepDraft *d = s->draft;
+    Bin *bin = malloc(((size_t)d->vessel_point_count + 1) * sizeof *bin);
+    int64_t bins = 0, found = 0;
+    for (int64_t p = 0; bin && p < d->vessel_point_count; p++) {
+        const SweepSight *sight = &s->system->sight[p];
+        double r = d->tree->radius[d->node[p]], angle = same_atan2(sight->zeta[1], sight->zeta[0]), length = d->curve[sight->branch]->length;
+        if (!(d->t[p] > 0 && d->t[p] < length) || is_at_fork(d, sight->branch, d->t[p]))
+            continue;
+        int64_t place = (int64_t)(d->t[p] / (ALONG * d->branches->branch[sight->branch].radius_least)), around = (int64_t)((angle / (2 * PI) + 0.5) * AROUND);
+        bin[bins++] = (Bin){((int64_t)sight->branch << 40) + place * (AROUND + 1) + around, s->rho[p] / r};
+    }
+    if (bins > 0)
+        qsort(bin, (size_t)bins, sizeof *bin, compare_bins);
+    for (int64_t from = 0, to; from < bins; from = to) {
+        int64_t step = -1;
+        for (to = from + 1; to < bins && bin[to].key == bin[from].key; to++)
+            if (bin[to].rho - bin[to - 1].rho > APART)
+                step = to;
+        if (step >= 0)
+            found += step - from < to - step ? step - from : to - step;
+    }
+    free(bin);
+    return found;
+}
+
 // Fits all rows to the branches' own points; if not `tuned`, roughly, with every third point and the strengths of the start. `system` is created here.
 static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
 {
@@ -131,6 +182,8 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
         measure_sections(&s, section_knee[SECTION_ROUNDS - 1], 1);
         good = sweep_system_tune(system) && sweep_system_step(system, false);
     }
+    if (good && tuned)
+        d->second_sheets = count_second_sheets(&s);
     sweep_field_free(s.field);
     free(s.rho);
     return good;
@@ -152,16 +205,6 @@ static double end_shift(const SweepDraft *d, const SweepSystem *system, int bran
             product -= system->trust[p] * steep * system->distance[p], square += system->trust[p] * steep * steep;
         }
     return square > 2 ? fmax(-0.5 * r, fmin(0.5 * r, product / square)) : 0;
-}
-
-// Returns whether t lies at a fork, where sections alone lean towards the other vessel.
-static bool is_at_fork(const SweepDraft *d, int branch, double t)
-{
-    const SweepBranch *b = &d->model->branch[branch];
-    int q = 0;
-    while (q + 2 < b->break_count && d->model->break_t[b->first_break + q + 1] <= t)
-        q++;
-    return d->is_fork[b->first_break + q];
 }
 
 static void centre_knots(SweepDraft *d, const SweepSystem *system, int branch, bool forks)
@@ -340,6 +383,12 @@ static bool take_figures(const SweepDraft *d, const SweepSystem *system, SweepFi
         figures->most = value[figures->points - 1];
     }
     figures->noise = system->noise;
+    figures->not_star_shaped = d->second_sheets;
+    for (int64_t p = 0; p < d->vessel_point_count; p++) {
+        SweepJet jet = sweep_curve_at(d->curve[d->owner[p]], d->t[p]);
+        double speed2 = vec3_norm2(jet.s1);
+        figures->folded += speed2 - vec3_dot(vec3_sub(d->point[p], jet.s), jet.s2) < SWEEP_LEAST_D * speed2;
+    }
     count_numbers(d, figures);
     free(value);
     return true;
