@@ -39,6 +39,7 @@ void sweep_draft_free(SweepDraft *d)
     free(d->owner);
     free(d->node);
     free(d->t);
+    free(d->guard);
     vessel_branches_free(d->branches);
     *d = (SweepDraft){0};
 }
@@ -228,6 +229,13 @@ static void find_zone(const SweepDraft *d, int child, Zone zone[2], double *pare
     zone[1] = (Zone){child, in, clear + ZONE_CHILD * rc, d->options->fork_spacing * rc};
 }
 
+// The zone of a neck: where `vessel` is linked to `sac`.
+static Zone neck_zone(const SweepDraft *d, int vessel, int sac)
+{
+    double r = d->tree->radius[vessel], t = d->node_t[vessel], around = fmax(r, fmin(d->tree->radius[sac], 2 * r)) + r;
+    return (Zone){d->branches->of_node[vessel], t - around, t + around, d->options->fork_spacing * r};
+}
+
 static double spacing_at(const SweepDraft *d, const Zone *zone, int zones, int branch, double t, double spacing)
 {
     double h = spacing * sweep_draft_radius(d, branch, t);
@@ -347,12 +355,19 @@ static bool make_model(SweepDraft *d, const Zone *zone, int zones, double spacin
 
 bool sweep_draft_divide(SweepDraft *d, double spacing)
 {
-    Zone *zone = calloc(2 * (size_t)d->count + 1, sizeof *zone);
+    const VesselTree *tree = d->tree;
+    int zones = 2 * d->count;
+    for (int i = 1; i < tree->node_count; i++)
+        zones += tree->kind[i] != tree->kind[tree->parent[i]];
+    Zone *zone = calloc((size_t)zones + 1, sizeof *zone);
     double *parent_t = calloc((size_t)d->count + 1, sizeof *parent_t);
     bool good = zone && parent_t;
-    int zones = 0;
+    zones = 0;
     for (int i = 1; good && i < d->count; i++, zones += 2)
         find_zone(d, i, zone + zones, &parent_t[i]);
+    for (int i = 1; good && i < tree->node_count; i++)
+        if (tree->kind[i] != tree->kind[tree->parent[i]])
+            zone[zones++] = tree->kind[i] == NODE_VESSEL ? neck_zone(d, i, tree->parent[i]) : neck_zone(d, tree->parent[i], i);
     good = good && make_model(d, zone, zones, spacing, parent_t);
     free(zone);
     free(parent_t);
@@ -397,4 +412,28 @@ bool sweep_draft_project(SweepDraft *d)
     if (d->t)
         parallel_for(d->options->threads, (long)d->vessel_point_count, project, d, NULL);
     return d->t != NULL;
+}
+
+bool sweep_draft_guard(SweepDraft *d)
+{
+    enum { AROUND = 12 };
+    free(d->guard);
+    d->guard_count = 0;
+    d->guard = malloc(((size_t)d->model->break_count * AROUND + 1) * sizeof *d->guard);
+    for (int i = 0; d->guard && i < d->count; i++) {
+        const SweepBranch *b = &d->model->branch[i];
+        const double *at = d->model->break_t + b->first_break;
+        for (int q = 0; q < b->break_count - 1; q++) {
+            if (!d->is_fork[b->first_break + q] && !d->is_hidden[b->first_row + q + 1])
+                continue;
+            double t = 0.5 * (at[q] + at[q + 1]), r = sweep_draft_radius(d, i, t);
+            SweepJet jet = sweep_curve_at(d->curve[i], t);
+            for (int k = 0; k < AROUND; k++) {
+                double angle = 2 * PI * (k + 0.5 * (q % 2)) / AROUND;
+                Vec3 out = vec3_add(vec3_scale(jet.n, same_cos(angle)), vec3_scale(jet.b, same_sin(angle)));
+                d->guard[d->guard_count++] = (SweepGuard){i, t, r, vec3_add_scaled(jet.s, r, out)};
+            }
+        }
+    }
+    return d->guard != NULL;
 }

@@ -5,6 +5,12 @@
 #include "geom/geom.h"
 #include "recon/fit/sweep_fit.h"
 
+typedef struct SweepGuard {
+    int branch;
+    double t, rho;           // a point beside the curve at the tree's radius
+    Vec3 x;
+} SweepGuard;
+
 typedef struct SweepDraft {
     const VesselTree *tree;
     const SweepFitOptions *options;
@@ -26,6 +32,8 @@ typedef struct SweepDraft {
     Vec3 *point;
     int *owner;              // (points) branch, -1: a sac
     int *node;               // (points) node
+    int64_t guard_count;     // places at forks where a branch's wall is hidden in another vessel's lumen …
+    SweepGuard *guard;        // … if at all: sweep_draft_guard
     double *t;               // (vessel points) [mm] foot on the branch's curve
 } SweepDraft;
 
@@ -38,6 +46,8 @@ bool sweep_draft_curves(SweepDraft *draft);
 bool sweep_draft_divide(SweepDraft *draft, double spacing);
 // Radius of the tree at t, from its nodes.
 double sweep_draft_radius(const SweepDraft *draft, int branch, double t);
+// Lists the places for guards. Returns false if out of memory.
+bool sweep_draft_guard(SweepDraft *draft);
 // Feet of all points on their own branch: `t`. Returns false if out of memory.
 bool sweep_draft_project(SweepDraft *draft);
 // Value of a term of a branch at t.

@@ -163,7 +163,7 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
     double noise = system->noise, strength[PENALTIES][SWEEP_HARMONICS + 1];
     memcpy(strength, system->strength, sizeof strength);
     sweep_system_free(system);
-    bool good = sweep_system_create(system, d) && sweep_draft_project(d);
+    bool good = sweep_draft_guard(d) && sweep_system_create(system, d) && sweep_draft_project(d);
     if (noise > 0)
         memcpy(system->strength, strength, sizeof strength);
     system->noise = noise > 0 ? noise : FIRST_NOISE * d->branches->branch[0].radius_mean;
@@ -171,7 +171,7 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
     good = good && s.field && s.rho;
     if (good) {
         parallel_for(d->options->threads, (long)d->vessel_point_count, see_own_branch, &s, NULL);
-        for (int64_t p = d->vessel_point_count; p <= d->point_count; p++)
+        for (int64_t p = d->vessel_point_count; p <= system->count; p++)
             system->first[p] = d->vessel_point_count;
     }
     for (int k = 0; good && k < (tuned ? SECTION_ROUNDS : THINNED_ROUNDS); k++) {
@@ -286,6 +286,27 @@ static void see_blend(void *context, long p)
             r->sight[p][r->count[p]++] = sight_of(r->field, &blend.part[i], blend.part[i].share / slope);
 }
 
+// A guard holds a section near the tree's radius where it is deep in another vessel's lumen; no point does.
+static void see_guard(void *context, long index)
+{
+    static const double DEEP = 0.2, LOOSE = 0.1;     // [radii] in the other lumen; standard deviation
+    Refinement *r = context;
+    const SweepGuard *guard = &r->draft->guard[index];
+    int64_t p = r->draft->point_count + index;
+    SweepBlend blend;
+    SweepPart part;
+    sweep_field_blend(r->field, (SweepPlace){.branch = guard->branch, .t = guard->t, .sac = -1}, guard->x, &blend);
+    sweep_field_branch(r->field, guard->branch, guard->x, guard->t, &part);
+    double deepest = -HUGE_VAL;
+    for (int i = 0; i < blend.count; i++)
+        if (blend.part[i].branch != guard->branch)
+            deepest = fmax(deepest, blend.part[i].f);
+    r->sight[p][0] = sight_of(r->field, &part, 1);
+    r->count[p] = 1;
+    r->system->distance[p] = part.f;
+    r->system->trust[p] = deepest > DEEP * guard->rho ? same_square(r->system->noise / (LOOSE * guard->rho)) : 0;
+}
+
 static bool look_at_blend(Refinement *r, double knee)
 {
     SweepDraft *d = r->draft;
@@ -294,18 +315,19 @@ static bool look_at_blend(Refinement *r, double knee)
     if (!(r->field = sweep_field_create(d->model)))
         return false;
     parallel_for(d->options->threads, (long)d->point_count, see_blend, r, NULL);
+    parallel_for(d->options->threads, (long)d->guard_count, see_guard, r, NULL);
     int64_t sum = 0;
-    for (int64_t p = 0; p < d->point_count; p++)
+    for (int64_t p = 0; p < r->system->count; p++)
         sum += r->count[p];
     if (!sweep_system_reserve(r->system, sum))
         return false;
     sum = 0;
-    for (int64_t p = 0; p < d->point_count; p++) {
+    for (int64_t p = 0; p < r->system->count; p++) {
         r->system->first[p] = sum;
         memcpy(r->system->sight + sum, r->sight[p], (size_t)r->count[p] * sizeof(SweepSight));
         sum += r->count[p];
     }
-    r->system->first[d->point_count] = sum;
+    r->system->first[r->system->count] = sum;
     return true;
 }
 
@@ -321,10 +343,58 @@ static void trim_harmonics(SweepDraft *d, double noise)
     }
 }
 
-static bool refine(SweepDraft *d, SweepSystem *system)
+typedef struct Neck {
+    const Refinement *refinement;
+    Vec3 *moved;             // (tree's points)
+    int64_t *index;          // (points) index of the tree's point
+} Neck;
+
+// Where the sac's own wall has to pass for the blended wall to pass through a point of the sac.
+static void move_point(void *context, long i)
+{
+    static const double LEAST_SHARE = 0.2, LONGEST = 0.3;    // [radii of the link's vessel: of the stub]
+    const Neck *neck = context;
+    const SweepDraft *d = neck->refinement->draft;
+    int64_t p = d->vessel_point_count + i;
+    SweepBlend blend;
+    sweep_field_blend(neck->refinement->field, (SweepPlace){.branch = -1, .sac = neck->refinement->sac_of[d->node[p]]}, d->point[p], &blend);
+    const SweepPart *sac = &blend.part[blend.count - 1];
+    if (sac->branch >= 0 || sac->share < LEAST_SHARE || sac->share > 0.9999)
+        return;
+    double slope = fmax(vec3_norm(sac->gradient), LEAST_SLOPE), most = LONGEST * d->tree->radius[d->node[p]];
+    double raised = sac->f - blend.f / sac->share;   // of the sac's field at the point; the wall is where it is 0
+    neck->moved[neck->index[p]] = vec3_add_scaled(d->point[p], -fmax(-most, fmin(most, raised / slope)), vec3_unit(sac->gradient));
+}
+
+// Fits the sacs' blobs again so that, blended with the vessels, they pass through their points.
+static bool refit_sacs(Refinement *r, Faults *faults)
+{
+    SweepDraft *d = r->draft;
+    VesselTree moved = *d->tree;
+    Neck neck = {r, malloc(((size_t)moved.point_count + 1) * sizeof(Vec3)), malloc(((size_t)d->point_count + 1) * sizeof(int64_t))};
+    bool good = neck.moved && neck.index;
+    if (good) {
+        memcpy(neck.moved, d->tree->point, (size_t)moved.point_count * sizeof(Vec3));
+        int64_t p = d->vessel_point_count;
+        for (int i = 0; i < moved.node_count; i++)
+            for (int64_t k = moved.point_offset[i]; k < moved.point_offset[i + 1] && moved.kind[i] == NODE_ANEURYSM; k++)
+                neck.index[p++] = k;
+        parallel_for(d->options->threads, (long)(d->point_count - d->vessel_point_count), move_point, &neck, NULL);
+        moved.point = neck.moved;
+        vessel_tree_free(d->model->sac);
+        free(d->model->sac_node);
+        d->model->sac = NULL, d->model->sac_node = NULL;
+        good = sweep_sacs_fit(&moved, d->options, d->model, faults);
+    }
+    free(neck.moved);
+    free(neck.index);
+    return good;
+}
+
+static bool refine(SweepDraft *d, SweepSystem *system, Faults *faults)
 {
     enum { KNEES = sizeof round_knee / sizeof round_knee[0] };
-    size_t points = (size_t)d->point_count + 1;
+    size_t points = (size_t)system->count + 1;
     Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), malloc((size_t)d->tree->node_count * sizeof *r.sac_of),
                     0};
     bool good = r.sight && r.count && r.sac_of;
@@ -332,11 +402,15 @@ static bool refine(SweepDraft *d, SweepSystem *system)
     for (int i = 0; good && d->model->sac && i < d->model->sac->node_count; i++)
         r.sac_of[d->model->sac_node[i]] = i;
     for (int k = 0; k <= d->options->rounds && good && d->options->rounds > 0; k++) {
-        good = look_at_blend(&r, round_knee[k < KNEES ? k : KNEES - 1]) && sweep_system_sum(system);
+        double knee = round_knee[k < KNEES ? k : KNEES - 1], least = round_noise[k < KNEES ? k : KNEES - 1] * d->branches->branch[0].radius_mean;
+        system->noise = fmax(system->noise, least);
+        if (k == d->options->rounds - 2 && d->model->sac)
+            good = look_at_blend(&r, knee) && refit_sacs(&r, faults);
+        good = good && look_at_blend(&r, knee) && sweep_system_sum(system);
         if (good && k > 0)
             good = sweep_system_tune(system);
         double found = system->noise;
-        system->noise = fmax(found, round_noise[k < KNEES ? k : KNEES - 1] * d->branches->branch[0].radius_mean);
+        system->noise = fmax(found, least);
         good = good && sweep_system_step(system, true);
         system->noise = found;
         if (k == d->options->rounds - 1)     // one round more for the rest
@@ -397,7 +471,7 @@ static bool take_figures(const SweepDraft *d, const SweepSystem *system, SweepFi
 static bool fit(SweepDraft *d, SweepSystem *system, Faults *faults)
 {
     bool good = lay_curves(d, system) && sweep_draft_divide(d, d->options->spacing) && fit_sections(d, system, true);
-    return good && sweep_sacs_fit(d->tree, d->options, d->model, faults) && refine(d, system);
+    return good && sweep_sacs_fit(d->tree, d->options, d->model, faults) && refine(d, system, faults);
 }
 
 SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, SweepFitFigures *figures, Faults *faults)

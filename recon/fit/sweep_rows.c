@@ -25,8 +25,9 @@ static double *row_of(const SweepSystem *s, int branch) { return s->draft->model
 
 bool sweep_system_create(SweepSystem *s, const SweepDraft *draft)
 {
-    size_t points = (size_t)draft->point_count + 1, branches = (size_t)draft->count + 1;
+    size_t points = (size_t)(draft->point_count + draft->guard_count) + 1, branches = (size_t)draft->count + 1;
     *s = (SweepSystem){.draft = draft,
+                       .count = draft->point_count + draft->guard_count,
                        .distance = calloc(points, sizeof *s->distance),
                        .trust = calloc(points, sizeof *s->trust),
                        .first = calloc(points, sizeof *s->first),
@@ -43,7 +44,7 @@ bool sweep_system_create(SweepSystem *s, const SweepDraft *draft)
         s->slope[i] = malloc(n * sizeof *s->slope[i]);
         good = s->matrix[i] && s->slope[i];
     }
-    return good && sweep_system_reserve(s, draft->point_count);
+    return good && sweep_system_reserve(s, s->count);
 }
 
 void sweep_system_soften_forks(SweepSystem *s)
@@ -105,14 +106,14 @@ static bool order_sights(SweepSystem *s)
     int64_t *start = calloc((size_t)rows + 1, sizeof *start);
     if (!start)
         return false;
-    for (int64_t i = 0; i < s->first[s->draft->point_count]; i++)
+    for (int64_t i = 0; i < s->first[s->count]; i++)
         start[branch_of(s, s->sight[i].branch)->first_row + s->sight[i].first + 1]++;
     for (int i = 0; i < rows; i++)
         start[i + 1] += start[i];
     for (int i = 0; i < s->draft->count; i++)
         s->order_first[i] = start[branch_of(s, i)->first_row];
     s->order_first[s->draft->count] = start[rows];
-    for (int64_t p = 0; p < s->draft->point_count; p++)
+    for (int64_t p = 0; p < s->count; p++)
         for (int64_t i = s->first[p]; i < s->first[p + 1]; i++) {
             int64_t at = start[branch_of(s, s->sight[i].branch)->first_row + s->sight[i].first]++;
             s->order[at] = i;

@@ -20,10 +20,11 @@ typedef struct SweepSight {  // how a point's distance depends on four rows of a
 
 typedef struct SweepSystem {
     const SweepDraft *draft;
-    double *distance;        // (points) [mm]
-    double *trust;           // (points) 0 … 1
-    int64_t *first;          // (points + 1)
-    SweepSight *sight;       // (first[points])
+    int64_t count;           // points and guards
+    double *distance;        // (count) [mm]
+    double *trust;           // (count) 0 … 1
+    int64_t *first;          // (count + 1)
+    SweepSight *sight;       // (first[count])
     double noise;            // [mm]
     double strength[PENALTIES][SWEEP_HARMONICS + 1];
     double freedom;          // number of effectively free coefficients, as sweep_system_tune found it
@@ -36,6 +37,7 @@ typedef struct SweepSystem {
     bool failed;
 } SweepSystem;
 
+// For the draft's points and guards.
 bool sweep_system_create(SweepSystem *system, const SweepDraft *draft);
 // Resets the strengths at forks: what sections alone find there is the misfit of tubes to a fork.
 void sweep_system_soften_forks(SweepSystem *system);

@@ -104,6 +104,12 @@ bool sweep_sacs_fit(const VesselTree *tree, const SweepFitOptions *options, Swee
         model->sac->point_count = 0;         // they are the tree's
         memset(model->sac->point_offset, 0, ((size_t)nodes + 1) * sizeof *model->sac->point_offset);
         memset(model->sac->error, 0, (size_t)nodes * sizeof *model->sac->error);
+        for (int i = 0; i < nodes; i++)      // the blend's width goes by the vessel's radius
+            model->sac->radius[i] = tree->radius[e.node[i]];
+        if (!vessel_tree_link(model->sac)) {
+            faults_add(faults, "fit", 0, 0, "not enough memory for the sacs");
+            good = false;
+        }
     } else {
         free(e.node);
     }
