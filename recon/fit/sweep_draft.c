@@ -416,7 +416,7 @@ bool sweep_draft_project(SweepDraft *d)
 
 bool sweep_draft_guard(SweepDraft *d)
 {
-    enum { AROUND = 12 };
+    enum { AROUND = 20 };       // more than terms, or a section could pass between
     free(d->guard);
     d->guard_count = 0;
     d->guard = malloc(((size_t)d->model->break_count * AROUND + 1) * sizeof *d->guard);

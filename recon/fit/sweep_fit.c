@@ -289,7 +289,8 @@ static void see_blend(void *context, long p)
 // A guard holds a section near the tree's radius where it is deep in another vessel's lumen; no point does.
 static void see_guard(void *context, long index)
 {
-    static const double DEEP = 0.2, LOOSE = 0.1;     // [radii] in the other lumen; standard deviation
+    // [radii] depth in the other lumen; standard deviation; and the least weight relative to a point's: exact points would outweigh any deviation
+    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 4e-4;
     Refinement *r = context;
     const SweepGuard *guard = &r->draft->guard[index];
     int64_t p = r->draft->point_count + index;
@@ -304,7 +305,7 @@ static void see_guard(void *context, long index)
     r->sight[p][0] = sight_of(r->field, &part, 1);
     r->count[p] = 1;
     r->system->distance[p] = part.f;
-    r->system->trust[p] = deepest > DEEP * guard->rho ? same_square(r->system->noise / (LOOSE * guard->rho)) : 0;
+    r->system->trust[p] = deepest > DEEP * guard->rho ? fmax(LEAST, same_square(r->system->noise / (LOOSE * guard->rho))) : 0;
 }
 
 static bool look_at_blend(Refinement *r, double knee)
