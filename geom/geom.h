@@ -14,6 +14,10 @@
 #include "geom/power_walk.h"
 #include "geom/sweep_field.h"
 
+// the swept model: branches with cross-sections along them
+#include "geom/sweep_model.h"
+#include "geom/sweep_field.h"
+
 // vessels: the wall as the solver queries it
 #include "geom/vessel.h"
 #include "geom/grid_vessel.h"

@@ -4,8 +4,11 @@
 // 2 delta. The result is the same to the bit.
 #include "geom/sweep_feet.h"
 
+#include "geom/field_lanes.h"
+#include "geom/power_walk.h"
 #include "geom/sweep_views.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int i, int segment, int sac, double t)
@@ -177,14 +180,14 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
             evaluate_part(feet, b, k, lanes);
             evaluated |= 1u << k;
         }
-    for (int i = 0; i < FOOT_BLOCK && parts > 1; i++) {
+    for (int i = 0; i < FOOT_BLOCK; i++) {
         // of two parts, the later one's delta counts; of more, two of them may have blended before they meet the own one
         most[i] = 0;
         for (int k = 1; k < parts; k++)
             if (b->part[k].absent[i] == 0)
                 most[i] += (b->view[i]->count == 2 ? 2 : 3) * b->part[k].width[i];
     }
-    for (int k = 0; k < parts && parts > 1; k++) {
+    for (int k = 0; k < parts; k++) {
         if (!(own >> k & 1) && lanes_need(b, k, lanes, most)) {
             evaluate_part(feet, b, k, lanes);
             evaluated |= 1u << k;
@@ -238,7 +241,7 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
         copy_part(&b->foot.at, &b->part[0]);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if (lanes >> i & 1)
-                b->owner[i] = 0, b->keeps_t[i] = true;
+                b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true;
         return;
     }
     clear_sum(&b->foot.at);
@@ -253,7 +256,10 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
     if (sacs != 0)
         blend_sacs(feet, b, lanes, sacs);
     for (int i = 0; i < FOOT_BLOCK; i++)
-        b->keeps_t[i] = b->keeps_t[i] || (lanes >> i & 1);
+        if (lanes >> i & 1) {
+            b->keeps_t[i] = true;
+            b->pure[i] = b->owner[i] >= 0 && b->foot.at.f[i] == b->part[b->owner[i]].f[i];
+        }
 }
 
 // --- Feet ---
@@ -279,7 +285,7 @@ SweepFoot sweep_block_foot(const SweepFeet *feet, const SweepBlock *b, int i)
                       .normal = vec3(f->nx[i], f->ny[i], f->nz[i]),
                       .gap = f->gap[i],
                       .sure = true,
-                      .pure = b->owner[i] >= 0 && f->at.f[i] == b->part[b->owner[i]].f[i],
+                      .pure = b->pure[i],
                       .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
     foot_place(feet, b, i, &foot);
     return foot;
@@ -319,45 +325,87 @@ static void add_foot(SweepFoot *foot, int *count, const SweepFoot *more)
 
 static const double REST_FRESH = 1e-10;      // [mm] error of the gap that Newton may leave for a foot found from scratch
 
-int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot)
+// Prepares a block for careful steps; lanes beyond `count` repeat the first.
+static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, const SweepStart *start, int count)
 {
-    enum { ROUNDS = 24 };
-    static const double LEFT = 1e-4, OFF = 1e-6;     // relative to the radius: tangential and normal residual of a foot that is one of many on a circle
-    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "starts fit into a block");
-    SweepBlock b;
-    FootBatch *f = &b.foot;
-    unsigned all = (1u << count) - 1, done = 0;
-    int found = 0;
-    memset(&b.ring, 0, sizeof b.ring);
+    FootBatch *f = &b->foot;
+    memset(&b->ring, 0, sizeof b->ring);
     for (int i = 0; i < FOOT_BLOCK; i++) {
-        const SweepStart *s = &start[i < count ? i : 0];
-        sweep_block_place(feet, &b, i, s->segment, s->sac, s->t);
-        sweep_block_set_point(feet, &b, i, x);
+        int from = i < count ? i : 0;
+        const SweepStart *s = &start[from];
+        sweep_block_place(feet, b, i, s->segment, s->sac, s->t);
+        sweep_block_set_point(feet, b, i, x[from]);
         f->at.x[i] = s->at.x, f->at.y[i] = s->at.y, f->at.z[i] = s->at.z;
         f->longest[i] = fmin(0.5 * f->radius[i], fmax(0.1 * f->radius[i], 0.4 * s->far));
         f->allowed[i] = REST_FRESH;
         f->state[i] = FOOT_PENDING;
     }
-    for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
-        sweep_block_sample(feet, &b, round == 0 ? FOOT_ALL : all & ~done);
+}
+
+// On a ridge that is narrower than a step, Newton leaps from one flank to the other: a lane whose step turns back takes shorter ones.
+static unsigned run_block(const SweepFeet *feet, SweepBlock *b, unsigned all, int rounds)
+{
+    static const double BACK = -0.25;        // of the last step's square: the next one leads back
+    FootBatch *f = &b->foot;
+    unsigned done = 0;
+    Vec3 last[FOOT_BLOCK] = {{0, 0, 0}};
+    for (int round = 0; round < rounds && (done & all) != all; round++) {
+        Vec3 from[FOOT_BLOCK];
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            from[i] = lane_foot(f, i);
+        sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : all & ~done);
         done = feet->kernels->newton(f, true);
-    }
-    if ((done & all) != all)
-        sweep_block_sample(feet, &b, all & ~done);
-    feet->kernels->finish(f);
-    for (int i = 0; i < count; i++) {
-        SweepFoot one = sweep_block_foot(feet, &b, i);
-        if (!(done >> i & 1)) {
-            // on the axis of a round vessel all feet around are equally near, and the tangential step never ends
-            Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(one.at, x);
-            double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
-            if (!(slope > 0.1 && gap > 0.3 * radius && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius))
-                continue;
-            one.normal = n, one.gap = gap;
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            Vec3 step = vec3_sub(lane_foot(f, i), from[i]);
+            if (vec3_dot(step, last[i]) < BACK * vec3_norm2(last[i]))
+                f->longest[i] = fmin(f->longest[i], 0.5 * vec3_norm(step));
+            last[i] = step;
         }
-        if (vec3_is_finite(one.at) && vec3_is_finite(one.normal) && isfinite(one.gap))
-            add_foot(foot, &found, &one);
     }
+    return done & all;
+}
+
+static bool is_number(const SweepFoot *foot) { return vec3_is_finite(foot->at) && vec3_is_finite(foot->normal) && isfinite(foot->gap); }
+
+// A lane that has not converged may still hold a foot: on the axis of a round vessel all feet around are equally near, and the tangential step never ends.
+static bool is_one_of_many(const SweepBlock *b, int i, Vec3 x, SweepFoot *foot)
+{
+    static const double LEFT = 1e-4, OFF = 1e-6;     // relative to the radius: tangential and normal residual
+    const FootBatch *f = &b->foot;
+    Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(foot->at, x);
+    double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
+    foot->normal = n, foot->gap = gap;
+    return slope > 0.1 && gap > 0.3 * radius && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius;
+}
+
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, int rounds, SweepFoot *foot)
+{
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET && rounds > 0, "points fit into a block");
+    SweepBlock b;
+    start_block(feet, &b, x, start, count);
+    unsigned all = (1u << count) - 1, done = run_block(feet, &b, all, rounds), sound = 0;
+    if (done != all)
+        sweep_block_sample(feet, &b, all & ~done);
+    feet->kernels->finish(&b.foot);
+    for (int i = 0; i < count; i++) {
+        foot[i] = sweep_block_foot(feet, &b, i);
+        if ((done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])) && is_number(&foot[i]))
+            sound |= 1u << i;
+    }
+    return sound;
+}
+
+int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot)
+{
+    Vec3 same[SWEEP_FEET];
+    SweepFoot one[SWEEP_FEET];
+    int found = 0;
+    for (int i = 0; i < SWEEP_FEET; i++)
+        same[i] = x;
+    unsigned sound = sweep_follow(feet, same, start, count, SWEEP_ROUNDS, one);
+    for (int i = 0; i < count; i++)
+        if (sound >> i & 1)
+            add_foot(foot, &found, &one[i]);
     return found;
 }
 
@@ -389,179 +437,289 @@ static void add_start(SweepStart *start, int *count, int most, const SweepStart 
     *count = kept;
 }
 
+// The branches that are seen, with t of x on them, and the branch there.
+typedef struct Seen {
+    int count, sac;
+    int branch[SWEEP_CANDIDATES], segment[SWEEP_CANDIDATES];
+    double t[SWEEP_CANDIDATES];
+    SweepNear near[SWEEP_CANDIDATES];
+} Seen;
+
 // Rings around a branch at several t: points of its wall and their distances from x.
-enum { RINGS = 5 };
+enum { RINGS = 5, RING_POINTS = RINGS * SWEEP_RING };
 typedef struct Rings {
-    Vec3 at[RINGS][SWEEP_RING];
-    double far2[RINGS][SWEEP_RING];
+    SweepRing of[RINGS];
     int segment[RINGS];
     double t[RINGS], radius;     // radius: c_0 of the middle ring
 } Rings;
 
-static void fill_ring(const SweepFeet *feet, Vec3 x, int branch, double t, Rings *rings, int which)
+static Vec3 curve_part(const Vec3 c[4], double x) { return vec3_add_scaled(c[0], x, vec3_add_scaled(c[1], x, vec3_add_scaled(c[2], x, c[3]))); }
+static Vec3 curve_slope(const Vec3 c[4], double x) { return vec3_add_scaled(c[1], x, vec3_add_scaled(vec3_scale(c[2], 2), 3 * x, c[3])); }
+
+static void fill_ring(const SweepFeet *feet, Vec3 x, const SweepSegment *near, double t, Rings *rings, int which)
 {
-    const SweepField *field = feet->field;
-    int segment = sweep_field_segment(field, branch, t);
-    const SweepSegment *s = &field->segment[segment];
-    const SweepInterval line = {
-        .origin = s->origin, .s = {s->s[0], s->s[1], s->s[2], s->s[3]}, .n = {s->n[0], s->n[1], s->n[2], s->n[3]}, .b = {s->b[0], s->b[1], s->b[2], s->b[3]}};
-    SweepJet j = sweep_interval_at(&line, s->rise != 0 ? s->origin : t);
-    double term[SWEEP_TERMS], radius[SWEEP_RING], at = t - s->origin, up = 0, out = 1;
+    int segment = neighbour(feet->field, near, t);
+    const SweepSegment *s = &feet->field->segment[segment];
+    double term[SWEEP_TERMS], at = t - s->origin, up = 0, out = 1, foot = at;
     for (int k = 0; k <= 2 * feet->harmonics; k++)
         term[k] = s->section[k][0] + at * (s->section[k][1] + at * (s->section[k][2] + at * s->section[k][3]));
     if (s->rise != 0) {      // the direction of the ring: at its height over the end's plane, as far as the dome reaches
         double power = 1;
-        up = fmax(-0.98, fmin(0.98, s->rise * at / fmax(term[0], 1e-9))), out = sqrt(1 - up * up);
+        up = fmax(-0.98, fmin(0.98, s->rise * at / fmax(term[0], 1e-9))), out = sqrt(1 - up * up), foot = 0;
         for (int k = 1; k <= feet->harmonics; k++)
             power *= out, term[2 * k - 1] *= power, term[2 * k] *= power;
     }
-    Vec3 along = vec3_unit(j.s1), u = vec3_sub(x, j.s);
-    feet->kernels->ring_about(term, feet->harmonics, vec3_dot(u, j.n), vec3_dot(u, j.b), vec3_dot(u, along), radius, rings->far2[which]);
-    for (int k = 0; k < SWEEP_RING; k++) {
-        Vec3 way = vec3_add(vec3_scale(j.n, out * sweep_ring_cos[k]), vec3_scale(j.b, out * sweep_ring_sin[k]));
-        rings->at[which][k] = vec3_add_scaled(j.s, radius[k], vec3_add_scaled(way, up, along));
-        if (up != 0)
-            rings->far2[which][k] = vec3_norm2(vec3_sub(x, rings->at[which][k]));
-    }
+    Vec3 n = vec3_scale(curve_part(s->n, foot), out), b = vec3_scale(curve_part(s->b, foot), out), tip = {0, 0, 0};
+    if (up != 0)
+        tip = vec3_scale(vec3_unit(s->s[1]), up);
+    feet->kernels->ring_points(term, feet->harmonics, curve_part(s->s, foot), n, b, tip, x, &rings->of[which]);
     rings->segment[which] = segment, rings->t[which] = t;
     rings->radius = which == RINGS / 2 ? term[0] : rings->radius;
 }
 
-// Removes the points of a branch's rings that lie inside another branch, which is seen from t on it, or inside a sac: they are no wall.
-static void drop_inner(const SweepFeet *feet, Rings *rings, double limit, int branch, double t, int sac)
+static void fill_near(const SweepFeet *feet, int branch, int segment, double t, SweepNear *near)
 {
-    SweepPartLanes p = {.absent = {0}};
-    SweepLane x, y, z;
-    for (int i = 0; i < RINGS; i++)
-        for (int k = 0; k < SWEEP_RING; k += FOOT_BLOCK) {
-            unsigned near = 0, outside;
-            for (int l = 0; l < FOOT_BLOCK; l++) {
-                Vec3 at = rings->at[i][k + l];
-                near |= rings->far2[i][k + l] < limit * limit ? 1u << l : 0;
-                x[l] = at.x, y[l] = at.y, z[l] = at.z;
-            }
-            if (near == 0)
-                continue;
-            for (int l = 0; l < FOOT_BLOCK && branch >= 0; l++) {
-                p.t[l] = t, p.longest[l] = 2 * feet->field->model->branch[branch].radius, p.settled[l] = near >> l & 1 ? 0 : 1;
-                p.segment[l] = feet->field->segment + sweep_field_segment(feet->field, branch, t);
-            }
-            for (int round = 0; round < 6 && branch >= 0; round++) {
-                unsigned again = feet->kernels->seek(&p, x, y, z, &outside) & near;
-                for (outside &= near; outside != 0; outside &= outside - 1) {
-                    int l = __builtin_ctz(outside);
-                    p.segment[l] = feet->field->segment + neighbour(feet->field, p.segment[l], p.t[l]);
-                }
-                if (again == 0)
-                    break;
-            }
-            if (branch >= 0)
-                feet->kernels->depth(&p, x, y, z, feet->harmonics);
-            for (; near != 0; near &= near - 1) {
-                int l = __builtin_ctz(near);
-                SweepPart part = {.f = p.f[l]};
-                if (branch < 0)
-                    sweep_field_sac(feet->field, sac, rings->at[i][k + l], &part);
-                if (part.f > 0)
-                    rings->far2[i][k + l] = HUGE_VAL;
-            }
+    const SweepField *field = feet->field;
+    double length = field->curve[branch]->length, from = field->model->branch[branch].open_start ? -HUGE_VAL : 0, at = fmax(from, fmin(length, t));
+    const SweepSegment *s = &field->segment[neighbour(field, &field->segment[segment], at)];
+    double x = at - s->origin;
+    Vec3 s1 = curve_slope(s->s, x);
+    double speed = vec3_norm(s1), by = 1 / speed;
+    near->s = curve_part(s->s, x), near->tangent = vec3_scale(s1, by), near->bend = vec3_scale(vec3_add_scaled(s->s[2], 3 * x, s->s[3]), 2 * by * by);
+    near->n = curve_part(s->n, x), near->n1 = vec3_scale(curve_slope(s->n, x), by);
+    near->b = curve_part(s->b, x), near->b1 = vec3_scale(curve_slope(s->b, x), by);
+    near->from = (from - at) * speed, near->to = (length - at) * speed;
+    for (int k = 0; k <= 2 * feet->harmonics; k++) {
+        const double *c = s->section[k];
+        near->term[k] = c[0] + x * (c[1] + x * (c[2] + x * c[3])), near->term1[k] = by * (c[1] + x * (2 * c[2] + x * 3 * c[3]));
+    }
+}
+
+// Removes the points of a branch's rings that lie inside another branch or a sac: they are no wall.
+static void drop_inner(const SweepFeet *feet, Rings *rings, double limit2, const SweepNear *other, int sac)
+{
+    for (int i = 0; i < RINGS; i++) {
+        SweepRing *r = &rings->of[i];
+        double f[SWEEP_RING];
+        if (other)
+            feet->kernels->near_field(other, feet->harmonics, SWEEP_RING, r->x, r->y, r->z, f);
+        for (int k = 0; k < SWEEP_RING; k++) {
+            SweepPart part = {.f = other ? f[k] : -1};
+            if (!other && r->far2[k] < limit2)
+                sweep_field_sac(feet->field, sac, vec3(r->x[k], r->y[k], r->z[k]), &part);
+            r->far2[k] = part.f > 0 ? HUGE_VAL : r->far2[k];
         }
+    }
 }
 
-// Returns whether no neighbour on the rings is nearer.
-static bool is_least(const Rings *r, int ring, int k)
+// For each point of the rings, the square of the distance of the nearest of its neighbours and itself.
+static void least_around(const Rings *r, double least[RINGS][SWEEP_RING])
 {
-    for (int i = -1; i <= 1; i++)
-        for (int j = -1; j <= 1; j++)
-            if (ring + i >= 0 && ring + i < RINGS && r->far2[ring + i][(k + j + SWEEP_RING) % SWEEP_RING] < r->far2[ring][k])
-                return false;
-    return true;
+    double along[RINGS][SWEEP_RING];
+    for (int i = 0; i < RINGS; i++) {
+        double f[SWEEP_RING + 2];
+        memcpy(f + 1, r->of[i].far2, sizeof r->of[i].far2);
+        f[0] = f[SWEEP_RING], f[SWEEP_RING + 1] = f[1];
+        for (int k = 0; k < SWEEP_RING; k++) {
+            double two = f[k] < f[k + 1] ? f[k] : f[k + 1];
+            along[i][k] = two < f[k + 2] ? two : f[k + 2];
+        }
+    }
+    for (int i = 0; i < RINGS; i++) {
+        const double *before = along[i > 0 ? i - 1 : 0], *after = along[i + 1 < RINGS ? i + 1 : i];
+        for (int k = 0; k < SWEEP_RING; k++) {
+            double two = before[k] < along[i][k] ? before[k] : along[i][k];
+            least[i][k] = two < after[k] ? two : after[k];
+        }
+    }
 }
 
-// The branches that are seen, with t of x on them.
-typedef struct Seen {
-    int count, sac;
-    int branch[SWEEP_CANDIDATES];
-    double t[SWEEP_CANDIDATES];
-} Seen;
-
-static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, double limit, SweepStart *start, int *count, int most)
+static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, const SweepSearch *search, SweepStart *start, int *count)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
     Rings rings;
-    double half_angle = 0.2 * sweep_field_largest(feet->field, seen->branch[which], seen->t[which]), half_step = 0.5 * ASIDE * reach;
-    double slack2 = half_angle * half_angle + half_step * half_step;
+    double least[RINGS][SWEEP_RING], limit2 = search->limit * search->limit, own2 = search->own * search->own, zone2 = search->zone * search->zone;
+    const SweepSegment *near = &feet->field->segment[seen->segment[which]];
+    double half_angle = 0.2 * near->largest, half_step = 0.5 * ASIDE * reach, slack2 = half_angle * half_angle + half_step * half_step;
+    double beyond2 = search->beyond * search->beyond;
     for (int i = 0; i < RINGS; i++)
-        fill_ring(feet, x, seen->branch[which], seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
+        fill_ring(feet, x, near, seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
     for (int i = 0; i < seen->count; i++)
         if (i != which)
-            drop_inner(feet, &rings, limit, seen->branch[i], seen->t[i], -1);
+            drop_inner(feet, &rings, limit2, &seen->near[i], -1);
     if (seen->sac >= 0)
-        drop_inner(feet, &rings, limit, -1, 0, seen->sac);
+        drop_inner(feet, &rings, limit2, NULL, seen->sac);
+    least_around(&rings, least);
     for (int i = 0; i < RINGS; i++)
         for (int k = 0; k < SWEEP_RING; k++) {
-            if (!(rings.far2[i][k] < limit * limit) || !is_least(&rings, i, k))
+            const SweepRing *r = &rings.of[i];
+            if (!(r->far2[k] < limit2) || (r->far2[k] > least[i][k] && r->far2[k] >= beyond2))
                 continue;
-            SweepStart more = {.at = rings.at[i][k], .far = sqrt(rings.far2[i][k]), .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
-            more.least = sqrt(fmax(0, rings.far2[i][k] - slack2));
-            add_start(start, count, most, &more, 0.2 * rings.radius);
+            SweepStart more = {.at = {r->x[k], r->y[k], r->z[k]}, .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
+            double aside2 = vec3_norm2(vec3_sub(more.at, search->from));
+            if (r->far2[k] < beyond2 && aside2 > zone2)
+                beyond2 = r->far2[k];
+            if (r->far2[k] > least[i][k] || aside2 <= own2)
+                continue;
+            more.far = sqrt(r->far2[k]), more.least = sqrt(fmax(0, r->far2[k] - slack2));
+            add_start(start, count, search->most, &more, 0.2 * rings.radius);
         }
+    *search->nearest_beyond = fmin(*search->nearest_beyond, sqrt(beyond2));
 }
 
-// Points of the spheres of a sac's nodes.
-static void add_sac(const SweepFeet *feet, Vec3 x, int sac, double limit, SweepStart *start, int *count, int most)
+// Points of a sac's wall that lie in no branch.
+static void add_sac(const SweepFeet *feet, Vec3 x, const Seen *seen, const SweepSearch *search, SweepStart *start, int *count)
 {
+    static const double HALF = 0.27;         // half the distance between neighbouring points, relative to the radius
+    const SweepSacPoints *all = &feet->sacs;
     const VesselTree *tree = feet->field->model->sac;
-    int group = feet->field->sac_group[sac];
-    for (int i = 0; i < tree->node_count; i++) {
-        if (feet->field->sac_group[i] != group)
+    int group = feet->field->sac_group[seen->sac];
+    double limit = search->limit;
+    for (int first = 0; first < all->count; first += FOOT_BLOCK) {
+        double far2[FOOT_BLOCK], f[FOOT_BLOCK], least2 = HUGE_VAL;
+        for (int l = 0; l < FOOT_BLOCK; l++) {
+            far2[l] = vec3_norm2(vec3_sub(vec3(all->x[first + l], all->y[first + l], all->z[first + l]), x));
+            least2 = fmin(least2, far2[l]);
+        }
+        if (!(least2 < limit * limit))
             continue;
-        Vec3 out = vec3_unit_or(vec3_sub(x, tree->center[i]), tree->direction[i]);
-        SweepStart more = {.at = vec3_add_scaled(tree->center[i], tree->radius[i], out), .segment = -1, .sac = i};
-        more.far = vec3_distance(x, more.at);
-        more.least = fmax(0, more.far - 0.5 * tree->radius[i]);      // a sac is no union of its nodes' spheres
-        if (more.far < limit)
-            add_start(start, count, most, &more, 0.4 * tree->radius[i]);
+        for (int k = 0; k < seen->count; k++) {
+            feet->kernels->near_field(&seen->near[k], feet->harmonics, FOOT_BLOCK, all->x + first, all->y + first, all->z + first, f);
+            for (int l = 0; l < FOOT_BLOCK; l++)
+                far2[l] = f[l] > 0 ? HUGE_VAL : far2[l];
+        }
+        for (int l = 0; l < FOOT_BLOCK; l++) {
+            int node = all->node[first + l];
+            if (!(far2[l] < limit * limit) || feet->field->sac_group[node] != group)
+                continue;
+            SweepStart more = {.at = {all->x[first + l], all->y[first + l], all->z[first + l]}, .far = sqrt(far2[l]), .segment = -1, .sac = node};
+            more.least = sqrt(fmax(0, far2[l] - HALF * HALF * tree->radius[node] * tree->radius[node]));
+            double aside = vec3_distance(more.at, search->from);
+            if (aside > search->zone)
+                *search->nearest_beyond = fmin(*search->nearest_beyond, more.far);
+            if (aside > search->own)
+                add_start(start, count, search->most, &more, 0.5 * tree->radius[node]);
+        }
     }
 }
 
-static const SweepView *view_of(const SweepField *field, SweepPlace place)
+enum { RAYS = 96 };
+
+// The distance from a node's centre at which a ray leaves the sac's blobs; 0: the centre is outside.
+static double leave_sac(const SweepField *field, int node, Vec3 way)
 {
-    return place.branch >= 0 ? &field->view[sweep_field_segment(field, place.branch, place.t)] : &field->sac[place.sac].view;
+    enum { STEPS = 60, HALVINGS = 30 };
+    const VesselTree *tree = field->model->sac;
+    double step = 0.1 * tree->radius[node], low = 0, high = 0;
+    SweepPart part;
+    for (int i = 0; i < STEPS; i++, low = high, high += step) {
+        sweep_field_sac(field, node, vec3_add_scaled(tree->center[node], high, way), &part);
+        if (!(part.f > 0))
+            break;
+    }
+    for (int i = 0; i < HALVINGS; i++) {
+        double middle = 0.5 * (low + high);
+        sweep_field_sac(field, node, vec3_add_scaled(tree->center[node], middle, way), &part);
+        if (part.f > 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
 }
 
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most)
+// A point belongs to the node in whose power cell it lies.
+bool sweep_sac_points_create(const SweepField *field, SweepSacPoints *points)
 {
-    SEL_ASSERT(most > 0 && most <= SWEEP_FEET && limit > 0, "starts fit into a block");
+    *points = (SweepSacPoints){0};
+    const VesselTree *tree = field->model->sac;
+    if (!tree)
+        return true;
+    size_t room = (size_t)tree->node_count * RAYS + FOOT_BLOCK;
+    points->x = calloc(3 * room, sizeof *points->x);
+    points->node = calloc(room, sizeof *points->node);
+    if (!points->x || !points->node)
+        return false;
+    points->y = points->x + room, points->z = points->y + room;
+    Vec3 way[RAYS];
+    field_directions(way, RAYS);
+    for (int i = 0; i < tree->node_count; i++)
+        for (int k = 0; k < RAYS && tree->kind[i] == NODE_ANEURYSM; k++) {
+            double far = leave_sac(field, i, way[k]);
+            Vec3 at = vec3_add_scaled(tree->center[i], far, way[k]);
+            if (!(far > 0) || power_walk(tree, at, i, 1 << 20) != i)
+                continue;
+            points->x[points->count] = at.x, points->y[points->count] = at.y, points->z[points->count] = at.z;
+            points->node[points->count++] = i;
+        }
+    for (; points->count % FOOT_BLOCK != 0; points->count++) {
+        int last = points->count - 1;
+        points->x[points->count] = points->x[last], points->y[points->count] = points->y[last], points->z[points->count] = points->z[last];
+        points->node[points->count] = points->node[last];
+    }
+    return true;
+}
+
+void sweep_sac_points_free(SweepSacPoints *points)
+{
+    free(points->x);
+    free(points->node);
+    *points = (SweepSacPoints){0};
+}
+
+// t of x on a branch, to about a hundredth of the radius: for starts.
+static double near_t(const SweepField *field, Vec3 x, double t, double longest, int *segment)
+{
+    enum { ROUNDS = 12 };
+    for (int round = 0; round < ROUNDS; round++) {
+        const SweepSegment *s = &field->segment[*segment];
+        double at = t - s->origin;
+        Vec3 u = vec3_sub(x, curve_part(s->s, at)), s1 = curve_slope(s->s, at), s2 = vec3_add_scaled(vec3_scale(s->s[2], 2), 6 * at, s->s[3]);
+        double speed2 = vec3_norm2(s1), d = speed2 - vec3_dot(u, s2), step = vec3_dot(u, s1) / (d > SWEEP_LEAST_D * speed2 ? d : SWEEP_LEAST_D * speed2);
+        step = step > longest ? longest : step < -longest ? -longest : step;
+        t += step;
+        *segment = neighbour(field, s, t);
+        if (fabs(step) < 0.02 * longest)
+            break;
+    }
+    return t;
+}
+
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, const SweepSearch *search, SweepStart *start)
+{
+    SEL_ASSERT(search->most > 0 && search->most <= SWEEP_FEET && search->limit > 0, "starts fit into a block");
     const SweepField *field = feet->field;
-    const SweepView *view = view_of(field, place);
-    Seen seen = {.count = view->count, .sac = place.branch >= 0 ? view->sac : place.sac};
+    const SweepView *view = place.branch >= 0 ? &field->view[segment] : &field->sac[place.sac].view;
+    double own_t = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
+    Seen seen;
     int count = 0;
-    if (alone) {
-        SEL_ASSERT(place.branch >= 0, "a branch alone is one of the branches");
-        seen = (Seen){.count = 1, .sac = -1, .branch = {place.branch}};
-        seen.t[0] = sweep_curve_project(field->curve[place.branch], x, place.t, 2 * field->model->branch[place.branch].radius);
-    }
-    for (int i = 0; i < view->count && !alone; i++) {
+    seen.count = 0, seen.sac = search->alone ? -1 : place.branch >= 0 ? view->sac : place.sac;
+    for (int i = 0; i < view->count; i++) {
         const SweepCandidate *c = &view->of[i];
-        double at = place.branch >= 0 ? fmax(0, fmin(field->curve[place.branch]->length, place.t)) : 0;
-        double from = c->branch == place.branch ? place.t : c->t + c->slope * at;
-        seen.branch[i] = c->branch;
-        seen.t[i] = sweep_curve_project(field->curve[c->branch], x, from, 2 * field->model->branch[c->branch].radius);
+        bool own = c->branch == place.branch;
+        if (search->alone && !own)
+            continue;
+        double t = own ? place.t : c->t + c->slope * own_t;
+        int k = seen.count++;
+        seen.branch[k] = c->branch;
+        seen.segment[k] = own ? segment : sweep_field_segment(field, c->branch, t);
+        seen.t[k] = near_t(field, x, t, 2 * field->model->branch[c->branch].radius, &seen.segment[k]);
     }
+    for (int i = 0; i < seen.count && (seen.count > 1 || seen.sac >= 0); i++)
+        fill_near(feet, seen.branch[i], seen.segment[i], seen.t[i], &seen.near[i]);
     for (int i = 0; i < seen.count; i++) {
-        double largest = sweep_field_largest(field, seen.branch[i], seen.t[i]);
-        if (vec3_distance(x, sweep_curve_at(field->curve[seen.branch[i]], seen.t[i]).s) - largest < limit)
-            add_rings(feet, x, &seen, i, fmin(limit, largest), limit, start, &count, most);
+        const SweepSegment *s = &field->segment[seen.segment[i]];
+        if (vec3_distance(x, curve_part(s->s, seen.t[i] - s->origin)) - s->largest < search->limit)
+            add_rings(feet, x, &seen, i, fmin(search->limit, s->largest), search, start, &count);
     }
     if (seen.sac >= 0)
-        add_sac(feet, x, seen.sac, limit, start, &count, most);
+        add_sac(feet, x, &seen, search, start, &count);
     return count;
 }
 
 // --- Places ---
 
-SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f)
+SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f, Vec3 *gradient)
 {
     enum { MOVES = 6 };
     SweepBlend blend;
@@ -575,7 +733,7 @@ SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double
         if (same)
             break;
     }
-    *f = blend.f;
+    *f = blend.f, *gradient = blend.gradient;
     return place;
 }
 

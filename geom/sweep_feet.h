@@ -5,11 +5,23 @@
 #include "geom/sweep_lanes.h"
 #include "geom/vessel.h"
 
+// Points of the sacs' walls, as if there were no branches: where rays from each node leave the blobs.
+typedef struct SweepSacPoints {
+    int count;               // a multiple of FOOT_BLOCK, the last ones repeated
+    double *x, *y, *z;       // one allocation, owned by x
+    int *node;               // of the sacs' tree
+} SweepSacPoints;
+
 typedef struct SweepFeet {
     const SweepField *field;
     const SweepKernels *kernels;
     int harmonics;           // highest harmonic that any row uses
+    SweepSacPoints sacs;
 } SweepFeet;
+
+// Returns false if out of memory; sweep_sac_points_free must be called in either case.
+bool sweep_sac_points_create(const SweepField *field, SweepSacPoints *points);
+void sweep_sac_points_free(SweepSacPoints *points);
 
 enum { SWEEP_PARTS = SWEEP_CANDIDATES };
 
@@ -21,6 +33,7 @@ typedef struct SweepBlock {
     const SweepView *view[FOOT_BLOCK];
     int own[FOOT_BLOCK];                 // index of the own branch in the view; -1: on a sac
     int owner[FOOT_BLOCK];               // after a sample: index of the part of largest share in the view; -1: the sac
+    bool pure[FOOT_BLOCK];               // after a sample: the owner alone, nothing is blended
     bool keeps_t[FOOT_BLOCK];            // the parts' t are near the feet; else they start from the view
     SweepLane own_t;                     // t on the own branch
     SweepLane is_flat;                   // 1: the ring holds (the own segment is no dome)
@@ -65,11 +78,24 @@ typedef struct SweepStart {
 enum { SWEEP_FEET = 8 };
 // Careful Newton steps of x from up to eight starts. Returns the number of feet found, closest first; feet closer together than 1e-4 mm are one.
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot);
-// Starts for x on all walls that are seen from a place, the nearest first; at most `most` <= SWEEP_FEET, those further than `limit` mm left out. `alone`: on the
-// wall of the place's own branch only, as if no other existed.
-int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, bool alone, double limit, SweepStart *start, int most);
-// The place as seen from x: the branch or sac in which x lies deepest, from a place near it.
-SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f);
+// What a search for starts leaves out, and what it reports.
+typedef struct SweepSearch {
+    bool alone;              // only the wall of the place's own branch, as if no other existed
+    int most;                // starts, <= SWEEP_FEET
+    double limit;            // [mm] starts further from x than this
+    Vec3 from;               // the foot that is known; starts nearer to it than …
+    double own;              // … this [mm]; 0: none is known
+    double zone;             // [mm] the nearest point of a wall that lies farther from `from` than this, …
+    double beyond;           // … if nearer to x than this, …
+    double *nearest_beyond;  // … reduces this distance
+} SweepSearch;
+// Starts for x on all walls that are seen from a place (`segment`: its segment), the nearest first.
+int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, const SweepSearch *search, SweepStart *start);
+// Careful Newton steps of up to eight points, each from its own start; at most `rounds`. Returns the bits of those that reach a foot.
+enum { SWEEP_ROUNDS = 24 };
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, int rounds, SweepFoot *foot);
+// The place as seen from x: the branch or sac in which x lies deepest, from a place near it; F at x and its gradient.
+SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f, Vec3 *gradient);
 // A foot on the line from the curve through x, by bisection. Always finds a wall point; `sure` is false.
 SweepFoot sweep_bisect(const SweepFeet *feet, Vec3 x, SweepPlace place);
 

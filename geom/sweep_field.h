@@ -49,6 +49,7 @@ typedef struct SweepSac {
 
 typedef struct SweepField {
     const SweepModel *model;
+    int branch_count;        // as in the model
     SweepCurve **curve;      // (branches)
     int *first_segment;      // (branches + 1)
     SweepSegment *segment;   // by branch and t

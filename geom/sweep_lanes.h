@@ -34,6 +34,19 @@ typedef struct SweepRingLanes {
     SweepLane near2, at_n, at_b;         // result: the square of X's distance to the nearest point of the ring, and that point's coordinates
 } SweepRingLanes;
 
+// Points of a section's contour at equal angles, the first at N.
+typedef struct SweepRing {
+    double x[SWEEP_RING], y[SWEEP_RING], z[SWEEP_RING], far2[SWEEP_RING];
+} SweepRing;
+
+// A branch near a place: curve, frame and section to second order in the length w along its tangent there.
+typedef struct SweepNear {
+    Vec3 s, tangent, bend;               // S; unit; S''/|S'|^2
+    Vec3 n, b, n1, b1;                   // the frame, and its derivatives by w
+    double from, to;                     // w of closed ends, where domes begin
+    double term[SWEEP_TERMS], term1[SWEEP_TERMS];    // the section's coefficients, and their derivatives by w
+} SweepNear;
+
 typedef struct SweepKernels {
     // Up to three Newton steps of t for the lanes that are not settled, on their segments. Returns the bits of lanes that are not settled, or whose t lies
     // outside its segment (`outside`): these need another segment.
@@ -41,16 +54,17 @@ typedef struct SweepKernels {
     // f, gradient and Hessian at the points. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
     // stored to it.
     void (*evaluate)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics, SweepRingLanes *ring, const double *own);
-    // f alone, of domes too.
-    void (*depth)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics);
     // Blends a part into the sum; `share`: the part's share, for each lane.
     void (*blend)(FootSample *sum, SweepPartLanes *part, double *share);
     // Width of the blend at t.
     void (*width)(SweepPartLanes *part);
     // The nearest point of the ring at the foot's t to X.
     void (*ring)(SweepRingLanes *ring, const FootBatch *foot, const double *foot_x, const double *foot_y, const double *foot_z, int harmonics);
-    // The squares of a ring's distances from a point with coordinates (n, b, w): at the angles of sweep_ring_angle. `term`: SWEEP_TERMS coefficients.
-    void (*ring_about)(const double *term, int harmonics, double n, double b, double w, double *radius, double *far2);
+    // A ring's points and the squares of their distances from x. `term`: the section's SWEEP_TERMS coefficients; `middle`: S; n, b, up: N, B and the ring's
+    // height per mm of radius.
+    void (*ring_points)(const double *term, int harmonics, Vec3 middle, Vec3 n, Vec3 b, Vec3 up, Vec3 x, SweepRing *ring);
+    // f of a branch at `count` points (a multiple of FOOT_BLOCK), approximately.
+    void (*near_field)(const SweepNear *near, int harmonics, int count, const double *x, const double *y, const double *z, double *f);
     void (*predict)(FootBatch *foot, double allowed);
     unsigned (*newton)(FootBatch *foot, bool careful);
     void (*finish)(FootBatch *foot);

@@ -110,6 +110,7 @@ static void take_section(const SweepModel *m, const SweepBranch *b, SweepSegment
     double p[4][4], middle = 0.5 * (s->from + s->to);
     int span = span_of(breaks, b->break_count - 1, middle);
     span_polynomials(breaks, b->break_count - 1, span, s->origin, p);
+    SEL_ASSERT(span + 4 <= b->break_count + 2, "a span has four rows");
     const double *row = m->row + (size_t)(b->first_row + span) * SWEEP_TERMS;
     for (int k = 0; k < SWEEP_TERMS; k++)
         for (int power = 0; power < 4; power++) {
@@ -223,8 +224,10 @@ SweepField *sweep_field_create(const SweepModel *model)
     SweepField *field = calloc(1, sizeof *field);
     if (!field)
         return NULL;
+    SEL_ASSERT(model->branch_count > 0, "a model has branches");
     size_t branches = (size_t)model->branch_count;
     field->model = model;
+    field->branch_count = model->branch_count;
     field->curve = calloc(branches, sizeof(SweepCurve *));
     field->first_segment = calloc(branches + 1, sizeof *field->first_segment);
     field->fork = calloc(branches, sizeof *field->fork);
@@ -265,7 +268,7 @@ void sweep_field_free(SweepField *field)
 {
     if (!field)
         return;
-    for (int i = 0; field->curve && i < field->model->branch_count; i++)
+    for (int i = 0; field->curve && i < field->branch_count; i++)
         sweep_curve_free(field->curve[i]);
     free(field->curve);
     free(field->first_segment);

@@ -13,6 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+// The nodes of the knots before and after a segment, and t between them.
+typedef struct SegmentNodes {
+    double middle;
+    int before, after;
+} SegmentNodes;
+
 typedef struct SweepVessel {
     Vessel vessel;           // first: a Vessel * points to its SweepVessel
     const SweepModel *model;
@@ -20,6 +26,7 @@ typedef struct SweepVessel {
     SweepFeet feet;
     int node_count;          // one more than the highest node of a knot or of a sac
     SweepPlace *place;       // (nodes) branch -2: none
+    SegmentNodes *nodes;     // (segments)
     int *first_child, *next_child;   // (branches) those that spring from a branch; -1: none
     VesselTree *knots;       // centres and radii of knots, then of the sacs' nodes, for the first location
     PowerBlocks blocks;
@@ -30,14 +37,15 @@ _Static_assert((int)VESSEL_SEEN >= (int)SWEEP_CANDIDATES, "a memory holds t of a
 static const double REST = 1e-8;             // [mm] error of the gap that Newton may leave for a foot that is followed
 static const double FOLLOWED = 1;            // relative to the radius: a point that has moved further has no foot to follow
 static const double LOOK = 1;                // relative to the radius: how much further than the foot rivals are searched
-static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;   // relative to the radius: travel between two searches
+static const double BESIDE = 0.25;           // relative to the radius: a rival that is no further than this behind the foot is followed
+static const double LOOK_BESIDE = 0.25;      // relative to the radius: with a rival, a third foot may be this near
+static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;    // relative to the radius: travel between two searches …
+static const double TRUST_AMONG = 0.25;      // … and at most this where several branches are seen
 
 // --- Nodes and places ---
 
-static int node_of(const SweepVessel *v, int segment, int sac, double t)
+static int find_node(const SweepVessel *v, int segment, double t)
 {
-    if (segment < 0)
-        return v->model->sac_node[sac];
     int branch = 0, high = v->model->branch_count - 1;
     while (branch < high) {
         int middle = (branch + high + 1) / 2;
@@ -53,6 +61,15 @@ static int node_of(const SweepVessel *v, int segment, int sac, double t)
     else if (after < curve->knot_count && curve->knot_t[after] - t < t - curve->knot_t[after - 1])
         knot = after;
     return v->model->knot_node[v->model->branch[branch].first_knot + knot];
+}
+
+static int node_of(const SweepVessel *v, int segment, int sac, double t)
+{
+    if (segment < 0)
+        return v->model->sac_node[sac];
+    SEL_ASSERT(segment < v->field->first_segment[v->model->branch_count], "a foot lies on a segment of the model");
+    const SegmentNodes *nodes = &v->nodes[segment];
+    return t < nodes->middle ? nodes->before : nodes->after;
 }
 
 static bool has_place(const SweepVessel *v, int node) { return node >= 0 && node < v->node_count && v->place[node].branch != -2; }
@@ -78,6 +95,7 @@ static void set_flags(const SweepVessel *v, Vec3 x, const SweepFoot *foot, Vesse
 // Fills memory and hit outside the lanes.
 static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMemory *m, VesselHit *hit)
 {
+    SEL_ASSERT(isfinite(foot->gap) && vec3_is_finite(foot->at), "a foot that was found has a distance and a place");
     *hit = (VesselHit){.gap = foot->gap, .normal = foot->normal, .hessian = foot->hessian, .flags = foot->sure ? 0 : VESSEL_UNSURE};
     m->node = hit->node = node_of(v, foot->segment, foot->sac, foot->t);
     m->has_foot = foot->sure;
@@ -91,9 +109,22 @@ static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMe
 // Trusts a foot for half the distance to its nearest rival.
 static void trust(const SweepVessel *v, Vec3 x, const SweepFoot *foot, double rival, VesselMemory *m)
 {
+    SEL_ASSERT(!isnan(rival), "the distance of a rival is a number, or infinite");
     double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac);
+    bool alone = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
     m->bound_at = x;
-    m->trust = fmax(TRUST_LEAST * radius, fmin(TRUST_MOST * radius, 0.45 * (rival - fabs(foot->gap))));
+    m->trust = fmax(TRUST_LEAST * radius, fmin((alone ? TRUST_MOST : TRUST_AMONG) * radius, 0.45 * (rival - fabs(foot->gap))));
+}
+
+// Remembers the second nearest foot if it is nearer than `most`: it is followed, too.
+static void hold_rival(const SweepFoot *second, double most, VesselMemory *m)
+{
+    m->has_rival = fabs(second->gap) < most;
+    if (!m->has_rival)
+        return;
+    SEL_ASSERT(second->segment >= 0 || second->sac >= 0, "a rival has a place");
+    m->rival = second->at;
+    m->sweep.rival_segment = second->segment, m->sweep.rival_sac = second->sac, m->sweep.rival_t = second->t;
 }
 
 static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
@@ -108,69 +139,131 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
     return (SweepPlace){.branch = branch, .t = foot->t};
 }
 
-// Divides starts into those that may lead to a foot nearer than `foot`, kept, and the others. Returns the number kept; `rival`: about the distance of the
-// nearest foot among the others.
-static int keep_starts(const SweepFoot *foot, double radius, SweepStart *start, int count, double *rival)
+// --- Checks ---
+
+// A foot that may not be the nearest: its rivals' starts, and the feet that Newton finds from them.
+enum { CHECK_STARTS = 4 };
+typedef struct Check {
+    int point, count;        // index in the query; number of starts
+    bool nearer;             // a ring has a point nearer than the foot
+    SweepFoot foot, found[CHECK_STARTS];
+    SweepStart start[CHECK_STARTS];
+    unsigned sound;          // bits of the feet that were found
+    double radius, rival, beyond;    // [mm] rival: about the distance of the nearest wall without a start; beyond: see SweepSearch
+} Check;
+
+// Keeps the starts that may lead to a foot nearer than `most`.
+static void keep_starts(double most, const SweepStart *start, int count, Check *check)
 {
-    static const double OWN = 0.45;          // relative to the radius: a start closer to the foot leads to it
-    int kept = 0;
+    check->count = 0;
     for (int i = 0; i < count; i++) {
-        if (vec3_distance(start[i].at, foot->at) <= OWN * radius)
-            continue;
-        if (start[i].least < fabs(foot->gap))
-            start[kept++] = start[i];
+        if (start[i].least < most && check->count < CHECK_STARTS)
+            check->start[check->count++] = start[i];
         else
-            *rival = fmin(*rival, start[i].least);
+            check->rival = fmin(check->rival, start[i].least);
     }
-    return kept;
 }
 
-// Searches for rivals of a foot, and answers with the nearest. A ball that lies inside one branch is lumen, whatever the other branches are: a foot on the wall
-// of one branch alone is compared only with the rest of that wall, and with other walls if that does not suffice. `nearer`: a ring has a point nearer than the
-// foot.
-static void answer_surely(const SweepVessel *v, Vec3 x, SweepFoot foot, bool nearer, VesselMemory *m, VesselHit *hit)
+// Searches for rivals of check->foot. A ball that lies inside one branch is lumen, whatever the other branches are: a foot on the wall of one branch alone is
+// compared only with the rest of that wall, and with other walls if that does not suffice.
+static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
 {
-    double radius = sweep_place_radius(&v->feet, foot.segment, foot.sac), limit = fabs(foot.gap) + LOOK * radius, rival = limit;
+    const SweepFoot *foot = &check->foot;
+    double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac), limit = fabs(foot->gap) + LOOK * radius;
+    SweepStart start[SWEEP_FEET];
+    SweepPlace place = place_of_foot(v, foot);
+    SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot->at, .beyond = limit, .nearest_beyond = &check->beyond};
+    // a start closer to the foot than this leads to it, and a wall closer than `zone` belongs to it; outside, in the groove between two tubes, feet on both sides
+    // are as near to each other as to x
+    search.own = foot->gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot->gap);
+    search.zone = foot->gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot->gap);
+    bool single = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
+    check->radius = radius, check->rival = check->beyond = limit, check->count = 0, check->sound = 0;
+    search.alone = single || (foot->pure && foot->gap > 0 && !check->nearer);
+    if (search.alone) {
+        int count = sweep_starts(&v->feet, x, place, foot->segment, &search, start);
+        keep_starts(fabs(foot->gap), start, count, check);
+    }
+    if (!single && (!search.alone || check->count > 0)) {
+        check->rival = check->beyond = limit;
+        search.alone = false;
+        int count = sweep_starts(&v->feet, x, place, foot->segment, &search, start);
+        keep_starts(fabs(foot->gap) + BESIDE * radius, start, count, check);
+    }
+}
+
+// Finds feet from the starts of several checks, eight at a time.
+static void run_checks(const SweepVessel *v, const Vec3 *point, Check *check, int count)
+{
+    Vec3 x[SWEEP_FEET];
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
-    SweepPlace place = place_of_foot(v, &foot);
-    int count = 0;
-    bool alone = foot.pure && foot.gap > 0 && !nearer;
-    if (alone) {
-        count = sweep_starts(&v->feet, x, place, true, limit, start, SWEEP_FEET);
-        count = keep_starts(&foot, radius, start, count, &rival);
-    }
-    if (!alone || (count > 0 && (v->field->view[foot.segment].count > 1 || v->field->view[foot.segment].sac >= 0))) {
-        rival = limit;
-        count = sweep_starts(&v->feet, x, place, false, limit, start, SWEEP_FEET);
-        count = keep_starts(&foot, radius, start, count, &rival);
-    }
-    count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
-    for (int i = 0; i < count; i++) {
-        if (vec3_distance(found[i].at, foot.at) < 1e-4)
-            continue;
-        if (fabs(found[i].gap) < fabs(foot.gap)) {
-            rival = fmin(rival, fabs(foot.gap));
-            foot = found[i];
-            nearer = false;
-        } else {
-            rival = fmin(rival, fabs(found[i].gap));
+    int which[SWEEP_FEET], index[SWEEP_FEET], filled = 0;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < check[i].count; k++) {
+            x[filled] = point[check[i].point], start[filled] = check[i].start[k];
+            which[filled] = i, index[filled++] = k;
+            bool last = true;
+            for (int j = i + (k + 1 == check[i].count); j < count && last; j++)
+                last = check[j].count == 0;
+            if (filled < SWEEP_FEET && !last)
+                continue;
+            unsigned sound = sweep_follow(&v->feet, x, start, filled, SWEEP_ROUNDS, found);
+            for (int j = 0; j < filled; j++)
+                if (sound >> j & 1) {
+                    check[which[j]].found[index[j]] = found[j];
+                    check[which[j]].sound |= 1u << index[j];
+                }
+            filled = 0;
         }
+}
+
+// Answers with the nearest foot of a check.
+static void end_check(const SweepVessel *v, Vec3 x, const Check *check, VesselMemory *m, VesselHit *hit)
+{
+    static const double SAME = 1e-4;         // [mm] feet closer together are one
+    SweepFoot foot = check->foot, second = {.gap = HUGE_VAL};
+    double rival = check->rival;
+    bool nearer = check->nearer;
+    for (int i = 0; i < check->count; i++) {
+        SweepFoot other = check->found[i];
+        if (!(check->sound >> i & 1) || vec3_distance(other.at, foot.at) < SAME || (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
+            continue;
+        if (fabs(other.gap) < fabs(foot.gap)) {
+            other = foot, foot = check->found[i];
+            nearer = false;
+        }
+        if (fabs(other.gap) < fabs(second.gap)) {
+            SweepFoot third = second;
+            second = other, other = third;
+        }
+        rival = fmin(rival, fabs(other.gap));
     }
     answer(v, x, &foot, m, hit);
+    hold_rival(&second, fabs(foot.gap) + BESIDE * check->radius, m);
+    if (!m->has_rival)
+        rival = fmin(rival, fmin(check->beyond, fabs(second.gap)));
+    else
+        rival = fmin(rival, fabs(foot.gap) + LOOK_BESIDE * check->radius);
     trust(v, x, &foot, rival, m);
     m->sweep.open = nearer;
 }
 
 static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
-    double f, side;
-    SweepPlace place = sweep_descend(&v->feet, x, v->place[m->node], &f);
+    double f, side, beyond = HUGE_VAL;
+    Vec3 g;
+    SweepPlace place = sweep_descend(&v->feet, x, v->place[m->node], &f, &g);
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET], foot;
     side = f > 0 ? 1 : -1;
-    int count = sweep_starts(&v->feet, x, place, false, HUGE_VAL, start, SWEEP_FEET), best = -1;
-    count = count > 0 ? sweep_settle(&v->feet, x, start, count, found) : 0;
+    const SweepSearch search = {.most = SWEEP_FEET - 1, .limit = HUGE_VAL, .from = x, .own = 0, .nearest_beyond = &beyond};
+    int segment = place.branch >= 0 ? sweep_field_segment(v->field, place.branch, place.t) : -1;
+    int count = sweep_starts(&v->feet, x, place, segment, &search, start), best = -1;
+    // where F would be 0 if it were linear
+    start[count] = (SweepStart){.at = vec3_add_scaled(x, -f / fmax(vec3_norm2(g), 0.25), g), .far = fabs(f), .sac = place.sac, .t = place.t};
+    start[count++].segment = segment;
+    count = sweep_settle(&v->feet, x, start, count, found);
     for (int i = count - 1; i >= 0; i--)
         best = found[i].gap * side > -1e-9 ? i : best;
     if (best < 0) {
@@ -182,17 +275,16 @@ static void answer_afresh(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselH
         else
             foot.gap = side * fabs(foot.gap);
         answer(v, x, &foot, m, hit);
+        m->has_rival = false;
         trust(v, x, &foot, 0, m);
         m->sweep.open = 1;
         return;
     }
-    foot = found[best];
-    double rival = HUGE_VAL;
-    for (int i = best + 1; i < count; i++)
-        rival = fmin(rival, fabs(found[i].gap));
-    answer(v, x, &foot, m, hit);
-    trust(v, x, &foot, fmin(rival, fabs(foot.gap) + 0.2 * sweep_place_radius(&v->feet, foot.segment, foot.sac)), m);
-    m->sweep.open = start[0].far < fabs(foot.gap);
+    // rings about a foot that is known are closer to each other than those of the first search
+    Check check = {.foot = found[best], .nearer = true};
+    begin_check(v, x, &check);
+    run_checks(v, &x, &check, 1);
+    end_check(v, x, &check, m, hit);
 }
 
 // Returns true if the hit can be filled without evaluating the field.
@@ -216,6 +308,7 @@ static bool answer_cheaply(const SweepVessel *v, Vec3 x, double reach, VesselMem
 static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const VesselMemory *m)
 {
     FootBatch *f = &b->foot;
+    SEL_ASSERT(m->has_foot && m->sweep.segment < v->field->first_segment[v->model->branch_count], "a foot that is followed lies on the model");
     sweep_block_place(&v->feet, b, i, m->sweep.segment, m->sweep.sac, m->sweep.own_t);
     sweep_block_set_point(&v->feet, b, i, x);
     f->at.x[i] = m->foot.x, f->at.y[i] = m->foot.y, f->at.z[i] = m->foot.z;
@@ -239,23 +332,37 @@ static void store_lane(const SweepVessel *v, const SweepBlock *b, int i, Vec3 x,
         m->sweep.t[k] = b->part[k].t[i];
 }
 
-// Points of a batch whose feet are followed, and those that are found by other means.
+// Points of a batch that wait for the same treatment.
 typedef struct Queue {
     int count, point[FOOT_BATCH];
 } Queue;
 
-// A foot that was followed but not reached in a few steps: careful steps from where it was.
-static void answer_sought(const SweepVessel *v, Vec3 x, VesselMemory *m, VesselHit *hit)
+typedef struct Batch {
+    const Vec3 *point;
+    VesselMemory *memory;
+    VesselHit *hit;
+    Queue alone, among;      // feet that are followed: those that see one branch, and those that see several
+    Queue sought;            // feet that are not reached by one or two steps: careful steps from where they were
+    Queue beside;            // feet whose rivals are followed, too
+    int checks;              // feet that may not be the nearest
+    Check check[FOOT_BATCH];
+} Batch;
+
+static void put(Queue *queue, int point)
 {
-    SweepStart start = {.at = m->foot, .far = vec3_distance(x, m->foot), .segment = m->sweep.segment, .sac = m->sweep.sac, .t = m->sweep.own_t};
-    SweepFoot found[SWEEP_FEET];
-    if (sweep_settle(&v->feet, x, &start, 1, found) > 0)
-        answer_surely(v, x, found[0], false, m, hit);
-    else
-        answer_afresh(v, x, m, hit);
+    SEL_REQUIRE(queue->count < FOOT_BATCH, "a point is in a queue at most once");
+    queue->point[queue->count++] = point;
 }
 
-static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *memory, VesselHit *hit, const int *which, int count)
+static void put_check(const SweepVessel *v, Batch *batch, int point, const SweepFoot *foot, bool nearer)
+{
+    SEL_REQUIRE(batch->checks < FOOT_BATCH, "a point is checked at most once");
+    Check *check = &batch->check[batch->checks++];
+    check->point = point, check->foot = *foot, check->nearer = nearer;
+    begin_check(v, batch->point[point], check);
+}
+
+static void follow_block(const SweepVessel *v, Batch *batch, const int *which, int count)
 {
     enum { ROUNDS = 2 };
     static const double NEARER = 1e-6;       // [mm]
@@ -266,7 +373,7 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
     memset(&b.ring, 0, sizeof b.ring);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int p = which[i < count ? i : 0];
-        load_lane(v, &b, i, point[p], &memory[p]);
+        load_lane(v, &b, i, batch->point[p], &batch->memory[p]);
     }
     v->feet.kernels->predict(f, REST);
     for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
@@ -277,41 +384,109 @@ static void follow_block(const SweepVessel *v, const Vec3 *point, VesselMemory *
     v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, v->feet.harmonics);
     for (int i = 0; i < count; i++) {
         int p = which[i];
-        VesselMemory *m = &memory[p];
+        VesselMemory *m = &batch->memory[p];
         if (!(done >> i & 1)) {
-            answer_sought(v, point[p], m, &hit[p]);
+            put(&batch->sought, p);
             continue;
         }
         double size = fabs(f->gap[i]) - NEARER, travel = m->trust;
         bool nearer = b.own[i] >= 0 && b.is_flat[i] > 0 && size > 0 && b.ring.near2[i] < size * size;
-        if ((nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(point[p], m->bound_at)) < travel * travel)) {
+        if ((nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(batch->point[p], m->bound_at)) < travel * travel)) {
             SweepFoot foot = sweep_block_foot(&v->feet, &b, i);
-            answer_surely(v, point[p], foot, nearer, m, &hit[p]);
+            put_check(v, batch, p, &foot, nearer);
             continue;
         }
-        store_lane(v, &b, i, point[p], m, &hit[p]);
+        store_lane(v, &b, i, batch->point[p], m, &batch->hit[p]);
+        if (m->has_rival)
+            put(&batch->beside, p);
     }
+}
+
+static void seek_block(const SweepVessel *v, Batch *batch, const int *which, int count)
+{
+    SweepStart start[SWEEP_FEET];
+    SweepFoot found[SWEEP_FEET];
+    Vec3 x[SWEEP_FEET];
+    for (int i = 0; i < count; i++) {
+        const VesselMemory *m = &batch->memory[which[i]];
+        x[i] = batch->point[which[i]];
+        start[i] = (SweepStart){.at = m->foot, .far = vec3_distance(x[i], m->foot), .segment = m->sweep.segment, .sac = m->sweep.sac, .t = m->sweep.own_t};
+    }
+    unsigned sound = sweep_follow(&v->feet, x, start, count, SWEEP_ROUNDS, found);
+    for (int i = 0; i < count; i++) {
+        if (sound >> i & 1)
+            put_check(v, batch, which[i], &found[i], false);
+        else
+            answer_afresh(v, x[i], &batch->memory[which[i]], &batch->hit[which[i]]);
+    }
+}
+
+// Follows the rivals of feet that were found. A rival that has become nearer is the foot, and the foot its rival.
+static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, int count)
+{
+    enum { ROUNDS = 6 };
+    SweepStart start[SWEEP_FEET];
+    SweepFoot rival[SWEEP_FEET];
+    Vec3 x[SWEEP_FEET];
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "rivals come in blocks");
+    for (int i = 0; i < count; i++) {
+        const VesselMemory *m = &batch->memory[which[i]];
+        x[i] = batch->point[which[i]];
+        start[i] = (SweepStart){
+            .at = m->rival, .far = vec3_distance(x[i], m->rival), .segment = m->sweep.rival_segment, .sac = m->sweep.rival_sac, .t = m->sweep.rival_t};
+    }
+    unsigned done = sweep_follow(&v->feet, x, start, count, ROUNDS, rival);
+    for (int i = 0; i < count; i++) {
+        VesselMemory *m = &batch->memory[which[i]];
+        VesselHit *h = &batch->hit[which[i]];
+        SweepFoot foot = {.at = m->foot, .normal = m->normal, .hessian = m->hessian, .gap = h->gap, .sure = true};
+        foot.segment = m->sweep.segment, foot.sac = m->sweep.sac, foot.t = m->sweep.own_t;
+        if (!(done >> i & 1) || vec3_distance(rival[i].at, foot.at) < 1e-4) {
+            put_check(v, batch, which[i], &foot, m->sweep.open != 0);
+            continue;
+        }
+        if (fabs(rival[i].gap) < fabs(foot.gap)) {
+            answer(v, x[i], &rival[i], m, h);
+            hold_rival(&foot, HUGE_VAL, m);
+        } else {
+            hold_rival(&rival[i], HUGE_VAL, m);
+        }
+    }
+}
+
+static void in_blocks(const SweepVessel *v, Batch *batch, const Queue *queue, void (*treat)(const SweepVessel *v, Batch *batch, const int *which, int count))
+{
+    for (int i = 0; i < queue->count; i += FOOT_BLOCK)
+        treat(v, batch, queue->point + i, queue->count - i < FOOT_BLOCK ? queue->count - i : FOOT_BLOCK);
 }
 
 static void query_batch(const SweepVessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    Queue alone = {0}, among = {0};          // feet that see one branch, and those that see several
+    SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
+    Batch batch;
+    batch.point = point, batch.memory = memory, batch.hit = hit;
+    batch.alone.count = batch.among.count = batch.sought.count = batch.beside.count = batch.checks = 0;
     for (int i = 0; i < count; i++) {
         VesselMemory *m = &memory[i];
         if (answer_cheaply(v, point[i], reach, m, &hit[i]))
             continue;
         double far = m->has_foot ? FOLLOWED * sweep_place_radius(&v->feet, m->sweep.segment, m->sweep.sac) : 0;
-        if (!(vec3_norm2(vec3_sub(point[i], m->place)) < far * far)) {
+        if (!(vec3_norm2(vec3_sub(point[i], m->place)) < far * far))
             answer_afresh(v, point[i], m, &hit[i]);
-            continue;
-        }
-        Queue *queue = m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0 ? &alone : &among;
-        queue->point[queue->count++] = i;
+        else if (m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0)
+            put(&batch.alone, i);
+        else
+            put(&batch.among, i);
     }
-    for (int i = 0; i < alone.count; i += FOOT_BLOCK)
-        follow_block(v, point, memory, hit, alone.point + i, alone.count - i < FOOT_BLOCK ? alone.count - i : FOOT_BLOCK);
-    for (int i = 0; i < among.count; i += FOOT_BLOCK)
-        follow_block(v, point, memory, hit, among.point + i, among.count - i < FOOT_BLOCK ? among.count - i : FOOT_BLOCK);
+    in_blocks(v, &batch, &batch.alone, follow_block);
+    in_blocks(v, &batch, &batch.among, follow_block);
+    in_blocks(v, &batch, &batch.sought, seek_block);
+    in_blocks(v, &batch, &batch.beside, follow_rivals);
+    run_checks(v, point, batch.check, batch.checks);
+    for (int i = 0; i < batch.checks; i++) {
+        int p = batch.check[i].point;
+        end_check(v, point[p], &batch.check[i], &memory[p], &hit[p]);
+    }
 }
 
 static void sweep_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -336,6 +511,7 @@ typedef struct Walk {
 static void walk_branch(Walk *w, int branch, double t, double far, int except)
 {
     const SweepVessel *v = w->vessel;
+    SEL_ASSERT(branch >= 0 && branch < v->model->branch_count && far >= 0, "a walk goes along branches of the model, forwards");
     const SweepCurve *curve = v->field->curve[branch];
     const SweepBranch *b = &v->model->branch[branch];
     for (int k = 0; k < curve->knot_count && w->steps > 0; k++) {
@@ -397,9 +573,11 @@ static void sweep_destroy(Vessel *vessel)
     if (!v)
         return;
     sweep_field_free(v->field);
+    sweep_sac_points_free(&v->feet.sacs);
     power_blocks_free(&v->blocks);
     vessel_tree_free(v->knots);
     free(v->place);
+    free(v->nodes);
     free(v->first_child);
     free(v->next_child);
     free(v);
@@ -434,6 +612,14 @@ static void fill_places(SweepVessel *v)
                 v->place[node] = (SweepPlace){.branch = i, .t = t};
         }
     }
+    for (int i = 0; i < m->branch_count; i++)
+        for (int s = v->field->first_segment[i]; s < v->field->first_segment[i + 1]; s++) {
+            const SweepInterval *interval = &v->field->curve[i]->interval[0];
+            double from = v->field->segment[s].from, to = v->field->segment[s].to, t = from < 0 ? 0 : isfinite(to) ? 0.5 * (from + to) : from;
+            interval += sweep_curve_interval(v->field->curve[i], t);
+            double low = fmax(interval->from, 0), high = fmin(interval->to, v->field->curve[i]->length);
+            v->nodes[s] = (SegmentNodes){0.5 * (low + high), find_node(v, s, low), find_node(v, s, high)};
+        }
     for (int i = m->branch_count - 1; i > 0; i--) {
         int parent = m->branch[i].parent;
         v->next_child[i] = v->first_child[parent];
@@ -460,11 +646,13 @@ static bool allocate(SweepVessel *v)
     v->first_child = calloc((size_t)m->branch_count, sizeof *v->first_child);
     v->next_child = calloc((size_t)m->branch_count, sizeof *v->next_child);
     v->knots = vessel_tree_create(m->knot_count + sacs, 0, 0);
-    return v->field && v->place && v->first_child && v->next_child && v->knots;
+    v->nodes = v->field ? calloc((size_t)v->field->first_segment[m->branch_count], sizeof *v->nodes) : NULL;
+    return v->field && v->nodes && v->place && v->first_child && v->next_child && v->knots;
 }
 
 Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
 {
+    SEL_ASSERT(model->branch_count > 0 && model->branch[0].parent == -1, "the model is valid (sweep_model_validate)");
     SweepVessel *v = calloc(1, sizeof *v);
     if (!v)
         return NULL;
@@ -473,9 +661,9 @@ Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
         sweep_destroy(&v->vessel);
         return NULL;
     }
-    v->feet = (SweepFeet){v->field, sweep_kernels(isa), highest_harmonic(model)};
+    v->feet = (SweepFeet){.field = v->field, .kernels = sweep_kernels(isa), .harmonics = highest_harmonic(model)};
     fill_places(v);
-    if (!power_blocks_create(&v->blocks, v->knots)) {
+    if (!power_blocks_create(&v->blocks, v->knots) || !sweep_sac_points_create(v->field, &v->feet.sacs)) {
         sweep_destroy(&v->vessel);
         return NULL;
     }

@@ -11,6 +11,7 @@ static const double ASIDE = 1.5;             // how much longer the overlap may 
 
 static void add_candidate(SweepField *field, int segment, int branch, double t, double slope)
 {
+    SEL_ASSERT(segment >= 0 && branch >= 0, "a segment sees branches");
     SweepView *view = &field->view[segment];
     int at = 0;
     while (at < view->count && view->of[at].branch < branch)

@@ -20,6 +20,8 @@ typedef struct VesselSweepMemory {
     int32_t sac;             // on a sac: the node of the sacs' tree
     double t[VESSEL_SEEN];   // on the branches that the segment, or the sac's node, sees [mm]
     double own_t;            // on the own branch
+    double rival_t;          // of the rival: segment, sac and t as above
+    int32_t rival_segment, rival_sac;
     int32_t is_known;        // 0: t are not set
     int32_t open;            // 1: points of the rings are nearer than the foot, but are no wall
 } VesselSweepMemory;

@@ -290,7 +290,7 @@ static void see_blend(void *context, long p)
 static void see_guard(void *context, long index)
 {
     // [radii] depth in the other lumen; standard deviation; and the least weight relative to a point's: exact points would outweigh any deviation
-    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 4e-4;
+    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 1e-2;
     Refinement *r = context;
     const SweepGuard *guard = &r->draft->guard[index];
     int64_t p = r->draft->point_count + index;

@@ -80,4 +80,22 @@ static inline SweepModel *sweep_model_of(const SweepShape *shape, int branches)
     return m;
 }
 
+// A round sac beside the first branch of a model: one blob whose surface is a sphere, linked to the branch's knot. The model owns it.
+static inline void sweep_add_sac(SweepModel *m, int knot, Vec3 center, double radius)
+{
+    VesselTree *t = vessel_tree_create_shared(2, 0, 1);
+    t->center[0] = m->knot[knot], t->center[1] = t->blob_center[0] = center;
+    t->radius[0] = m->branch[0].radius, t->radius[1] = radius;
+    t->direction[0] = t->direction[1] = vec3_unit(vec3_sub(center, m->knot[knot]));
+    t->parent[0] = -1, t->parent[1] = 0;
+    t->kind[0] = NODE_VESSEL, t->kind[1] = NODE_ANEURYSM;
+    t->blob_width[0] = 2 * radius;
+    t->blob_amplitude[0] = 1 / (0.75 * 0.75 * 0.75);     // u = 3/4 at d = radius
+    t->blob_offset[1] = 0, t->blob_offset[2] = 1;
+    vessel_tree_link(t);
+    m->sac = t;
+    m->sac_node = (int32_t *)calloc(2, sizeof *m->sac_node);
+    m->sac_node[0] = m->knot_node[knot], m->sac_node[1] = m->knot_count + 1;
+}
+
 #endif

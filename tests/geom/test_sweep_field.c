@@ -216,8 +216,7 @@ static void derivatives_of_a_branch(void **state)
             if (is_off_knots(f, &at))
                 compare_derivatives(f, place, x, &worst);
         }
-        print_message("a branch with an %s start, %d places: gradient %.1e, Hessian %.1e\n", open ? "open" : "closed", worst.places, worst.gradient,
-                      worst.hessian);
+        print_message("%s start, %d places: gradient %.1e, Hessian %.1e\n", open ? "open" : "closed", worst.places, worst.gradient, worst.hessian);
         assert_true(worst.places > 2000 && worst.gradient < 1e-6 && worst.hessian < 1e-5);
         sweep_field_free(f);
         sweep_model_free(m);
@@ -276,11 +275,97 @@ static void derivatives_at_a_fork(void **state)
     }
 }
 
+static void derivatives_at_a_sac(void **state)
+{
+    (void)state;
+    SweepShape s = {.pitch = 1.3, .parent = -1, .radius = 1, .section = twisting};
+    sweep_shape_line(&s, vec3(-6, 0, 0), vec3(6, 0, 0.5), 25);
+    SweepModel *m = sweep_model_of(&s, 1);
+    sweep_add_sac(m, 12, vec3(0.2, 1.6, 0.3), 1.4);
+    SweepField *f = make(m);
+    uint64_t seed = 7;
+    Worst worst = {0};
+    int blended = 0, from_sac = 0;
+    for (int trial = 0; trial < 3000; trial++) {
+        double t = 6 + random_in(&seed, -2.5, 2.5);
+        Vec3 x = trial % 2 ? vec3_add_scaled(sweep_curve_at(f->curve[0], t).s, random_in(&seed, 0.3, 1.3), random_unit_vector(&seed))
+                           : vec3_add_scaled(m->sac->center[1], random_in(&seed, 0.5, 1.7), random_unit_vector(&seed));
+        SweepPlace branch = {.branch = 0, .t = t}, sac = {.branch = -1, .sac = 1};
+        SweepBlend a, b;
+        sweep_field_blend(f, branch, x, &a);
+        sweep_field_blend(f, sac, x, &b);
+        assert_int_equal(a.count, 2);
+        assert_near(a.f, b.f, 1e-12);    // the wall is the same from both sides
+        if (!is_off_knots(f, &a))
+            continue;
+        blended += a.part[a.largest].share < 0.999;
+        from_sac += a.part[a.largest].branch < 0;
+        compare_derivatives(f, trial % 3 ? branch : sac, x, &worst);
+    }
+    print_message("sac: %d places, %d blended, %d on the sac: gradient %.1e, Hessian %.1e\n", worst.places, blended, from_sac, worst.gradient, worst.hessian);
+    assert_true(blended > 200 && from_sac > 500 && worst.gradient < 1e-6 && worst.hessian < 1e-5);
+    sweep_field_free(f);
+    sweep_model_free(m);
+}
+
+// --- bad models ---
+
+static int faults_of(const SweepModel *m)
+{
+    static Faults faults;
+    faults_clear(&faults);
+    assert_true(sweep_model_validate(m, "model", &faults) == (faults.count == 0));
+    return faults.count;
+}
+
+static void faults_are_found(void **state)
+{
+    (void)state;
+    SweepShape s[2];
+    fork_of_two(s, 40);
+    assert_null(sweep_model_create(0, 2, 2, 4));
+    assert_null(sweep_model_create(1, 1 << 30, 2, 4));
+    SweepModel *m = sweep_model_of(s, 2), good = *m;
+    SweepBranch branch = m->branch[1];
+    assert_int_equal(faults_of(m), 0);
+#define EXPECT_FAULT(place, value)                                                                                                                             \
+    do {                                                                                                                                                       \
+        unsigned char kept[sizeof(place)];                                                                                                                     \
+        memcpy(kept, &(place), sizeof kept);                                                                                                                   \
+        place = value;                                                                                                                                         \
+        assert_true(faults_of(m) > 0);                                                                                                                         \
+        memcpy(&(place), kept, sizeof kept);                                                                                                                   \
+        assert_int_equal(faults_of(m), 0);                                                                                                                     \
+    } while (0)
+    EXPECT_FAULT(m->knot[3].x, NAN);
+    EXPECT_FAULT(m->knot_node[2], -1);
+    EXPECT_FAULT(m->break_t[1], 1e5);
+    EXPECT_FAULT(m->break_t[0], 0.1);
+    EXPECT_FAULT(m->row[5], INFINITY);
+    EXPECT_FAULT(m->row[SWEEP_TERMS], -1);
+    EXPECT_FAULT(m->blend, -1);
+    EXPECT_FAULT(m->branch[1].parent, 1);
+    EXPECT_FAULT(m->branch[1].parent, -1);
+    EXPECT_FAULT(m->branch[0].parent, 0);
+    EXPECT_FAULT(m->branch[1].parent_t, 1e3);
+    EXPECT_FAULT(m->branch[0].radius, 0);
+    EXPECT_FAULT(m->branch[1].first_knot, 7);
+    EXPECT_FAULT(m->branch[1].knot_count, 1 << 28);
+    EXPECT_FAULT(m->branch[1].break_count, 1);
+    EXPECT_FAULT(m->row_count, 3);
+    m->knot[4] = m->knot[3];
+    assert_true(faults_of(m) > 0);
+    assert_memory_equal(&m->branch[1], &branch, sizeof branch);
+    assert_int_equal(m->row_count, good.row_count);
+    sweep_model_free(m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spline_and_frame_converge), cmocka_unit_test(curve_derivatives),       cmocka_unit_test(sections_are_precise),
         cmocka_unit_test(basis_gives_the_field),     cmocka_unit_test(derivatives_of_a_branch), cmocka_unit_test(derivatives_at_a_fork),
+        cmocka_unit_test(derivatives_at_a_sac),      cmocka_unit_test(faults_are_found),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
