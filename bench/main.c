@@ -10,6 +10,7 @@ static const Verb *const tables[] = {&bench_collision,
                                      &bench_fit,
                                      &bench_track,
                                      &bench_wall,
+                                     &bench_models,
                                      &bench_torture,
                                      &bench_peer,
 #ifdef SELDINGER_RENDER

@@ -28,12 +28,19 @@ static VesselTree *load_tree(const FitCommand *command, TreeFileInfo *info, Faul
     return tree;
 }
 
-static bool save(const FitCommand *command, const VesselTree *model, const TreeFileInfo *from, Faults *faults)
+// Saves the new model with the tree, and with a model of the other kind from the tree's file.
+static bool save(const FitCommand *command, const TreeFit *fit, const VesselTree *tree, const TreeFileInfo *from, Faults *faults)
 {
+    SweepModel *kept = NULL;
+    if (!fit->sweep && sweep_file_is_in(command->tree, faults))
+        kept = sweep_file_load(command->tree, tree, faults);
+    if (faults->count > 0)
+        return false;
     TreeFileInfo info = {
         .source = from->source, .parameters = tree_fit_parameters(&command->fit, from), .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " fit"};
-    bool good = tree_file_save(model, &info, command->output, faults);
+    bool good = tree_file_save_with(fit->sweep ? tree : fit->model, fit->sweep ? fit->sweep : kept, &info, command->output, faults);
     free(info.parameters);
+    sweep_model_free(kept);
     return good;
 }
 
@@ -63,6 +70,35 @@ static bool write_results(const FitCommand *command, const TreeFit *fit, Faults 
     return good;
 }
 
+// The figures of a swept model.
+static bool write_sweep_results(const FitCommand *command, const TreeFit *fit, Faults *faults)
+{
+    const SweepFitFigures *f = &fit->figures;
+    if (!command->quiet && !cli_is_standard_output(command->json))
+        printf("swept model: %d branches, %d sections, %lld numbers, %.1f s\n"
+               "distance of %lld points from the wall: mean %.4f, 99 %% %.4f, largest %.4f mm; noise %.4f mm\n"
+               "%lld points left out (another vessel's lumen, outliers), %lld beyond the focal line of a bend, %lld where a section is not star-shaped\n",
+               fit->sweep->branch_count, fit->sweep->row_count, (long long)f->numbers, f->seconds, (long long)f->points, f->mean, f->p99, f->most, f->noise,
+               (long long)f->left_out, (long long)f->folded, (long long)f->not_star_shaped);
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "model", "sweep");
+    cJSON_AddNumberToObject(root, "branches", fit->sweep->branch_count);
+    cJSON_AddNumberToObject(root, "sections", fit->sweep->row_count);
+    cJSON_AddNumberToObject(root, "numbers", (double)f->numbers);
+    cJSON_AddNumberToObject(root, "points", (double)f->points);
+    cJSON_AddNumberToObject(root, "mean_mm", f->mean);
+    cJSON_AddNumberToObject(root, "p99_mm", f->p99);
+    cJSON_AddNumberToObject(root, "max_mm", f->most);
+    cJSON_AddNumberToObject(root, "noise_mm", f->noise);
+    cJSON_AddNumberToObject(root, "left_out", (double)f->left_out);
+    cJSON_AddNumberToObject(root, "folded", (double)f->folded);
+    cJSON_AddNumberToObject(root, "not_star_shaped", (double)f->not_star_shaped);
+    cJSON_AddNumberToObject(root, "seconds", f->seconds);
+    bool good = !command->json || cli_write_json(command->json, root, faults);
+    cJSON_Delete(root);
+    return good;
+}
+
 static bool draw(const FitCommand *command, const VesselTree *model, Faults *faults)
 {
     bool good = junction_pages_draw(&command->junctions, command->output ? command->output : command->tree, model, faults);
@@ -81,10 +117,14 @@ static int call(void *structure, Faults *faults)
     if (good)
         tree_fit_complete_options(&command->fit, tree, &from);
     if (good && command->output)
-        good = tree_fit(tree, command->tree, &command->fit, &progress, &fit, faults) && save(command, fit.model, &from, faults);
+        good = tree_fit(tree, command->tree, &command->fit, &progress, &fit, faults) && save(command, &fit, tree, &from, faults);
     else
         fit.model = tree, tree = NULL;
-    good = good && write_results(command, &fit, faults) && draw(command, fit.model, faults);
+    if (good && fit.sweep)
+        good = write_sweep_results(command, &fit, faults);
+    else
+        good = good && write_results(command, &fit, faults) && draw(command, fit.model, faults);
+    sweep_model_free(fit.sweep);
     vessel_tree_free(fit.model);
     vessel_tree_free(tree);
     tree_file_info_free(&from);

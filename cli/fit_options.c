@@ -18,8 +18,12 @@ static const char *take_preset(void *structure, const Option *option, const char
 
 #define AT(member) OPTION_AT(FitCommand, member)
 static const char *const presets[] = {"default", "local", "paper", NULL};
+static const char *const models[] = {"lim", "sweep", NULL};
 static const Option options[] = {
     {"output", "F.h5", OPTION_FILE, AT(output), "the model", .letter = 'o'},
+    {"model", "KIND", OPTION_CHOICE, AT(fit.model),
+     "lim: blobs; sweep: curves with cross-sections along them, blended at forks. The file keeps a model of the other kind that TREE.h5 holds",
+     .choices = models},
     {"preset", "NAME", OPTION_CHOICE, AT(fit.preset),
      "default: shared blobs; local: a model for each node, neighbours blended; paper: the published values and method. Must come before the other options",
      .choices = presets, .take = take_preset},
@@ -68,12 +72,17 @@ static const char *check(void *structure)
 {
     const FitCommand *command = structure;
     bool is_local = command->fit.preset != FIT_DEFAULT;
-    return !command->output && !command->measure  ? "missing -o MODEL.h5"
-           : command->has_alpha && !is_local      ? "--alpha needs --preset local or paper"
-           : command->has_beta && !is_local       ? "--beta needs --preset local or paper"
-           : command->has_max_blobs && !is_local  ? "--max-blobs needs --preset local or paper"
-           : command->has_max_points && !is_local ? "--max-points needs --preset local or paper"
-                                                  : NULL;
+    bool is_swept = command->fit.model == FIT_MODEL_SWEEP;
+    return !command->output && !command->measure    ? "missing -o MODEL.h5"
+           : is_swept && is_local                   ? "--preset needs --model lim"
+           : is_swept && command->measure           ? "--measure needs --model lim"
+           : is_swept && command->picture           ? "--picture needs --model lim"
+           : is_swept && command->junctions.picture ? "--junctions needs --model lim"
+           : command->has_alpha && !is_local        ? "--alpha needs --preset local or paper"
+           : command->has_beta && !is_local         ? "--beta needs --preset local or paper"
+           : command->has_max_blobs && !is_local    ? "--max-blobs needs --preset local or paper"
+           : command->has_max_points && !is_local   ? "--max-points needs --preset local or paper"
+                                                    : NULL;
 }
 
 const OptionTable fit_options = {
@@ -81,7 +90,8 @@ const OptionTable fit_options = {
     .does = "fits a vessel wall to the points of a tree (LIM)",
     .usage = "TREE.h5 -o MODEL.h5 [options]\nMODEL.h5 --measure [--json F]",
     .intro = "Fits an implicit wall to the points of a tree: one field of shared blobs of compact support, which is continuous across every border "
-             "between neighbouring nodes; or, by preset, a local blobby model for each node (LIM, Kerrien et al. 2017).",
+             "between neighbouring nodes; or, by preset, a local blobby model for each node (LIM, Kerrien et al. 2017). --model sweep: a centreline curve with "
+             "cross-sections for each branch.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, FitCommand),
     .set_defaults = set_defaults,

@@ -18,6 +18,7 @@
 // models
 #include "recon/fit/field_fit.h"
 #include "recon/fit/lim_fit.h"
+#include "recon/fit/sweep_fit.h"
 #include "recon/fit/tree_fit.h"
 #include "recon/fit/fit_figures.h"
 #include "recon/fit/measure_report.h"
@@ -43,6 +44,7 @@
 #include "recon/describe.h"
 #include "recon/hdf5_reader.h"
 #include "recon/hdf5_silence.h"
+#include "recon/sweep_file.h"
 #include "recon/tree_file.h"
 
 #endif

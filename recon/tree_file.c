@@ -6,6 +6,8 @@
 #include "base/base.h"
 #include "recon/hdf5_reader.h"
 #include "recon/hdf5_silence.h"
+#include "recon/hdf5_writer.h"
+#include "recon/sweep_file.h"
 
 #include <hdf5.h>
 #include <inttypes.h>
@@ -182,79 +184,31 @@ VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 
 // --- writing ---
 
-static bool write_column(hid_t file, const char *path, hid_t type, int rank, int64_t rows, const void *data)
-{
-    hsize_t size[2] = {(hsize_t)rows, 3};
-    hid_t space = H5Screate_simple(rank, size, NULL), plist = H5Pcreate(H5P_DATASET_CREATE);
-    bool good = space >= 0 && plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0;   // no time stamps: same content, same bytes
-    hid_t dataset = good ? H5Dcreate2(file, path, type, space, H5P_DEFAULT, plist, H5P_DEFAULT) : -1;
-    good = dataset >= 0 && (rows == 0 || H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0);
-    if (dataset >= 0)
-        good = H5Dclose(dataset) >= 0 && good;
-    if (plist >= 0)
-        H5Pclose(plist);
-    if (space >= 0)
-        H5Sclose(space);
-    return good;
-}
-
-// Writes a string of fixed length: the heap of variable-length strings has no checksum, and damaged bytes there crash the library.
-static bool write_text(hid_t file, const char *key, const char *text)
-{
-    hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
-    const char *value = text ? text : "";
-    bool good = H5Tset_size(type, strlen(value) + 1) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0;
-    hid_t attribute = good ? H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT) : -1;
-    good = attribute >= 0 && H5Awrite(attribute, type, value) >= 0;
-    if (attribute >= 0)
-        H5Aclose(attribute);
-    H5Sclose(space);
-    H5Tclose(type);
-    return good;
-}
-
-static bool write_scalar(hid_t file, const char *key, hid_t type, const void *value)
-{
-    hid_t space = H5Screate(H5S_SCALAR), attribute = H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT);
-    bool good = attribute >= 0 && H5Awrite(attribute, type, value) >= 0;
-    if (attribute >= 0)
-        H5Aclose(attribute);
-    H5Sclose(space);
-    return good;
-}
-
-static bool make_group(hid_t file, const char *path)
-{
-    hid_t plist = H5Pcreate(H5P_GROUP_CREATE);
-    H5Pset_obj_track_times(plist, false);
-    hid_t group = H5Gcreate2(file, path, H5P_DEFAULT, plist, H5P_DEFAULT);
-    H5Pclose(plist);
-    return group >= 0 && H5Gclose(group) >= 0;
-}
-
-static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *info)
+static bool write_tree(hid_t file, const VesselTree *tree, const SweepModel *sweep, const TreeFileInfo *info)
 {
     const int32_t version = FORMAT_VERSION;
     int64_t n = tree->node_count, p = tree->point_count, b = tree->blob_count;
-    bool good = make_group(file, "/nodes") && make_group(file, "/points") && write_text(file, "format", b > 0 ? "seldinger-model" : "seldinger-tree") &&
-                write_scalar(file, "version", H5T_NATIVE_INT32, &version) && write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) &&
-                write_text(file, "kernel", kernel_name[vessel_tree_is_shared(tree) ? KERNEL_COMPACT : KERNEL_CAUCHY]) &&
-                write_text(file, "source", info ? info->source : "") && write_text(file, "parameters", info ? info->parameters : "") &&
-                write_text(file, "created_by", info && info->created_by ? info->created_by : "seldinger " SELDINGER_VERSION);
-    good = good && write_column(file, "/nodes/center", H5T_NATIVE_DOUBLE, 2, n, tree->center) &&
-           write_column(file, "/nodes/radius", H5T_NATIVE_DOUBLE, 1, n, tree->radius) &&
-           write_column(file, "/nodes/direction", H5T_NATIVE_DOUBLE, 2, n, tree->direction) &&
-           write_column(file, "/nodes/height", H5T_NATIVE_DOUBLE, 1, n, tree->height) &&
-           write_column(file, "/nodes/parent", H5T_NATIVE_INT32, 1, n, tree->parent) && write_column(file, "/nodes/kind", H5T_NATIVE_UINT8, 1, n, tree->kind) &&
-           write_column(file, "/points/xyz", H5T_NATIVE_DOUBLE, 2, p, tree->point) &&
-           write_column(file, "/points/offset", H5T_NATIVE_INT64, 1, n + 1, tree->point_offset);
+    bool good = hdf5_make_group(file, "/nodes") && hdf5_make_group(file, "/points") &&
+                hdf5_write_text(file, "format", b > 0 || sweep ? "seldinger-model" : "seldinger-tree") &&
+                hdf5_write_scalar(file, "version", H5T_NATIVE_INT32, &version) && hdf5_write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) &&
+                hdf5_write_text(file, "kernel", kernel_name[vessel_tree_is_shared(tree) ? KERNEL_COMPACT : KERNEL_CAUCHY]) &&
+                hdf5_write_text(file, "source", info ? info->source : "") && hdf5_write_text(file, "parameters", info ? info->parameters : "") &&
+                hdf5_write_text(file, "created_by", info && info->created_by ? info->created_by : "seldinger " SELDINGER_VERSION);
+    good = good && hdf5_write_column(file, "/nodes/center", H5T_NATIVE_DOUBLE, n, 3, tree->center) &&
+           hdf5_write_column(file, "/nodes/radius", H5T_NATIVE_DOUBLE, n, 0, tree->radius) &&
+           hdf5_write_column(file, "/nodes/direction", H5T_NATIVE_DOUBLE, n, 3, tree->direction) &&
+           hdf5_write_column(file, "/nodes/height", H5T_NATIVE_DOUBLE, n, 0, tree->height) &&
+           hdf5_write_column(file, "/nodes/parent", H5T_NATIVE_INT32, n, 0, tree->parent) &&
+           hdf5_write_column(file, "/nodes/kind", H5T_NATIVE_UINT8, n, 0, tree->kind) &&
+           hdf5_write_column(file, "/points/xyz", H5T_NATIVE_DOUBLE, p, 3, tree->point) &&
+           hdf5_write_column(file, "/points/offset", H5T_NATIVE_INT64, n + 1, 0, tree->point_offset);
     if (good && b > 0)
-        good = make_group(file, "/blobs") && write_column(file, "/blobs/center", H5T_NATIVE_DOUBLE, 2, b, tree->blob_center) &&
-               write_column(file, "/blobs/width", H5T_NATIVE_DOUBLE, 1, b, tree->blob_width) &&
-               write_column(file, "/blobs/offset", H5T_NATIVE_INT64, 1, n + 1, tree->blob_offset) &&
-               write_column(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, 1, n, tree->error) &&
-               (!vessel_tree_is_shared(tree) || write_column(file, "/blobs/amplitude", H5T_NATIVE_DOUBLE, 1, b, tree->blob_amplitude));
-    return good;
+        good = hdf5_make_group(file, "/blobs") && hdf5_write_column(file, "/blobs/center", H5T_NATIVE_DOUBLE, b, 3, tree->blob_center) &&
+               hdf5_write_column(file, "/blobs/width", H5T_NATIVE_DOUBLE, b, 0, tree->blob_width) &&
+               hdf5_write_column(file, "/blobs/offset", H5T_NATIVE_INT64, n + 1, 0, tree->blob_offset) &&
+               hdf5_write_column(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, n, 0, tree->error) &&
+               (!vessel_tree_is_shared(tree) || hdf5_write_column(file, "/blobs/amplitude", H5T_NATIVE_DOUBLE, b, 0, tree->blob_amplitude));
+    return good && (!sweep || sweep_file_write(file, sweep));
 }
 
 // The core driver frees the file's memory when the file is closed. The file is complete by then, so we take ownership of the memory. (H5Fget_file_image of an
@@ -310,6 +264,11 @@ static size_t image_length(const Image *image)
 
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults)
 {
+    return tree_file_save_with(tree, NULL, info, path, faults);
+}
+
+bool tree_file_save_with(const VesselTree *tree, const SweepModel *sweep, const TreeFileInfo *info, const char *path, Faults *faults)
+{
     if (!heap_can_allocate(HEAP_RESERVE_OF_HDF5)) {
         faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library is out of memory");
         return false;
@@ -323,7 +282,7 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
     H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
     H5Pset_obj_track_times(create, false);
     hid_t file = H5Fcreate("/dev/null/image", H5F_ACC_TRUNC, create, access);
-    bool built = file >= 0 && write_tree(file, tree, info);
+    bool built = file >= 0 && write_tree(file, tree, sweep, info);
     if (file >= 0)
         built = H5Fclose(file) >= 0 && built;
     H5Pclose(create);

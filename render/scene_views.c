@@ -48,7 +48,7 @@ static double contrast_rate(const VesselTree *tree)
 static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, OperatorControls *controls, char *note, size_t capacity,
                      Faults *faults)
 {
-    if (!open->mesh && open->tree)
+    if (!open->mesh && open->tree && !open->sweep)
         open->mesh = isosurface_of_tree(open->tree, live_cell(open->tree));
     const TriangleMesh *mesh = open_vessel_mesh(scene, open);
     ViewsOptions options = {.scene = scene, .vessel = open->vessel, .tree = open->tree, .mesh = mesh, .pose = pose, .patient = patient_of(scene, mesh)};

@@ -42,14 +42,14 @@ static bool cache_folder(char folder[CACHE_PATH])
 // options. Returns false if the program cannot be read.
 static bool cache_key(const Scene *scene, char hex[65])
 {
-    bool local = contact_is_local(scene->contact);
+    int kind = contact_is_local(scene->contact) ? 1 : scene->contact == CONTACT_SWEEP ? 2 : 0;
     Sha256 sha;
     char program[65], path[CACHE_PATH];
     if (!process_code_file(path, sizeof path) || !sha256_of_file(path, program))
         return false;
     sha256_begin(&sha);
     sha256_add(&sha, program, strlen(program));
-    sha256_add(&sha, &local, sizeof local);
+    sha256_add(&sha, &kind, sizeof kind);
     sha256_add(&sha, scene->shape_name, strlen(scene->shape_name) + 1);
     for (int i = 0; i < scene->shape_option_count; i++)
         for (int j = 0; j < 2; j++)
@@ -68,19 +68,47 @@ VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const Li
     return field_fit(sampled, &shared, progress, faults);
 }
 
-static VesselTree *fit_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults)
+SweepModel *sweep_samples(const VesselTree *sampled, double voxel_mm, int threads, Faults *faults)
+{
+    SweepFitOptions options = sweep_fit_default_options();
+    options.voxel_mm = voxel_mm;
+    options.threads = threads;
+    return sweep_fit(sampled, &options, NULL, faults);
+}
+
+static VesselTree *fit_shape(const Scene *scene, int threads, const Progress *progress, SweepModel **sweep, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
     // exact samples allow a tighter fit than an angiogram's
     options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
     options.threads = threads;
     VesselTree *sampled = shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
+    if (sweep) {
+        *sweep = sampled ? sweep_samples(sampled, options.voxel_mm, threads, faults) : NULL;
+        if (*sweep)
+            return sampled;
+        vessel_tree_free(sampled);
+        return NULL;
+    }
     VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &options, progress, faults) : NULL;
     vessel_tree_free(sampled);
     return model;
 }
 
-VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults)
+// The cached model. `sweep` may be NULL, see fitted_shape.
+static VesselTree *load_cached(const char *path, SweepModel **sweep, Faults *ignored)
+{
+    VesselTree *model = tree_file_load(path, NULL, ignored);
+    if (model && sweep)
+        *sweep = sweep_file_load(path, model, ignored);
+    if (model && !(sweep ? *sweep != NULL : vessel_tree_is_model(model))) {
+        vessel_tree_free(model);
+        return NULL;
+    }
+    return model;
+}
+
+VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progress, SweepModel **sweep, Faults *faults)
 {
     char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
     Faults *ignored = calloc(1, sizeof *ignored);
@@ -88,20 +116,16 @@ VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progre
     if (ignored && cache_folder(folder) && cache_key(scene, hex)) {
         snprintf(path, sizeof path, "%.4000s/fit-%.32s.h5", folder, hex);
         if (access(path, R_OK) == 0)
-            model = tree_file_load(path, NULL, ignored);
-        if (model && !vessel_tree_is_model(model)) {
-            vessel_tree_free(model);
-            model = NULL;
-        }
+            model = load_cached(path, sweep, ignored);
     }
     if (!model) {
-        model = fit_shape(scene, threads, progress, faults);
+        model = fit_shape(scene, threads, progress, sweep, faults);
         char source[sizeof scene->shape_name];
         strcpy(source, scene->shape_name);
         char created_by[] = "seldinger " SELDINGER_VERSION, parameters[] = "";
         TreeFileInfo info = {.source = source, .parameters = parameters, .created_by = created_by};
         if (model && *path)
-            tree_file_save(model, &info, path, ignored);
+            tree_file_save_with(model, sweep ? *sweep : NULL, &info, path, ignored);
     }
     free(ignored);
     return model;

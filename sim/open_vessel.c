@@ -38,17 +38,49 @@ static bool open_tree(VesselTree *tree, ContactKind contact, const char *path, O
     return out->vessel != NULL;
 }
 
-// Contact 'lim' of a tube: samples the exact tube and replaces it by the fit.
+// `tree` and `sweep` may be NULL after a fault.
+static bool open_swept(VesselTree *tree, SweepModel *sweep, const char *path, OpenVessel *out, Faults *faults)
+{
+    out->tree = tree;
+    out->sweep = sweep;
+    if (!tree || !sweep)
+        return false;
+    out->vessel = sweep_vessel_create(sweep);
+    if (!out->vessel)
+        faults_add(faults, path, 0, 0, "not enough memory for its contact");
+    return out->vessel != NULL;
+}
+
+static bool open_model(const Scene *scene, OpenVessel *out, Faults *faults)
+{
+    VesselTree *tree = tree_file_load(scene->model_path, NULL, faults);
+    if (scene->contact != CONTACT_SWEEP)
+        return open_tree(tree, scene->contact, scene->model_path, out, faults);
+    return open_swept(tree, tree ? sweep_file_load(scene->model_path, tree, faults) : NULL, scene->model_path, out, faults);
+}
+
+static bool open_shape(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    SweepModel *sweep = NULL;
+    VesselTree *tree = fitted_shape(scene, options->threads, options->progress, scene->contact == CONTACT_SWEEP ? &sweep : NULL, faults);
+    if (scene->contact == CONTACT_SWEEP)
+        return open_swept(tree, sweep, scene->path, out, faults);
+    return open_tree(tree, scene->contact, scene->path, out, faults);
+}
+
+// Contacts 'lim' and 'sweep' of a tube: samples the exact tube and replaces it by the fit.
 static bool fit_tube(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
 {
     LimFitOptions fit = lim_fit_default_options();
     fit.voxel_mm = shape_options_voxel_mm(0, NULL);
     fit.threads = options->threads;
     VesselTree *sampled = tube_tree(out->vessel, &scene->tube, scene->path, faults);
-    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &fit, options->progress, faults) : NULL;
-    vessel_tree_free(sampled);
     out->vessel->destroy(out->vessel);
     out->vessel = NULL;
+    if (scene->contact == CONTACT_SWEEP)
+        return open_swept(sampled, sampled ? sweep_samples(sampled, fit.voxel_mm, options->threads, faults) : NULL, scene->path, out, faults);
+    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &fit, options->progress, faults) : NULL;
+    vessel_tree_free(sampled);
     return open_tree(model, scene->contact, scene->path, out, faults);
 }
 
@@ -117,8 +149,8 @@ static bool open_source(const Scene *scene, const OpenVesselOptions *options, Op
 {
     switch (scene->source) {
     case SOURCE_NONE: return true;
-    case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->contact, scene->model_path, out, faults);
-    case SOURCE_SHAPE: return open_tree(fitted_shape(scene, options->threads, options->progress, faults), scene->contact, scene->path, out, faults);
+    case SOURCE_MODEL: return open_model(scene, out, faults);
+    case SOURCE_SHAPE: return open_shape(scene, options, out, faults);
     case SOURCE_MESH: return open_mesh(scene, options, out, faults);
     case SOURCE_TUBE:
         out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
@@ -144,7 +176,7 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
         return true;
     if (scene->contact == CONTACT_TUBE && !exact)
         faults_add(faults, scene->path, 0, 0,
-                   "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, mesh, smooth_mesh, "
+                   "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, sweep, mesh, smooth_mesh, "
                    "flat_mesh and grid, a mesh the last four");
     else if (contact_is_fitted(scene->contact) && scene->source == SOURCE_MESH)
         faults_add(faults, scene->path, 0, 0,
@@ -167,7 +199,11 @@ const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)
 {
     if (open->mesh)
         return open->mesh;
-    if (open->tree)
+    if (open->tree && open->sweep) {
+        Faults ignored;
+        faults_clear(&ignored);
+        open->mesh = contact_surface_mesh(open->vessel, open->tree, false, isosurface_cell_for(open->tree), scene->path, NULL, &ignored);
+    } else if (open->tree)
         open->mesh = isosurface_of_tree(open->tree, isosurface_cell_for(open->tree));
     else if (scene->source == SOURCE_TUBE)
         open->mesh = triangle_mesh_of_tube(&scene->tube);
@@ -190,6 +226,7 @@ void open_vessel_close(OpenVessel *open)
 {
     if (open->vessel)
         open->vessel->destroy(open->vessel);
+    sweep_model_free(open->sweep);
     vessel_tree_free(open->tree);
     triangle_mesh_free(open->mesh);
     *open = (OpenVessel){0};

@@ -8,7 +8,8 @@
 
 typedef struct OpenVessel {
     Vessel *vessel;          // NULL for SOURCE_NONE
-    VesselTree *tree;        // LIM only
+    VesselTree *tree;        // LIM and swept models only
+    SweepModel *sweep;       // contact 'sweep' only
     TriangleMesh *mesh;      // the wall if it consists of triangles, else filled on demand by open_vessel_mesh
 } OpenVessel;
 

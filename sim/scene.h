@@ -13,7 +13,7 @@
 typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_MESH, SOURCE_NONE } VesselSourceKind;
 // `contact:` of the vessel, `--contact` on the command line.
 // lim: the wall of a fitted model of either type; shapes and tubes are fitted with shared blobs. lim_blend, lim_switch: local models only, with neighbours
-// blended, or with one model per point as in the paper.
+// blended, or with one model per point as in the paper. sweep: the swept model of a file, or fitted to a shape or tube.
 typedef enum {
     CONTACT_LIM,
     CONTACT_MESH,
@@ -23,10 +23,11 @@ typedef enum {
     CONTACT_GRID,
     CONTACT_LIM_BLEND,
     CONTACT_LIM_SWITCH,
+    CONTACT_SWEEP,
     CONTACT_COUNT
 } ContactKind;
 static inline bool contact_is_local(ContactKind contact) { return contact == CONTACT_LIM_BLEND || contact == CONTACT_LIM_SWITCH; }
-static inline bool contact_is_fitted(ContactKind contact) { return contact == CONTACT_LIM || contact_is_local(contact); }
+static inline bool contact_is_fitted(ContactKind contact) { return contact == CONTACT_LIM || contact == CONTACT_SWEEP || contact_is_local(contact); }
 extern const char *const contact_name[CONTACT_COUNT + 1];  // as written in files; NULL at the end
 
 typedef struct SceneTarget {

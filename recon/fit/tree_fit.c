@@ -11,7 +11,10 @@
 
 static const char *const fit_preset_name[] = {"default", "local", "paper", NULL};
 
-TreeFitOptions tree_fit_default_options(void) { return (TreeFitOptions){.local = lim_fit_default_options(), .edge_blur = -1}; }
+TreeFitOptions tree_fit_default_options(void)
+{
+    return (TreeFitOptions){.sweep = sweep_fit_default_options(), .local = lim_fit_default_options(), .edge_blur = -1};
+}
 
 static FieldFitOptions shared_options(const TreeFitOptions *options)
 {
@@ -25,6 +28,14 @@ static FieldFitOptions shared_options(const TreeFitOptions *options)
 static int describe_fit(const TreeFitOptions *options, char *text, size_t capacity)
 {
     const LimFitOptions *o = &options->local;
+    if (options->model == FIT_MODEL_SWEEP) {
+        const SweepFitOptions *w = &options->sweep;
+        return snprintf(
+            text, room,
+            "fit:\n  model: sweep\n  edge_blur_mm: %g\n  voxel_mm: %g\n  spacing_radii: %g\n  fork_spacing_radii: %g\n  harmonics: %d\n  rounds: %d\n"
+            "  blend: %g\ntree:\n",
+            options->edge_blur, o->voxel_mm, w->spacing, w->fork_spacing, w->harmonics, w->rounds, w->blend);
+    }
     if (options->preset == FIT_DEFAULT) {
         FieldFitOptions f = shared_options(options);
         return snprintf(text, capacity,
@@ -85,7 +96,13 @@ bool tree_fit(VesselTree *tree, const char *path, const TreeFitOptions *options,
         return false;
     }
     double begin = seconds_now();
-    if (options->preset == FIT_DEFAULT) {
+    if (options->model == FIT_MODEL_SWEEP) {
+        SweepFitOptions sweep = options->sweep;
+        sweep.threads = options->local.threads;
+        sweep.voxel_mm = options->local.voxel_mm;
+        fit->sweep = sweep_fit(tree, &sweep, &fit->figures, faults);
+        fit->left_out = fit->figures.left_out;
+    } else if (options->preset == FIT_DEFAULT) {
         FieldFitOptions shared = shared_options(options);
         shared.left_out = &fit->left_out;
         fit->model = field_fit(tree, &shared, progress, faults);
@@ -93,5 +110,5 @@ bool tree_fit(VesselTree *tree, const char *path, const TreeFitOptions *options,
         fit->model = lim_fit(tree, &options->local, progress, faults);
     }
     fit->seconds = seconds_now() - begin;
-    return fit->model != NULL;
+    return fit->model || fit->sweep;
 }

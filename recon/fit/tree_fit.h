@@ -4,6 +4,7 @@
 
 #include "recon/fit/field_fit.h"
 #include "recon/fit/lim_fit.h"
+#include "recon/fit/sweep_fit.h"
 #include "recon/tree_file.h"
 
 typedef enum {
@@ -12,7 +13,11 @@ typedef enum {
     FIT_PAPER                // local models with the published values and method
 } FitPreset;
 
+typedef enum { FIT_MODEL_LIM, FIT_MODEL_SWEEP } FitModel;
+
 typedef struct TreeFitOptions {
+    FitModel model;
+    SweepFitOptions sweep;   // takes voxel_mm and threads from `local`
     FitPreset preset;
     LimFitOptions local;     // options of local models; the shared field takes its target_mm, voxel_mm and threads from them
     bool has_voxel;          // local.voxel_mm is given; else it is taken from the tree's file, 0 if the file does not give it
@@ -21,7 +26,9 @@ typedef struct TreeFitOptions {
 TreeFitOptions tree_fit_default_options(void);
 
 typedef struct TreeFit {
-    VesselTree *model;       // owned by the caller
+    VesselTree *model;       // owned by the caller; NULL for a swept model
+    SweepModel *sweep;       // owned by the caller; NULL for LIM
+    SweepFitFigures figures; // of the swept model
     double seconds;
     int64_t left_out;        // number of points that lie in another vessel's lumen and were not fitted
 } TreeFit;

@@ -47,7 +47,8 @@ static void take_contact(Scene *scene, const char *name, Faults *faults)
     if (kind < CONTACT_COUNT)
         scene->contact = (ContactKind)kind;
     else
-        faults_add(faults, scene->path, 0, 0, "unknown contact '%.40s'; expected lim, lim_blend, lim_switch, mesh, smooth_mesh, flat_mesh, grid or tube", name);
+        faults_add(faults, scene->path, 0, 0, "unknown contact '%.40s'; expected lim, lim_blend, lim_switch, sweep, mesh, smooth_mesh, flat_mesh, grid or tube",
+                   name);
 }
 
 static void take_script(Scene *scene, const char *path, Faults *faults)

@@ -87,7 +87,7 @@ static void bad_input_ends_with_2_and_says_where(void **state)
     expect_bad(GOOD, "run bad.yaml --script back.csv", "back.csv:4:1: t_s 1 does not follow 2");
     expect_bad(GOOD, "run bad.yaml --script short.csv", "short.csv:1:14");
     expect_bad(GOOD, "run bad.yaml --script nowhere.csv", "nowhere.csv: cannot be opened");
-    expect_bad(GOOD, "run bad.yaml --contact wall", "valid: lim, lim_blend, lim_switch, mesh, smooth_mesh, flat_mesh, grid, tube");
+    expect_bad(GOOD, "run bad.yaml --contact wall", "valid: lim, lim_blend, lim_switch, sweep, mesh, smooth_mesh, flat_mesh, grid, tube");
     expect_bad(GOOD, "run bad.yaml --duration-s -1", "--duration-s: '-1' is not valid");
     expect_bad(GOOD, "run bad.yaml --settle-s soon", "--settle-s: 'soon' is not valid");
     expect_bad(GOOD, "run bad.yaml --banana", "see `seldinger run --help`");

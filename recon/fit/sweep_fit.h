@@ -1,0 +1,38 @@
+//
+// 1. Curves: the branches' node centres (vessel_branches.h), smoothed and thinned; each knot is then moved to the middle of its section.
+// 2. Sections: R(theta, t) of each branch by linear least squares from its own points: cubic B-splines along t, Fourier terms around. Penalties on the second
+//    derivative along t and on the size of harmonics; their strengths and the noise come from the points (restricted maximum likelihood, by the iteration of
+//    Wood and Fasiolo 2017), so that exact points are followed closely and noisy ones are smoothed.
+// 3. Refinement of all rows of all branches together: Gauss and Newton's method on the distance F/|grad F| of every point from the blended wall.
+// Points far from the wall count less (1 / (1 + (e/s)^4)): those in another vessel's lumen, and outliers.
+#ifndef SELDINGER_RECON_FIT_SWEEP_FIT_H
+#define SELDINGER_RECON_FIT_SWEEP_FIT_H
+
+#include "base/base.h"
+#include "geom/geom.h"
+
+typedef struct SweepFitOptions {
+    double spacing;          // of sections along a tube, in local radii; default 1
+    double fork_spacing;     // the same at forks; default 0.4
+    int harmonics;           // highest harmonic along tubes, 1 to 8; default 8. At forks 8
+    int rounds;              // of the refinement; default 6; 0: sections alone
+    double voxel_mm;         // [mm] voxel size of the angiogram, for the sacs' blobs; 0: unknown
+    double blend;            // width of the blends relative to the child's radius; default 0.6
+    int threads;             // 0: all cores; the result does not depend on it
+} SweepFitOptions;
+SweepFitOptions sweep_fit_default_options(void);
+
+typedef struct SweepFitFigures {
+    double mean, p99, most;  // [mm] distance of the vessels' points from the wall, those left out excepted
+    int64_t points, left_out;        // left out: further than 0.5 radii from the wall: in another vessel's lumen, or outliers
+    int64_t folded;          // points beyond the focal line of their branch's curve, where a bend is tighter than the lumen is wide
+    int64_t not_star_shaped; // points of sections that a ray from the middle meets more than once
+    int64_t numbers;         // stored: knots, breaks, coefficients that are not held at 0, blobs
+    double noise;            // [mm] standard deviation of the points, as the fit found it
+    double seconds;
+} SweepFitFigures;
+
+// `tree`: linked, with points. `figures` may be NULL. Returns NULL with faults (options out of range, too few points, no vessel nodes, out of memory).
+SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, SweepFitFigures *figures, Faults *faults);
+
+#endif
