@@ -316,7 +316,7 @@ static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const 
     f->nx[i] = m->normal.x, f->ny[i] = m->normal.y, f->nz[i] = m->normal.z;
     f->axx[i] = m->hessian.xx, f->axy[i] = m->hessian.xy, f->axz[i] = m->hessian.xz;
     f->ayy[i] = m->hessian.yy, f->ayz[i] = m->hessian.yz, f->azz[i] = m->hessian.zz;
-    f->room[i] = 0;
+    f->unique[i] = 0;
     b->keeps_t[i] = m->sweep.is_known != 0;
     for (int k = 0; b->keeps_t[i] && k < b->view[i]->count; k++)
         b->part[k].t[i] = m->sweep.t[k];

@@ -31,7 +31,7 @@ static int describe_fit(const TreeFitOptions *options, char *text, size_t capaci
     if (options->model == FIT_MODEL_SWEEP) {
         const SweepFitOptions *w = &options->sweep;
         return snprintf(
-            text, room,
+            text, capacity,
             "fit:\n  model: sweep\n  edge_blur_mm: %g\n  voxel_mm: %g\n  spacing_radii: %g\n  fork_spacing_radii: %g\n  harmonics: %d\n  rounds: %d\n"
             "  blend: %g\ntree:\n",
             options->edge_blur, o->voxel_mm, w->spacing, w->fork_spacing, w->harmonics, w->rounds, w->blend);

@@ -90,6 +90,9 @@ static void what_is_no_file_is_refused(void **state)
     for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++)
         for (size_t k = 0; k < sizeof what / sizeof *what; k++) {
             char arguments[200];
+            // under the sanitizers a pipe, which could wait for ever, and one of the others for each verb
+            if (!WHOLE_RUN && k > 0 && k != 1 + i % 3)
+                continue;
             // a folder may contain scenes or the slices of a series
             if (!strcmp(what[k], "sub") && (strstr(verbs[i], "check") || strstr(verbs[i], "--volume")))
                 continue;
@@ -133,7 +136,7 @@ static void put_zeros(const char *name, const char *plain, const void *head, siz
 {
     static const char zeros[MB];
     put(name, plain);
-    gzFile file = gzopen(in_folder(name), "ab9");
+    gzFile file = gzopen(in_folder(name), "ab1");
     assert_non_null(file);
     if (head_length)
         assert_int_equal(gzwrite(file, head, (unsigned)head_length), head_length);
@@ -155,19 +158,20 @@ static void a_stream_is_read_as_far_as_its_header_says(void **state)
 {
     (void)state;
     static const char head[] = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 64\nencoding: gzip\n\n";
+    enum { MANY = WHOLE_OR_SHORT(512, 32) };     // MB, more than there is memory in the whole run
     unsigned char nifti[352] = {0};
     int32_t size = 348;
     int16_t dim[8] = {3, 128, 128, 64, 1, 1, 1, 1}, type[2] = {2, 8};
-    float pixdim[8] = {1, 1, 1, 1, 1, 1, 1, 1}, offset = 512 * MB;
+    float pixdim[8] = {1, 1, 1, 1, 1, 1, 1, 1}, offset = MANY * MB;
     put_zeros("fits.nrrd", head, NULL, 0, 1);
-    put_zeros("bomb.nrrd", head, NULL, 0, 512);
+    put_zeros("bomb.nrrd", head, NULL, 0, MANY);
     memcpy(nifti, &size, 4);
     memcpy(nifti + 40, dim, 16);
     memcpy(nifti + 70, type, 4);
     memcpy(nifti + 76, pixdim, 32);
     memcpy(nifti + 108, &offset, 4);
     memcpy(nifti + 344, "n+1", 4);
-    put_zeros("skip.nii.gz", "", nifti, sizeof nifti, 512);
+    put_zeros("skip.nii.gz", "", nifti, sizeof nifti, MANY);
     ends_in_little_memory("info fits.nrrd", 0, "128");
     ends_in_little_memory("info bomb.nrrd", 2, "holds more than the 1048576 bytes that the header promises");
     // 352 bytes of header are skipped too, so the last voxels are missing

@@ -7,6 +7,7 @@
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
 #include "random_numbers.h"
+#include "tests/short_run.h"
 
 #include <malloc.h>
 #include <setjmp.h>
@@ -699,7 +700,7 @@ static VesselTree *sponge(void)
 static void rough_walls_are_met(void **state)
 {
     (void)state;
-    enum { WALKS = 40, STEPS = 1000, EVERY = 10 };
+    enum { WALKS = WHOLE_OR_SHORT(40, 8), STEPS = 1000, EVERY = 10 };
     VesselTree *t = sponge();
     Vessel *v = make(t, 0);
     uint64_t seed = 5;
@@ -777,7 +778,7 @@ static VesselTree *fork(uint64_t *seed)
 static void no_wall_where_a_field_ends(void **state)
 {
     (void)state;
-    enum { FORKS = 60, PLACES = 500 };
+    enum { FORKS = WHOLE_OR_SHORT(60, 5), PLACES = 500 };
     uint64_t seed = 3;
     int asked = 0, ends = 0;
     for (int n = 0; n < FORKS; n++) {

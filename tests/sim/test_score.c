@@ -9,6 +9,7 @@
 #include "../heap_calls.h"
 #include "score_scene.h"
 #include "sim/score_path.h"
+#include "tests/short_run.h"
 
 #include <stdio.h>
 
@@ -245,7 +246,8 @@ static void the_border_decides(void **state)
     (void)state;
     for (int inside = 0; inside < 2; inside++) {
         Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", hold_s: 0.5"), NULL);
-        ScoreFigures f = practice_go(p, 1, inside ? 18.002 : 17.998);
+        practice_go(p, 10, 1.7);
+        ScoreFigures f = practice_go(p, 1, inside ? 1.002 : 0.998);
         f = practice_go(p, 0, 0.49);
         assert_int_equal(f.state, SCORE_RUNNING);
         f = practice_go(p, 0, 0.02);
@@ -454,7 +456,7 @@ static void normal_bends_are_no_buckling(void **state)
         "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2.5, path: [{line_mm: "
                                                                                        "60}]}}\n" EXERCISE(""),
     };
-    for (size_t i = 0; i < sizeof scene / sizeof scene[0]; i++) {
+    for (size_t i = 0; i < sizeof scene / sizeof scene[0]; i += WHOLE_OR_SHORT(1, 3)) {     // the first and the last have all kinds of pieces
         Practice *p = practice_begin(scene[i], NULL);
         double most = 0;
         for (int k = 0; k < 3; k++) {                        // in, half out, in again
@@ -858,7 +860,7 @@ static void a_worse_figure_never_gives_more_points(void **state)
     assert_true(best.points > 50 && best.points <= 100);
     for (int k = 0; k < 4; k++) {
         double before = best.points;
-        for (int level = 1; level <= 3; level++) {
+        for (int level = WHOLE_OR_SHORT(1, 2); level <= WHOLE_OR_SHORT(3, 2); level++) {
             double x = level;
             Hand hand = {.wait_s = k == 0 ? x : 0, .contrast_ml_s = k == 1 ? 1.2 * x : 0, .detour_mm = k == 2 ? x : 0, .pedal_off_s = k == 3 ? 0.3 * x : 0};
             ScoreFigures f = reach(hand);

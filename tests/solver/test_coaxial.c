@@ -799,7 +799,7 @@ static void two_curved_tubes(void **state)
         for (int elements = 8; elements <= WHOLE_OR_SHORT(32, 16); elements *= 2) {
             two_curved(&c, elements, length);
             // up to the fold, where the base angle is largest; then by parabolas
-            double step = n == 0 ? 0.1 : 0.03, tip = 0, base[3] = {0}, degree = PI / 180;
+            double step = n == 0 ? WHOLE_OR_SHORT(0.1, 0.2) : 0.05, tip = 0, base[3] = {0}, degree = PI / 180;
             do {
                 best = c;
                 base[0] = base[1], base[1] = base[2];
@@ -831,10 +831,10 @@ static void two_curved_tubes(void **state)
     }
     // for L sqrt(c) < pi / 2 the base angle grows with the tip's angle through a whole turn; otherwise it turns back before
     for (int n = 0; n < 2; n++) {
-        two_curved(&c, 16, (n ? 1.65 : 1.5) / root);
+        two_curved(&c, WHOLE_OR_SHORT(16, 8), (n ? 1.65 : 1.5) / root);
         double last = 0, now = 0;
         bool turns_back = false;
-        for (double tip = 0.1; tip < PI; tip += 0.1) {
+        for (double tip = 0.1; tip < PI; tip += WHOLE_OR_SHORT(0.1, 0.2)) {
             c.turn[0][1] = 2 * now - last;
             last = now;
             now = base_of(&c, tip);
@@ -940,7 +940,7 @@ static Vec3 leaving_tip(double d, double *angle)
 static void bend_leaves_a_catheter(void **state)
 {
     (void)state;
-    enum { STEPS = 52, ROUNDS = WHOLE_OR_SHORT(20, 2) };
+    enum { STEPS = 52, ROUNDS = WHOLE_OR_SHORT(6, 2) };
     static Chain c, before;
     static double push_first[STEPS];
     static Vec3 tip_first[STEPS];
@@ -1159,14 +1159,14 @@ static void tangent_against_the_true_hessian(void **state)
     const Vec3 load[4] = {{0, 0, 0}, {0.01, 0.01, 0.01}, {-0.03, 0.03, 0.03}, {0.05, -0.05, 0.03}};
     double low, high;
     straight_into_curved(&c, 10, 33);
-    for (int n = 0; n < 4; n++) {
+    for (int n = 0; n < 4; n += WHOLE_OR_SHORT(1, 3)) {
         c.end_force = load[n];
         assert_true(chain_settle(&c, 200));
         spread(&c, &low, &high);
         print_message("straight in curved, %.3f N at the end: %.4f to %.4f (%d iterations)\n", vec3_norm(load[n]), low, high, c.iterations);
         assert_true(n > 0 ? low > 0.3 && high < 1.2 : low > 0.999 && high < 1.001);
     }
-    for (int n = 0; n < 5; n++) {
+    for (int n = 0; n < 5; n += WHOLE_OR_SHORT(1, 2)) {
         two_curved(&c, 10, 25);
         c.is_true = false;
         for (int i = 0; i < c.nodes; i++)
@@ -1177,7 +1177,7 @@ static void tangent_against_the_true_hessian(void **state)
         print_message("two curved, turned by %.1f%s: %.4f to %.4f (%d iterations)\n", c.turn[0][1], n < 4 ? "" : ", loaded", low, high, c.iterations);
         assert_true(n == 4 ? low > 0.3 && high < 1.2 : low > 0.999 && high < 1.001);
     }
-    for (int n = 0; n < 12; n++) {
+    for (int n = 0; n < WHOLE_OR_SHORT(12, 4); n++) {
         leaving(&c, n > 0 ? &before : NULL, 58.3 + n, 2, 0.01);
         assert_true(chain_settle(&c, 100));
         before = c;

@@ -102,8 +102,9 @@ static void a_straight_wire_in_a_curved_tube(void **state)
         start(&c, 1, false);
         const StepReport *r = move_tool(c.stepper, 1, 0, 0, 1, 400);
         double least = HUGE_VAL, most = 0;
-        for (double d = 1.5; d < 30; d += 0.95) {
-            r = move_tool(c.stepper, 1, 0.95, 0, 20, 200);
+        const double stride = WHOLE_OR_SHORT(0.95, 2.85);
+        for (double d = 1.5; d < 30; d += stride) {
+            r = move_tool(c.stepper, 1, stride, 0, WHOLE_OR_SHORT(20, 60), 200);
             least = fmin(least, r->push[1]);
             most = fmax(most, r->push[1]);
         }
@@ -132,7 +133,7 @@ static void turned_tubes_follow_up_to_the_fold(void **state)
     start(&c, 1, false);
     move_tool(c.stepper, 1, 0, 0, 1, 800);
     for (int turn = 60; turn <= WHOLE_OR_SHORT(240, 60); turn += 60) {
-        move_tool(c.stepper, 1, 0, PI / 3, 1500, 1500);
+        move_tool(c.stepper, 1, 0, PI / 3, WHOLE_OR_SHORT(1500, 500), WHOLE_OR_SHORT(1500, 800));
         const WireState *w = stepper_state(c.stepper);
         double tip = w->angle[60], phi = tip, slope = 0, h = L / 20000;
         for (int i = 0; i < 20000; i++) {        // from the tip back
@@ -167,7 +168,7 @@ static void a_bend_leaves_the_catheter(void **state)
         for (int i = 0; i < 16; i++) {
             int k = i < 8 ? i : 15 - i;
             double distance = stop[k].at - stepper_tool_inserted(c.stepper, 1);
-            const StepReport *r = move_tool(c.stepper, 1, distance, 0, 1 + (int)(fabs(distance) / 0.02), 400);
+            const StepReport *r = move_tool(c.stepper, 1, distance, 0, 1 + (int)(fabs(distance) / WHOLE_OR_SHORT(0.02, 0.05)), WHOLE_OR_SHORT(400, 250));
             assert_true(fabs(r->push[1] - stop[k].push) < 2e-5);
             assert_true(fabs(r->push[0] + stop[k].push) < 2e-5);
             if (k != 7 || i > 7)
@@ -229,14 +230,15 @@ static void tools_leave_the_sheath(void **state)
     assert_true(fabs(r->push[0] - 0.075) < 1e-5 && fabs(r->push[1] + 0.1) < 1e-5);      // tips flush
     StepEnergy before = stepper_energy(c.stepper);
     double gained = 0, work = 0;
-    for (int i = 0; i < 5000; i++) {
+    const int fast = WHOLE_OR_SHORT(1, 4);
+    for (int i = 0; i < 5000; i += fast) {
         StepCommand command[2] = {{0}};
         if (i < 2000)
-            command[0].advance = command[1].advance = 0.01;
+            command[0].advance = command[1].advance = 0.01 * fast;
         else if (i < 3500)
-            command[1] = (StepCommand){0.01, 0.001};
+            command[1] = (StepCommand){0.01 * fast, 0.001 * fast};
         else
-            command[1].advance = -0.01;
+            command[1].advance = -0.01 * fast;
         r = step_tools(c.stepper, command);
         assert_int_equal(r->flags, 0);
         StepEnergy e = stepper_energy(c.stepper);
@@ -341,9 +343,9 @@ static void a_thread_over_a_bend(void **state)
         StepCommand rest[2] = {{0}};
         for (int k = 0; k < 800; k++)
             step_tools(c.stepper, rest);
-        move_tool(c.stepper, 1, 33, 0, 3300, 200);
-        double up = -move_tool(c.stepper, 1, -2, 0, 2000, 0)->push[1] / weight;
-        double down = -move_tool(c.stepper, 1, 2, 0, 2000, 0)->push[1] / weight, exact = exp(0.1 * PI / 2);
+        move_tool(c.stepper, 1, 33, 0, WHOLE_OR_SHORT(3300, 1100), 200);
+        double up = -move_tool(c.stepper, 1, -2, 0, WHOLE_OR_SHORT(2000, 1000), 0)->push[1] / weight;
+        double down = -move_tool(c.stepper, 1, 2, 0, WHOLE_OR_SHORT(2000, 1000), 0)->push[1] / weight, exact = exp(0.1 * PI / 2);
         print_message("%d elements: %.5f of the weight up (%.5f), %.5f down (%.5f)\n", fine ? 80 : 40, up, exact, down, 1 / exact);
         assert_true(fabs(up / exact - 1) < 0.005 && fabs(down * exact - 1) < 0.005);
         stepper_destroy(c.stepper);
@@ -440,7 +442,7 @@ static void three_tools_stay_in_the_tube(void **state)
     three_in_a_tube(&c, vessel);
     double deepest = 0;
     int nodes = 0, stuck = 0;
-    for (int i = 0; i < WHOLE_OR_SHORT(6000, 4000); i++) {
+    for (int i = 0; i < WHOLE_OR_SHORT(6000, 2000); i++) {
         StepCommand command[3];
         wire_first(i, command);
         const StepReport *r = step_tools(c.stepper, command);
@@ -472,7 +474,7 @@ static void three_tools_stay_in_the_tube(void **state)
 static void turned_and_mirrored_scenes_go_the_same_way(void **state)
 {
     (void)state;
-    enum { STEPS = WHOLE_OR_SHORT(2500, 1000) };
+    enum { STEPS = WHOLE_OR_SHORT(2500, 600) };
     Quat turn[3] = {{1, 0, 0, 0}, quat_from_rotation_vector(vec3(0.7, -1.9, 0.4)), {1, 0, 0, 0}};
     double push[3][3];
     Vec3 tip[3];
@@ -584,14 +586,15 @@ static void events_leave_the_energy(void **state)
     start(&c, 1, true);
     double most[2] = {0}, highest = 0;
     int events = 0;
-    for (int i = 0; i < 7150; i++) {
+    const int fast = WHOLE_OR_SHORT(1, 2);
+    for (int i = 0; i < 7150; i += i < 6000 ? fast : 1) {
         StepCommand command[2] = {{0}};
         if (i < 2000)
-            command[0].advance = command[1].advance = 0.01;
+            command[0].advance = command[1].advance = 0.01 * fast;
         else if (i < 4000)
-            command[1] = (StepCommand){0.01, 0.001};
+            command[1] = (StepCommand){0.01 * fast, 0.001 * fast};
         else if (i < 6000)
-            command[1].advance = -0.02;
+            command[1].advance = -0.02 * fast;
         else         // the catheter is pulled back to the mouth and pushed out again around a wire that is rotated in it
             command[0].advance = i < 7050 ? -0.02 : 0.02;
         double before = stepper_elastic_energy(c.stepper);
@@ -671,10 +674,10 @@ static void tools_are_exchanged_at_the_hub(void **state)
     start(&c, 1, true);
     Stepper *s = c.stepper;
     assert_true(stepper_exchange(s, 0, 4) == EXCHANGE_NO_SUCH_TOOL && stepper_exchange(s, 2, 0) == EXCHANGE_NO_SUCH_TOOL);
-    move_tool(s, 1, 50, 1, 2000, 50);
-    move_tool(s, 0, 30, 0, 1500, 50);
+    move_tool(s, 1, 50, 1, WHOLE_OR_SHORT(2000, 700), 50);
+    move_tool(s, 0, 30, 0, WHOLE_OR_SHORT(1500, 500), 50);
     assert_true(stepper_exchange(s, 0, 1) == EXCHANGE_INSERTED && stepper_exchange(s, 1, 1) == EXCHANGE_INSERTED);
-    move_tool(s, 0, -30.99, 0, 2000, 200);
+    move_tool(s, 0, -30.99, 0, WHOLE_OR_SHORT(2000, 700), 200);
     const WireState *w = stepper_state(s);
     Vec3 before[60];
     double push = step_report(s)->push[1], elastic = stepper_elastic_energy(s);
@@ -696,8 +699,8 @@ static void tools_are_exchanged_at_the_hub(void **state)
     move_tool(s, 1, 0, 0, 1, 0);
     assert_true(stepper_hash(s) == hash);
     // the new catheter is inserted over the wire, then the wire is pulled out and a stiff one is inserted
-    move_tool(s, 0, 25, 0, 1500, 50);
-    move_tool(s, 1, -(stepper_tool_inserted(s, 1) - stepper_tool_inserted(s, 0) + 182) + 0.2, 0, WHOLE_OR_SHORT(8000, 2500), 200);
+    move_tool(s, 0, 25, 0, WHOLE_OR_SHORT(1500, 500), 50);
+    move_tool(s, 1, -(stepper_tool_inserted(s, 1) - stepper_tool_inserted(s, 0) + 182) + 0.2, 0, WHOLE_OR_SHORT(8000, 1500), 200);
     for (int i = 0; i < 40; i++)
         before[i] = w->position[w->node_count - 1 - i];
     assert_true(stepper_exchange(s, 1, 1) == EXCHANGE_DONE);
@@ -705,7 +708,7 @@ static void tools_are_exchanged_at_the_hub(void **state)
     moved = furthest_moved(before, w, 0, 40);
     print_message("wire: nodes move by %.1e mm, the new one's push %.1e N\n", moved, r->push[1]);
     assert_true(moved < 1e-4 && fabs(r->push[1]) < 1e-3);
-    move_tool(s, 1, 200, 0, WHOLE_OR_SHORT(8000, 2500), 50);
+    move_tool(s, 1, 200, 0, WHOLE_OR_SHORT(8000, 1500), 50);
     assert_true(stepper_tool_inserted(s, 1) > 30 && !(step_report(s)->flags & STEP_DIVERGED));
     checkpoint_free(kept);
     stepper_destroy(s);
@@ -741,7 +744,7 @@ static void the_outermost_hand_slips_by_its_own_push(void **state)
 {
     (void)state;
     double error[2];
-    for (int fine = 0; fine < 2; fine++) {
+    for (int fine = 0; fine < WHOLE_OR_SHORT(2, 1); fine++) {
         Coaxial c = {0};
         c.options.dt = fine ? 0.5 : 1;
         start_kick(&c, 0.05, 0, 2e-4);
@@ -762,7 +765,8 @@ static void the_outermost_hand_slips_by_its_own_push(void **state)
         assert_true(slipping > 100 && slipping < 1000 && vec3_distance(after, tip) < 1);
         stepper_destroy(c.stepper);
     }
-    assert_true(error[1] > 0 && error[1] < error[0] && error[1] < 0.015 * 13.49);
+    const int finest = WHOLE_OR_SHORT(1, 0);
+    assert_true(error[finest] > 0 && (!WHOLE_RUN || error[1] < error[0]) && error[finest] < 0.015 * 13.49);
 }
 
 // No hand holds the J. A valve of 0.1 N holds it and moves it with the catheter's hub, so that the catheter's hand has no force; a valve of 0.03 N lets it

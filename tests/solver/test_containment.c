@@ -11,6 +11,7 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
 #include "wire_scene.h"
 
 enum { PIECES_MAX = 12, STEPS_MAX = 6000 };
@@ -108,21 +109,21 @@ typedef struct Case {
 } Case;
 
 static const Case cases[] = {
-    {"capsule, 10 mm/s", &capsule, 100, 0.3, 60, 0.5, 0.1, 0, {{1500, 10, 0}}},
+    {"capsule, 10 mm/s", &capsule, 100, 0.3, 60, 0.5, 0.1, 0, {{WHOLE_OR_SHORT(1500, 600), 10, 0}}},
     {"capsule, 50 mm/s", &capsule, 100, 0.3, 120, 0.5, 0.1, 0, {{700, 50, 0}}},
     {"capsule, 200 mm/s", &capsule, 100, 0.3, 120, 0.5, 0.1, 0, {{200, 200, 0}}},
     {"bends, 100 mm/s and pull", &bends, 100, 0.36, 160, 0.5, 0.2, 0.1, {{600, 100, 0}, {280, -200, 0}}},
     {"coil, push and pull", &coil, 100, 0.2, 120, 0.4, 0.2, 0, {{600, 50, 0}, {130, -200, 0}}},
     {"coil, without friction", &coil, 100, 0.2, 120, 0.4, 0, 0, {{200, 200, 0}}},
-    {"spin in the wide", &wide, 80, 0.36, 60, 1, 0.1, 0.1, {{600, 50, 0}, {4000, 0, 1}}},
-    {"spin in bends, mu 0.5", &bends, 80, 0.36, 100, 0.5, 0.5, 0.3, {{600, 50, 0}, {1000, 0, 1}, {300, 0, -3}}},
+    {"spin in the wide", &wide, 80, 0.36, 60, 1, 0.1, 0.1, {{600, 50, 0}, {WHOLE_OR_SHORT(4000, 600), 0, 1}}},
+    {"spin in bends, mu 0.5", &bends, 80, 0.36, 100, 0.5, 0.5, 0.3, {{600, 50, 0}, {WHOLE_OR_SHORT(1000, 400), 0, 1}, {WHOLE_OR_SHORT(300, 150), 0, -3}}},
     {"jam, mu 0.1", &dead_end, 100, 0.36, 80, 0.75, 0.1, 0, {{1000, 50, 0}, {100, 0, 0}}},
-    {"jam, mu 1", &dead_end, 100, 0.36, 80, 0.75, 1, 0, {{1000, 50, 0}, {100, -50, 0}}},
+    {"jam, mu 1", &dead_end, 100, 0.36, 80, 0.75, 1, 0, {{WHOLE_OR_SHORT(1000, 600), 50, 0}, {100, -50, 0}}},
     {"noodle", &bends, 0.05, 0.36, 160, 0.5, 0.3, 0, {{350, 200, 0}, {200, -200, 0}}},
     {"hair", &bends, 20, 0.1, 160, 0.5, 0.1, 0.3, {{400, 100, 0}}},
     {"rod of 1 mm", &bends, 20, 1, 100, 0.7, 0.2, 0, {{400, 100, 0}, {150, -200, 0}}},
     {"20 elements of 4 mm", &wide, 80, 0.36, 20, 4, 0.5, 0, {{300, 200, 0}}},
-    {"800 elements of 0.05 mm", &bends, 100, 0.36, 800, 0.05, 0.5, 0, {{300, 100, 0}, {100, -100, 0}}},
+    {"800 elements of 0.05 mm", &bends, 100, 0.36, 800, 0.05, 0.5, 0, {{WHOLE_OR_SHORT(300, 150), 100, 0}, {WHOLE_OR_SHORT(100, 50), -100, 0}}},
 };
 
 static Stepper *make(const Case *c, const Vessel *vessel, Bench *b)

@@ -342,10 +342,10 @@ static void chain_takes_off_bounds(void **state)
     const double pulls[] = {0.05, 0.5, 3.3, 7.777, 10.6, 20};
     int most[2][2] = {{0}};
     for (int t = 0; t < 3; t++)
-        for (int direction = 0; direction < 8; direction++)
+        for (int direction = WHOLE_OR_SHORT(0, 1); direction < 8; direction += WHOLE_OR_SHORT(1, 2))
             for (size_t n = 0; n < sizeof pulls / sizeof *pulls; n++) {
                 pull_chain(CONTACT_BLOCK, sizes[t], direction * PI / 4, pulls[n], most[0]);
-                if (direction == 5 && n % WHOLE_OR_SHORT(1, 3) == 0)         // thousands of sweeps
+                if (direction == 5 && n % WHOLE_OR_SHORT(1, 6) == 0)         // thousands of sweeps
                     pull_chain(CONTACT_POINTWISE, sizes[t], direction * PI / 4, pulls[n], most[1]);
             }
     print_message("chain of 100 slides: up to %d factorisations from rest, %d turned round; %d and %d sweeps\n", most[0][0], most[0][1], most[1][0],
