@@ -227,7 +227,7 @@ static void end_check(const SweepVessel *v, Vec3 x, const Check *check, VesselMe
     bool nearer = check->nearer;
     for (int i = 0; i < check->count; i++) {
         SweepFoot other = check->found[i];
-        if (!(check->sound >> i & 1) || vec3_distance(other.at, foot.at) < SAME || (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
+        if (!(check->sound >> i & 1) || other.doubtful || vec3_distance(other.at, foot.at) < SAME || (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
             continue;
         if (fabs(other.gap) < fabs(foot.gap)) {
             other = foot, foot = check->found[i];
@@ -441,7 +441,7 @@ static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, 
         VesselHit *h = &batch->hit[which[i]];
         SweepFoot foot = {.at = m->foot, .normal = m->normal, .hessian = m->hessian, .gap = h->gap, .sure = true};
         foot.segment = m->sweep.segment, foot.sac = m->sweep.sac, foot.t = m->sweep.own_t;
-        if (!(done >> i & 1) || vec3_distance(rival[i].at, foot.at) < 1e-4) {
+        if (!(done >> i & 1) || rival[i].doubtful || vec3_distance(rival[i].at, foot.at) < 1e-4) {
             put_check(v, batch, which[i], &foot, m->sweep.open != 0);
             continue;
         }
