@@ -227,7 +227,8 @@ static void end_check(const SweepVessel *v, Vec3 x, const Check *check, VesselMe
     bool nearer = check->nearer;
     for (int i = 0; i < check->count; i++) {
         SweepFoot other = check->found[i];
-        if (!(check->sound >> i & 1) || other.doubtful || vec3_distance(other.at, foot.at) < SAME || (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
+        if (!(check->sound >> i & 1) || other.doubtful || vec3_distance(other.at, foot.at) < SAME ||
+            (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
             continue;
         if (fabs(other.gap) < fabs(foot.gap)) {
             other = foot, foot = check->found[i];

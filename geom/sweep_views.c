@@ -50,7 +50,8 @@ static double apart(const SweepField *field, Meeting *m, double *own, double *le
     m->t_earlier = sweep_curve_project(field->curve[m->earlier], x, m->t_earlier, 2 * field->model->branch[m->earlier].radius);
     double their = sweep_field_largest(field, m->earlier, m->t_earlier);
     *own = sweep_field_largest(field, m->later, m->t), *least = fmin(*own, their);
-    *blend = 2 * width_at(field, m->later, m->t) + MARGIN * *least;
+    // the earlier one may blend with a third branch before they meet
+    *blend = 2 * (width_at(field, m->later, m->t) + width_at(field, m->earlier, m->t_earlier)) + MARGIN * *least;
     return vec3_distance(x, sweep_curve_at(field->curve[m->earlier], m->t_earlier).s) - *own - their - *blend;
 }
 
