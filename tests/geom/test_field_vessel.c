@@ -491,6 +491,24 @@ static void moved_and_mirrored_scenes(void **state)
         assert_true(vec3_distance(mirrored(hit[0].normal), hit[2].normal) < 1e-6);
     }
     assert_true(compared > 300);
+    // about the inlet, where the fields are those of the section at the root; the helix starts obliquely to all axes
+    Vec3 d = t[0]->direction[0], e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
+    int near = 0;
+    for (int trial = 0; trial < 400; trial++) {
+        double z = random_in(&seed, -1.5, 0.6), rho = random_in(&seed, 0.6, 1), angle = random_in(&seed, 0, 2 * PI);
+        Vec3 at = vec3_add_scaled(t[0]->center[0], z, d);
+        at = vec3_add(at, vec3_add_scaled(vec3_scale(e1, rho * cos(angle)), rho * sin(angle), e2));
+        VesselHit hit[3] = {ask(v[0], at, 0, 0.5), ask(v[1], vec3_add(quat_rotate(q, at), shift), 0, 0.5), ask(v[2], mirrored(at), 0, 0.5)};
+        if (hit[0].flags & ~(unsigned)VESSEL_BEYOND || hit[0].gap > 0.4)
+            continue;
+        near++;
+        Vec3 u = random_unit_vector(&seed);
+        assert_true(hit[1].flags == hit[0].flags && hit[2].flags == hit[0].flags);
+        assert_near(hit[0].gap, hit[1].gap, 1e-8);
+        assert_near(sym3_quadratic(&hit[0].hessian, u), sym3_quadratic(&hit[1].hessian, quat_rotate(q, u)), 1e-3);
+        assert_near(sym3_quadratic(&hit[0].hessian, u), sym3_quadratic(&hit[2].hessian, mirrored(u)), 1e-3);
+    }
+    assert_true(near > 200);
     for (int i = 0; i < 3; i++) {
         v[i]->destroy(v[i]);
         vessel_tree_free(t[i]);

@@ -283,12 +283,18 @@ static void bad_options(void **state)
     Vec3 was = s->surface->vertex[3];
     s->surface->vertex[3].y = NAN;
     assert_null(grid_vessel_create(s->exact, s->surface, &good, "test", &faults));
+    for (int axis = 0; axis < 3; axis++) {      // beyond the lattice along one axis
+        double far[3] = {1, 1, 1};
+        far[axis] = axis == 1 ? -1e9 : 1e9;
+        s->surface->vertex[3] = vec3(far[0], far[1], far[2]);
+        assert_null(grid_vessel_create(s->exact, s->surface, &good, "test", &faults));
+    }
     s->surface->vertex[3] = was;
     int v = s->surface->triangle[7][1];
     s->surface->triangle[7][1] = s->surface->vertex_count;
     assert_null(grid_vessel_create(s->exact, s->surface, &good, "test", &faults));
     s->surface->triangle[7][1] = v;
-    assert_int_equal(faults.count, 3);
+    assert_int_equal(faults.count, 6);
     free_sampled(s);
 }
 

@@ -181,6 +181,24 @@ static void junctions_are_open_capped_or_apart(void **state)
     }
 }
 
+// Two equal branches without blobs at their starts, on opposite sides of a trunk along x: of equal junctions the one with the lower node comes first.
+static void equal_junctions_are_in_the_order_of_nodes(void **state)
+{
+    (void)state;
+    FieldTree *t = fresh();
+    field_tree_branch(t, -1, vec3(0, 0, 0), vec3(30, 0, 0), 1, 1e9, 0);
+    field_tree_extend_root(t);
+    for (int side = -1; side < 2; side += 2)
+        field_tree_branch(t, 40, vec3(20, 0.4 * side, 0), vec3(20, 8 * side, 0), 0.5, -1, 2.6);
+    VesselTree *tree = field_tree_make(t, NULL);
+    Reach *reach = reach_with(tree, 0.18);
+    assert_int_equal(reach->junction_count, 2);
+    assert_true(reach->junction[0].clearance == reach->junction[1].clearance);
+    assert_true(reach->junction[0].node < reach->junction[1].node);
+    reach_free(reach);
+    vessel_tree_free(tree);
+}
+
 static void a_kissing_vessel_opens_nothing(void **state)
 {
     (void)state;
@@ -257,10 +275,15 @@ static void options_are_checked(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_straight_tube_is_reached_to_its_end), cmocka_unit_test(a_gap_stops_the_flood_where_it_begins),
-        cmocka_unit_test(a_tool_gets_by_beside_the_line),        cmocka_unit_test(a_thin_diaphragm_shuts),
-        cmocka_unit_test(junctions_are_open_capped_or_apart),    cmocka_unit_test(a_kissing_vessel_opens_nothing),
-        cmocka_unit_test(local_models_are_flooded_too),          cmocka_unit_test(options_are_checked),
+        cmocka_unit_test(a_straight_tube_is_reached_to_its_end),
+        cmocka_unit_test(a_gap_stops_the_flood_where_it_begins),
+        cmocka_unit_test(a_tool_gets_by_beside_the_line),
+        cmocka_unit_test(a_thin_diaphragm_shuts),
+        cmocka_unit_test(junctions_are_open_capped_or_apart),
+        cmocka_unit_test(equal_junctions_are_in_the_order_of_nodes),
+        cmocka_unit_test(a_kissing_vessel_opens_nothing),
+        cmocka_unit_test(local_models_are_flooded_too),
+        cmocka_unit_test(options_are_checked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -156,6 +156,26 @@ static void what_hangs_on_nothing_is_found(void **state)
     }
 }
 
+// A branch that is shut and larger than the trunk: the part of the inlet is the one that a point reaches, not the largest.
+static void the_largest_part_may_be_shut(void **state)
+{
+    (void)state;
+    FieldTree *t = fresh();
+    field_tree_branch(t, -1, vec3(0, 0, 0), vec3(30, 0, 0), 1, 1e9, 0);
+    field_tree_extend_root(t);
+    field_tree_branch(t, 40, vec3(20, 0.4, 0), vec3(20, 30, 0), 2, -1, 5);
+    VesselTree *tree = field_tree_make(t, NULL);
+    TriangleMesh *mesh = isosurface_of_tree(tree, 0.3);
+    SurfaceParts *parts = parts_of(mesh, tree);
+    assert_int_equal(parts->count, 2);
+    assert_true(parts->part[0].volume > 2 * parts->part[1].volume);
+    assert_int_equal(parts->part[0].kind, PART_SHUT);
+    assert_int_equal(parts->part[1].kind, PART_INLET);
+    surface_parts_free(parts);
+    triangle_mesh_free(mesh);
+    vessel_tree_free(tree);
+}
+
 static void ghosts_are_found_without_a_mesh(void **state)
 {
     (void)state;
@@ -186,9 +206,8 @@ static void ghosts_are_found_without_a_mesh(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kissing_lumens_are_two_sheets),
-        cmocka_unit_test(a_fork_is_one_part),
-        cmocka_unit_test(what_hangs_on_nothing_is_found),
+        cmocka_unit_test(kissing_lumens_are_two_sheets),   cmocka_unit_test(a_fork_is_one_part),
+        cmocka_unit_test(what_hangs_on_nothing_is_found),  cmocka_unit_test(the_largest_part_may_be_shut),
         cmocka_unit_test(ghosts_are_found_without_a_mesh),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

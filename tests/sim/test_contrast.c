@@ -302,6 +302,29 @@ static void a_sac_washes_out_exponentially(void **state)
     vessel_tree_free(tree);
 }
 
+// Two equal sacs at one place of a tube have equal contents at all times, whether the blood flows on or, with more injected than flows, back.
+static void sacs_at_one_neck_fill_alike(void **state)
+{
+    (void)state;
+    VesselTree *tree = new_tree(43);
+    for (int i = 0; i <= 40; i++)
+        set_node(tree, i, i - 1, vec3(i, 0, 0), 2);
+    set_node(tree, 41, 20, vec3(20, 4, 0), 1);
+    set_node(tree, 42, 20, vec3(20, -4, 0), 1);
+    tree->kind[41] = tree->kind[42] = NODE_ANEURYSM;
+    ContrastOptions options = steady(2);
+    for (int tip = 5; tip <= 35; tip += 30) {
+        Contrast *contrast = make(tree, &options);
+        const float *c = contrast_concentration(contrast);
+        for (int i = 0; i < 200; i++)
+            contrast_advance(contrast, 0.005, tip, 8);
+        assert_true(c[41] > 0.3 && fabs(c[41] - c[42]) < 1e-6);
+        check_balance(contrast);
+        contrast_free(contrast);
+    }
+    vessel_tree_free(tree);
+}
+
 // Each node below the tip receives the injected agent, diluted by the flow at the tip and delayed by the transit time: the areas under the curves are equal,
 // and the mean times differ by the transit time. Other nodes receive nothing.
 static void every_node_sees_the_bolus_in_its_time(void **state)
@@ -625,6 +648,7 @@ int main(void)
         cmocka_unit_test(below_the_tip_only),
         cmocka_unit_test(what_does_not_continue_goes_back),
         cmocka_unit_test(a_sac_washes_out_exponentially),
+        cmocka_unit_test(sacs_at_one_neck_fill_alike),
         cmocka_unit_test(every_node_sees_the_bolus_in_its_time),
         cmocka_unit_test(the_pulse_moves_by_its_integral),
         cmocka_unit_test(a_mirrored_tree_fills_alike),

@@ -100,6 +100,35 @@ static void let_go(void)
     atomic_store(&port.twist_deg_s, 0);
 }
 
+// What is injected at a steady flow has reached the vessel, except that of the last few steps, and is seen there.
+static void agent_reaches_the_vessel(void **state)
+{
+    (void)state;
+    enum { STEPS = 405 };
+    static const ToolCommands still = {0};
+    Simulator *simulator = simulator_create(trainer.scene, trainer.open.vessel, &faults);
+    SessionTracker *tracker = session_tracker_create(simulator, trainer.open.tree);
+    TrackerView *view = malloc(session_tracker_view_bytes(tracker));
+    assert_non_null(view);
+    XrayControl xray = xray_default_control();
+    xray.contrast_ml_s = 4;
+    for (int i = 0; i < STEPS; i++) {
+        simulator_step_one_tool(simulator, still.tool[0]);
+        session_tracker_step(tracker, simulator, &still, &xray);
+    }
+    session_tracker_publish(tracker, view);
+    double injected = 4 * STEPS * simulator_scene(simulator)->dt / 1000, each = 4 * simulator_scene(simulator)->dt / 1000;
+    float most = 0;
+    for (int i = 0; i < view->node_count; i++)
+        most = fmaxf(most, view->concentration[i]);
+    assert_near(view->flow_ml_s, 4, 1e-9);
+    assert_true(view->injected_ml <= injected + 1e-9 && view->injected_ml > injected - 10 * each);
+    assert_true(most > 0.1f && most <= 1);
+    free(view);
+    session_tracker_free(tracker);
+    simulator_destroy(simulator);
+}
+
 static int progress_calls;
 
 static void take_note(void *context, double part)
@@ -396,7 +425,7 @@ static void a_place_where_nothing_can_be_written_is_reported(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_continues_from_a_moment_of_it),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(agent_reaches_the_vessel), cmocka_unit_test(a_session_continues_from_a_moment_of_it),
                                        cmocka_unit_test(two_tools_are_moved_locked_let_go_and_replayed), cmocka_unit_test(a_tool_is_exchanged_and_replayed),
                                        cmocka_unit_test(what_is_not_the_recording_of_a_session_is_refused),
                                        cmocka_unit_test(a_place_where_nothing_can_be_written_is_reported)};

@@ -298,8 +298,17 @@ static void what_is_read_of_several_tools(void **state)
         assert_same_pose(pose, seen[run->frame_step[k]]);
     }
     // there are no values beyond the nodes in use
-    int64_t unused = run->frame_nodes[0];
-    assert_true(unused < run->node_count && isnan(run->position[unused].x) && isnan(run->s[unused]) && run->vessel_node[unused] == -1);
+    assert_true(run->frame_nodes[0] < run->node_count);
+    for (int64_t k = 0; k < run->frame_count; k++)
+        for (int64_t i = 0; i < run->node_count; i++) {
+            int64_t at = k * run->node_count + i;
+            bool is_unused = i >= run->frame_nodes[k];
+            assert_true(isnan(run->position[at].x) == is_unused && isnan(run->quaternion[at].w) == is_unused && isnan(run->s[at]) == is_unused);
+            for (int c = 0; c < 3; c++)
+                assert_true(isnan(run->force[3 * at + c]) == is_unused);
+            assert_true(isnan(run->gap[at]) == is_unused && isnan(run->radius[at]) == is_unused);
+            assert_true(!is_unused || run->vessel_node[at] == -1);
+        }
     assert_replays(run);
     pose_free(pose);
     for (int i = 0; i < STEPS; i++)

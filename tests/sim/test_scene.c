@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 // cmocka's own function compares in single precision
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
@@ -243,6 +244,7 @@ static const Broken broken[] = {
     {VERIFY("quantity: speed, reference: 1, tolerance: 1"), "4:38", "one of: position_mm"},
     {VERIFY("quantity: position_mm, reference: 1, tolerance: 1"), "4:18", "has no key 's_mm'"},
     {VERIFY("quantity: position_mm, s_mm: 101, reference: 1, tolerance: 1"), "4:57", "at most 100"},
+    {VERIFY("quantity: wall_force_n, s_mm: 10, from_s_mm: 20, reference: 1, tolerance: 1"), "4:73", "lies beyond 's_mm' 10"},
     {VERIFY("quantity: tangent_deg, s_mm: end, reference: 1, tolerance: 1"), "4:18", "has no key 'axis'"},
     {VERIFY("quantity: push_force_n, s_mm: 1, reference: 1, tolerance: 1"), "4:58", "has no effect here"},
     {VERIFY("quantity: push_force_n, tolerance: 1"), "4:18", "has no key 'reference'"},
@@ -298,6 +300,27 @@ static void each_fault_has_its_line_and_column(void **state)
                                  faults.count ? faults.text[0] : "");
     }
     assert_int_equal(wrong, 0);
+}
+
+static void a_polyline_has_two_points_at_least(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/seldinger-points-XXXXXX", text[500];
+    static const char *const points = "x_mm,y_mm,z_mm\n0,0,0\n10,0,0\n";
+    FILE *file = fdopen(mkstemp(path), "w");
+    assert_non_null(file);
+    fputs(points, file);
+    assert_int_equal(fclose(file), 0);
+    snprintf(text, sizeof text, "%svessel: {tube: {radius_mm: 1, points: %s}}\n", WHOLE, path);
+    Scene *scene = good(text);
+    assert_int_equal(scene->tube.point_count, 2);
+    assert_true(scene->tube.point[1].x == 10);
+    scene_free(scene);
+    assert_int_equal(truncate(path, (off_t)(strlen(points) - strlen("10,0,0\n"))), 0);
+    assert_null(parse(text));
+    assert_int_equal(faults.count, 1);
+    assert_non_null(strstr(faults.text[0], "has 1 points; expected at least 2"));
+    remove(path);
 }
 
 static void all_faults_come_in_one_pass(void **state)
@@ -403,6 +426,7 @@ int main(void)
         cmocka_unit_test(a_verify_plan_is_read),
         cmocka_unit_test(the_contracts_example_with_sheath_and_rig_is_good),
         cmocka_unit_test(each_fault_has_its_line_and_column),
+        cmocka_unit_test(a_polyline_has_two_points_at_least),
         cmocka_unit_test(all_faults_come_in_one_pass),
         cmocka_unit_test(a_missing_script_and_a_wrong_one_are_the_scenes_faults),
         cmocka_unit_test(another_script_takes_its_place),

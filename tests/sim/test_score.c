@@ -379,6 +379,31 @@ static void a_tip_in_another_branch_is_found(void **state)
     vessel_tree_free(t);
 }
 
+// Beside a wide vessel that belongs to a far part of the tree: although its nodes are the nearest by power, the tip stays in its own branch.
+static void a_tip_beside_a_wide_vessel_stays(void **state)
+{
+    (void)state;
+    enum { ARM = 16, LOOP = 31 };
+    VesselTree *t = vessel_tree_create(2 * ARM + LOOP, 0, 0);
+    assert_non_null(t);
+    for (int i = 0; i < t->node_count; i++) {
+        int k = i - ARM, half = LOOP / 2;
+        t->center[i] = k < 0 ? vec3(2 * i, 0, 0) : k < LOOP ? vec3(33, k > half ? 3.5 : 0, 2 * (half + 1 - abs(k - half))) : vec3(33 - 2 * (k - LOOP), 3.5, 0);
+        t->radius[i] = k < LOOP ? 2 : 4;
+        t->direction[i] = vec3(1, 0, 0);
+        t->parent[i] = i - 1;
+    }
+    assert_true(vessel_tree_link(t));
+    assert_true(power_nearest(t, vec3(21, 0, 0)) >= ARM + LOOP);
+    Practice *p = practice_begin("seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" AT(60) EXERCISE(""), t);
+    for (int k = 1; k < 12; k++) {
+        ScoreFigures f = practice_go(p, 20, 0.1);            // 2 mm further, halfway between two nodes
+        assert_true(f.tip_node == k || f.tip_node == k + 1);
+    }
+    practice_end(p);
+    vessel_tree_free(t);
+}
+
 // --- buckling ---
 
 #define TUBE(path, ends)                                                                                                                                       \
@@ -972,6 +997,7 @@ int main(void)
         cmocka_unit_test(the_path_is_measured_along_the_tree),
         cmocka_unit_test(a_wrong_branch_counts_once_each_time),
         cmocka_unit_test(a_tip_in_another_branch_is_found),
+        cmocka_unit_test(a_tip_beside_a_wide_vessel_stays),
         cmocka_unit_test(a_tool_whose_tip_is_held_buckles_at_the_sheath),
         cmocka_unit_test(a_blind_end_makes_it_buckle),
         cmocka_unit_test(normal_bends_are_no_buckling),

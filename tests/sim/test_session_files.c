@@ -157,9 +157,43 @@ static void the_session_file_is_of_its_recording(void **state)
     trainer_scene_close(&it);
 }
 
+// A recording with a date that is none, as another program could write: the recovered session gets the time at which the file was last written.
+static void a_wrong_date_is_replaced(void **state)
+{
+    (void)state;
+    static Session session;
+    struct stat status;
+    char path[200], report[500], written[SESSION_DATE];
+    snprintf(path, sizeof path, "%s", in_folder("undated.h5"));
+    faults_clear(&faults);
+    TrainerScene it = trainer_scene_open(false);
+    Simulator *simulator = simulator_create(it.scene, it.open.vessel, &faults);
+    RecordingOptions options = recording_default_options();
+    options.trainee = "Ada";
+    options.date = "2023-11-14 22:13";
+    Recording *recording = recording_create(path, simulator, &options, &faults);
+    assert_non_null(recording);
+    Command command = {25, 40};
+    XrayControl xray = xray_default_control();
+    for (int i = 0; i < 20; i++) {
+        simulator_step_one_tool(simulator, command);
+        assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, &xray));
+    }
+    assert_true(recording_close(recording, simulator, &faults));
+    assert_int_equal(stat(path, &status), 0);
+    session_date(status.st_mtime, written);
+    snprintf(report, sizeof report, "%s report --quiet '%s'", SELDINGER_PROGRAM, path);
+    assert_int_equal(system(report), 0);
+    assert_true(session_load(in_folder("undated.json"), &session, &faults));
+    assert_string_equal(session.date, written);
+    simulator_destroy(simulator);
+    trainer_scene_close(&it);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_folder_is_made_where_it_is_wanted), cmocka_unit_test(what_is_no_folder_is_refused),
-                                       cmocka_unit_test(no_name_is_taken_twice), cmocka_unit_test(the_session_file_is_of_its_recording)};
+                                       cmocka_unit_test(no_name_is_taken_twice), cmocka_unit_test(the_session_file_is_of_its_recording),
+                                       cmocka_unit_test(a_wrong_date_is_replaced)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

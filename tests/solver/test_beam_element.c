@@ -1,6 +1,7 @@
 // Laws of the beam element: no force at rest, force = -dE/dx, invariance, symmetry, tangent compared with the derivative of the force.
 #include "base/simd.h"
 #include "solver/beam.h"
+#include "solver/node_turn.h"
 #include "solver/sheath.h"
 #include "solver/wire.h"
 
@@ -535,6 +536,20 @@ static void sheath_joins_the_chain(void **state)
     }
 }
 
+// exp(r/2) by its series against cosine and sine, up to the largest angle; the terms that are left out are below 1e-16.
+static void turns_are_exact(void **state)
+{
+    (void)state;
+    for (int i = 1; i <= 50; i++) {
+        double angle = NODE_TURN_MAX * i / 50;
+        Vec3 axis = vec3_unit(random_vec(1)), r = vec3_scale(axis, angle);
+        Quat q = {1, 0, 0, 0};
+        node_turn(1, &r.x, &r.y, &r.z, &q);
+        assert_true(fabs(q.w - cos(0.5 * angle)) < 1e-15);
+        assert_true(vec3_distance(vec3(q.x, q.y, q.z), vec3_scale(axis, sin(0.5 * angle))) < 1e-15);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -549,6 +564,7 @@ int main(void)
         cmocka_unit_test(chain_equals_elements),
         cmocka_unit_test(sheath_gradient),
         cmocka_unit_test(sheath_joins_the_chain),
+        cmocka_unit_test(turns_are_exact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
