@@ -425,8 +425,10 @@ static void a_place_where_nothing_can_be_written_is_reported(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(agent_reaches_the_vessel), cmocka_unit_test(a_session_continues_from_a_moment_of_it),
-                                       cmocka_unit_test(two_tools_are_moved_locked_let_go_and_replayed), cmocka_unit_test(a_tool_is_exchanged_and_replayed),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(agent_reaches_the_vessel),
+                                       cmocka_unit_test(a_session_continues_from_a_moment_of_it),
+                                       cmocka_unit_test(two_tools_are_moved_locked_let_go_and_replayed),
+                                       cmocka_unit_test(a_tool_is_exchanged_and_replayed),
                                        cmocka_unit_test(what_is_not_the_recording_of_a_session_is_refused),
                                        cmocka_unit_test(a_place_where_nothing_can_be_written_is_reported)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
