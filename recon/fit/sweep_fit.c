@@ -22,7 +22,7 @@ static const double OUT = 0.5;               // [radii] points further from the 
 
 SweepFitOptions sweep_fit_default_options(void)
 {
-    return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = SWEEP_HARMONICS, .rounds = 6, .blend = 0.6};
+    return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = SWEEP_HARMONICS, .rounds = 9, .blend = 0.6};
 }
 
 static bool check_options(const SweepFitOptions *o, Faults *faults)
@@ -279,7 +279,12 @@ static void see_blend(void *context, long p)
     sweep_field_blend(r->field, place, d->point[p], &blend);
     double slope = fmax(vec3_norm(blend.gradient), LEAST_SLOPE);
     r->system->distance[p] = blend.f / slope;
-    r->system->trust[p] = trust_of(blend.f / slope, r->system->noise, r->knee * d->tree->radius[d->node[p]]);
+    // a point on its own branch's wall is no outlier, even if another branch's section has grown over it
+    double e = fabs(blend.f) / slope;
+    for (int i = 0; i < blend.count; i++)
+        if (blend.part[i].branch >= 0 && blend.part[i].branch == d->owner[p])
+            e = fmin(e, fabs(blend.part[i].f));
+    r->system->trust[p] = trust_of(e, r->system->noise, r->knee * d->tree->radius[d->node[p]]);
     r->count[p] = 0;
     for (int i = 0; i < blend.count && r->count[p] < MOST_SIGHTS; i++)
         if (blend.part[i].branch >= 0 && fabs(blend.part[i].share) > 1e-4)
@@ -290,7 +295,7 @@ static void see_blend(void *context, long p)
 static void see_guard(void *context, long index)
 {
     // [radii] depth in the other lumen; standard deviation; and the least weight relative to a point's: exact points would outweigh any deviation
-    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 1e-2;
+    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 4e-4;
     Refinement *r = context;
     const SweepGuard *guard = &r->draft->guard[index];
     int64_t p = r->draft->point_count + index;
