@@ -314,7 +314,7 @@ static void add_foot(SweepFoot *foot, int *count, const SweepFoot *more)
     for (int i = 0; i < *count; i++) {
         if (vec3_distance(foot[i].at, more->at) < SAME)
             return;
-        at += fabs(foot[i].gap) <= fabs(more->gap);
+        at += foot[i].doubtful < more->doubtful || (foot[i].doubtful == more->doubtful && fabs(foot[i].gap) <= fabs(more->gap));
     }
     if (at == SWEEP_FEET)
         return;
@@ -323,6 +323,7 @@ static void add_foot(SweepFoot *foot, int *count, const SweepFoot *more)
     foot[at] = *more;
 }
 
+static const double OFF_WALL = 1e-4;        // relative to the radius: |F| of what is no foot
 static const double REST_FRESH = 1e-10;      // [mm] error of the gap that Newton may leave for a foot found from scratch
 
 // Prepares a block for careful steps; lanes beyond `count` repeat the first.
@@ -387,9 +388,20 @@ unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *st
     if (done != all)
         sweep_block_sample(feet, &b, all & ~done);
     feet->kernels->finish(&b.foot);
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++)
         foot[i] = sweep_block_foot(feet, &b, i);
-        if ((done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])) && is_number(&foot[i]))
+    // On the way from a distant start, t of another branch may have been caught at a place where that branch comes near again: F as seen from the foot decides.
+    unsigned several = 0;
+    for (int i = 0; i < count; i++)
+        if (b.view[i]->count > 1 && is_number(&foot[i])) {
+            sweep_block_place(feet, &b, i, foot[i].segment, foot[i].sac, foot[i].t);
+            several |= 1u << i;
+        }
+    if (several != 0)
+        sweep_block_sample(feet, &b, several);
+    for (int i = 0; i < count; i++) {
+        foot[i].doubtful = several >> i & 1 && fabs(b.foot.at.f[i]) > OFF_WALL * b.foot.radius[i];
+        if (is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
             sound |= 1u << i;
     }
     return sound;

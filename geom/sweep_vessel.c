@@ -142,7 +142,7 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
 // --- Checks ---
 
 // A foot that may not be the nearest: its rivals' starts, and the feet that Newton finds from them.
-enum { CHECK_STARTS = 4 };
+enum { CHECK_STARTS = SWEEP_FEET };
 typedef struct Check {
     int point, count;        // index in the query; number of starts
     bool nearer;             // a ring has a point nearer than the foot
@@ -175,7 +175,7 @@ static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
     SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot->at, .beyond = limit, .nearest_beyond = &check->beyond};
     // a start closer to the foot than this leads to it, and a wall closer than `zone` belongs to it; outside, in the groove between two tubes, feet on both sides
     // are as near to each other as to x
-    search.own = foot->gap > 0 ? 0.45 * radius : fmin(0.45 * radius, -0.6 * foot->gap);
+    search.own = foot->gap > 0 ? 0.33 * radius : fmin(0.33 * radius, -0.6 * foot->gap);
     search.zone = foot->gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot->gap);
     bool single = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
     check->radius = radius, check->rival = check->beyond = limit, check->count = 0, check->sound = 0;
@@ -227,7 +227,8 @@ static void end_check(const SweepVessel *v, Vec3 x, const Check *check, VesselMe
     bool nearer = check->nearer;
     for (int i = 0; i < check->count; i++) {
         SweepFoot other = check->found[i];
-        if (!(check->sound >> i & 1) || vec3_distance(other.at, foot.at) < SAME || (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
+        if (!(check->sound >> i & 1) || other.doubtful || vec3_distance(other.at, foot.at) < SAME ||
+            (isfinite(second.gap) && vec3_distance(other.at, second.at) < SAME))
             continue;
         if (fabs(other.gap) < fabs(foot.gap)) {
             other = foot, foot = check->found[i];
@@ -441,7 +442,7 @@ static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, 
         VesselHit *h = &batch->hit[which[i]];
         SweepFoot foot = {.at = m->foot, .normal = m->normal, .hessian = m->hessian, .gap = h->gap, .sure = true};
         foot.segment = m->sweep.segment, foot.sac = m->sweep.sac, foot.t = m->sweep.own_t;
-        if (!(done >> i & 1) || vec3_distance(rival[i].at, foot.at) < 1e-4) {
+        if (!(done >> i & 1) || rival[i].doubtful || vec3_distance(rival[i].at, foot.at) < 1e-4) {
             put_check(v, batch, which[i], &foot, m->sweep.open != 0);
             continue;
         }

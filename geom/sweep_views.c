@@ -5,6 +5,7 @@
 
 #include "geom/power_walk.h"
 
+enum { PASSES = 4 };
 static const double STEP = 0.25;             // of a walk, relative to the narrower tube
 static const double MARGIN = 0.25;           // relative to the narrower tube's radius: what is further apart is not seen
 static const double ASIDE = 1.5;             // how much longer the overlap may be on the parent's curve, on the inner side of a bend
@@ -35,33 +36,44 @@ static double width_at(const SweepField *field, int branch, double t)
     return fork->delta * (SWEEP_LEAST_BLEND + (left > 0 ? (1 - SWEEP_LEAST_BLEND) * left * left : 0));
 }
 
-// Follows `child` from its start along `other`, from t = start there.
-static void follow(SweepField *field, int child, int other, double start)
+// A place on two branches, the later one and an earlier one, where their tubes may overlap.
+typedef struct Meeting {
+    int later, earlier;
+    double t, t_earlier;
+} Meeting;
+
+// [mm] How far the tubes, enlarged by the width of the blend, are apart at a meeting; < 0: they overlap. Moves t_earlier to the foot of the later branch's
+// point.
+static double apart(const SweepField *field, Meeting *m, double *own, double *least, double *blend)
 {
-    const SweepCurve *curve = field->curve[child], *along = field->curve[other];
-    int last = field->first_segment[child] - 1, end = field->first_segment[child + 1];
-    double t_other = start, longest = 2 * field->model->branch[other].radius;
-    for (double t = 0;;) {
-        Vec3 x = sweep_curve_at(curve, t).s;
-        t_other = sweep_curve_project(along, x, t_other, longest);
-        double own = sweep_field_largest(field, child, t), their = sweep_field_largest(field, other, t_other), least = fmin(own, their);
-        double blend = 2 * width_at(field, child, t) + MARGIN * least;
-        if (!(vec3_distance(x, sweep_curve_at(along, t_other).s) < own + their + blend))
-            break;
-        int here = sweep_field_segment(field, child, t);
-        for (int s = last + 1; s <= here; s++)
-            add_candidate(field, s, other, t_other, 0);
-        last = here > last ? here : last;
+    Vec3 x = sweep_curve_at(field->curve[m->later], m->t).s;
+    m->t_earlier = sweep_curve_project(field->curve[m->earlier], x, m->t_earlier, 2 * field->model->branch[m->earlier].radius);
+    double their = sweep_field_largest(field, m->earlier, m->t_earlier);
+    *own = sweep_field_largest(field, m->later, m->t), *least = fmin(*own, their);
+    // the earlier one may blend with a third branch before they meet
+    *blend = 2 * (width_at(field, m->later, m->t) + width_at(field, m->earlier, m->t_earlier)) + MARGIN * *least;
+    return vec3_distance(x, sweep_curve_at(field->curve[m->earlier], m->t_earlier).s) - *own - their - *blend;
+}
+
+// Follows the later branch of a meeting, forwards or backwards, as long as the tubes overlap.
+static void follow(SweepField *field, Meeting m, double way)
+{
+    double length = field->curve[m.later]->length, end = way > 0 ? length : 0, own, least, blend;
+    int first = field->first_segment[m.later], last = field->first_segment[m.later + 1] - 1, before = sweep_field_segment(field, m.later, m.t);
+    while (apart(field, &m, &own, &least, &blend) < 0) {
+        int here = sweep_field_segment(field, m.later, m.t), low = here < before ? here : before, high = here < before ? before : here;
+        // the segments beyond an end see what the end sees
+        low = m.t <= 0 ? first : low, high = m.t >= length ? last : high;
+        for (int s = low; s <= high; s++)
+            add_candidate(field, s, m.earlier, m.t_earlier, 0);
+        before = here;
         double aside = ASIDE * (own + blend);
-        int from = sweep_field_segment(field, other, t_other - aside), to = sweep_field_segment(field, other, t_other + aside);
+        int from = sweep_field_segment(field, m.earlier, m.t_earlier - aside), to = sweep_field_segment(field, m.earlier, m.t_earlier + aside);
         for (int s = from; s <= to; s++)
-            add_candidate(field, s, child, t, 0);
-        if (t >= curve->length) {
-            for (int s = last + 1; s < end; s++)
-                add_candidate(field, s, other, t_other, 0);
-            break;
-        }
-        t = fmin(t + STEP * fmax(least, 0.02 * field->model->branch[child].radius), curve->length);
+            add_candidate(field, s, m.later, m.t, 0);
+        if (m.t == end)
+            return;
+        m.t = fmax(0, fmin(length, m.t + way * STEP * fmax(least, 0.02 * field->model->branch[m.later].radius)));
     }
 }
 
@@ -71,6 +83,43 @@ static double middle_of(const SweepSegment *s)
     if (!isfinite(s->from))
         return s->to;
     return isfinite(s->to) ? 0.5 * (s->from + s->to) : s->from;
+}
+
+static bool sees(const SweepView *view, int branch)
+{
+    for (int i = 0; i < view->count; i++)
+        if (view->of[i].branch == branch)
+            return true;
+    return false;
+}
+
+// What a branch that is seen from a segment sees there is seen from the segment, too, if it overlaps: otherwise the wall would depend on the place from which it
+// is seen. Returns whether something was added.
+static bool see_through(SweepField *field, int segment, int branch)
+{
+    bool added = false;
+    double middle = middle_of(&field->segment[segment]), own, least, blend;
+    if (middle < 0 || middle > field->curve[branch]->length)
+        return false;
+    SweepView view = field->view[segment];
+    for (int i = 0; i < view.count; i++) {
+        if (view.of[i].branch == branch)
+            continue;
+        SweepView through = field->view[sweep_field_segment(field, view.of[i].branch, view.of[i].t)];
+        for (int k = 0; k < through.count; k++) {
+            int other = through.of[k].branch;
+            if (other == branch || other == view.of[i].branch || sees(&field->view[segment], other))
+                continue;
+            Meeting m = other < branch ? (Meeting){branch, other, middle, through.of[k].t} : (Meeting){other, branch, fmax(0, through.of[k].t), middle};
+            if (apart(field, &m, &own, &least, &blend) >= 0)
+                continue;
+            int before = field->view[segment].count;
+            follow(field, m, 1);
+            follow(field, m, -1);
+            added |= field->view[segment].count > before;
+        }
+    }
+    return added;
 }
 
 // Where Newton starts on each candidate: the curve's point nearest to that of the place.
@@ -230,7 +279,14 @@ void sweep_field_fill_views(SweepField *field)
         const SweepBranch *b = &m->branch[i];
         SweepView fork = field->view[sweep_field_segment(field, b->parent, b->parent_t)];
         for (int k = 0; k < fork.count; k++)
-            follow(field, i, fork.of[k].branch, fork.of[k].branch == b->parent ? b->parent_t : fork.of[k].t);
+            follow(field, (Meeting){i, fork.of[k].branch, 0, fork.of[k].branch == b->parent ? b->parent_t : fork.of[k].t}, 1);
+    }
+    bool added = true;
+    for (int pass = 0; pass < PASSES && added; pass++) {
+        added = false;
+        for (int i = 0; i < m->branch_count; i++)
+            for (int s = field->first_segment[i]; s < field->first_segment[i + 1]; s++)
+                added |= see_through(field, s, i);
     }
     for (int i = 0; i < m->branch_count; i++)
         refine_starts(field, i);

@@ -191,19 +191,27 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
 
 // --- Knots to the middle of their sections ---
 
-// A closed end is moved along its tangent by what its dome's points say.
+// How far the end has to move along its tangent. A dome: by what its points say. An end that was cut, without points across it: beyond the last point.
 static double end_shift(const SweepDraft *d, const SweepSystem *system, int branch)
 {
+    static const double ACROSS = 0.6, CAP = 0.05;    // [radii] from the tangent; share of such points that make an end a dome
     const SweepCurve *curve = d->curve[branch];
     SweepJet end = sweep_curve_at(curve, curve->length);
     Vec3 out = vec3_unit(end.s1);
-    double product = 0, square = 0, r = sweep_draft_radius(d, branch, curve->length);
+    double product = 0, square = 0, r = sweep_draft_radius(d, branch, curve->length), furthest = 0;
+    int beyond = 0, across = 0;
     for (int64_t p = 0; p < d->vessel_point_count; p++)
         if (d->owner[p] == branch && d->t[p] > curve->length) {
             Vec3 u = vec3_sub(d->point[p], end.s);
-            double steep = vec3_dot(u, out) / fmax(vec3_norm(u), 1e-9 * r);
+            double height = vec3_dot(u, out), aside = vec3_norm(vec3_add_scaled(u, -height, out)), steep = height / fmax(vec3_norm(u), 1e-9 * r);
             product -= system->trust[p] * steep * system->distance[p], square += system->trust[p] * steep * steep;
+            beyond++;
+            across += aside < ACROSS * r;
+            if (aside < 1.5 * r)
+                furthest = fmax(furthest, height);
         }
+    if (across <= CAP * beyond)
+        return fmin(1.5 * r, furthest);
     return square > 2 ? fmax(-0.5 * r, fmin(0.5 * r, product / square)) : 0;
 }
 

@@ -16,7 +16,7 @@ static const double HELD = 1e30;             // stiffness of coefficients that a
 static const double PRIOR = 4, PRIOR_HIDDEN = 100;
 // [points] of the joint steps: what hardly any point sees must not go far in one step, because there the linear form holds least
 static const double DAMPING = 0.06;
-static const double LONGEST = 0.25;          // [radii] step of a coefficient
+static const double LONGEST = 0.25;          // [radii] step of a harmonic
 static const double LEAST_STRENGTH[PENALTIES] = {1e-2, 1e-2, 1}, MOST_STRENGTH = 1e10;
 static const double CLOSE = 1e-4;            // of the gradients' residual
 
@@ -545,15 +545,14 @@ static void take_step(const SweepSystem *s, double *x)
         for (int j = 0; j < rows_of(s, i); j++) {
             double *row = row_of(s, i) + j * T;
             double *step = x + (size_t)(branch_of(s, i)->first_row + j) * T;
-            double radius = d->prior_radius[branch_of(s, i)->first_row + j], most = LONGEST * radius;
+            double radius = d->prior_radius[branch_of(s, i)->first_row + j], most = LONGEST * radius, added[T];
             for (int a = 0; a < T; a++) {
-                double before = row[a];
-                if (!is_held(s, i, j, harmonic_of(a)))
-                    row[a] += fmax(-most, fmin(most, step[a]));
-                if (a == 0)
-                    row[a] = fmax(row[a], 0.05 * radius);
-                step[a] = row[a] - before;
+                double before = row[a], length = a == 0 ? fabs(step[0]) : same_hypot(step[a - (a + 1) % 2], step[a + a % 2]);
+                double share = is_held(s, i, j, harmonic_of(a)) ? 0 : length > most ? most / length : 1;
+                row[a] = a == 0 ? fmax(row[a] + share * step[a], 0.05 * radius) : row[a] + share * step[a];
+                added[a] = row[a] - before;
             }
+            memcpy(step, added, sizeof added);
         }
 }
 
@@ -561,7 +560,8 @@ bool sweep_system_step(SweepSystem *s, bool coupled)
 {
     size_t branches = (size_t)s->draft->count, n = (size_t)s->draft->model->row_count * T;
     double *memory = calloc(5 * n, sizeof *memory);
-    Stepper t = {.system = s, .coupled = coupled,
+    Stepper t = {.system = s,
+                 .coupled = coupled,
                  .stiffness = calloc(branches, sizeof *t.stiffness),
                  .factor = calloc(branches, sizeof *t.factor),
                  .failed = calloc(branches, sizeof *t.failed)};
