@@ -12,7 +12,6 @@
 #include "geom/blob_flood.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
-#include "geom/sweep_field.h"
 
 // the swept model: branches with cross-sections along them
 #include "geom/sweep_model.h"

@@ -417,19 +417,25 @@ bool sweep_draft_project(SweepDraft *d)
 bool sweep_draft_guard(SweepDraft *d)
 {
     enum { AROUND = 20 };       // more than terms, or a section could pass between
+    int64_t p = 0;
     free(d->guard);
     d->guard_count = 0;
     d->guard = malloc(((size_t)d->model->break_count * AROUND + 1) * sizeof *d->guard);
     for (int i = 0; d->guard && i < d->count; i++) {
         const SweepBranch *b = &d->model->branch[i];
         const double *at = d->model->break_t + b->first_break;
+        while (p < d->vessel_point_count && d->owner[p] < i)
+            p++;
+        Vec3 origin = d->point[p < d->vessel_point_count ? p : 0];
         for (int q = 0; q < b->break_count - 1; q++) {
             if (!d->is_fork[b->first_break + q] && !d->is_hidden[b->first_row + q + 1])
                 continue;
             double t = 0.5 * (at[q] + at[q + 1]), r = sweep_draft_radius(d, i, t);
             SweepJet jet = sweep_curve_at(d->curve[i], t);
+            // angles count from the branch's first point, so that they do not depend on the coordinates' axes
+            double first = same_atan2(vec3_dot(vec3_sub(origin, jet.s), jet.b), vec3_dot(vec3_sub(origin, jet.s), jet.n));
             for (int k = 0; k < AROUND; k++) {
-                double angle = 2 * PI * (k + 0.5 * (q % 2)) / AROUND;
+                double angle = first + 2 * PI * (k + 0.5 * (q % 2)) / AROUND;
                 Vec3 out = vec3_add(vec3_scale(jet.n, same_cos(angle)), vec3_scale(jet.b, same_sin(angle)));
                 d->guard[d->guard_count++] = (SweepGuard){i, t, r, vec3_add_scaled(jet.s, r, out)};
             }

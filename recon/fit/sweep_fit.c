@@ -22,7 +22,7 @@ static const double OUT = 0.5;               // [radii] points further from the 
 
 SweepFitOptions sweep_fit_default_options(void)
 {
-    return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = SWEEP_HARMONICS, .rounds = 6, .blend = 0.6};
+    return (SweepFitOptions){.spacing = 1, .fork_spacing = 0.4, .harmonics = SWEEP_HARMONICS, .rounds = 9, .blend = 0.6};
 }
 
 static bool check_options(const SweepFitOptions *o, Faults *faults)
@@ -191,19 +191,27 @@ static bool fit_sections(SweepDraft *d, SweepSystem *system, bool tuned)
 
 // --- Knots to the middle of their sections ---
 
-// A closed end is moved along its tangent by what its dome's points say.
+// How far the end has to move along its tangent. A dome: by what its points say. An end that was cut, without points across it: beyond the last point.
 static double end_shift(const SweepDraft *d, const SweepSystem *system, int branch)
 {
+    static const double ACROSS = 0.6, CAP = 0.05;    // [radii] from the tangent; share of such points that make an end a dome
     const SweepCurve *curve = d->curve[branch];
     SweepJet end = sweep_curve_at(curve, curve->length);
     Vec3 out = vec3_unit(end.s1);
-    double product = 0, square = 0, r = sweep_draft_radius(d, branch, curve->length);
+    double product = 0, square = 0, r = sweep_draft_radius(d, branch, curve->length), furthest = 0;
+    int beyond = 0, across = 0;
     for (int64_t p = 0; p < d->vessel_point_count; p++)
         if (d->owner[p] == branch && d->t[p] > curve->length) {
             Vec3 u = vec3_sub(d->point[p], end.s);
-            double steep = vec3_dot(u, out) / fmax(vec3_norm(u), 1e-9 * r);
+            double height = vec3_dot(u, out), aside = vec3_norm(vec3_add_scaled(u, -height, out)), steep = height / fmax(vec3_norm(u), 1e-9 * r);
             product -= system->trust[p] * steep * system->distance[p], square += system->trust[p] * steep * steep;
+            beyond++;
+            across += aside < ACROSS * r;
+            if (aside < 1.5 * r)
+                furthest = fmax(furthest, height);
         }
+    if (across <= CAP * beyond)
+        return fmin(1.5 * r, furthest);
     return square > 2 ? fmax(-0.5 * r, fmin(0.5 * r, product / square)) : 0;
 }
 
@@ -279,7 +287,12 @@ static void see_blend(void *context, long p)
     sweep_field_blend(r->field, place, d->point[p], &blend);
     double slope = fmax(vec3_norm(blend.gradient), LEAST_SLOPE);
     r->system->distance[p] = blend.f / slope;
-    r->system->trust[p] = trust_of(blend.f / slope, r->system->noise, r->knee * d->tree->radius[d->node[p]]);
+    // a point on its own branch's wall is no outlier, even if another branch's section has grown over it
+    double e = fabs(blend.f) / slope;
+    for (int i = 0; i < blend.count; i++)
+        if (blend.part[i].branch >= 0 && blend.part[i].branch == d->owner[p])
+            e = fmin(e, fabs(blend.part[i].f));
+    r->system->trust[p] = trust_of(e, r->system->noise, r->knee * d->tree->radius[d->node[p]]);
     r->count[p] = 0;
     for (int i = 0; i < blend.count && r->count[p] < MOST_SIGHTS; i++)
         if (blend.part[i].branch >= 0 && fabs(blend.part[i].share) > 1e-4)
@@ -290,7 +303,7 @@ static void see_blend(void *context, long p)
 static void see_guard(void *context, long index)
 {
     // [radii] depth in the other lumen; standard deviation; and the least weight relative to a point's: exact points would outweigh any deviation
-    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 1e-2;
+    static const double DEEP = 0.2, LOOSE = 0.1, LEAST = 4e-4;
     Refinement *r = context;
     const SweepGuard *guard = &r->draft->guard[index];
     int64_t p = r->draft->point_count + index;

@@ -14,7 +14,9 @@ enum { T = SWEEP_TERMS, WIDTH = 4 * SWEEP_TERMS - 1, GRADIENTS = 60 };
 static const double HELD = 1e30;             // stiffness of coefficients that are held at 0
 // [1/r^2] of the mean radius, towards the tree's: decides only where there are no points; of all terms of rows in the parent's lumen
 static const double PRIOR = 4, PRIOR_HIDDEN = 100;
-static const double LONGEST = 0.25;          // [radii] step of a coefficient
+// [points] of the joint steps: what hardly any point sees must not go far in one step, because there the linear form holds least
+static const double DAMPING = 0.06;
+static const double LONGEST = 0.25;          // [radii] step of a harmonic
 static const double LEAST_STRENGTH[PENALTIES] = {1e-2, 1e-2, 1}, MOST_STRENGTH = 1e10;
 static const double CLOSE = 1e-4;            // of the gradients' residual
 
@@ -413,6 +415,7 @@ bool sweep_system_tune(SweepSystem *s)
 
 typedef struct Stepper {
     SweepSystem *system;
+    bool coupled;
     double **stiffness, **factor;    // (branches) V and its factor
     double *x, *residual, *way, *image, *preconditioned;     // (rows, T)
     bool *failed;            // (branches)
@@ -433,6 +436,8 @@ static void prepare_branch(void *context, long index)
     bool good = v && f && make_penalties(s, branch, &p);
     if (good) {
         fill_stiffness(s, branch, &p, v);
+        for (int i = 0; t->coupled && i < rows * T; i++)
+            v[(size_t)i * (WIDTH + 1)] += DAMPING / (s->noise * s->noise);
         memcpy(f, v, n * sizeof *f);
         good = band_factor(f, rows * T, WIDTH);
         for (int i = 0; i < rows * T; i++)
@@ -540,15 +545,14 @@ static void take_step(const SweepSystem *s, double *x)
         for (int j = 0; j < rows_of(s, i); j++) {
             double *row = row_of(s, i) + j * T;
             double *step = x + (size_t)(branch_of(s, i)->first_row + j) * T;
-            double radius = d->prior_radius[branch_of(s, i)->first_row + j], most = LONGEST * radius;
+            double radius = d->prior_radius[branch_of(s, i)->first_row + j], most = LONGEST * radius, added[T];
             for (int a = 0; a < T; a++) {
-                double before = row[a];
-                if (!is_held(s, i, j, harmonic_of(a)))
-                    row[a] += fmax(-most, fmin(most, step[a]));
-                if (a == 0)
-                    row[a] = fmax(row[a], 0.05 * radius);
-                step[a] = row[a] - before;
+                double before = row[a], length = a == 0 ? fabs(step[0]) : same_hypot(step[a - (a + 1) % 2], step[a + a % 2]);
+                double share = is_held(s, i, j, harmonic_of(a)) ? 0 : length > most ? most / length : 1;
+                row[a] = a == 0 ? fmax(row[a] + share * step[a], 0.05 * radius) : row[a] + share * step[a];
+                added[a] = row[a] - before;
             }
+            memcpy(step, added, sizeof added);
         }
 }
 
@@ -557,6 +561,7 @@ bool sweep_system_step(SweepSystem *s, bool coupled)
     size_t branches = (size_t)s->draft->count, n = (size_t)s->draft->model->row_count * T;
     double *memory = calloc(5 * n, sizeof *memory);
     Stepper t = {.system = s,
+                 .coupled = coupled,
                  .stiffness = calloc(branches, sizeof *t.stiffness),
                  .factor = calloc(branches, sizeof *t.factor),
                  .failed = calloc(branches, sizeof *t.failed)};
