@@ -526,10 +526,10 @@ static void walk_branch(Walk *w, int branch, double t, double far, int except)
     }
     for (int child = v->first_child[branch]; child >= 0; child = v->next_child[child]) {
         double way = fabs(v->model->branch[child].parent_t - t);
-        if (child != except && way < far)
+        if (child != except && way < far && w->steps > 0)
             walk_branch(w, child, 0, far - way, branch);
     }
-    if (b->parent >= 0 && b->parent != except && t < far)
+    if (b->parent >= 0 && b->parent != except && t < far && w->steps > 0)
         walk_branch(w, b->parent, b->parent_t, far - t, branch);
 }
 
