@@ -408,6 +408,7 @@ static void seek_block(const SweepVessel *v, Batch *batch, const int *which, int
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
     Vec3 x[SWEEP_FEET];
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "points come in blocks");
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &batch->memory[which[i]];
         x[i] = batch->point[which[i]];
