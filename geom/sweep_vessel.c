@@ -404,9 +404,9 @@ static void follow_block(const SweepVessel *v, Batch *batch, const int *which, i
 
 static void seek_block(const SweepVessel *v, Batch *batch, const int *which, int count)
 {
-    SweepStart start[SWEEP_FEET];
+    SweepStart start[SWEEP_FEET] = {0};
     SweepFoot found[SWEEP_FEET];
-    Vec3 x[SWEEP_FEET];
+    Vec3 x[SWEEP_FEET] = {{0, 0, 0}};
     SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "points come in blocks");
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &batch->memory[which[i]];
