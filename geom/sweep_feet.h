@@ -57,6 +57,7 @@ typedef struct SweepFoot {
     double t;
     bool sure;
     bool pure;               // one branch alone: nothing is blended there
+    bool doubtful;           // F as seen from the foot's place is not 0
 } SweepFoot;
 
 // The foot of a lane after `finish`.
@@ -76,7 +77,7 @@ typedef struct SweepStart {
 } SweepStart;
 
 enum { SWEEP_FEET = 8 };
-// Careful Newton steps of x from up to eight starts. Returns the number of feet found, closest first; feet closer together than 1e-4 mm are one.
+// Careful Newton steps of x from up to eight starts. Returns the number of feet found, closest first, doubtful ones last; feet closer together than 1e-4 mm are one.
 int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int count, SweepFoot *foot);
 // What a search for starts leaves out, and what it reports.
 typedef struct SweepSearch {

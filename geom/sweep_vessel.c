@@ -142,7 +142,7 @@ static SweepPlace place_of_foot(const SweepVessel *v, const SweepFoot *foot)
 // --- Checks ---
 
 // A foot that may not be the nearest: its rivals' starts, and the feet that Newton finds from them.
-enum { CHECK_STARTS = SWEEP_FEET };
+enum { CHECK_STARTS = SWEEP_FEET, CHECK_ROUNDS = 14 };
 typedef struct Check {
     int point, count;        // index in the query; number of starts
     bool nearer;             // a ring has a point nearer than the foot
@@ -208,7 +208,7 @@ static void run_checks(const SweepVessel *v, const Vec3 *point, Check *check, in
                 last = check[j].count == 0;
             if (filled < SWEEP_FEET && !last)
                 continue;
-            unsigned sound = sweep_follow(&v->feet, x, start, filled, SWEEP_ROUNDS, found);
+            unsigned sound = sweep_follow(&v->feet, x, start, filled, CHECK_ROUNDS, found);
             for (int j = 0; j < filled; j++)
                 if (sound >> j & 1) {
                     check[which[j]].found[index[j]] = found[j];

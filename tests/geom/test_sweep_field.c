@@ -308,6 +308,51 @@ static void derivatives_at_a_sac(void **state)
     sweep_model_free(m);
 }
 
+// Where three branches overlap, the wall is the same as seen from each of them.
+static void same_wall_from_every_branch(void **state)
+{
+    (void)state;
+    static const double turn[] = {0, 40, 100, 180};  // between the planes of the two children
+    for (int scene = 0; scene < 4; scene++) {
+        SweepShape s[3];
+        fork_of_two(s, 50);
+        s[2] = s[1];
+        double a = turn[scene] * PI / 180;
+        for (int k = 0; k < s[2].knots; k++) {
+            Vec3 out = vec3_sub(s[1].knot[k], s[1].knot[0]);
+            s[2].knot[k] = vec3_add(s[0].knot[16], vec3(out.x, out.y * cos(a), out.y * sin(a)));
+        }
+        for (int k = 15; k <= 16; k++)
+            s[2].parent_t += vec3_distance(s[0].knot[k], s[0].knot[k - 1]);
+        SweepModel *m = sweep_model_of(s, 3);
+        SweepField *f = make(m);
+        assert_int_equal(f->crowded, 0);
+        uint64_t seed = 9;
+        double worst = 0;
+        int compared = 0;
+        for (int trial = 0; trial < 6000; trial++) {
+            int branch = trial % 3;
+            double t = branch ? random_in(&seed, 0, 8) : s[1].parent_t + random_in(&seed, -3, 6);
+            Vec3 x = vec3_add_scaled(sweep_curve_at(f->curve[branch], t).s, random_in(&seed, 0.5, 1.1), random_unit_vector(&seed));
+            SweepBlend at, other;
+            sweep_field_blend(f, (SweepPlace){.branch = branch, .t = t}, x, &at);
+            if (fabs(at.f) > 0.15 || at.part[at.largest].branch != branch)
+                continue;
+            for (int i = 0; i < at.count; i++) {
+                if (at.part[i].share < 1e-6 || i == at.largest)
+                    continue;
+                sweep_field_blend(f, (SweepPlace){.branch = at.part[i].branch, .t = at.part[i].t}, x, &other);
+                worst = fmax(worst, fabs(other.f - at.f));
+                compared++;
+            }
+        }
+        print_message("children %.0f degrees apart: %d places blended, seen from two branches, differ by %.1e\n", turn[scene], compared, worst);
+        assert_true(compared > 300 && worst < 1e-12);
+        sweep_field_free(f);
+        sweep_model_free(m);
+    }
+}
+
 // --- bad models ---
 
 static int faults_of(const SweepModel *m)
@@ -365,7 +410,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spline_and_frame_converge), cmocka_unit_test(curve_derivatives),       cmocka_unit_test(sections_are_precise),
         cmocka_unit_test(basis_gives_the_field),     cmocka_unit_test(derivatives_of_a_branch), cmocka_unit_test(derivatives_at_a_fork),
-        cmocka_unit_test(derivatives_at_a_sac),      cmocka_unit_test(faults_are_found),
+        cmocka_unit_test(derivatives_at_a_sac),      cmocka_unit_test(faults_are_found),        cmocka_unit_test(same_wall_from_every_branch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
