@@ -13,6 +13,8 @@ static const double SKIP = 0.7;              // [parent's radii] of a child's st
 static const double KNEE_NOISE = 2.5;        // distance at which a point's trust has fallen to a half, in standard deviations of the noise …
 // … and at least, in radii, round by round: from far away, a sharp knee would take the wall for outliers
 static const double section_knee[SECTION_ROUNDS] = {0.5, 0.2, 0.1, 0.06}, round_knee[] = {0.6, 0.4, 0.3, 0.2, 0.1, 0.1};
+enum { KNEES = sizeof round_knee / sizeof round_knee[0], REFIT = 4 };    // rounds of these; round before which sacs are fitted again
+static const double GAIN = 0.98;             // a round that leaves more of the mean distance than this is the last but one
 static const double FIRST_NOISE = 0.03;      // [radii]
 // Least noise of each round, in radii: while the blends are far from the wall, exact points must not be followed closely.
 static const double round_noise[] = {0.02, 0.01, 0.004, 0.002, 0.001, 0.0005};
@@ -271,7 +273,7 @@ typedef struct Refinement {
     SweepSight (*sight)[MOST_SIGHTS];        // (points)
     int *count;              // (points)
     int *sac_of;             // (N) node of the sacs' tree, -1: none
-    double knee;
+    double knee, mean;
 } Refinement;
 
 static void see_blend(void *context, long p)
@@ -405,30 +407,54 @@ static bool refit_sacs(Refinement *r, Faults *faults)
     return good;
 }
 
+// Mean distance of the points that are trusted.
+static double mean_distance(const SweepSystem *system)
+{
+    double sum = 0, trust = 0;
+    for (int64_t p = 0; p < system->draft->point_count; p++)
+        sum += system->trust[p] * fabs(system->distance[p]), trust += system->trust[p];
+    return trust > 0 ? sum / trust : 0;
+}
+
+// One step of Gauss and Newton. `r->mean` is of the rows before it.
+static bool run_round(Refinement *r, int k)
+{
+    SweepSystem *system = r->system;
+    int at = k < KNEES ? k : KNEES - 1;
+    double least = round_noise[at] * r->draft->branches->branch[0].radius_mean;
+    system->noise = fmax(system->noise, least);
+    if (!look_at_blend(r, round_knee[at]) || !sweep_system_sum(system) || (k > 0 && !sweep_system_tune(system)))
+        return false;
+    double found = system->noise;
+    r->mean = mean_distance(system);
+    system->noise = fmax(found, least);
+    bool good = sweep_system_step(system, true);
+    system->noise = found;
+    return good;
+}
+
 static bool refine(SweepDraft *d, SweepSystem *system, Faults *faults)
 {
-    enum { KNEES = sizeof round_knee / sizeof round_knee[0] };
     size_t points = (size_t)system->count + 1;
     Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), malloc((size_t)d->tree->node_count * sizeof *r.sac_of),
-                    0};
+                    0, 0};
     bool good = r.sight && r.count && r.sac_of;
     sweep_system_soften_forks(system);
     for (int i = 0; good && d->model->sac && i < d->model->sac->node_count; i++)
         r.sac_of[d->model->sac_node[i]] = i;
-    for (int k = 0; k <= d->options->rounds && good && d->options->rounds > 0; k++) {
-        double knee = round_knee[k < KNEES ? k : KNEES - 1], least = round_noise[k < KNEES ? k : KNEES - 1] * d->branches->branch[0].radius_mean;
-        system->noise = fmax(system->noise, least);
-        if (k == d->options->rounds - 2 && d->model->sac)
-            good = look_at_blend(&r, knee) && refit_sacs(&r, faults);
-        good = good && look_at_blend(&r, knee) && sweep_system_sum(system);
-        if (good && k > 0)
-            good = sweep_system_tune(system);
-        double found = system->noise;
-        system->noise = fmax(found, least);
-        good = good && sweep_system_step(system, true);
-        system->noise = found;
-        if (k == d->options->rounds - 1)     // one round more for the rest
-            trim_harmonics(d, system->noise);
+    int rounds = d->options->rounds, refit = rounds - 2 > REFIT ? REFIT : rounds - 2;
+    double before = HUGE_VAL;
+    for (int k = 0; good && k < rounds; k++) {
+        if (k == refit && d->model->sac)
+            good = look_at_blend(&r, round_knee[k < KNEES ? k : KNEES - 1]) && refit_sacs(&r, faults);
+        good = good && run_round(&r, k);
+        if (k > refit && r.mean > GAIN * before)
+            break;
+        before = r.mean;
+    }
+    if (good && rounds > 0) {
+        trim_harmonics(d, system->noise);    // one round more for the rest
+        good = run_round(&r, KNEES);
     }
     good = good && look_at_blend(&r, round_knee[KNEES - 1]);
     sweep_field_free(r.field);
