@@ -408,6 +408,7 @@ static void seek_block(const SweepVessel *v, Batch *batch, const int *which, int
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
     Vec3 x[SWEEP_FEET];
+    SEL_ASSERT(count > 0 && count <= SWEEP_FEET, "points come in blocks");
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &batch->memory[which[i]];
         x[i] = batch->point[which[i]];
@@ -526,10 +527,10 @@ static void walk_branch(Walk *w, int branch, double t, double far, int except)
     }
     for (int child = v->first_child[branch]; child >= 0; child = v->next_child[child]) {
         double way = fabs(v->model->branch[child].parent_t - t);
-        if (child != except && way < far)
+        if (child != except && way < far && w->steps > 0)
             walk_branch(w, child, 0, far - way, branch);
     }
-    if (b->parent >= 0 && b->parent != except && t < far)
+    if (b->parent >= 0 && b->parent != except && t < far && w->steps > 0)
         walk_branch(w, b->parent, b->parent_t, far - t, branch);
 }
 

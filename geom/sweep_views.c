@@ -7,6 +7,7 @@
 
 enum { PASSES = 4 };
 static const double STEP = 0.25;             // of a walk, relative to the narrower tube
+static const double LEAST_STEP = 1e-4;       // … but at least this, relative to the length
 static const double MARGIN = 0.25;           // relative to the narrower tube's radius: what is further apart is not seen
 static const double ASIDE = 1.5;             // how much longer the overlap may be on the parent's curve, on the inner side of a bend
 
@@ -73,7 +74,7 @@ static void follow(SweepField *field, Meeting m, double way)
             add_candidate(field, s, m.later, m.t, 0);
         if (m.t == end)
             return;
-        m.t = fmax(0, fmin(length, m.t + way * STEP * fmax(least, 0.02 * field->model->branch[m.later].radius)));
+        m.t = fmax(0, fmin(length, m.t + way * fmax(STEP * least, LEAST_STEP * length)));
     }
 }
 
@@ -195,7 +196,7 @@ static void mark_sac(SweepField *field, int group, const int *group_of_node, int
 {
     const SweepCurve *curve = field->curve[branch];
     const VesselTree *sac = field->model->sac;
-    double step = STEP * field->model->branch[branch].radius;
+    double step = fmax(STEP * field->model->branch[branch].radius, LEAST_STEP * curve->length);
     for (int side = -1; side <= 1; side += 2)
         for (double t = fmax(0, fmin(curve->length, start)); is_reached(field, group, group_of_node, branch, t);) {
             int from = sweep_field_segment(field, branch, t - step), to = sweep_field_segment(field, branch, t + step);
