@@ -6,7 +6,6 @@
 
 #include "geom/field_lanes.h"
 #include "geom/power_walk.h"
-#include "geom/sweep_views.h"
 
 #include <stdlib.h>
 #include <string.h>

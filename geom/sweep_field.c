@@ -26,6 +26,15 @@ int sweep_field_segment(const SweepField *field, int branch, double t)
     return low;
 }
 
+double sweep_field_largest(const SweepField *field, int branch, double t) { return field->segment[sweep_field_segment(field, branch, t)].largest; }
+
+double sweep_field_mean(const SweepField *field, int branch, double t)
+{
+    const SweepSegment *s = &field->segment[sweep_field_segment(field, branch, t)];
+    double x = t - s->origin;
+    return s->section[0][0] + x * (s->section[0][1] + x * (s->section[0][2] + x * s->section[0][3]));
+}
+
 // --- One branch ---
 
 // Polynomials of the section at x = t - origin and their derivatives.

@@ -67,6 +67,11 @@ void sweep_field_free(SweepField *field);
 // Index of the branch's segment that holds t.
 int sweep_field_segment(const SweepField *field, int branch, double t);
 
+// [mm] upper bound of the section's R at t on a branch.
+double sweep_field_largest(const SweepField *field, int branch, double t);
+// [mm] mean radius of the section at t, c_0.
+double sweep_field_mean(const SweepField *field, int branch, double t);
+
 // Where on the model a wall point is sought: it determines the candidates and where Newton for their t starts.
 typedef struct SweepPlace {
     int branch;              // -1: on a sac

@@ -1,5 +1,5 @@
 // The swept model of a vessel tree: each branch is a centreline curve with cross-sections along it; branches are blended where they meet, and sacs are local
-// models that are blended like branches. Kretschmer et al. 2013, Hong et al. 2012 and 2018 use this form with sections of other kinds (section.h).
+// models that are blended like branches. Kretschmer et al. 2013, Hong et al. 2012 and 2018 use this form with sections of other kinds.
 //
 // Curve. S(t), t >= 0 [mm of chord], is the natural cubic spline through the branch's knots. On each interval between knots the frame is two cubic Hermite
 // polynomials N(t), B(t) through rotation-minimising frames at the knots with their exact derivative there, N' = -(S''.N) S' / |S'|^2; the frame is therefore
@@ -16,14 +16,14 @@
 // c_k(t) are cubic B-splines over the branch's breaks (not uniform; the first and the last break are knots of multiplicity four, so the first and the last row
 // are the sections at the ends); each row of coefficients is one section of the field's terms.
 // Blends. F = M(... M(f_1, f_2) ...) over the candidates of a place, M(x, y) = (x + y + A(x - y))/2, A(d) = delta (2/3 + q^2/2 - q^3/12) for q = |d|/delta <= 2,
-// else |d|: C2, and F is the plain maximum where the fields differ by more than 2 delta. Branches are taken in the order of their indices. delta = blend * (radius of the child at the fork) *
-// (0.2 + 0.8 (1 - (t_c/(3 r_p))^2)^2) with t_c the child's t and r_p the parent's radius at the fork, 0.2 beyond: where branches part at a small angle, their
-// walls still meet there, and an edge without any blending has no foot that Newton finds. (Radii at a fork are mean
-// radii: the parent's at parent_t, the child's one r_p from its start.)
+// else |d|: C2, and F is the plain maximum where the fields differ by more than 2 delta. Branches are taken in the order of their indices.
+// delta = blend * (radius of the child at the fork) * (0.2 + 0.8 (1 - (t_c/(3 r_p))^2)^2) with t_c the child's t and r_p the parent's radius at the fork, and
+// 0.2 instead of the bracket beyond 3 r_p: where branches part at a small angle, their walls still meet there, and an edge without any blending has no foot that
+// Newton finds. (Radii at a fork are mean radii: the parent's at parent_t, the child's one r_p from its start.)
 // Sacs are taken last: f = (r/2) (sum a u^3 - 1), r the radius of the sac's largest node, and delta = blend/2 times the smaller of r and the mean radius of the
 // vessel's nodes beside the neck.
-// Candidates are given by topology: a place on a branch sees only the branches that meet it within a few radii along the tree, so that vessels that touch
-// elsewhere are never blended.
+// Candidates are given by topology (sweep_views.c): a child is followed from its start along the branches that are seen at its fork, as long as the tubes,
+// enlarged by the width of the blend, overlap; so vessels that touch elsewhere are never blended.
 //
 // Lengths mm. A model owns its arrays. It is evaluated through a SweepField (sweep_field.h), which is made from it and borrows it.
 #ifndef SELDINGER_GEOM_SWEEP_MODEL_H
@@ -31,10 +31,8 @@
 
 #include "geom/vessel_tree.h"
 
-enum {
-    SWEEP_HARMONICS = 8,
-    SWEEP_TERMS = 2 * SWEEP_HARMONICS + 1
-};                             // terms of a row: c_0, then Re c_1, -Im c_1, Re c_2, … (factors of cos k theta, sin k theta)
+enum { SWEEP_HARMONICS = 8 };
+enum { SWEEP_TERMS = 2 * SWEEP_HARMONICS + 1 };      // of a row: c_0, then Re c_1, -Im c_1, Re c_2, … (factors of cos k theta, sin k theta)
 enum { SWEEP_CANDIDATES = 6 };       // most branches and sacs that are blended at one place
 
 typedef struct SweepBranch {

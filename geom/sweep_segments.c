@@ -200,15 +200,6 @@ static void fill_branch(SweepField *field, int branch)
     extend(&curve->interval[curve->knot_count], &s[last - 2], 1, field->level_to[branch], true, &s[last - 1], &s[last]);
 }
 
-double sweep_field_largest(const SweepField *field, int branch, double t) { return field->segment[sweep_field_segment(field, branch, t)].largest; }
-
-double sweep_field_mean(const SweepField *field, int branch, double t)
-{
-    const SweepSegment *s = &field->segment[sweep_field_segment(field, branch, t)];
-    double x = t - s->origin;
-    return s->section[0][0] + x * (s->section[0][1] + x * (s->section[0][2] + x * s->section[0][3]));
-}
-
 static void fill_forks(SweepField *field)
 {
     for (int i = 1; i < field->model->branch_count; i++) {

@@ -8,7 +8,6 @@
 
 #include "geom/power_blocks.h"
 #include "geom/sweep_feet.h"
-#include "geom/sweep_views.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -6,9 +6,4 @@
 
 // Fills field->view and the views and scales of field->sac. Curves, segments and forks are filled; the arrays are allocated and zeroed.
 void sweep_field_fill_views(SweepField *field);
-// [mm] upper bound of the section's R at t on a branch.
-double sweep_field_largest(const SweepField *field, int branch, double t);
-// [mm] mean radius of the section at t, c_0.
-double sweep_field_mean(const SweepField *field, int branch, double t);
-
 #endif
