@@ -3,7 +3,7 @@
 #define SELDINGER_RECON_FIT_SWEEP_DRAFT_H
 
 #include "geom/geom.h"
-#include "recon/fit/sweep_fit.h"
+#include "recon/fit/sweep_options.h"
 
 typedef struct SweepGuard {
     int branch;

@@ -10,16 +10,8 @@
 
 #include "base/base.h"
 #include "geom/geom.h"
+#include "recon/fit/sweep_options.h"
 
-typedef struct SweepFitOptions {
-    double spacing;          // of sections along a tube, in local radii; default 1
-    double fork_spacing;     // the same at forks; default 0.4
-    int harmonics;           // highest harmonic along tubes, 1 to 8; default 8. At forks 8
-    int rounds;              // of the refinement; default 9; 0: sections alone
-    double voxel_mm;         // [mm] voxel size of the angiogram, for the sacs' blobs; 0: unknown
-    double blend;            // width of the blends relative to the child's radius; default 0.6
-    int threads;             // 0: all cores; the result does not depend on it
-} SweepFitOptions;
 SweepFitOptions sweep_fit_default_options(void);
 
 typedef struct SweepFitFigures {
