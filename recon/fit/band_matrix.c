@@ -1,5 +1,7 @@
 #include "recon/fit/band_matrix.h"
 
+#include "base/base.h"
+
 #include <math.h>
 #include <stddef.h>
 
@@ -9,6 +11,7 @@ static int height_of(int n, int j, int width) { return n - 1 - j < width ? n - 1
 
 bool band_factor(double *a, int n, int width)
 {
+    SEL_ASSERT(n > 0 && width >= 0, "a matrix has rows");
     for (int j = 0; j < n; j++) {
         double *c = column_of(a, j, width);
         int height = height_of(n, j, width);
@@ -47,6 +50,7 @@ void band_solve(const double *factor, int n, int width, double *x)
 
 void band_inverse(const double *factor, int n, int width, double *inverse)
 {
+    SEL_ASSERT(factor != inverse, "the factor is read while the inverse is written");
     for (int j = n - 1; j >= 0; j--) {
         const double *c = factor_column(factor, j, width);
         double *z = column_of(inverse, j, width), pivot = 1 / c[0];

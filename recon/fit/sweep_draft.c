@@ -112,6 +112,7 @@ static bool lay_knots(SweepDraft *d, int branch)
 bool sweep_draft_curves(SweepDraft *d)
 {
     for (int i = 0; i < d->count; i++) {
+        SEL_ASSERT(d->knot_count[i] >= 2, "a curve has two knots");
         sweep_curve_free(d->curve[i]);
         if (!(d->curve[i] = sweep_curve_create(d->knot_count[i], d->knot[i])))
             return false;
@@ -177,6 +178,7 @@ bool sweep_draft_create(SweepDraft *d, const VesselTree *tree, const SweepFitOpt
 
 double sweep_draft_radius(const SweepDraft *d, int branch, double t)
 {
+    SEL_ASSERT(branch >= 0 && branch < d->count && !isnan(t), "the branch is one of the draft's, and t is a number");
     const VesselBranch *b = &d->branches->branch[branch];
     const int *node = d->branches->node + b->first;
     int low = 0, high = b->count - 1;
@@ -378,6 +380,7 @@ bool sweep_draft_divide(SweepDraft *d, double spacing)
 
 double sweep_draft_term(const SweepDraft *d, int branch, int term, double t)
 {
+    SEL_ASSERT(d->model && term >= 0 && term < SWEEP_TERMS, "the curves were divided, and the term is one of a row");
     const SweepBranch *b = &d->model->branch[branch];
     double value[4], slope[4], bend[4], sum = 0;
     int row = b->first_row + sweep_spline(d->model->break_t + b->first_break, b->break_count, t, value, slope, bend);
@@ -416,6 +419,7 @@ bool sweep_draft_project(SweepDraft *d)
 
 bool sweep_draft_guard(SweepDraft *d)
 {
+    SEL_ASSERT(d->model, "the curves were divided");
     enum { AROUND = 20 };       // more than terms, or a section could pass between
     int64_t p = 0;
     free(d->guard);

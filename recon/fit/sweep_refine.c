@@ -35,6 +35,7 @@ static void see_blend(void *context, long p)
     else
         place.sac = r->sac_of[d->node[p]];
     sweep_field_blend(r->field, place, d->point[p], &blend);
+    SEL_ASSERT(blend.count > 0 && isfinite(blend.f), "a place on the tree sees a wall");
     double slope = fmax(vec3_norm(blend.gradient), LEAST_SLOPE);
     r->system->distance[p] = blend.f / slope;
     // a point on its own branch's wall is no outlier, even if another branch's section has grown over it

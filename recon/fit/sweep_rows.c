@@ -182,6 +182,8 @@ static void sum_branch(void *context, long index)
     for (int64_t i = s->order_first[branch]; i < s->order_first[branch + 1]; i++) {
         const SweepSight *sight = &s->sight[s->order[i]];
         double trust = s->trust[s->order_point[i]];
+        SEL_ASSERT(sight->first >= 0 && sight->first + 4 <= rows_of(s, branch), "a sight sees four rows of its branch");
+        SEL_ASSERT(trust >= 0 && trust <= 1, "a trust is a share");
         if (sight->first != first)
             flush_sums(&sums, first, matrix, slope);
         first = sight->first;
@@ -193,6 +195,7 @@ static void sum_branch(void *context, long index)
 
 bool sweep_system_sum(SweepSystem *s)
 {
+    SEL_ASSERT(s->first[0] == 0 && s->first[s->count] >= 0, "points have ranges of sights");
     if (!order_sights(s))
         return false;
     parallel_for(s->draft->options->threads, s->draft->count, sum_branch, s, NULL);
@@ -380,6 +383,7 @@ static double measure_noise(const SweepSystem *s, double freedom)
 
 bool sweep_system_tune(SweepSystem *s)
 {
+    SEL_ASSERT(s->noise > 0, "points have noise: precisions are its inverse");
     size_t count = (size_t)s->draft->count;
     Tuning tuning = {s, calloc(count, sizeof *tuning.kept), calloc(count, sizeof *tuning.size), calloc(count, sizeof *tuning.freedom),
                      calloc(count, sizeof *tuning.failed)};
@@ -558,6 +562,7 @@ static void take_step(const SweepSystem *s, double *x)
 
 bool sweep_system_step(SweepSystem *s, bool coupled)
 {
+    SEL_ASSERT(s->noise > 0, "points have noise: precisions are its inverse");
     size_t branches = (size_t)s->draft->count, n = (size_t)s->draft->model->row_count * T;
     double *memory = calloc(5 * n, sizeof *memory);
     Stepper t = {.system = s,

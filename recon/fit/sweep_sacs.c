@@ -23,6 +23,7 @@ static bool is_sac(const VesselTree *tree, int node) { return node >= 0 && tree-
 static int add_node(Extract *e, int node, int parent)
 {
     const VesselTree *tree = e->tree;
+    SEL_ASSERT(parent < e->count, "parents come before children");
     int at = e->count++;
     e->sac->center[at] = tree->center[node];
     e->sac->radius[at] = tree->radius[node];

@@ -13,6 +13,7 @@ static const double FIRST_NOISE = 0.03;      // [radii]
 
 SweepSight sweep_sight_of(const SweepField *field, const SweepPart *part, double share)
 {
+    SEL_ASSERT(part->branch >= 0 && isfinite(share), "a sac has no rows");
     SweepBasis basis = sweep_field_basis(field, part->branch, part->t);
     double rho = fmax(part->rho, 1e-12);
     SweepSight sight = {
@@ -21,7 +22,11 @@ SweepSight sweep_sight_of(const SweepField *field, const SweepPart *part, double
     return sight;
 }
 
-double sweep_trust_of(double e, double noise, double least) { return 1 / (1 + same_square(same_square(e / fmax(KNEE_NOISE * noise, least)))); }
+double sweep_trust_of(double e, double noise, double least)
+{
+    SEL_ASSERT(!isnan(e) && least > 0, "a distance is a number");
+    return 1 / (1 + same_square(same_square(e / fmax(KNEE_NOISE * noise, least))));
+}
 
 // Returns whether t lies at a fork, where sections alone lean towards the other vessel.
 bool sweep_is_at_fork(const SweepDraft *d, int branch, double t)

@@ -1,6 +1,8 @@
 // de Boor's recursion; derivatives from the functions of degree 1 and 2.
 #include "recon/fit/sweep_spline.h"
 
+#include "base/base.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -8,6 +10,7 @@ static double knot(const double *at, int breaks, int i) { return at[i < 3 ? 0 : 
 
 int sweep_spline(const double *at, int breaks, double t, double value[4], double slope[4], double bend[4])
 {
+    SEL_ASSERT(breaks >= 2 && !isnan(t), "two breaks bound an interval, and t is a number");
     int low = 0, high = breaks - 1;
     t = fmax(at[0], fmin(at[breaks - 1], t));
     while (high - low > 1) {
@@ -36,6 +39,7 @@ int sweep_spline(const double *at, int breaks, double t, double value[4], double
 
 void sweep_spline_integrals(const double *at, int breaks, int q, double rough[4][4], double size[4][4])
 {
+    SEL_ASSERT(q >= 0 && q < breaks - 1 && at[q + 1] > at[q], "the interval lies between two breaks");
     // three Gauss points: exact for products of second derivatives, and near enough for products of values
     static const double place[3] = {-0.7745966692414834, 0, 0.7745966692414834}, weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
     double value[4], slope[4], bend[4], length = at[q + 1] - at[q];

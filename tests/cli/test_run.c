@@ -396,6 +396,37 @@ static void help_names_every_option(void **state)
     assert_int_equal(run("--completion | bash -n"), 0);
 }
 
+// fit --model sweep, beside blobs and without them, and the scenes that use it.
+static void a_swept_model_is_fitted_kept_and_used(void **state)
+{
+    (void)state;
+#define SWEPT_SCENE(vessel)                                                                                                                                    \
+    "seldinger: 1\nvessel: {" vessel ", contact: sweep}\nwire: {elements: 20, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"        \
+    "sheath: {inlet: root, inserted_mm: 1}\nscript: [[0, 30, 0], [0.2, 0, 0]]\n"
+    put("file.yaml", SWEPT_SCENE("model: both.h5"));
+    put("none.yaml", SWEPT_SCENE("model: lim.h5"));
+    put("shape.yaml", SWEPT_SCENE("shape: {name: open-capsule, length_mm: 20}"));
+    put("tube.yaml", SCENE("80", "0.68", "40", "  contact: sweep\n", SCRIPT));
+    assert_int_equal(run("synth open-capsule --length-mm 20 -o tree.h5 --quiet"), 0);
+    assert_int_equal(run("fit tree.h5 -o lim.h5 --quiet"), 0);
+    assert_int_equal(run("fit lim.h5 -o both.h5 --model sweep"), 0);
+    assert_non_null(strstr(output, "swept model: 1 branches"));
+    assert_int_equal(run("fit both.h5 -o again.h5 --model lim --quiet"), 0);
+    assert_int_equal(run("info again.h5"), 0);       // blobs and swept model are both there: the file opens as either
+    assert_non_null(strstr(output, "model"));
+    for (int i = 0; i < 3; i++) {
+        static const char *const scene[] = {"run file.yaml --summary s.json --quiet", "run shape.yaml --summary s.json --quiet",
+                                            "run tube.yaml --summary s.json --quiet"};
+        int code = run(scene[i]);
+        if (code != 0)
+            fail_msg("`%s` ended with %d: %s", scene[i], code, output);
+    }
+    expect_bad(NULL, "run none.yaml", "seldinger fit");
+    expect_bad(NULL, "run none.yaml", "--model sweep -o");
+    assert_int_equal(run("fit tree.h5 -o x.h5 --model sweep --preset local"), 2);
+    assert_non_null(strstr(output, "--preset needs --model lim"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -410,6 +441,7 @@ int main(void)
         cmocka_unit_test(a_full_disk_ends_with_3),
         cmocka_unit_test(check_passes_on_identity_and_fails_on_one_per_cent),
         cmocka_unit_test(help_names_every_option),
+        cmocka_unit_test(a_swept_model_is_fitted_kept_and_used),
     };
     return cmocka_run_group_tests(tests, make_folder_with_cache, remove_folder);
 }
