@@ -1,4 +1,4 @@
-// The kinds of sections, for section.c alone.
+// The kinds of sections, for section_create.c and the files of the kinds.
 #ifndef SELDINGER_GEOM_SECTION_KINDS_H
 #define SELDINGER_GEOM_SECTION_KINDS_H
 

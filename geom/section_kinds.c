@@ -1,0 +1,90 @@
+#include "geom/section_kinds.h"
+
+#include <stdlib.h>
+
+Section *section_allocate(SectionKind kind, size_t values, double radius)
+{
+    Section *section = calloc(1, sizeof *section + values * sizeof section->values[0]);
+    if (section) {
+        section->kind = kind;
+        section->radius = radius;
+    }
+    return section;
+}
+
+void section_free(Section *section) { free(section); }
+
+SectionJet section_evaluate(const Section *section, double n, double b) { return section->evaluate(section, n, b); }
+
+int section_numbers(const Section *section) { return section->numbers; }
+
+// The place between `in` (C > 0) and `out` (C <= 0) on a ray where C changes its sign.
+static double crossing(const Section *section, double n0, double b0, double c, double s, double in, double out)
+{
+    for (int i = 0; i < 60 && out - in > 1e-13 * section->radius; i++) {
+        double middle = 0.5 * (in + out);
+        if (section_evaluate(section, n0 + middle * c, b0 + middle * s).value > 0)
+            in = middle;
+        else
+            out = middle;
+    }
+    return 0.5 * (in + out);
+}
+
+int section_radii(const Section *section, double n0, double b0, int count, double *radius)
+{
+    enum { STEPS = 64 };
+    if (!(section_evaluate(section, n0, b0).value > 0))
+        return -1;
+    int more = 0;
+    double longest = 3 * section->radius + same_hypot(n0, b0);
+    for (int i = 0; i < count; i++) {
+        double c = same_cos(2 * PI * i / count), s = same_sin(2 * PI * i / count), found = longest;
+        bool inside = true;
+        int met = 0;
+        for (int k = 1; k <= STEPS; k++) {
+            double r = longest * k / STEPS;
+            bool now = section_evaluate(section, n0 + r * c, b0 + r * s).value > 0;
+            if (inside && !now)
+                met++, found = crossing(section, n0, b0, c, s, longest * (k - 1) / STEPS, r);
+            inside = now;
+        }
+        radius[i] = found;
+        more += met > 1;
+    }
+    return more;
+}
+
+bool cholesky_factor(int size, double *a)
+{
+    for (int j = 0; j < size; j++) {
+        double *row = a + (size_t)j * (size_t)size, square = row[j];
+        for (int k = 0; k < j; k++)
+            square -= row[k] * row[k];
+        if (!(square > 0))
+            return false;
+        row[j] = sqrt(square);
+        for (int i = j + 1; i < size; i++) {
+            double *lower = a + (size_t)i * (size_t)size, sum = lower[j];
+            for (int k = 0; k < j; k++)
+                sum -= lower[k] * row[k];
+            lower[j] = sum / row[j];
+        }
+    }
+    return true;
+}
+
+void cholesky_solve(int size, const double *a, double *x)
+{
+    for (int i = 0; i < size; i++) {
+        const double *row = a + (size_t)i * (size_t)size;
+        for (int k = 0; k < i; k++)
+            x[i] -= row[k] * x[k];
+        x[i] /= row[i];
+    }
+    for (int i = size - 1; i >= 0; i--) {
+        for (int k = i + 1; k < size; k++)
+            x[i] -= a[(size_t)k * (size_t)size + (size_t)i] * x[k];
+        x[i] /= a[(size_t)i * (size_t)size + (size_t)i];
+    }
+}
