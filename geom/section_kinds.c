@@ -55,6 +55,18 @@ int section_radii(const Section *section, double n0, double b0, int count, doubl
     return more;
 }
 
+void section_step(double x, double h[4])
+{
+    double a = fabs(x), left = 3 - a, sign = x < 0 ? -1 : 1, part;
+    if (a >= 3)
+        part = h[1] = h[2] = h[3] = 0;
+    else if (a >= 1)
+        part = left * left * left / 48, h[1] = left * left / 16, h[2] = -sign * left / 8, h[3] = 0.125;
+    else
+        part = 0.5 - a * (9 - a * a) / 24, h[1] = (3 - a * a) / 8, h[2] = -0.25 * x, h[3] = -0.25;
+    h[0] = x < 0 ? part : 1 - part;
+}
+
 bool cholesky_factor(int size, double *a)
 {
     for (int j = 0; j < size; j++) {

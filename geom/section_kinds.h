@@ -20,6 +20,8 @@ Section *section_raster_create(const SectionOptions *options, int count, const S
 Section *section_rbf_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius);
 Section *section_pas_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius);
 
+// The step H_3 of Hong et al. 2012, eq. 4: 0 below -3, 1 above 3, C2, cubic between the knots -3, -1, 1, 3; and its first three derivatives.
+void section_step(double x, double h[4]);
 // Factors a symmetric positive definite matrix (size, size) in place, lower triangle; false if it is not positive definite.
 bool cholesky_factor(int size, double *matrix);
 // Solves with the factor, in place.

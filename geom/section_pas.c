@@ -16,22 +16,11 @@ static const double FLAT = 0.02;     // P between FLAT and 1 - FLAT gives the di
 // values: [0] count, [1] delta, [2] level, [3] shift H^-1(level), [4] 1 as printed, [5], [6] centre; then the contour
 enum { COUNT, DELTA, LEVEL, SHIFT, PRINTED, CENTRE_N, CENTRE_B, CONTOUR };
 
-// k = H_3' and its first two derivatives.
-static void kernel(double x, double k[3])
+static double step(double x)
 {
-    double a = fabs(x), sign = x < 0 ? -1 : 1;
-    if (a >= 3)
-        k[0] = k[1] = k[2] = 0;
-    else if (a >= 1)
-        k[0] = (3 - a) * (3 - a) / 16, k[1] = -sign * (3 - a) / 8, k[2] = 0.125;
-    else
-        k[0] = (3 - x * x) / 8, k[1] = -0.25 * x, k[2] = -0.25;
-}
-
-static double step(double x)         // H_3
-{
-    double a = fabs(x), left = 3 - a, part = a >= 3 ? 0 : a >= 1 ? left * left * left / 48 : 0.5 - a * (9 - a * a) / 24;
-    return x < 0 ? part : 1 - part;
+    double h[4];
+    section_step(x, h);
+    return h[0];
 }
 
 static double inverse_step(double p)
@@ -53,13 +42,12 @@ static void add_part(const double from[2], const double along[2], double u, doub
     static const double PLACE[3] = {-0.77459666924148338, 0, 0.77459666924148338}, WEIGHT[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
     double dy = along[1] * (v - u), f = 1 / delta;
     for (int g = 0; g < 3; g++) {
-        double at = 0.5 * (u + v) + 0.5 * (v - u) * PLACE[g], x[3], y[3], w = WEIGHT[g] * dy;
-        double s = from[0] + at * along[0], h = step(s);
-        kernel(s, x);
-        kernel(-(from[1] + at * along[1]), y);       // (Y - y)/delta
-        jet->value += w * h * y[0];
-        jet->n -= w * x[0] * y[0] * f, jet->b += w * h * y[1] * f;
-        jet->nn += w * x[1] * y[0] * f * f, jet->nb -= w * x[0] * y[1] * f * f, jet->bb += w * h * y[2] * f * f;
+        double at = 0.5 * (u + v) + 0.5 * (v - u) * PLACE[g], x[4], y[4], w = WEIGHT[g] * dy;
+        section_step(from[0] + at * along[0], x);
+        section_step(-(from[1] + at * along[1]), y);         // (Y - y)/delta
+        jet->value += w * x[0] * y[1];
+        jet->n -= w * x[1] * y[1] * f, jet->b += w * x[0] * y[2] * f;
+        jet->nn += w * x[2] * y[1] * f * f, jet->nb -= w * x[1] * y[2] * f * f, jet->bb += w * x[0] * y[3] * f * f;
     }
 }
 
@@ -126,9 +114,9 @@ static SectionJet evaluate_pas(const Section *section, double n, double b)
     if (!(jet.value > FLAT && jet.value < 1 - FLAT))
         return polar_distance(v, n, b);
     // d = delta H^-1(P): grad d = delta grad P / k, Hess d = delta (Hess P / k - k' grad P grad P' / k^3)
-    double d = inverse_step(jet.value), k[3];
-    kernel(d, k);
-    double per = v[DELTA] / k[0], bend = v[DELTA] * k[1] / (k[0] * k[0] * k[0]);
+    double d = inverse_step(jet.value), h[4];
+    section_step(d, h);
+    double per = v[DELTA] / h[1], bend = v[DELTA] * h[2] / (h[1] * h[1] * h[1]);
     return (SectionJet){.value = v[DELTA] * (d - v[SHIFT]),
                         .n = per * jet.n,
                         .b = per * jet.b,

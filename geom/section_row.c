@@ -1,16 +1,8 @@
 #include "geom/section_row.h"
 
-#include <math.h>
+#include "geom/section_kinds.h"
 
-// H_3 and its first two derivatives; 0 below -3, 1 above 3.
-static void smooth_step(double x, double h[3])
-{
-    double a = fabs(x), left = 3 - a, sign = x < 0 ? -1 : 1;
-    double part = a >= 3 ? 0 : a >= 1 ? left * left * left / 48 : 0.5 - a * (9 - a * a) / 24;
-    h[0] = x < 0 ? part : 1 - part;
-    h[1] = a >= 3 ? 0 : a >= 1 ? left * left / 16 : (3 - a * a) / 8;
-    h[2] = a >= 3 ? 0 : a >= 1 ? -sign * left / 8 : -0.25 * x;
-}
+#include <math.h>
 
 // The station at or before t; 0 if t lies before all.
 static int station_before(const SectionRow *row, double t)
@@ -69,12 +61,12 @@ static SectionShares piecewise(const SectionRow *row, double t)
         last++;
     }
     SectionShares shares = {.first = first};
-    double before[3] = {1, 0, 0};
+    double before[4] = {1, 0, 0, 0};
     for (int j = first; j <= last; j++) {
-        double after[3] = {0, 0, 0};
+        double after[4] = {0, 0, 0, 0};
         if (j < last) {
             double d = row->t[j + 1] - row->t[j], per = 1 / (row->width * d);
-            smooth_step((t - 0.5 * (row->t[j + 1] + row->t[j])) * per, after);
+            section_step((t - 0.5 * (row->t[j + 1] + row->t[j])) * per, after);
             after[1] *= per, after[2] *= per * per;
         }
         add_share(&shares, j, before[0] - after[0], before[1] - after[1], before[2] - after[2]);

@@ -11,10 +11,10 @@ static const double LEAST_STEP = 1e-4;       // … but at least this, relative 
 static const double MARGIN = 0.25;           // relative to the narrower tube's radius: what is further apart is not seen
 static const double ASIDE = 1.5;             // how much longer the overlap may be on the parent's curve, on the inner side of a bend
 
-static void add_candidate(SweepField *field, int segment, int branch, double t, double slope)
+// Branches stay in ascending order; one that is already listed keeps its first place.
+static void add_candidate(SweepField *field, SweepView *view, int branch, double t, double slope)
 {
-    SEL_ASSERT(segment >= 0 && branch >= 0, "a segment sees branches");
-    SweepView *view = &field->view[segment];
+    SEL_ASSERT(branch >= 0 && branch < field->model->branch_count, "a view lists branches of the model");
     int at = 0;
     while (at < view->count && view->of[at].branch < branch)
         at++;
@@ -66,12 +66,12 @@ static void follow(SweepField *field, Meeting m, double way)
         // the segments beyond an end see what the end sees
         low = m.t <= 0 ? first : low, high = m.t >= length ? last : high;
         for (int s = low; s <= high; s++)
-            add_candidate(field, s, m.earlier, m.t_earlier, 0);
+            add_candidate(field, &field->view[s], m.earlier, m.t_earlier, 0);
         before = here;
         double aside = ASIDE * (own + blend);
         int from = sweep_field_segment(field, m.earlier, m.t_earlier - aside), to = sweep_field_segment(field, m.earlier, m.t_earlier + aside);
         for (int s = from; s <= to; s++)
-            add_candidate(field, s, m.later, m.t, 0);
+            add_candidate(field, &field->view[s], m.later, m.t, 0);
         if (m.t == end)
             return;
         m.t = fmax(0, fmin(length, m.t + way * fmax(STEP * least, LEAST_STEP * length)));
@@ -215,21 +215,8 @@ static void mark_sac(SweepField *field, int group, const int *group_of_node, int
 
 static void see_from_sac(SweepField *field, int node, int branch, double start)
 {
-    SweepView *view = &field->sac[node].view;
     double t = sweep_curve_project(field->curve[branch], field->model->sac->center[node], start, field->model->branch[branch].radius);
-    int at = 0;
-    while (at < view->count && view->of[at].branch < branch)
-        at++;
-    if (at < view->count && view->of[at].branch == branch)
-        return;
-    if (view->count == SWEEP_CANDIDATES) {
-        field->crowded++;
-        return;
-    }
-    for (int i = view->count; i > at; i--)
-        view->of[i] = view->of[i - 1];
-    view->of[at] = (SweepCandidate){branch, t, 0};
-    view->count++;
+    add_candidate(field, &field->sac[node].view, branch, t, 0);
 }
 
 static void fill_sac(SweepField *field, int group, const int *group_of_node)
@@ -273,7 +260,7 @@ void sweep_field_fill_views(SweepField *field)
     for (int i = 0; i < m->branch_count; i++) {
         for (int s = field->first_segment[i]; s < field->first_segment[i + 1]; s++) {
             field->view[s].sac = -1;
-            add_candidate(field, s, i, 0, 1);
+            add_candidate(field, &field->view[s], i, 0, 1);
         }
         if (i == 0)
             continue;
