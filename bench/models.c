@@ -43,6 +43,8 @@ static const Case cases[] = {
     {"star .05", "star", 0, {{""}}, 0.05},
     {"ellipse", "ellipse", 0, {{""}}, 0},
     {"ellipse .05", "ellipse", 0, {{""}}, 0.05},
+    {"kidney", "kidney", 0, {{""}}, 0},
+    {"kidney .05", "kidney", 0, {{""}}, 0.05},
     {"arc", "arc", 0, {{""}}, 0},
     {"y 37.5", "y", 0, {{""}}, 0},
     {"y 37.5 .05", "y", 1, {{"noise_mm", "0.05"}}, 0.05},
@@ -291,8 +293,8 @@ static void report(const ModelsBench *bench, const char *name, int model, const 
     fprintf(text, "%-12.12s %-6s %8.5f %8.5f %8.5f %+9.5f %7.3f %7.4f %8lld %7.2f", name, model_name[model], row->mean, row->p99, row->most, row->bias,
             row->normal_deg, row->bulge, (long long)fitted->numbers, fitted->seconds);
     if (model == MODEL_SWEEP)
-        fprintf(text, "   noise %.5f, %lld left out, %lld folded, %lld not star-shaped", fitted->figures.noise, (long long)fitted->figures.left_out,
-                (long long)fitted->figures.folded, (long long)fitted->figures.not_star_shaped);
+        fprintf(text, "   noise %.5f, %lld left out, %lld folded, %lld not star-shaped, %d shaped", fitted->figures.noise, (long long)fitted->figures.left_out,
+                (long long)fitted->figures.folded, (long long)fitted->figures.not_star_shaped, fitted->figures.shaped);
     fprintf(text, "\n");
     fflush(text);
     cJSON *out = cJSON_CreateObject();
@@ -339,8 +341,11 @@ static int call(void *structure, Faults *faults)
         const Case *c = &cases[i];
         if (bench->shape && strncmp(bench->shape, c->name, strlen(bench->shape)))
             continue;
-        bool tube = !strcmp(c->shape, "star") || !strcmp(c->shape, "ellipse");
-        good = tube ? sample_tube(c->shape[0] == 's' ? SHAPED_STAR : SHAPED_ELLIPSE, c->noise, &subject) : sample_shape(c, &subject, faults);
+        static const char *const tube[] = {[SHAPED_STAR] = "star", [SHAPED_ELLIPSE] = "ellipse", [SHAPED_KIDNEY] = "kidney"};
+        int which = 0;
+        while (which < 3 && strcmp(c->shape, tube[which]))
+            which++;
+        good = which < 3 ? sample_tube((ShapedTube)which, c->noise, &subject) : sample_shape(c, &subject, faults);
         good = good && compare(bench, c->name, &subject, rows, faults);
         free_subject(&subject);
     }

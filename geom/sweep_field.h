@@ -15,7 +15,8 @@ typedef struct SweepSegment {
     double origin, rise, from, to;       // rise: w = rise (t - origin); 0: w = 0
     double section[SWEEP_TERMS][4];      // the terms' polynomials
     double largest;                      // [mm] upper bound of R on the segment
-    double unused[3];
+    double is_shaped;                    // 1: sections of another kind reach into the segment (sweep_stretch.h)
+    double unused[2];
 } __attribute__((aligned(64))) SweepSegment;
 
 enum { SWEEP_SEGMENT_ROW = sizeof(SweepSegment) / sizeof(double) };
@@ -101,6 +102,8 @@ typedef struct SweepBlend {
 // One branch alone at x; Newton for t starts from `start`.
 void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part);
 // The same at a known t, which the segment holds; leaves `branch`, `share` and `sac` unset.
+void sweep_branch_evaluate(const SweepField *field, int branch, const SweepSegment *segment, Vec3 x, double t, SweepPart *part);
+// The same of the rows alone, without sections of another kind.
 void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, SweepPart *part);
 // A sac alone at x, from a node near x.
 void sweep_field_sac(const SweepField *field, int node, Vec3 x, SweepPart *part);

@@ -34,6 +34,7 @@ void sweep_model_free(SweepModel *model)
 {
     if (!model)
         return;
+    sweep_model_set_stretches(model, 0, NULL, 0, NULL, 0, NULL, "", NULL);
     free(model->branch);
     free(model->knot);
     free(model->knot_node);

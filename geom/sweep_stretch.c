@@ -1,0 +1,276 @@
+// With g_v = grad v, H_v = Hess v of v = n, b, t (sweep_model.h) and the row's jet C(n, b, t):
+//   grad C = C_n g_n + C_b g_b + C_t g_t,   Hess C = sum_v C_v H_v + sum_vw C_vw g_v g_w',
+//   H_n = N' g_t' + g_t N'' + c g_t g_t' + a H_t, with a and c as in sweep_model.h; the same for b.
+// The mixture f = f_rows + m (C - f_rows), with d = C - f_rows:
+//   grad f = grad f_rows + m grad d + m' d g_t,
+//   Hess f = Hess f_rows + m Hess d + m' (g_t grad d' + grad d g_t') + m'' d g_t g_t' + m' d H_t.
+#include "geom/sweep_stretch.h"
+
+#include "geom/section_kinds.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// --- Evaluation ---
+
+typedef struct FieldJet {
+    double f;
+    Vec3 gradient;
+    Sym3 hessian;
+} FieldJet;
+
+SweepStretchShare sweep_stretch_share(const SweepModel *model, const SweepStretch *stretch, double t)
+{
+    bool runs_on = stretch->from <= 0 && model->branch[stretch->branch].open_start;
+    double s = 1, side = 0, per = 1 / stretch->fade;
+    if (!runs_on && t < stretch->from + stretch->fade)
+        s = (t - stretch->from) * per, side = per;
+    if (t > stretch->to - stretch->fade)
+        s = (stretch->to - t) * per, side = -per;
+    if (s >= 1)
+        return (SweepStretchShare){1, 0, 0};
+    if (s <= 0)
+        return (SweepStretchShare){0, 0, 0};
+    return (SweepStretchShare){s * s * s * (10 - s * (15 - 6 * s)), 30 * s * s * (1 - s) * (1 - s) * side, 60 * s * (1 - s) * (1 - 2 * s) * side * side};
+}
+
+// C in the coordinates of the curve, in space.
+static void carry_to_space(const SweepJet *j, Vec3 x, const SweepPart *p, const SectionRowJet *c, FieldJet *out)
+{
+    Vec3 u = vec3_sub(x, j->s), gt = p->t_gradient, axis[2] = {j->n, j->b}, axis1[2] = {j->n1, j->b1}, axis2[2] = {j->n2, j->b2}, g[2];
+    double first[2] = {c->n, c->b}, mixed[2] = {c->nt, c->bt};
+    out->f = c->value;
+    out->gradient = vec3_scale(gt, c->t);
+    out->hessian = (Sym3){0, 0, 0, 0, 0, 0};
+    sym3_add(&out->hessian, c->t, &p->t_hessian);
+    sym3_add_outer(&out->hessian, c->tt, gt);
+    for (int i = 0; i < 2; i++) {
+        double a = vec3_dot(u, axis1[i]) - vec3_dot(j->s1, axis[i]);
+        double bend = vec3_dot(u, axis2[i]) - vec3_dot(j->s2, axis[i]) - 2 * vec3_dot(j->s1, axis1[i]);
+        g[i] = vec3_add_scaled(axis[i], a, gt);
+        out->gradient = vec3_add_scaled(out->gradient, first[i], g[i]);
+        sym3_add_pair(&out->hessian, first[i], axis1[i], gt);
+        sym3_add_outer(&out->hessian, first[i] * bend, gt);
+        sym3_add(&out->hessian, first[i] * a, &p->t_hessian);
+        sym3_add_pair(&out->hessian, mixed[i], g[i], gt);
+    }
+    sym3_add_outer(&out->hessian, c->nn, g[0]);
+    sym3_add_outer(&out->hessian, c->bb, g[1]);
+    sym3_add_pair(&out->hessian, c->nb, g[0], g[1]);
+}
+
+enum { ROW_MOST = 4096 };    // stations of one stretch
+
+// C of sections in straight frames: sum_i C_i(n_i, b_i) B_i(t_i), B_i(t) = H((d/2 - t)/delta) - H((-d/2 - t)/delta), d the mean distance of the neighbours.
+static void evaluate_straight(const SweepField *field, const SweepStretch *stretch, Vec3 x, double t, FieldJet *out)
+{
+    const SweepStation *station = field->model->station + stretch->first_station;
+    *out = (FieldJet){.f = 0};
+    for (int i = 0; i < stretch->station_count; i++) {
+        double before = i > 0 ? station[i].t - station[i - 1].t : 0, after = i + 1 < stretch->station_count ? station[i + 1].t - station[i].t : 0;
+        double d = before > 0 && after > 0 ? 0.5 * (before + after) : fmax(before, after), delta = stretch->width * d, up[4] = {1, 0, 0, 0},
+               down[4] = {0, 0, 0, 0};
+        if (stretch->station_count > 1 && fabs(t - station[i].t) > 3 * d)
+            continue;
+        SweepJet j = sweep_curve_at(field->curve[stretch->branch], station[i].t);
+        Vec3 u = vec3_sub(x, j.s), axis[3] = {j.n, j.b, vec3_unit(j.s1)};
+        double along = vec3_dot(u, axis[2]), w[3] = {0, 0, 0};
+        SectionJet c = section_evaluate(field->model->section[stretch->first_station + i], vec3_dot(u, axis[0]), vec3_dot(u, axis[1]));
+        // the first and the last section run on beyond the ends
+        if (i + 1 < stretch->station_count)
+            section_step((0.5 * d - along) / delta, up);
+        if (i > 0)
+            section_step((-0.5 * d - along) / delta, down);
+        w[0] = up[0] - down[0], w[1] = -(up[1] - down[1]) / delta, w[2] = (up[2] - down[2]) / (delta * delta);
+        if (stretch->station_count == 1)
+            w[0] = 1, w[1] = w[2] = 0;
+        Vec3 across = vec3_add_scaled(vec3_scale(axis[0], c.n), c.b, axis[1]);
+        out->f += w[0] * c.value;
+        out->gradient = vec3_add_scaled(vec3_add_scaled(out->gradient, w[0], across), w[1] * c.value, axis[2]);
+        sym3_add_outer(&out->hessian, w[0] * c.nn, axis[0]);
+        sym3_add_outer(&out->hessian, w[0] * c.bb, axis[1]);
+        sym3_add_pair(&out->hessian, w[0] * c.nb, axis[0], axis[1]);
+        sym3_add_pair(&out->hessian, w[1], across, axis[2]);
+        sym3_add_outer(&out->hessian, w[2] * c.value, axis[2]);
+    }
+}
+
+static void evaluate_stretch(const SweepField *field, const SweepStretch *stretch, Vec3 x, const SweepPart *p, FieldJet *out)
+{
+    if (stretch->is_straight) {
+        evaluate_straight(field, stretch, x, p->t, out);
+        return;
+    }
+    SweepJet j = sweep_curve_at(field->curve[stretch->branch], p->t);
+    const SectionRow row = {.count = stretch->station_count,
+                            .t = field->model->station_t + stretch->first_station,
+                            .section = field->model->section + stretch->first_station,
+                            .weights = stretch->weights,
+                            .tension = stretch->tension,
+                            .width = stretch->width};
+    SectionRowJet c = section_row_evaluate(&row, p->n, p->b, p->t);
+    carry_to_space(&j, x, p, &c, out);
+}
+
+void sweep_stretch_apply(const SweepField *field, int branch, Vec3 x, SweepPart *p)
+{
+    const SweepModel *model = field->model;
+    for (int i = 0; i < model->stretch_count; i++) {
+        const SweepStretch *stretch = &model->stretch[i];
+        if (stretch->branch != branch)
+            continue;
+        SweepStretchShare s = sweep_stretch_share(model, stretch, p->t);
+        if (!(s.m > 0))
+            continue;
+        FieldJet c;
+        evaluate_stretch(field, stretch, x, p, &c);
+        double d = c.f - p->f;
+        Vec3 d1 = vec3_sub(c.gradient, p->gradient);
+        sym3_add(&c.hessian, -1, &p->hessian);
+        p->f += s.m * d;
+        p->gradient = vec3_add_scaled(vec3_add_scaled(p->gradient, s.m, d1), s.m1 * d, p->t_gradient);
+        sym3_add(&p->hessian, s.m, &c.hessian);
+        sym3_add_pair(&p->hessian, s.m1, p->t_gradient, d1);
+        sym3_add_outer(&p->hessian, s.m2 * d, p->t_gradient);
+        sym3_add(&p->hessian, s.m1 * d, &p->t_hessian);
+        return;
+    }
+}
+
+void sweep_stretch_mark(const SweepModel *model, int branch, SweepSegment *segment)
+{
+    static const double SLACK = 1.1;         // sections lie near their contours, and the row between stations near the sections
+    for (int i = 0; i < model->stretch_count; i++) {
+        const SweepStretch *stretch = &model->stretch[i];
+        bool runs_on = stretch->from <= 0 && model->branch[branch].open_start;
+        if (stretch->branch != branch || segment->from >= stretch->to || (!runs_on && segment->to <= stretch->from))
+            continue;
+        segment->is_shaped = 1;
+        const SweepStation *station = model->station + stretch->first_station;
+        for (int k = 0; k < stretch->station_count; k++) {
+            int before = k > 1 ? k - 2 : 0, after = k + 2 < stretch->station_count ? k + 2 : stretch->station_count - 1;
+            if ((k > 1 && station[before].t > segment->to) || (k + 2 < stretch->station_count && station[after].t < segment->from))
+                continue;
+            for (int p = station[k].first_point; p < station[k].first_point + station[k].point_count; p++)
+                segment->largest = fmax(segment->largest, SLACK * same_hypot(model->contour[p].n, model->contour[p].b));
+        }
+    }
+}
+
+// --- The model's arrays ---
+
+static void drop_stretches(SweepModel *m)
+{
+    for (int i = 0; m->section && i < m->station_count; i++)
+        section_free(m->section[i]);
+    free(m->stretch);
+    free(m->station);
+    free(m->station_t);
+    free(m->contour);
+    free(m->section);
+    m->stretch = NULL, m->station = NULL, m->station_t = NULL, m->contour = NULL, m->section = NULL;
+    m->stretch_count = m->station_count = m->contour_count = 0;
+}
+
+static bool check_stretch(const SweepModel *m, int index, const SweepStretch *s, const SweepStretch *last, const char *file, Faults *faults)
+{
+    if (s->branch < 0 || s->branch >= m->branch_count || (last && s->branch < last->branch)) {
+        faults_add(faults, file, 0, 0, "sweep/stretch[%d] lies on branch %d; expected a branch of the model, 0 to %d, in ascending order", index, s->branch,
+                   m->branch_count - 1);
+        return false;
+    }
+    double length = sweep_model_length(m, s->branch), least = last && last->branch == s->branch ? last->to : 0, range = s->to - s->from;
+    if (!(s->from >= least && s->to <= length * (1 + 1e-6) && range > 0 && s->fade > 0 && 2 * s->fade <= range * (1 + 1e-9))) {
+        faults_add(faults, file, 0, 0,
+                   "sweep/stretch[%d] reaches from t = %g to %g and fades over %g; expected a range within %g to %g, twice as long as the fade", index, s->from,
+                   s->to, s->fade, least, length);
+        return false;
+    }
+    const SectionOptions *o = &s->section;
+    bool sound = (int)o->kind >= 0 && o->kind < SECTION_KINDS && (o->form == SECTION_MENDED || o->form == SECTION_AS_PRINTED) && o->harmonics >= 0 &&
+                 o->harmonics <= 16 && o->stiffness >= 0 && o->stiffness < 1e6 && o->delta_mm >= 0 && o->delta_mm < 1e6 && o->voxel_mm > 0 &&
+                 o->voxel_mm < 1e6 && (s->weights == SECTION_CATMULL_ROM || s->weights == SECTION_PSP) && s->tension > 0 && s->tension <= 1 && s->width > 0 &&
+                 s->width <= 0.5;
+    if (!sound)
+        faults_add(
+            faults, file, 0, 0,
+            "sweep/stretch[%d] has kind %d, form %d, %d harmonics, stiffness %g, delta %g, voxel %g, weights %d, tension %g, width %g; expected kind 0 to 3, "
+            "form and weights 0 or 1, 0 to 16 harmonics, tension 0 to 1, width 0 to 0.5, lengths above 0",
+            index, (int)o->kind, (int)o->form, o->harmonics, o->stiffness, o->delta_mm, o->voxel_mm, (int)s->weights, s->tension, s->width);
+    return sound;
+}
+
+static bool check_stations(const SweepStretch *stretch, int index, const SweepStation *station, int *next_point, int contour_count, const char *file,
+                           Faults *faults)
+{
+    for (int k = stretch->first_station; k < stretch->first_station + stretch->station_count; k++) {
+        const SweepStation *s = &station[k];
+        bool in_order = k == stretch->first_station || s->t - s[-1].t > 1e-9;
+        if (!isfinite(s->t) || !in_order || s->first_point != *next_point || s->point_count < 3 || s->point_count > 4096 ||
+            s->point_count > contour_count - *next_point) {
+            faults_add(faults, file, 0, 0,
+                       "sweep/station[%d] of stretch %d lies at t = %g and has %d points from %d; expected increasing t and 3 to 4096 points from %d", k, index,
+                       s->t, s->point_count, s->first_point, *next_point);
+            return false;
+        }
+        *next_point += s->point_count;
+    }
+    return true;
+}
+
+static bool check_stretches(const SweepModel *m, int stretches, const SweepStretch *stretch, int stations, const SweepStation *station, int contours,
+                            const char *file, Faults *faults)
+{
+    int next_station = 0, next_point = 0;
+    for (int i = 0; i < stretches; i++) {
+        const SweepStretch *s = &stretch[i];
+        if (s->first_station != next_station || s->station_count < 1 || s->station_count > ROW_MOST || s->station_count > stations - next_station) {
+            faults_add(faults, file, 0, 0, "sweep/stretch[%d] has %d stations from %d; expected 1 to %d from %d", i, s->station_count, s->first_station,
+                       (int)ROW_MOST, next_station);
+            return false;
+        }
+        if (!check_stretch(m, i, s, i > 0 ? &stretch[i - 1] : NULL, file, faults) || !check_stations(s, i, station, &next_point, contours, file, faults))
+            return false;
+        next_station += s->station_count;
+    }
+    if (next_station != stations || next_point != contours)
+        faults_add(faults, file, 0, 0, "sweep: the stretches have %d stations and %d points; expected %d and %d", next_station, next_point, stations, contours);
+    return next_station == stations && next_point == contours;
+}
+
+bool sweep_model_set_stretches(SweepModel *m, int stretch_count, const SweepStretch *stretch, int station_count, const SweepStation *station, int contour_count,
+                               const SectionPoint *contour, const char *file, Faults *faults)
+{
+    drop_stretches(m);
+    if (stretch_count == 0)
+        return true;
+    if (!check_stretches(m, stretch_count, stretch, station_count, station, contour_count, file, faults))
+        return false;
+    size_t stretches = (size_t)stretch_count, stations = (size_t)station_count, points = (size_t)contour_count;
+    m->stretch = malloc(stretches * sizeof *m->stretch);
+    m->station = malloc(stations * sizeof *m->station);
+    m->station_t = malloc(stations * sizeof *m->station_t);
+    m->contour = malloc(points * sizeof *m->contour);
+    m->section = calloc(stations, sizeof *m->section);
+    if (!m->stretch || !m->station || !m->station_t || !m->contour || !m->section) {
+        drop_stretches(m);
+        faults_add(faults, file, 0, 0, "needs more memory than is available (%d stations of sections)", station_count);
+        return false;
+    }
+    memcpy(m->stretch, stretch, stretches * sizeof *stretch);
+    memcpy(m->station, station, stations * sizeof *station);
+    memcpy(m->contour, contour, points * sizeof *contour);
+    m->stretch_count = stretch_count, m->station_count = station_count, m->contour_count = contour_count;
+    for (int i = 0; i < stretch_count; i++)
+        for (int k = stretch[i].first_station; k < stretch[i].first_station + stretch[i].station_count; k++) {
+            m->station_t[k] = station[k].t;
+            m->section[k] = section_create(&stretch[i].section, station[k].point_count, contour + station[k].first_point);
+            if (!m->section[k]) {
+                faults_add(faults, file, 0, 0, "sweep/station[%d] at t = %g of branch %d: its %d points give no section of kind %s", k, station[k].t,
+                           stretch[i].branch, station[k].point_count, section_kind_name[stretch[i].section.kind]);
+                drop_stretches(m);
+                return false;
+            }
+        }
+    return true;
+}
