@@ -150,7 +150,7 @@ void sweep_branch_evaluate(const SweepField *field, int branch, const SweepSegme
 {
     sweep_segment_evaluate(segment, x, t, part);
     if (segment->is_shaped > 0)
-        sweep_stretch_apply(field, branch, x, part);
+        sweep_stretch_apply(field->model, field->curve, branch, x, part);
 }
 
 void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part)

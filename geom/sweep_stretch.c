@@ -57,9 +57,9 @@ static void carry_to_space(const SweepJet *j, Vec3 x, const SweepPart *p, const 
 }
 
 // C of sections in straight frames: sum_i C_i(n_i, b_i) B_i(t_i), B_i(t) = H((d/2 - t)/delta) - H((-d/2 - t)/delta), d the mean distance of the neighbours.
-static void evaluate_straight(const SweepField *field, const SweepStretch *stretch, Vec3 x, double t, FieldJet *out)
+static void evaluate_straight(const SweepModel *model, const SweepCurve *curve, const SweepStretch *stretch, Vec3 x, double t, FieldJet *out)
 {
-    const SweepStation *station = field->model->station + stretch->first_station;
+    const SweepStation *station = model->station + stretch->first_station;
     *out = (FieldJet){.f = 0};
     for (int i = 0; i < stretch->station_count; i++) {
         double before = i > 0 ? station[i].t - station[i - 1].t : 0, after = i + 1 < stretch->station_count ? station[i + 1].t - station[i].t : 0;
@@ -67,10 +67,10 @@ static void evaluate_straight(const SweepField *field, const SweepStretch *stret
                down[4] = {0, 0, 0, 0};
         if (stretch->station_count > 1 && fabs(t - station[i].t) > 3 * d)
             continue;
-        SweepJet j = sweep_curve_at(field->curve[stretch->branch], station[i].t);
+        SweepJet j = sweep_curve_at(curve, station[i].t);
         Vec3 u = vec3_sub(x, j.s), axis[3] = {j.n, j.b, vec3_unit(j.s1)};
         double along = vec3_dot(u, axis[2]), w[3] = {0, 0, 0};
-        SectionJet c = section_evaluate(field->model->section[stretch->first_station + i], vec3_dot(u, axis[0]), vec3_dot(u, axis[1]));
+        SectionJet c = section_evaluate(model->section[stretch->first_station + i], vec3_dot(u, axis[0]), vec3_dot(u, axis[1]));
         // the first and the last section run on beyond the ends
         if (i + 1 < stretch->station_count)
             section_step((0.5 * d - along) / delta, up);
@@ -90,16 +90,16 @@ static void evaluate_straight(const SweepField *field, const SweepStretch *stret
     }
 }
 
-static void evaluate_stretch(const SweepField *field, const SweepStretch *stretch, Vec3 x, const SweepPart *p, FieldJet *out)
+static void evaluate_stretch(const SweepModel *model, const SweepCurve *curve, const SweepStretch *stretch, Vec3 x, const SweepPart *p, FieldJet *out)
 {
     if (stretch->is_straight) {
-        evaluate_straight(field, stretch, x, p->t, out);
+        evaluate_straight(model, curve, stretch, x, p->t, out);
         return;
     }
-    SweepJet j = sweep_curve_at(field->curve[stretch->branch], p->t);
+    SweepJet j = sweep_curve_at(curve, p->t);
     const SectionRow row = {.count = stretch->station_count,
-                            .t = field->model->station_t + stretch->first_station,
-                            .section = field->model->section + stretch->first_station,
+                            .t = model->station_t + stretch->first_station,
+                            .section = model->section + stretch->first_station,
                             .weights = stretch->weights,
                             .tension = stretch->tension,
                             .width = stretch->width};
@@ -107,9 +107,8 @@ static void evaluate_stretch(const SweepField *field, const SweepStretch *stretc
     carry_to_space(&j, x, p, &c, out);
 }
 
-void sweep_stretch_apply(const SweepField *field, int branch, Vec3 x, SweepPart *p)
+void sweep_stretch_apply(const SweepModel *model, SweepCurve *const *curve, int branch, Vec3 x, SweepPart *p)
 {
-    const SweepModel *model = field->model;
     for (int i = 0; i < model->stretch_count; i++) {
         const SweepStretch *stretch = &model->stretch[i];
         if (stretch->branch != branch)
@@ -118,7 +117,7 @@ void sweep_stretch_apply(const SweepField *field, int branch, Vec3 x, SweepPart 
         if (!(s.m > 0))
             continue;
         FieldJet c;
-        evaluate_stretch(field, stretch, x, p, &c);
+        evaluate_stretch(model, curve[branch], stretch, x, p, &c);
         double d = c.f - p->f;
         Vec3 d1 = vec3_sub(c.gradient, p->gradient);
         sym3_add(&c.hessian, -1, &p->hessian);

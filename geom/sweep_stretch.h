@@ -2,10 +2,12 @@
 #ifndef SELDINGER_GEOM_SWEEP_STRETCH_H
 #define SELDINGER_GEOM_SWEEP_STRETCH_H
 
-#include "geom/sweep_field.h"
+#include "geom/sweep_curve.h"
+#include "geom/sweep_part.h"
 
 // Replaces f and its derivatives, which are those of the rows, by those of the branch with its stretches. The part's t, n, b and their derivatives are filled.
-void sweep_stretch_apply(const SweepField *field, int branch, Vec3 x, SweepPart *part);
+// `curve`: (branches).
+void sweep_stretch_apply(const SweepModel *model, SweepCurve *const *curve, int branch, Vec3 x, SweepPart *part);
 // Marks a segment into which a stretch of the branch reaches, and enlarges its bound.
 void sweep_stretch_mark(const SweepModel *model, int branch, SweepSegment *segment);
 // m and its first two derivatives at t.
