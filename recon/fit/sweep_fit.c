@@ -27,6 +27,7 @@ SweepFitOptions sweep_fit_paper_options(SectionKind kind)
     options.section = section_default_options(kind, SECTION_AS_PRINTED);
     options.fork_spacing = 1;
     options.rounds = 0;
+    options.blend = 0;
     return options;
 }
 

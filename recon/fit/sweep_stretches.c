@@ -1,6 +1,7 @@
 // See sweep_stretches.h.
 #include "recon/fit/sweep_stretches.h"
 
+#include "recon/fit/band_matrix.h"
 #include "recon/fit/contour_tour.h"
 #include "recon/fit/sweep_sections.h"
 #include "recon/fit/sweep_spline.h"
@@ -20,6 +21,7 @@ static const double NEARER = 0.6;            // … and a contour through the po
 // A point of a branch in the coordinates of its curve.
 typedef struct Loose {
     SectionPoint at;
+    double t;
     int station;             // the nearest one of its branch, counted over all branches
     int64_t point;
 } Loose;
@@ -52,7 +54,7 @@ static void place_point(void *context, long p)
     int q = 0;
     while (q + 1 < b->break_count && 0.5 * (at[q] + at[q + 1]) < part.t)
         q++;
-    s->loose[p] = (Loose){.at = {part.n, part.b}, .station = part.w == 0 ? b->first_break + q : -1, .point = p};
+    s->loose[p] = (Loose){.at = {part.n, part.b}, .t = part.t, .station = part.w == 0 ? b->first_break + q : -1, .point = p};
 }
 
 static int compare_loose(const void *a, const void *b)
@@ -114,17 +116,17 @@ static double row_radius(const double *term, double theta)
     return sum;
 }
 
-static bool contour_of_rows(Stations *s, int branch, int station, int count)
+static bool contour_of_rows(Stations *s, int branch, int station)
 {
     double term[T];
     SectionPoint point[CONTOUR];
     for (int k = 0; k < T; k++)
         term[k] = sweep_draft_term(s->draft, branch, k, s->station[station].t);
-    for (int i = 0; i < count; i++) {
-        double theta = 2 * PI * i / count, r = row_radius(term, theta);
+    for (int i = 0; i < CONTOUR; i++) {
+        double theta = 2 * PI * i / CONTOUR, r = row_radius(term, theta);
         point[i] = (SectionPoint){r * same_cos(theta), r * same_sin(theta)};
     }
-    return add_contour(s, station, count, point);
+    return add_contour(s, station, CONTOUR, point);
 }
 
 // The shortest closed polygon through the points beside the station; one through the rows if the points give none. `apart`: [radii].
@@ -138,7 +140,59 @@ static bool contour_of_points(Stations *s, int branch, int station, double apart
         point[i] = s->loose[s->first[station] + i].at;
     int kept = contour_tour((int)count, point, apart * station_radius(s, station), tour);
     free(point);
-    return kept >= 8 && polygon_contains(kept, tour, 0, 0) ? add_contour(s, station, kept, tour) : contour_of_rows(s, branch, station, CONTOUR);
+    return kept >= 8 && polygon_contains(kept, tour, 0, 0) ? add_contour(s, station, kept, tour) : contour_of_rows(s, branch, station);
+}
+
+// A contour as the papers have it: of this station alone, without regard to forks. Points within 0.8 of the distance to the next stations, robust least squares of
+// rho = sum_k a_k cos k theta + b_k sin k theta, k <= 5, with a ridge k^4 (shared/rivals.md, section 1); a child's first part repeats the tree's radius. The rows are
+// moved there, too.
+static bool contour_of_station(Stations *s, int branch, int station)
+{
+    enum { HARMONICS = 5, TERMS = 2 * HARMONICS + 1, ROUNDS = 4 };
+    static const double REACH = 0.8, RIDGE = 1e-4, KNEE = 0.1, SKIP = 0.7;
+    const SweepBranch *b = &s->draft->model->branch[branch];
+    int first = station > b->first_break ? station - 1 : station, last = station + 1 < b->first_break + b->break_count ? station + 1 : station;
+    double t = s->station[station].t, reach = REACH * (s->station[last].t - s->station[first].t) / (last - first), term[T] = {0}, matrix[TERMS * TERMS],
+           c[TERMS] = {0};
+    double hidden = b->parent >= 0 ? SKIP * sweep_draft_radius(s->draft, b->parent, b->parent_t) : -HUGE_VAL, r = sweep_draft_radius(s->draft, branch, t);
+    c[0] = r;
+    for (int round = 0; round < ROUNDS && t >= hidden; round++) {
+        double next[TERMS] = {0}, basis[TERMS], sum = 0;
+        memset(matrix, 0, sizeof matrix);
+        for (int64_t p = s->first[first]; p < s->first[last + 1]; p++) {
+            double y = (s->loose[p].t - t) / reach, rho = same_hypot(s->loose[p].at.n, s->loose[p].at.b),
+                   theta = same_atan2(s->loose[p].at.b, s->loose[p].at.n), e = -rho;
+            if (!(fabs(y) < 1))
+                continue;
+            for (int k = 0; k < TERMS; k++) {
+                int harmonic = (k + 1) / 2;
+                basis[k] = k % 2 ? same_cos(harmonic * theta) : k > 0 ? same_sin(harmonic * theta) : 1;
+                e += c[k] * basis[k];
+            }
+            double w = same_square(1 - y * y) * (round > 0 ? sweep_trust_of(e, s->system->noise, KNEE * r) : 1);
+            sum += w;
+            for (int k = 0; k < TERMS; k++) {
+                next[k] += w * basis[k] * rho;
+                for (int j = k; j < TERMS; j++)
+                    matrix[k * TERMS + j - k] += w * basis[k] * basis[j];
+            }
+        }
+        for (int k = 1; k < TERMS; k++)
+            matrix[k * TERMS] += RIDGE * sum * same_square(same_square((k + 1) / 2));
+        if (!(sum > 1) || !band_factor(matrix, TERMS, TERMS - 1))
+            break;
+        band_solve(matrix, TERMS, TERMS - 1, next);
+        memcpy(c, next, sizeof c);
+    }
+    memcpy(term, c, sizeof c);
+    for (int k = 0; k < T; k++)
+        s->polar[(size_t)station * T + (size_t)k] = term[k] - sweep_draft_term(s->draft, branch, k, t);
+    SectionPoint point[PRINTED_CONTOUR];
+    for (int i = 0; i < PRINTED_CONTOUR; i++) {
+        double theta = 2 * PI * i / PRINTED_CONTOUR, rho = fmax(row_radius(term, theta), 0.1 * r);
+        point[i] = (SectionPoint){rho * same_cos(theta), rho * same_sin(theta)};
+    }
+    return add_contour(s, station, PRINTED_CONTOUR, point);
 }
 
 // --- Mended kinds ---
@@ -212,7 +266,7 @@ static Section *make_section(Stations *s, int branch, int station)
         section_free(section);
         s->contour_count = kept;
     }
-    if (!contour_of_rows(s, branch, station, CONTOUR))
+    if (!contour_of_rows(s, branch, station))
         return NULL;
     section = section_create(&options, at->point_count, s->contour + at->first_point);
     if (!section)
@@ -226,7 +280,7 @@ static bool fit_station(Stations *s, int branch, int station)
     SweepStretchFigures *f = s->figures;
     f->second_sheets += count_second_sheets(s, station);
     if (s->draft->options->section.kind == SECTION_POLAR && !rows_miss_points(s, station))
-        return contour_of_rows(s, branch, station, CONTOUR);
+        return contour_of_rows(s, branch, station);
     Section *section = make_section(s, branch, station);
     if (!section)
         return false;
@@ -263,7 +317,18 @@ static void move_rows(Stations *s, int branch, int term, double *x, double *uppe
         s->draft->model->row[(size_t)(b->first_row + k) * T + (size_t)term] += x[k];
 }
 
-// --- Shapes ---
+// --- Stretches ---
+
+static bool move_all_rows(Stations *s)
+{
+    const SweepModel *m = s->draft->model;
+    double *scratch = malloc(2 * ((size_t)m->row_count + 2) * sizeof *scratch);
+    for (int i = 0; scratch && i < m->branch_count; i++)
+        for (int k = 0; k < T; k++)
+            move_rows(s, i, k, scratch, scratch + m->row_count + 2);
+    free(scratch);
+    return scratch != NULL;
+}
 
 // The stretches of one branch: runs of shaped stations, each with a neighbour on either side, over which it fades.
 static int find_stretches(const Stations *s, int branch, SweepStretch *stretch)
@@ -344,20 +409,16 @@ static bool fit_mended(Stations *s)
     SweepModel *m = s->draft->model;
     bool good = true;
     SweepStretch *stretch = malloc(((size_t)m->break_count + 1) * sizeof *stretch);
-    double *scratch = malloc(2 * ((size_t)m->row_count + 2) * sizeof *scratch);
     int stretches = 0;
-    good = stretch && scratch;
+    good = stretch != NULL;
     for (int i = 0; good && i < m->branch_count; i++) {
         for (int q = m->branch[i].first_break; good && q < m->branch[i].first_break + m->branch[i].break_count; q++)
             good = fit_station(s, i, q);
         stretches += good ? find_stretches(s, i, stretch + stretches) : 0;
     }
-    for (int i = 0; good && i < m->branch_count && s->draft->options->section.kind != SECTION_POLAR; i++)
-        for (int k = 0; k < T; k++)
-            move_rows(s, i, k, scratch, scratch + m->row_count + 2);
+    good = good && (s->draft->options->section.kind == SECTION_POLAR || move_all_rows(s));
     good = good && set_stretches(s, stretches, stretch);
     free(stretch);
-    free(scratch);
     return good;
 }
 
@@ -369,8 +430,9 @@ static bool fit_printed(Stations *s)
     for (int i = 0; good && i < m->branch_count; i++) {
         stretch[i] = whole_branch(s, i);
         for (int q = m->branch[i].first_break; good && q < m->branch[i].first_break + m->branch[i].break_count; q++)
-            good = raw ? contour_of_points(s, i, q, 1e-9) : contour_of_rows(s, i, q, PRINTED_CONTOUR);
+            good = contour_of_station(s, i, q) && (!raw || contour_of_points(s, i, q, 1e-9));
     }
+    good = good && move_all_rows(s);
     good = good && set_stretches(s, m->branch_count, stretch);
     for (int i = 0; good && i < m->station_count; i++)
         s->figures->numbers += section_numbers(m->section[i]);

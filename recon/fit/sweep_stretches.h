@@ -3,7 +3,7 @@
 // Mended kinds: each break is a station. Its contour is sampled from the rows; where they miss points (the lumen is not star-shaped), it is the shortest
 // closed polygon through the points beside the station. A section of the kind is made from it. Where the section's curve agrees with a polar one to 0.01 radii
 // the rows are moved to it; where it does not, the model gets a stretch there (sweep_model.h), for polar sections of the kind raster.
-// As printed: one stretch for each whole branch. raster: weights of Catmull and Rom with tension 0.7. rbf: through the raw points beside the station; PSP weights.
+// As printed: one stretch for each whole branch, contours of each station alone. raster: weights of Catmull and Rom with tension 0.7. rbf: through the raw points beside the station; PSP weights.
 // pas: sections in the straight frames of their stations.
 #ifndef SELDINGER_RECON_FIT_SWEEP_STRETCHS_H
 #define SELDINGER_RECON_FIT_SWEEP_STRETCHS_H
