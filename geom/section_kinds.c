@@ -21,19 +21,20 @@ int section_numbers(const Section *section) { return section->numbers; }
 // The place between `in` (C > 0) and `out` (C <= 0) on a ray where C changes its sign.
 static double crossing(const Section *section, double n0, double b0, double c, double s, double in, double out)
 {
-    double f_in = section_evaluate(section, n0 + in * c, b0 + in * s).value, f_out = section_evaluate(section, n0 + out * c, b0 + out * s).value;
+    double at = 0.5 * (in + out);
     for (int i = 0; i < 60 && out - in > 1e-13 * section->radius; i++) {
-        // the secant, halved at the side that stays (Illinois); every fourth time the middle
-        double at = i % 4 == 3 ? 0.5 * (in + out) : in + (out - in) * f_in / (f_in - f_out);
-        double f = section_evaluate(section, n0 + at * c, b0 + at * s).value;
-        if (fabs(f) < 1e-14 * section->radius)
+        SectionJet jet = section_evaluate(section, n0 + at * c, b0 + at * s);
+        if (fabs(jet.value) < 1e-14 * section->radius)
             return at;
-        if (f > 0)
-            in = at, f_in = f, f_out *= 0.5;
+        if (jet.value > 0)
+            in = at;
         else
-            out = at, f_out = f, f_in *= 0.5;
+            out = at;
+        // Newton within the bracket; every fourth time the middle
+        double next = at - jet.value / fmin(jet.n * c + jet.b * s, -1e-9);
+        at = next > in && next < out && i % 4 != 3 ? next : 0.5 * (in + out);
     }
-    return 0.5 * (in + out);
+    return at;
 }
 
 int section_radii(const Section *section, double n0, double b0, int count, double *radius)

@@ -103,7 +103,7 @@ static void move(Stepper *s, double part)
     for (int i = 0; i < held; i++) {
         // exactly on the line, regardless of rounding
         const double *u = s->system.u + row_of(s, i);
-        double *k = s->iterate.moved + row_of(s, i), turn = part * (u[3] - k[3]);
+        double *k = s->iterate.moved + row_of(s, i), turn = fmax(-NODE_TURN_MAX, fmin(NODE_TURN_MAX, part * (u[3] - k[3])));
         k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
         k[3] += turn;
         double along = vec3_dot(vec3_sub(s->start.position[i], s->entry.mouth), s->entry.axis[0]) + k[0];

@@ -80,6 +80,8 @@ ContactProblem step_contacts(Stepper *s)
                             .u = s->system.u};
 }
 
+static const double IMPLAUSIBLE = 1e9;       // [mm], [rad] in one step
+
 bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
 {
     if (s->progress.has_failed)
@@ -104,10 +106,10 @@ bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
         s->report.flags |= STEP_NOT_CONVERGED;
     stepper_keep_forces(s);
     self_contact_keep_forces(s);
-    double sum = 0;
+    bool is_plausible = true;    // false for NaN, too
     for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
-        sum += s->system.u[i] * 0;          // 0, or NaN
-    s->progress.has_failed |= sum != 0;
+        is_plausible &= fabs(s->system.u[i]) < IMPLAUSIBLE;
+    s->progress.has_failed |= !is_plausible;
     return true;
 }
 
