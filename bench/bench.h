@@ -7,7 +7,7 @@
 
 #include <cJSON.h>
 
-extern const Verb bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing, bench_models;
+extern const Verb bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing, bench_models, bench_papers;
 
 typedef struct Spread {
     double median, p99, p999, max;

@@ -11,6 +11,7 @@ static const Verb *const tables[] = {&bench_collision,
                                      &bench_track,
                                      &bench_wall,
                                      &bench_models,
+                                     &bench_papers,
                                      &bench_torture,
                                      &bench_peer,
 #ifdef SELDINGER_RENDER

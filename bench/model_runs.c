@@ -136,7 +136,8 @@ bool model_loop(const char *scene_path, const ModelKind *kind, int threads, Mode
     int64_t steps = good ? bench_steps(scene, INT64_MAX) : 0;
     double *felt = calloc((size_t)steps + 1, sizeof *felt), *right = calloc((size_t)steps + 1, sizeof *right);
     CollisionLoop loop, truth;
-    good = good && felt && right && run(scene, model.vessel, exact, kind->is_printed, felt, &loop, faults) && run(scene, exact, exact, false, right, &truth, faults);
+    good = good && felt && right && run(scene, model.vessel, exact, kind->is_printed, felt, &loop, faults) &&
+           run(scene, exact, exact, false, right, &truth, faults);
     if (good) {
         int64_t felt_steps = loop.survived ? loop.steps : loop.failed_step, right_steps = truth.survived ? truth.steps : truth.failed_step;
         PushFigures push = collision_push(felt, felt_steps, right, right_steps);

@@ -3,6 +3,7 @@
 // The wall's points on which a model is measured are other than those that it was fitted to, without noise; those near open ends are left out. Of a tree given
 // on the command line the wall is not known: its own points are used, and the normal's error is not measured.
 #include "bench/model_runs.h"
+#include "bench/models_picture.h"
 #include "recon/phantom/phantom.h"
 #include "recon/phantom/shaped_tube.h"
 #include "recon/tree_file.h"
@@ -11,12 +12,12 @@
 #include <string.h>
 #include <time.h>
 
-enum { MOST_TREES = 8 };
+enum { MOST_TREES = 8, MOST_SHAPES = 8 };
 
 typedef struct ModelsBench {
     BenchOptions common;
-    const char *tree[MOST_TREES], *shape;
-    int tree_count, only;    // the model; MODEL_KINDS: all
+    const char *tree[MOST_TREES], *shape[MOST_SHAPES], *picture;
+    int tree_count, shape_count, only;    // the model; MODEL_KINDS: all
     SweepFitOptions sweep;
 } ModelsBench;
 
@@ -273,20 +274,35 @@ static void report(const ModelsBench *bench, const char *name, const FittedModel
     cJSON_AddItemToArray(rows, out);
 }
 
-static bool compare(const ModelsBench *bench, const char *name, const Subject *subject, cJSON *rows, Faults *faults)
+// Draws the models across the vessel or, where there are any, at a fork and at a sac.
+static bool draw(const ModelsBench *bench, const char *name, const Subject *subject, const FittedModel *fitted, ModelsPicture *picture)
+{
+    PictureView view = {.name = name};
+    bool fork = picture_view_fork(subject->tree, &view), good = !fork || models_picture_row(picture, &view, subject->tree, fitted, bench->common.threads);
+    bool sac = picture_view_sac(subject->tree, &view);
+    good = good && (!sac || models_picture_row(picture, &view, subject->tree, fitted, bench->common.threads));
+    return good &&
+           (fork || sac || !picture_view_across(subject->tree, &view) || models_picture_row(picture, &view, subject->tree, fitted, bench->common.threads));
+}
+
+static bool compare(const ModelsBench *bench, const char *name, const Subject *subject, ModelsPicture *picture, cJSON *rows, Faults *faults)
 {
     bool good = true;
+    FittedModel fitted[MODEL_KINDS] = {{0}};
     for (int i = 0; i < MODEL_KINDS && good; i++) {
         if (bench->only != MODEL_KINDS && bench->only != i)
             continue;
-        FittedModel fitted;
         Row row;
-        good = fitted_model_create(&model_kind[i], subject->tree, subject->voxel, bench->common.threads, &bench->sweep, &fitted, faults) &&
-               measure(bench, subject, &fitted, &row);
+        good = fitted_model_create(&model_kind[i], subject->tree, subject->voxel, bench->common.threads, &bench->sweep, &fitted[i], faults) &&
+               measure(bench, subject, &fitted[i], &row);
         if (good)
-            report(bench, name, &fitted, &row, rows);
-        fitted_model_free(&fitted);
+            report(bench, name, &fitted[i], &row, rows);
+        if (!picture)
+            fitted_model_free(&fitted[i]);
     }
+    good = good && (!picture || draw(bench, name, subject, fitted, picture));
+    for (int i = 0; i < MODEL_KINDS; i++)
+        fitted_model_free(&fitted[i]);
     return good;
 }
 
@@ -320,6 +336,14 @@ static bool compare_runs(const ModelsBench *bench, cJSON *root, Faults *faults)
     return true;
 }
 
+static bool is_wanted(const ModelsBench *bench, const char *name)
+{
+    for (int i = 0; i < bench->shape_count; i++)
+        if (!strncmp(bench->shape[i], name, strlen(bench->shape[i])))
+            return true;
+    return bench->shape_count == 0;
+}
+
 static int call(void *structure, Faults *faults)
 {
     ModelsBench *bench = structure;
@@ -327,28 +351,32 @@ static int call(void *structure, Faults *faults)
     FILE *text = bench_text(&bench->common);
     fprintf(text, "%s\n%-12s %-11s %8s %8s %8s %9s %7s %7s %7s %7s %8s %7s %7s\n", bench_processor(), "case", "model", "mean mm", "p99", "max", "bias",
             "nrm deg", "bulge r", "bending", "jump", "numbers", "build s", "us/80");
-    bool good = true;
+    ModelsPicture picture = {0};
+    bool good = !bench->picture || models_picture_open(&picture, bench->picture, faults);
     int count = (int)(sizeof cases / sizeof cases[0]) - (bench->common.quick ? 2 : 0);
     for (int i = 0; i < count && good && bench->tree_count == 0; i++) {
         Subject subject = {0};
         const Case *c = &cases[i];
-        if (bench->shape && strncmp(bench->shape, c->name, strlen(bench->shape)))
+        if (!is_wanted(bench, c->name))
             continue;
         static const char *const tube[] = {[SHAPED_STAR] = "star", [SHAPED_ELLIPSE] = "ellipse", [SHAPED_KIDNEY] = "kidney"};
         int which = 0;
         while (which < 3 && strcmp(c->shape, tube[which]))
             which++;
         good = which < 3 ? sample_tube((ShapedTube)which, c->noise, &subject) : sample_shape(c, &subject, faults);
-        good = good && compare(bench, c->name, &subject, rows, faults);
+        good = good && compare(bench, c->name, &subject, bench->picture ? &picture : NULL, rows, faults);
         free_subject(&subject);
     }
     for (int i = 0; i < bench->tree_count && good; i++) {
         Subject subject = {0};
         const char *slash = strrchr(bench->tree[i], '/');
-        good = take_tree(bench->tree[i], &subject, faults) && compare(bench, slash ? slash + 1 : bench->tree[i], &subject, rows, faults);
+        good = take_tree(bench->tree[i], &subject, faults) &&
+               compare(bench, slash ? slash + 1 : bench->tree[i], &subject, bench->picture ? &picture : NULL, rows, faults);
         free_subject(&subject);
     }
-    good = good && (bench->tree_count > 0 || bench->shape || bench->common.quick || compare_runs(bench, root, faults));
+    if (bench->picture && picture.out)
+        good = models_picture_close(&picture, bench->picture, faults) && good;
+    good = good && (bench->tree_count > 0 || bench->shape_count > 0 || bench->common.quick || compare_runs(bench, root, faults));
     if (!good && faults->count == 0)
         faults_add(faults, "bench models", 0, 0, "not enough memory");
     good = good && bench_write_json(&bench->common, root, faults);
@@ -368,12 +396,23 @@ static const char *take_path(void *structure, const Option *option, const char *
     return NULL;
 }
 
+static const char *take_shape(void *structure, const Option *option, const char *text)
+{
+    ModelsBench *bench = structure;
+    (void)option;
+    if (bench->shape_count == MOST_SHAPES)
+        return "at most eight";
+    bench->shape[bench->shape_count++] = text;
+    return NULL;
+}
+
 #define AT(member) OPTION_AT(ModelsBench, member)
 static const char *const only_choices[] = {"lim", "lim-paper", "sweep", "raster", "rbf", "pas", "sweep-paper", "rbf-paper", "pas-paper", NULL};
 static const Option options[] = {
     {"tree", "F.h5", OPTION_FILE, AT(tree), "a segmented tree instead of the shapes; may be given several times", .take = take_path},
     {"model", "NAME", OPTION_CHOICE, AT(only), "only this model", .choices = only_choices, .otherwise = "all"},
-    {"case", "NAME", OPTION_TEXT, AT(shape), "only the cases whose names begin so", .otherwise = "all"},
+    {"case", "NAME", OPTION_TEXT, AT(shape), "only the cases whose names begin so; may be given several times", .otherwise = "all", .take = take_shape},
+    {"picture", "F.svg", OPTION_FILE, AT(picture), "sections through all models, one row of cells for each case, fork and sac (at most eight)"},
     {"spacing", "X", OPTION_NUMBER, AT(sweep.spacing), "sections along a tube, in radii", .least = 0.1, .most = 10},
     {"fork-spacing", "X", OPTION_NUMBER, AT(sweep.fork_spacing), "the same at forks", .least = 0.1, .most = 10},
     {"rounds", "N", OPTION_INT, AT(sweep.rounds), "of the joint refinement", .least = 0, .most = 100},
