@@ -8,7 +8,7 @@
 
 static const OptionTable table = {
     .program = "seldinger bench",
-    .does = "timings of step, fit, track, peer, collision, drawing and wall, all in one run; torture: random runs",
+    .does = "timings of step, fit, track, peer, collision, drawing and wall, all in one run; models and papers: vessel models; torture: random runs",
     .usage = "TABLE [options]",
     .intro = "Timing tables and random tests by the program seldinger-bench in the same folder. `seldinger bench --help` lists them; "
              "`seldinger bench TABLE --help` lists their options.",
