@@ -308,3 +308,13 @@ bool sweep_model_set_stretches(SweepModel *m, int stretch_count, const SweepStre
         }
     return true;
 }
+
+int sweep_model_harmonics(const SweepModel *m)
+{
+    int highest = 1;
+    for (int i = 0; i < m->row_count; i++)
+        for (int k = 1; k < SWEEP_TERMS; k++)
+            if (m->row[i * SWEEP_TERMS + k] != 0 && (k + 1) / 2 > highest)
+                highest = (k + 1) / 2;
+    return highest;
+}

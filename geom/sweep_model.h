@@ -100,6 +100,8 @@ bool sweep_model_set_stretches(SweepModel *model, int stretch_count, const Sweep
 // are apart, breaks increase from 0 to the curve's length (to 1e-6 of it), numbers are finite, radii positive, sac nodes linked. Adds one fault per broken rule,
 // with the first offending index.
 bool sweep_model_validate(const SweepModel *model, const char *file, Faults *faults);
+// The highest harmonic that any row uses, at least 1.
+int sweep_model_harmonics(const SweepModel *model);
 // [mm] length of a branch's curve: t of its last knot.
 double sweep_model_length(const SweepModel *model, int branch);
 

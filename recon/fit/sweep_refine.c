@@ -69,7 +69,7 @@ static void see_guard(void *context, long index)
     r->sight[p][0] = sweep_sight_of(r->field, &part, 1);
     r->count[p] = 1;
     r->system->distance[p] = part.f;
-    r->system->trust[p] = deepest > DEEP * guard->rho ? fmax(LEAST, same_square(r->system->noise / (LOOSE * guard->rho))) : 0;
+    r->system->trust[p] = deepest > DEEP * guard->rho ? fmin(1, fmax(LEAST, same_square(r->system->noise / (LOOSE * guard->rho)))) : 0;
 }
 
 static bool look_at_blend(Refinement *r, double knee)
