@@ -118,7 +118,11 @@ static int find_runs(const SweepMeshParts *parts, MeshRun **runs, int *first_run
                 capacity = capacity > 0 ? 2 * capacity : 64;
                 *runs = HEAP_GROWN(*runs, (size_t)capacity, sizeof **runs);
             }
-            (*runs)[count++] = (MeshRun){.branch = i, .from = j, .to = to, .cut_from = -1, .cut_to = -1,
+            (*runs)[count++] = (MeshRun){.branch = i,
+                                         .from = j,
+                                         .to = to,
+                                         .cut_from = -1,
+                                         .cut_to = -1,
                                          .t_from = is_free(r->ring[j].kind) ? -HUGE_VAL : r->ring[j].t,
                                          .t_to = is_free(r->ring[to + 1].kind) ? HUGE_VAL : r->ring[to + 1].t};
             j = to;
@@ -310,10 +314,7 @@ static void row_at(const Assembly *a, int branch, int ring, bool is_cut, Row *ro
         }
 }
 
-static bool is_used(const MeshRings *r, int ring)
-{
-    return !(ring > 0 && r->in_patch[ring - 1]) && !(ring < r->count - 1 && r->in_patch[ring]);
-}
+static bool is_used(const MeshRings *r, int ring) { return !(ring > 0 && r->in_patch[ring - 1]) && !(ring < r->count - 1 && r->in_patch[ring]); }
 
 static void count_vertices(Assembly *a)
 {
@@ -410,7 +411,10 @@ static void put_strips(Assembly *a, int branch, Row *low, Row *high)
 static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
 {
     mesh->surface = HEAP_ZEROED(1, sizeof *mesh->surface);
-    Assembly a = {.parts = parts, .mesh = mesh, .good = true, .ring_first = HEAP_ZEROED((size_t)parts->branch_count, sizeof *a.ring_first),
+    Assembly a = {.parts = parts,
+                  .mesh = mesh,
+                  .good = true,
+                  .ring_first = HEAP_ZEROED((size_t)parts->branch_count, sizeof *a.ring_first),
                   .patch_first = HEAP_ZEROED((size_t)parts->patch_count + 1, sizeof *a.patch_first)};
     Row low = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
     Row high = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};

@@ -7,12 +7,14 @@
 #include <cmocka.h>
 
 #include "base/whole_file.h"
+#include "recon/phantom/shaped_tube.h"
 #include "recon/sweep_file.h"
 #include "recon/tree_file.h"
 #include "tests/recon/fitted_shape.h"
 #include "tests/recon/swept_shape.h"
 
 #include <hdf5.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -217,6 +219,58 @@ static void lies_are_found(void **state)
     expect_fault(path, "profile");
 }
 
+// A kidney-shaped tube has stretches with rasters; with rbf and pas models beside it in one file, each comes back as it was.
+static void stretches_and_several_models_live_in_one_file(void **state)
+{
+    (void)state;
+    VesselTree *tube = shaped_tube_sample(SHAPED_KIDNEY, 0, 1);
+    SweepModels models = {{NULL}}, back;
+    static const SectionKind kinds[] = {SECTION_POLAR, SECTION_RBF, SECTION_PAS};
+    for (int i = 0; i < 3; i++) {
+        SweepFitOptions options = kinds[i] == SECTION_PAS ? sweep_fit_paper_options(SECTION_PAS) : sweep_fit_default_options();
+        if (kinds[i] == SECTION_RBF)
+            options.section = section_default_options(SECTION_RBF, SECTION_MENDED);
+        models.of[kinds[i]] = swept(tube, options, NULL);
+        assert_true(models.of[kinds[i]]->stretch_count > 0);
+    }
+    faults_clear(&faults);
+    assert_true(tree_file_save_with(tube, &models, NULL, in_folder("all.h5"), &faults));
+    assert_true(sweep_models_load(in_folder("all.h5"), tube, &back, &faults));
+    assert_null(back.of[SECTION_RASTER]);
+    for (int i = 0; i < 3; i++) {
+        const SweepModel *a = models.of[kinds[i]], *b = back.of[kinds[i]];
+        assert_non_null(b);
+        assert_true(a->stretch_count == b->stretch_count && a->station_count == b->station_count && a->contour_count == b->contour_count);
+        assert_memory_equal(a->row, b->row, (size_t)a->row_count * SWEEP_TERMS * sizeof *a->row);
+        assert_memory_equal(a->contour, b->contour, (size_t)a->contour_count * sizeof *a->contour);
+        for (int k = 0; k < a->stretch_count; k++) {
+            const SweepStretch *p = &a->stretch[k], *q = &b->stretch[k];
+            assert_true(p->branch == q->branch && p->from == q->from && p->to == q->to && p->fade == q->fade && p->station_count == q->station_count);
+            assert_true(p->section.kind == q->section.kind && p->section.form == q->section.form && p->weights == q->weights &&
+                        p->is_straight == q->is_straight);
+            assert_true(p->section.delta_mm == q->section.delta_mm && p->section.stiffness == q->section.stiffness && p->width == q->width);
+        }
+        for (int k = 0; k < a->station_count; k++)
+            assert_true(a->station[k].t == b->station[k].t && a->station[k].point_count == b->station[k].point_count);
+    }
+    // every dataset of a stretch is needed, and checked
+    static const char *const names[] = {"branch", "range", "kind", "parameter", "station_offset", "station_t", "contour_offset", "contour"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        char path[64];
+        snprintf(path, sizeof path, "/rbf/stretch/%s", names[i]);
+        faults_clear(&faults);
+        assert_true(tree_file_save_with(tube, &models, NULL, in_folder("cut.h5"), &faults));
+        hid_t file = H5Fopen(in_folder("cut.h5"), H5F_ACC_RDWR, H5P_DEFAULT);
+        H5Ldelete(file, path, H5P_DEFAULT);
+        H5Fclose(file);
+        assert_null(sweep_file_load(in_folder("cut.h5"), SECTION_RBF, tube, &faults));
+        assert_true(has_fault(path));
+    }
+    sweep_models_free(&models);
+    sweep_models_free(&back);
+    vessel_tree_free(tube);
+}
+
 static void every_part_of_a_file_is_refused(void **state)
 {
     (void)state;
@@ -236,7 +290,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(save_load_is_equality),           cmocka_unit_test(a_file_without_the_model_says_how_to_make_it),
         cmocka_unit_test(missing_datasets_are_named),      cmocka_unit_test(lies_are_found),
-        cmocka_unit_test(every_part_of_a_file_is_refused),
+        cmocka_unit_test(every_part_of_a_file_is_refused), cmocka_unit_test(stretches_and_several_models_live_in_one_file),
     };
     return cmocka_run_group_tests(tests, make_all, remove_all);
 }

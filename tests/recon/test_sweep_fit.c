@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#include "recon/fit/contour_tour.h"
 #include "recon/phantom/shaped_tube.h"
 #include "tests/recon/fitted_shape.h"
 #include "tests/recon/swept_shape.h"
@@ -284,6 +285,96 @@ static void unfit_input_is_refused(void **state)
     vessel_tree_free(tree);
 }
 
+// Loose points of a kidney, in any order: the contour through them has its area, to the chords' loss, and its direction.
+static void a_contour_goes_through_loose_points(void **state)
+{
+    (void)state;
+    enum { POINTS = 300 };
+    SectionPoint point[POINTS], contour[CONTOUR_TOUR_MOST];
+    double exact = PI / 2 * (1.4 * 1.4 - 0.4 * 0.4) + PI * 0.25;
+    for (int mirrored = 0; mirrored < 2; mirrored++) {
+        for (int i = 0; i < POINTS; i++) {
+            int k = (i * 127) % POINTS;
+            double outer = PI * 1.4, end = PI * 0.5, inner = PI * 0.4, way = (outer + 2 * end + inner) * (k + 0.5) / POINTS, n, b;
+            if (way < outer)
+                n = 1.4 * cos(way / 1.4 - PI / 2), b = 1.4 * sin(way / 1.4 - PI / 2);
+            else if (way < outer + end)
+                n = 0.5 * cos((way - outer) / 0.5 + PI / 2), b = 0.9 + 0.5 * sin((way - outer) / 0.5 + PI / 2);
+            else if (way < outer + end + inner)
+                n = 0.4 * cos(PI / 2 - (way - outer - end) / 0.4), b = 0.4 * sin(PI / 2 - (way - outer - end) / 0.4);
+            else
+                n = 0.5 * cos((way - outer - end - inner) / 0.5 + PI / 2), b = -0.9 + 0.5 * sin((way - outer - end - inner) / 0.5 + PI / 2);
+            point[i] = (SectionPoint){mirrored ? -n : n, b};
+        }
+        int kept = contour_tour(POINTS, point, 0.12, contour);
+        double area = polygon_area(kept, contour);
+        print_message("kidney: %d of %d points, area %.4f, exact %.4f\n", kept, POINTS, area, exact);
+        assert_true(kept > 40 && kept <= CONTOUR_TOUR_MOST);
+        assert_true(fabs(area / exact - 1) < 0.02);
+        assert_int_equal(polygon_contains(kept, contour, mirrored ? -0.9 : 0.9, 0), 1);
+        assert_int_equal(polygon_contains(kept, contour, 0, 0), 0);      // the notch
+    }
+    assert_int_equal(contour_tour(2, point, 0.1, contour), 0);
+}
+
+// A lumen that is not star-shaped: the fit says so, and holds it with rasters better than polar sections can.
+static void a_kidney_gets_rasters(void **state)
+{
+    (void)state;
+    VesselTree *tree = shaped_tube_sample(SHAPED_KIDNEY, 0, 1);
+    SweepFitFigures figures, star;
+    SweepModel *model = swept(tree, sweep_fit_default_options(), &figures);
+    print_message("kidney: mean %.4f, 99 %% %.4f mm, %d sections are rasters, %lld points on second sheets\n", figures.mean, figures.p99, figures.shaped,
+                  (long long)figures.not_star_shaped);
+    assert_true(figures.shaped > 20 && figures.not_star_shaped > 100);
+    assert_true(figures.mean < 0.03);
+    SweepField *rows = sweep_field_create(model);
+    double with = figures.mean, without = 0;
+    int64_t count = 0;
+    for (int i = 10; i < tree->node_count - 10; i++)
+        for (int64_t p = tree->point_offset[i]; p < tree->point_offset[i + 1]; p++) {
+            SweepPart part;
+            SweepPlace place = swept_place(model, tree, tree->point[p]);
+            sweep_field_branch(rows, place.branch, tree->point[p], place.t, &part);
+            sweep_segment_evaluate(&rows->segment[sweep_field_segment(rows, place.branch, part.t)], tree->point[p], part.t, &part);
+            without += fabs(part.f), count++;
+        }
+    print_message("with rasters %.4f, rows alone %.4f mm\n", with, without / (double)count);
+    assert_true(with < 0.5 * without / (double)count);
+    sweep_field_free(rows);
+    sweep_model_free(model);
+    vessel_tree_free(tree);
+    tree = shaped_tube_sample(SHAPED_STAR, 0, 1);
+    model = swept(tree, sweep_fit_default_options(), &star);
+    assert_int_equal(star.shaped, 0);
+    sweep_model_free(model);
+    vessel_tree_free(tree);
+}
+
+// Mended kinds of sections give the star's wall; as printed, each has its known error.
+static void every_kind_of_section_holds_the_star(void **state)
+{
+    (void)state;
+    VesselTree *tree = shaped_tube_sample(SHAPED_STAR, 0, 1);
+    static const double most[SECTION_KINDS][2] = {{0.001, 0}, {0.002, 0.02}, {0.001, 0.02}, {0.006, 0.04}};
+    for (int kind = 0; kind < SECTION_KINDS; kind++)
+        for (int printed = 0; printed < (kind == SECTION_POLAR ? 1 : 2); printed++) {
+            SweepFitOptions options = printed ? sweep_fit_paper_options((SectionKind)kind) : sweep_fit_default_options();
+            options.section.kind = (SectionKind)kind;
+            if (!printed)
+                options.section = section_default_options((SectionKind)kind, SECTION_MENDED);
+            options.section.voxel_mm = 0.2;
+            SweepFitFigures figures;
+            SweepModel *model = swept(tree, options, &figures);
+            print_message("%s%s: mean %.4f mm, %lld numbers\n", section_kind_name[kind], printed ? " as printed" : "", figures.mean,
+                          (long long)figures.numbers);
+            assert_true(figures.mean < most[kind][printed]);
+            assert_int_equal(figures.shaped > 0, printed);
+            sweep_model_free(model);
+        }
+    vessel_tree_free(tree);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -296,6 +387,9 @@ int main(void)
         cmocka_unit_test(one_node_is_enough),
         cmocka_unit_test(closed_ends_and_few_points_are_fitted),
         cmocka_unit_test(tight_bends_are_told),
+        cmocka_unit_test(a_contour_goes_through_loose_points),
+        cmocka_unit_test(a_kidney_gets_rasters),
+        cmocka_unit_test(every_kind_of_section_holds_the_star),
         cmocka_unit_test(unfit_input_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
