@@ -1,6 +1,7 @@
 #include "recon/sweep_file.h"
 
 #include "base/base.h"
+#include "recon/edit/edit_list.h"
 #include "recon/hdf5_reader.h"
 #include "recon/hdf5_writer.h"
 
@@ -25,6 +26,11 @@ enum {
     BLOB_AMPLITUDE,
     COLUMNS
 };
+// what only edited models have
+static const Hdf5Dataset branch_blend = {"/sweep/branch/blend", HDF5_DOUBLE, 1, {0}, true};
+static const Hdf5Dataset branch_tag = {"/sweep/branch/tag", HDF5_UINT8, 2, {0, 2}, false};
+static const char edits_path[] = "/sweep/edits";
+
 static const Hdf5Dataset columns[COLUMNS] = {
     // as docs/file-formats.md specifies
     [PARENT] = {"/sweep/branch/parent", HDF5_INT32, 1, {0}, false},
@@ -228,6 +234,36 @@ static bool read_sacs(const Reader *r, SweepModel *m)
     return good;
 }
 
+// A dataset with a row for each branch. Returns NULL if the file lacks it, or with a fault.
+static void *read_for_branches(const Reader *r, const SweepModel *m, const Hdf5Dataset *column)
+{
+    Hdf5Dataset found = *column;
+    if (!hdf5_has(r->file, column->path))
+        return NULL;
+    found.size[0] = (uint64_t)m->branch_count;
+    return hdf5_read(r->file, &found);
+}
+
+static bool read_edits(const Reader *r, SweepModel *m)
+{
+    int before = r->faults->count;
+    double *blend = read_for_branches(r, m, &branch_blend);
+    uint8_t *tag = read_for_branches(r, m, &branch_tag);
+    for (int i = 0; i < m->branch_count; i++) {
+        SweepBranch *b = &m->branch[i];
+        if (blend && blend[i] != -1)
+            b->has_blend = true, b->blend = blend[i];
+        if (tag)
+            b->tag[0] = tag[2 * i], b->tag[1] = tag[2 * i + 1];
+    }
+    free(blend);
+    free(tag);
+    m->edits = hdf5_text(r->file, edits_path);
+    EditList *list = m->edits ? edit_list_parse(m->edits, strlen(m->edits), r->name, r->faults) : NULL;
+    edit_list_free(list);
+    return r->faults->count == before;
+}
+
 static SweepModel *read_model(Reader *r)
 {
     if (!hdf5_has(r->file, "/sweep")) {
@@ -241,7 +277,7 @@ static SweepModel *read_model(Reader *r)
         faults_add(r->faults, r->name, 0, 0, "needs more memory than is available (%" PRIu64 " rows of sections)", size_of(r, ROW));
         return NULL;
     }
-    bool good = read_branches(r, m) && (!r->has_sac || read_sacs(r, m)) && sweep_model_validate(m, r->name, r->faults);
+    bool good = read_branches(r, m) && (!r->has_sac || read_sacs(r, m)) && read_edits(r, m) && sweep_model_validate(m, r->name, r->faults);
     if (good)
         return m;
     sweep_model_free(m);
@@ -324,6 +360,27 @@ static bool write_branches(hid_t file, const SweepModel *m)
     return good;
 }
 
+static bool write_for_branches(hid_t file, const SweepModel *m)
+{
+    size_t n = (size_t)m->branch_count;
+    double *blend = calloc(n, sizeof *blend);
+    uint8_t *tag = calloc(2 * n, 1);
+    bool good = blend && tag, has_blend = false, has_tag = false;
+    for (size_t i = 0; good && i < n; i++) {
+        const SweepBranch *b = &m->branch[i];
+        blend[i] = b->has_blend ? b->blend : -1;
+        memcpy(tag + 2 * i, b->tag, 2);
+        has_blend |= b->has_blend, has_tag |= b->tag[0] || b->tag[1];
+    }
+    if (good && has_blend)
+        good = hdf5_write_column(file, branch_blend.path, H5T_NATIVE_DOUBLE, m->branch_count, 0, blend);
+    if (good && has_tag)
+        good = hdf5_write_column(file, branch_tag.path, H5T_NATIVE_UINT8, m->branch_count, 2, tag);
+    free(blend);
+    free(tag);
+    return good;
+}
+
 bool sweep_file_write(int64_t at, const SweepModel *m)
 {
     hid_t file = (hid_t)at;
@@ -331,7 +388,8 @@ bool sweep_file_write(int64_t at, const SweepModel *m)
     bool good = hdf5_make_group(file, "/sweep") && write_profile(file) && hdf5_make_group(file, "/sweep/branch") && hdf5_make_group(file, "/sweep/curve") &&
                 hdf5_make_group(file, "/sweep/section") && write_branches(file, m);
     good = good && write_at(file, KNOT, m->knot_count, m->knot) && write_at(file, KNOT_NODE, m->knot_count, m->knot_node) &&
-           write_at(file, BREAK_T, m->break_count, m->break_t) && write_at(file, ROW, m->row_count, m->row) && write_at(file, BLEND, 1, &m->blend);
+           write_at(file, BREAK_T, m->break_count, m->break_t) && write_at(file, ROW, m->row_count, m->row) && write_at(file, BLEND, 1, &m->blend) &&
+           write_for_branches(file, m) && (!m->edits || hdf5_write_long_text(file, edits_path, m->edits));
     if (!good || !s)
         return good;
     int64_t n = s->node_count, b = s->blob_count;
