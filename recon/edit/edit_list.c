@@ -98,7 +98,7 @@ static void read_smooth(YamlValue value, SweepEdit *edit)
     if (has_range) {
         read_t(&map, "from_mm", &edit->from);
         read_t(&map, "to_mm", &edit->to);
-        if (edit->from > edit->to)
+        if (yaml_has(&map, "from_mm") && yaml_has(&map, "to_mm") && edit->from > edit->to)
             yaml_fault(value, "the range ends before it begins; expected from_mm <= to_mm");
     }
 }
