@@ -28,19 +28,22 @@ static VesselTree *load_tree(const FitCommand *command, TreeFileInfo *info, Faul
     return tree;
 }
 
-// Saves the new model with the tree, and with a model of the other kind from the tree's file.
+// Saves the new model with the tree, and with the models of other kinds from the tree's file.
 static bool save(const FitCommand *command, const TreeFit *fit, const VesselTree *tree, const TreeFileInfo *from, Faults *faults)
 {
-    SweepModel *kept = NULL;
-    if (!fit->sweep && sweep_file_is_in(command->tree, faults))
-        kept = sweep_file_load(command->tree, tree, faults);
-    if (faults->count > 0)
+    SweepModels swept;
+    if (!sweep_models_load(command->tree, tree, &swept, faults))
         return false;
+    SweepModel **place = fit->sweep ? &swept.of[fit_model_section(command->fit.model)] : NULL, *replaced = place ? *place : NULL;
+    if (place)
+        *place = fit->sweep;
     TreeFileInfo info = {
         .source = from->source, .parameters = tree_fit_parameters(&command->fit, from), .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " fit"};
-    bool good = tree_file_save_with(fit->sweep ? tree : fit->model, fit->sweep ? fit->sweep : kept, &info, command->output, faults);
+    bool good = tree_file_save_with(fit->sweep ? tree : fit->model, &swept, &info, command->output, faults);
     free(info.parameters);
-    sweep_model_free(kept);
+    if (place)
+        *place = replaced;
+    sweep_models_free(&swept);
     return good;
 }
 
@@ -74,14 +77,17 @@ static bool write_results(const FitCommand *command, const TreeFit *fit, Faults 
 static bool write_sweep_results(const FitCommand *command, const TreeFit *fit, Faults *faults)
 {
     const SweepFitFigures *f = &fit->figures;
+    SectionKind kind = fit_model_section(command->fit.model);
     if (!command->quiet && !cli_is_standard_output(command->json))
-        printf("swept model: %d branches, %d sections, %lld numbers, %.1f s\n"
+        printf("swept model with sections of kind %s: %d branches, %d sections, %lld numbers, %.1f s\n"
                "distance of %lld points from the wall: mean %.4f, 99 %% %.4f, largest %.4f mm; noise %.4f mm\n"
-               "%lld points left out (another vessel's lumen, outliers), %lld beyond the focal line of a bend, %lld where a section is not star-shaped\n",
-               fit->sweep->branch_count, fit->sweep->row_count, (long long)f->numbers, f->seconds, (long long)f->points, f->mean, f->p99, f->most, f->noise,
-               (long long)f->left_out, (long long)f->folded, (long long)f->not_star_shaped);
+               "%lld points left out (another vessel's lumen, outliers), %lld beyond the focal line of a bend, %lld where a section is not star-shaped\n"
+               "%d sections are stored as %s: a polar section does not hold them\n",
+               section_kind_name[kind], fit->sweep->branch_count, fit->sweep->row_count, (long long)f->numbers, f->seconds, (long long)f->points, f->mean,
+               f->p99, f->most, f->noise, (long long)f->left_out, (long long)f->folded, (long long)f->not_star_shaped, f->shaped,
+               section_kind_name[kind == SECTION_POLAR ? SECTION_RASTER : kind]);
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "model", "sweep");
+    cJSON_AddStringToObject(root, "model", sweep_file_group(kind));
     cJSON_AddNumberToObject(root, "branches", fit->sweep->branch_count);
     cJSON_AddNumberToObject(root, "sections", fit->sweep->row_count);
     cJSON_AddNumberToObject(root, "numbers", (double)f->numbers);
@@ -93,6 +99,7 @@ static bool write_sweep_results(const FitCommand *command, const TreeFit *fit, F
     cJSON_AddNumberToObject(root, "left_out", (double)f->left_out);
     cJSON_AddNumberToObject(root, "folded", (double)f->folded);
     cJSON_AddNumberToObject(root, "not_star_shaped", (double)f->not_star_shaped);
+    cJSON_AddNumberToObject(root, "shaped_sections", f->shaped);
     cJSON_AddNumberToObject(root, "seconds", f->seconds);
     bool good = !command->json || cli_write_json(command->json, root, faults);
     cJSON_Delete(root);

@@ -18,14 +18,16 @@ static const char *take_preset(void *structure, const Option *option, const char
 
 #define AT(member) OPTION_AT(FitCommand, member)
 static const char *const presets[] = {"default", "local", "paper", NULL};
-static const char *const models[] = {"lim", "sweep", NULL};
+static const char *const models[] = {"lim", "sweep", "raster", "rbf", "pas", NULL};
 static const Option options[] = {
     {"output", "F.h5", OPTION_FILE, AT(output), "the model", .letter = 'o'},
     {"model", "KIND", OPTION_CHOICE, AT(fit.model),
-     "lim: blobs; sweep: curves with cross-sections along them, blended at forks. The file keeps a model of the other kind that TREE.h5 holds",
+     "lim: blobs; sweep: curves with polar cross-sections along them, blended at forks; raster, rbf, pas: the same with sections of Kretschmer et al. 2013, "
+     "Hong et al. 2018 and 2012. The file keeps the models of other kinds that TREE.h5 holds",
      .choices = models},
     {"preset", "NAME", OPTION_CHOICE, AT(fit.preset),
-     "default: shared blobs; local: a model for each node, neighbours blended; paper: the published values and method. Must come before the other options",
+     "default: the recommended form of each model; local (lim): a model for each node, neighbours blended; paper: the published values and method (sweep: as "
+     "raster). Must come before the other options",
      .choices = presets, .take = take_preset},
     {"target-mm", "X", OPTION_NUMBER, AT(fit.local.target_mm),
      "target distance of the wall from the points. default: a blob is added where the mean distance exceeds a fifth of this; without --target-mm where it "
@@ -71,18 +73,17 @@ static void set_defaults(void *structure)
 static const char *check(void *structure)
 {
     const FitCommand *command = structure;
-    bool is_local = command->fit.preset != FIT_DEFAULT;
-    bool is_swept = command->fit.model == FIT_MODEL_SWEEP;
-    return !command->output && !command->measure    ? "missing -o MODEL.h5"
-           : is_swept && is_local                   ? "--preset needs --model lim"
-           : is_swept && command->measure           ? "--measure needs --model lim"
-           : is_swept && command->picture           ? "--picture needs --model lim"
-           : is_swept && command->junctions.picture ? "--junctions needs --model lim"
-           : command->has_alpha && !is_local        ? "--alpha needs --preset local or paper"
-           : command->has_beta && !is_local         ? "--beta needs --preset local or paper"
-           : command->has_max_blobs && !is_local    ? "--max-blobs needs --preset local or paper"
-           : command->has_max_points && !is_local   ? "--max-points needs --preset local or paper"
-                                                    : NULL;
+    bool is_swept = fit_model_is_swept(command->fit.model), is_local = command->fit.preset != FIT_DEFAULT && !is_swept;
+    return !command->output && !command->measure          ? "missing -o MODEL.h5"
+           : is_swept && command->fit.preset == FIT_LOCAL ? "--preset local needs --model lim"
+           : is_swept && command->measure                 ? "--measure needs --model lim"
+           : is_swept && command->picture                 ? "--picture needs --model lim"
+           : is_swept && command->junctions.picture       ? "--junctions needs --model lim"
+           : command->has_alpha && !is_local              ? "--alpha needs --preset local or paper"
+           : command->has_beta && !is_local               ? "--beta needs --preset local or paper"
+           : command->has_max_blobs && !is_local          ? "--max-blobs needs --preset local or paper"
+           : command->has_max_points && !is_local         ? "--max-points needs --preset local or paper"
+                                                          : NULL;
 }
 
 const OptionTable fit_options = {

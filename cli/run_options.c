@@ -2,9 +2,9 @@
 
 #include "cli/cli.h"
 
-const char *const run_contact[] = {"lim", "lim_blend", "lim_switch", "sweep", "mesh", "smooth_mesh", "flat_mesh", "grid", "tube", NULL};
-const ContactKind run_contact_kind[] = {CONTACT_LIM,         CONTACT_LIM_BLEND, CONTACT_LIM_SWITCH, CONTACT_SWEEP, CONTACT_MESH,
-                                        CONTACT_SMOOTH_MESH, CONTACT_FLAT_MESH, CONTACT_GRID,       CONTACT_TUBE};
+const char *const run_contact[] = {"lim", "lim_blend", "lim_switch", "sweep", "raster", "rbf", "pas", "mesh", "smooth_mesh", "flat_mesh", "grid", "tube", NULL};
+const ContactKind run_contact_kind[] = {CONTACT_LIM, CONTACT_LIM_BLEND, CONTACT_LIM_SWITCH,  CONTACT_SWEEP,     CONTACT_RASTER, CONTACT_RBF,
+                                        CONTACT_PAS, CONTACT_MESH,      CONTACT_SMOOTH_MESH, CONTACT_FLAT_MESH, CONTACT_GRID,   CONTACT_TUBE};
 
 static const Option options[] = {
     {"script", "F.csv", OPTION_FILE, OPTION_AT(RunOptions, script),
@@ -31,7 +31,7 @@ static const Option options[] = {
     {"chart", "F.png", OPTION_FILE, OPTION_AT(RunOptions, files.chart),
      "forces at the hand and the wall, contacts, depth, CPU time, iterations and residual over time"},
     {"contact", "KIND", OPTION_CHOICE, OPTION_AT(RunOptions, contact),
-     "the surface used for contact: lim, lim_blend, lim_switch, sweep, mesh, smooth_mesh, flat_mesh, grid or tube", .choices = run_contact,
+     "the surface used for contact: lim, lim_blend, lim_switch, sweep, raster, rbf, pas, mesh, smooth_mesh, flat_mesh, grid or tube", .choices = run_contact,
      .otherwise = "that of the scene"},
     {"paced", NULL, OPTION_FLAG, OPTION_AT(RunOptions, headless.paced),
      "one step per millisecond of real time, with SCHED_FIFO if permitted. Under overload simulated time slows down and the summary reports it "

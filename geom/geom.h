@@ -27,6 +27,7 @@
 // surfaces as triangles
 #include "geom/isosurface.h"
 #include "geom/tree_surface.h"
+#include "geom/sweep_mesh.h"
 #include "geom/mesh_closure.h"
 #include "geom/mesh_decimate.h"
 #include "geom/surface_parts.h"

@@ -101,6 +101,17 @@ static inline void sym3_add_outer(Sym3 *s, double factor, Vec3 v)
     s->xx += factor * v.x * v.x, s->xy += factor * v.x * v.y, s->xz += factor * v.x * v.z;
     s->yy += factor * v.y * v.y, s->yz += factor * v.y * v.z, s->zz += factor * v.z * v.z;
 }
+static inline void sym3_add(Sym3 *s, double factor, const Sym3 *a)
+{
+    s->xx += factor * a->xx, s->xy += factor * a->xy, s->xz += factor * a->xz;
+    s->yy += factor * a->yy, s->yz += factor * a->yz, s->zz += factor * a->zz;
+}
+// *s += factor (a b' + b a')
+static inline void sym3_add_pair(Sym3 *s, double factor, Vec3 a, Vec3 b)
+{
+    s->xx += 2 * factor * a.x * b.x, s->xy += factor * (a.x * b.y + a.y * b.x), s->xz += factor * (a.x * b.z + a.z * b.x);
+    s->yy += 2 * factor * a.y * b.y, s->yz += factor * (a.y * b.z + a.z * b.y), s->zz += 2 * factor * a.z * b.z;
+}
 static inline double sym3_trace(const Sym3 *s) { return s->xx + s->yy + s->zz; }
 
 // Sum of the squares of all nine entries.

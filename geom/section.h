@@ -25,7 +25,7 @@ typedef struct SectionOptions {
     SectionForm form;        // default SECTION_MENDED
     int harmonics;           // polar: terms up to cos and sin of this multiple of theta, 0 to 16; default 8
     double stiffness;        // rbf: mu, the weight of the smoothing, >= 0; 0: the curve passes through the points; default 0.001, as printed 0
-    double delta_mm;         // pas: width of the kernel [mm], > 0; 0: 0.08 of the contour's mean radius (default), as printed 0.8 of `voxel_mm`
+    double delta_mm;         // pas: width of the kernel [mm], > 0; 0: 0.05 of the contour's mean radius (default), as printed 0.8 of `voxel_mm`
     double voxel_mm;         // pas, as printed: voxel size of the angiogram [mm]; default 1
 } SectionOptions;
 SectionOptions section_default_options(SectionKind kind, SectionForm form);

@@ -21,12 +21,17 @@ int section_numbers(const Section *section) { return section->numbers; }
 // The place between `in` (C > 0) and `out` (C <= 0) on a ray where C changes its sign.
 static double crossing(const Section *section, double n0, double b0, double c, double s, double in, double out)
 {
+    double f_in = section_evaluate(section, n0 + in * c, b0 + in * s).value, f_out = section_evaluate(section, n0 + out * c, b0 + out * s).value;
     for (int i = 0; i < 60 && out - in > 1e-13 * section->radius; i++) {
-        double middle = 0.5 * (in + out);
-        if (section_evaluate(section, n0 + middle * c, b0 + middle * s).value > 0)
-            in = middle;
+        // the secant, halved at the side that stays (Illinois); every fourth time the middle
+        double at = i % 4 == 3 ? 0.5 * (in + out) : in + (out - in) * f_in / (f_in - f_out);
+        double f = section_evaluate(section, n0 + at * c, b0 + at * s).value;
+        if (fabs(f) < 1e-14 * section->radius)
+            return at;
+        if (f > 0)
+            in = at, f_in = f, f_out *= 0.5;
         else
-            out = middle;
+            out = at, f_out = f, f_in *= 0.5;
     }
     return 0.5 * (in + out);
 }
@@ -34,7 +39,8 @@ static double crossing(const Section *section, double n0, double b0, double c, d
 int section_radii(const Section *section, double n0, double b0, int count, double *radius)
 {
     enum { STEPS = 64 };
-    if (!(section_evaluate(section, n0, b0).value > 0))
+    double first = section_evaluate(section, n0, b0).value;
+    if (!(first > 0))
         return -1;
     int more = 0;
     double longest = 3 * section->radius + same_hypot(n0, b0);
@@ -42,12 +48,15 @@ int section_radii(const Section *section, double n0, double b0, int count, doubl
         double c = same_cos(2 * PI * i / count), s = same_sin(2 * PI * i / count), found = longest;
         bool inside = true;
         int met = 0;
-        for (int k = 1; k <= STEPS; k++) {
-            double r = longest * k / STEPS;
-            bool now = section_evaluate(section, n0 + r * c, b0 + r * s).value > 0;
+        double at = 0, value = first;
+        while (at < longest) {
+            // mended sections are near to distances: no wall is nearer than a part of C
+            double next = at + fmax(longest / STEPS, section->is_distance ? 0.5 * fabs(value) : 0);
+            value = section_evaluate(section, n0 + next * c, b0 + next * s).value;
+            bool now = value > 0;
             if (inside && !now)
-                met++, found = crossing(section, n0, b0, c, s, longest * (k - 1) / STEPS, r);
-            inside = now;
+                met++, found = crossing(section, n0, b0, c, s, at, next);
+            inside = now, at = next;
         }
         radius[i] = found;
         more += met > 1;

@@ -8,6 +8,7 @@ struct Section {
     SectionKind kind;
     double radius;           // [mm] mean distance of the contour from the origin
     int numbers;             // that the kind stores
+    bool is_distance;        // C is near to the signed distance, not only at the curve
     SectionJet (*evaluate)(const Section *section, double n, double b);
     double values[];         // of the kind
 };

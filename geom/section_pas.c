@@ -7,8 +7,10 @@
 //
 // As printed the level is 0.5, which lies inside the contour by delta^2/(2 r) on a circle (m delta^2/(6 r)), and C is flat further than 3 delta from the contour:
 // nothing says where the wall is. Mended: C = delta (H^-1(P) - H^-1(level)), the distance that a straight side would have, with the level for which the curve
-// keeps the contour's area; where P leaves 0.02 ... 0.98, C changes to the contour's polar distance.
+// keeps the area of the smooth curve through the contour (Catmull-Rom, of which two chords a side are taken); where P leaves 0.02 ... 0.98, C changes to the distance from the contour.
 #include "geom/section_kinds.h"
+
+#include <string.h>
 
 enum { KNOTS = 4 };
 static const double KNOT[KNOTS] = {-3, -1, 1, 3};
@@ -25,15 +27,17 @@ static double step(double x)
 
 static double inverse_step(double p)
 {
-    double low = -3, high = 3;
-    for (int i = 0; i < 60; i++) {
-        double middle = 0.5 * (low + high);
-        if (step(middle) < p)
-            low = middle;
-        else
-            high = middle;
+    // by symmetry about (0, 1/2) the lower half, which is convex: exact below -1, else Newton from the right of the root
+    bool upper = p > 0.5;
+    double share = upper ? 1 - p : p, x = share < 1.0 / 6 ? -3 + same_cbrt(48 * share) : -(0.5 - share) * 8 / 3, h[4];
+    for (int i = 0; i < 8 && share >= 1.0 / 6; i++) {
+        section_step(x, h);
+        double change = h[1] > 0 ? (h[0] - share) / h[1] : 0;
+        x -= change;
+        if (fabs(change) < 1e-15)
+            break;
     }
-    return 0.5 * (low + high);
+    return upper ? -x : x;
 }
 
 // Adds a part of a side, from u to v of it, on which both arguments stay between knots.
@@ -83,36 +87,40 @@ static SectionJet smoothed_inside(const double *v, double n, double b)
     return jet;
 }
 
-// The distance along the ray from the centre to the contour's outermost side, minus that to the point.
-static SectionJet polar_distance(const double *v, double n, double b)
+// The distance from the contour's nearest side [mm] > 0 inside, and its derivatives: around a corner, the lines of equal distance are arcs.
+static SectionJet side_distance(const double *v, double n, double b)
 {
     int count = (int)v[COUNT];
-    double x = n - v[CENTRE_N], y = b - v[CENTRE_B], rho = same_hypot(x, y), wall = 0;
-    if (!(rho > 1e-9 * v[DELTA]))        // the centre itself: any ray
-        x = rho = 1e-9 * v[DELTA], y = 0;
-    double c = x / rho, s = y / rho;
+    double least2 = HUGE_VAL, x = 1, y = 0;
+    bool at_corner = false, inside = polygon_contains(count, (const SectionPoint *)(v + CONTOUR), n, b);
     for (int i = 0, k = count - 1; i < count; k = i++) {
         const double *p = v + CONTOUR + 2 * k, *q = v + CONTOUR + 2 * i;
-        double px = p[0] - v[CENTRE_N], py = p[1] - v[CENTRE_B], qx = q[0] - v[CENTRE_N], qy = q[1] - v[CENTRE_B];
-        double before = c * py - s * px, after = c * qy - s * qx;
-        if (before <= 0 && after > 0) {
-            double u = before / (before - after);
-            wall = fmax(wall, c * (px + u * (qx - px)) + s * (py + u * (qy - py)));
-        }
+        double dn = q[0] - p[0], db = q[1] - p[1], square = dn * dn + db * db, u = square > 0 ? ((n - p[0]) * dn + (b - p[1]) * db) / square : 0;
+        double share = u < 0 ? 0 : u > 1 ? 1 : u, en = n - p[0] - share * dn, eb = b - p[1] - share * db, far2 = en * en + eb * eb;
+        if (far2 < least2)
+            least2 = far2, x = en, y = eb, at_corner = share != u;
     }
-    return (SectionJet){.value = wall - rho, .n = -c, .b = -s, .nn = -s * s / rho, .nb = c * s / rho, .bb = -c * c / rho};
+    double d = sqrt(least2), side = inside ? 1 : -1, per = d > 0 ? 1 / d : 0, c = x * per, s = y * per, bend = at_corner ? side * per : 0;
+    return (SectionJet){.value = side * d, .n = side * c, .b = side * s, .nn = bend * s * s, .nb = -bend * c * s, .bb = bend * c * c};
 }
 
 static SectionJet evaluate_pas(const Section *section, double n, double b)
 {
+    static const double REACH = 4.25;        // [delta] further from the contour than the corner of the kernel's square, P is 0 or 1
     const double *v = section->values;
-    SectionJet jet = smoothed_inside(v, n, b);
+    SectionJet jet, far;
     if (v[PRINTED] > 0) {
+        jet = smoothed_inside(v, n, b);
         jet.value -= v[LEVEL];
         return jet;
     }
-    if (!(jet.value > FLAT && jet.value < 1 - FLAT))
-        return polar_distance(v, n, b);
+    far = side_distance(v, n, b);
+    bool is_far = fabs(far.value) > REACH * v[DELTA];
+    jet = is_far ? (SectionJet){.value = far.value > 0} : smoothed_inside(v, n, b);
+    if (!(jet.value > FLAT && jet.value < 1 - FLAT)) {
+        far.value -= v[DELTA] * v[SHIFT];
+        return far;
+    }
     // d = delta H^-1(P): grad d = delta grad P / k, Hess d = delta (Hess P / k - k' grad P grad P' / k^3)
     double d = inverse_step(jet.value), h[4];
     section_step(d, h);
@@ -125,19 +133,41 @@ static SectionJet evaluate_pas(const Section *section, double n, double b)
                         .bb = per * jet.bb - bend * jet.b * jet.b};
 }
 
-// The shift (in deltas) for which the curve keeps the contour's area: its area at the shift 0 and the length of the contour give it in three steps.
+// Area of the Catmull-Rom curve through the contour, of which the contour is an inscribed polygon.
+static double smooth_area(int count, const SectionPoint *contour)
+{
+    enum { STEPS = 8, AT_ONCE = 4 };
+    double twice = 0;
+    SectionPoint part[AT_ONCE], curve[AT_ONCE * STEPS], from = contour[0];
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < AT_ONCE; k++)
+            part[k] = contour[(i + count - 1 + k) % count];
+        polygon_smooth(AT_ONCE, part, 0.5, STEPS, curve);
+        for (int k = STEPS; k < 2 * STEPS; k++)      // from point i to the next
+            twice += (curve[k].n - from.n) * (curve[k + 1].b - from.b) - (curve[k + 1].n - from.n) * (curve[k].b - from.b);
+    }
+    return 0.5 * twice;
+}
+
+// The shift (in deltas) for which the curve keeps that area: its area at the shift 0 and the length of the contour give it in three steps.
 static void keep_area(Section *section, int count, const SectionPoint *contour)
 {
-    enum { RAYS = 96 };
-    double *v = section->values, radius[RAYS], length = 0, area = polygon_area(count, contour);
+    enum { RAYS = 96, ROUNDS = 3, NEWTONS = 2 };
+    double *v = section->values, radius[RAYS], length = 0, area = smooth_area(count, contour);
     SectionPoint curve[RAYS];
     for (int i = 0, k = count - 1; i < count; k = i++)
         length += same_hypot(contour[i].n - contour[k].n, contour[i].b - contour[k].b);
-    for (int round = 0; round < 3; round++) {
-        if (section_radii(section, v[CENTRE_N], v[CENTRE_B], RAYS, radius) != 0)
-            return;      // the curve has no polar form; it keeps the shift found so far
-        for (int i = 0; i < RAYS; i++)
-            curve[i] = (SectionPoint){radius[i] * same_cos(2 * PI * i / RAYS), radius[i] * same_sin(2 * PI * i / RAYS)};
+    if (section_radii(section, v[CENTRE_N], v[CENTRE_B], RAYS, radius) != 0)
+        return;      // the curve has no polar form: the shift stays 0
+    for (int round = 0; round < ROUNDS; round++) {
+        for (int i = 0; i < RAYS; i++) {
+            double c = same_cos(2 * PI * i / RAYS), s = same_sin(2 * PI * i / RAYS);
+            for (int k = 0; k < NEWTONS && round > 0; k++) {
+                SectionJet jet = section_evaluate(section, v[CENTRE_N] + radius[i] * c, v[CENTRE_B] + radius[i] * s);
+                radius[i] -= jet.value / fmin(c * jet.n + s * jet.b, -0.1);
+            }
+            curve[i] = (SectionPoint){radius[i] * c, radius[i] * s};
+        }
         // the polygon of rays lies inside the curve, by the same share as a circle's does
         double found = polygon_area(RAYS, curve) * PI / (0.5 * RAYS * same_sin(2 * PI / RAYS));
         v[SHIFT] += (found - area) / (length * v[DELTA]);
@@ -148,19 +178,25 @@ static void keep_area(Section *section, int count, const SectionPoint *contour)
 
 Section *section_pas_create(const SectionOptions *options, int count, const SectionPoint *contour, double radius)
 {
-    Section *section = section_allocate(SECTION_PAS, CONTOUR + 2 * (size_t)count, radius);
+    enum { STEPS = 2 };
+    bool printed = options->form == SECTION_AS_PRINTED;
+    int sides = printed ? count : STEPS * count;
+    Section *section = section_allocate(SECTION_PAS, CONTOUR + 2 * (size_t)sides, radius);
     if (!section)
         return NULL;
-    double *v = section->values, share = options->form == SECTION_AS_PRINTED ? 0.8 * options->voxel_mm : 0.08 * radius;
+    double *v = section->values, share = printed ? 0.8 * options->voxel_mm : 0.05 * radius;
     SectionPoint centre = polygon_centre(count, contour);
-    v[COUNT] = count, v[LEVEL] = 0.5, v[PRINTED] = options->form == SECTION_AS_PRINTED;
+    v[COUNT] = sides, v[LEVEL] = 0.5, v[PRINTED] = printed;
     v[DELTA] = options->delta_mm > 0 ? options->delta_mm : share;
     v[CENTRE_N] = centre.n, v[CENTRE_B] = centre.b;
-    for (int i = 0; i < count; i++)
-        v[CONTOUR + 2 * i] = contour[i].n, v[CONTOUR + 2 * i + 1] = contour[i].b;
+    if (printed)
+        memcpy(v + CONTOUR, contour, (size_t)count * sizeof *contour);
+    else
+        polygon_smooth(count, contour, 0.5, STEPS, (SectionPoint *)(v + CONTOUR));
     section->numbers = 2 * count + 2;
     section->evaluate = evaluate_pas;
-    if (options->form == SECTION_MENDED)
+    section->is_distance = !printed;
+    if (!printed)
         keep_area(section, count, contour);
     return section;
 }

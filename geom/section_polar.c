@@ -39,6 +39,7 @@ Section *section_polar_create(const SectionOptions *options, int count, const Se
         return NULL;
     section->numbers = terms;
     section->evaluate = evaluate_polar;
+    section->is_distance = true;
     for (int i = 0; i < count; i++) {
         fill_terms(harmonics, same_atan2(contour[i].b, contour[i].n), term);
         double rho = same_hypot(contour[i].n, contour[i].b);

@@ -176,6 +176,7 @@ Section *section_raster_create(const SectionOptions *options, int count, const S
     }
     section->numbers = SIDE * SIDE;
     section->evaluate = evaluate_raster;
+    section->is_distance = true;
     polygon_smooth(count, contour, TENSION, STEPS, curve);
     double most = 0;
     for (int i = 0; i < count * STEPS; i++)

@@ -89,6 +89,22 @@ static void set_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes
 
 // --- Fields ---
 
+// Sections of another kind are evaluated one by one.
+static void apply_stretches(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes)
+{
+    SweepPartLanes *p = &b->part[k];
+    for (int i = 0; i < FOOT_BLOCK; i++) {
+        if (!(lanes >> i & 1) || p->absent[i] > 0 || p->segment[i]->is_shaped == 0)
+            continue;
+        SweepPart part;
+        sweep_branch_evaluate(feet->field, b->view[i]->of[k].branch, p->segment[i], vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), p->t[i], &part);
+        p->f[i] = part.f;
+        p->gx[i] = part.gradient.x, p->gy[i] = part.gradient.y, p->gz[i] = part.gradient.z;
+        p->hxx[i] = part.hessian.xx, p->hxy[i] = part.hessian.xy, p->hxz[i] = part.hessian.xz;
+        p->hyy[i] = part.hessian.yy, p->hyz[i] = part.hessian.yz, p->hzz[i] = part.hessian.zz;
+    }
+}
+
 static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes)
 {
     SweepPartLanes *p = &b->part[k];
@@ -99,9 +115,11 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
         any |= own[i] > 0;
     }
     feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, feet->harmonics, any ? &b->ring : NULL, own);
+    if (feet->field->model->stretch_count > 0)
+        apply_stretches(feet, b, k, lanes);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         if (own[i] > 0) {
-            b->is_flat[i] = p->segment[i]->rise == 0;
+            b->is_flat[i] = p->segment[i]->rise == 0 && p->segment[i]->is_shaped == 0;
             b->own_t[i] = p->t[i];
             b->ring_x[i] = b->foot.at.x[i], b->ring_y[i] = b->foot.at.y[i], b->ring_z[i] = b->foot.at.z[i];
         }

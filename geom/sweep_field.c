@@ -9,6 +9,7 @@
 
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
+#include "geom/sweep_stretch.h"
 
 #include <string.h>
 
@@ -38,11 +39,11 @@ double sweep_field_mean(const SweepField *field, int branch, double t)
 // --- One branch ---
 
 // Polynomials of the section at x = t - origin and their derivatives.
-typedef struct Section {
+typedef struct RowJet {
     double c[SWEEP_TERMS], c1[SWEEP_TERMS], c2[SWEEP_TERMS];
-} Section;
+} RowJet;
 
-static void section_at(const SweepSegment *s, double x, Section *at)
+static void section_at(const SweepSegment *s, double x, RowJet *at)
 {
     for (int k = 0; k < SWEEP_TERMS; k++) {
         const double *p = s->section[k];
@@ -58,7 +59,7 @@ typedef struct SectionSum {
     double rt, rtt, rtx, rty;
 } SectionSum;
 
-static SectionSum sum_section(const Section *at, double x, double y)
+static SectionSum sum_section(const RowJet *at, double x, double y)
 {
     SectionSum sum = {.r = at->c[0], .rt = at->c1[0], .rtt = at->c2[0]};
     double re[3] = {1, 0, 0}, im[3] = {0, 0, 0};     // z^k, z^(k-1), z^(k-2)
@@ -88,19 +89,6 @@ static void differentiate_t(const SweepJet *j, Vec3 u, SweepPart *p)
     p->t_hessian.yy = 2 * j->s1.y * v.y, p->t_hessian.yz = j->s1.y * v.z + j->s1.z * v.y, p->t_hessian.zz = 2 * j->s1.z * v.z;
 }
 
-static void sym3_add(Sym3 *s, double factor, const Sym3 *a)
-{
-    s->xx += factor * a->xx, s->xy += factor * a->xy, s->xz += factor * a->xz;
-    s->yy += factor * a->yy, s->yz += factor * a->yz, s->zz += factor * a->zz;
-}
-
-// *s += factor (a b' + b a')
-static void sym3_add_pair(Sym3 *s, double factor, Vec3 a, Vec3 b)
-{
-    s->xx += 2 * factor * a.x * b.x, s->xy += factor * (a.x * b.y + a.y * b.x), s->xz += factor * (a.x * b.z + a.z * b.x);
-    s->yy += 2 * factor * a.y * b.y, s->yz += factor * (a.y * b.z + a.z * b.y), s->zz += 2 * factor * a.z * b.z;
-}
-
 // f, gradient and Hessian at a known t on a segment.
 void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, SweepPart *p)
 {
@@ -115,7 +103,7 @@ void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, Sweep
     differentiate_t(&j, u, p);
     double rho = sqrt(p->n * p->n + p->b * p->b + p->w * p->w), r = fmax(rho, LEAST);
     double e[3] = {p->n / r, p->b / r, p->w / r};
-    Section section;
+    RowJet section;
     section_at(segment, t - segment->origin, &section);
     SectionSum sum = sum_section(&section, e[0], e[1]);
     p->rho = rho;
@@ -158,11 +146,18 @@ void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, Sweep
     }
 }
 
+void sweep_branch_evaluate(const SweepField *field, int branch, const SweepSegment *segment, Vec3 x, double t, SweepPart *part)
+{
+    sweep_segment_evaluate(segment, x, t, part);
+    if (segment->is_shaped > 0)
+        sweep_stretch_apply(field->model, field->curve, branch, x, part);
+}
+
 void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part)
 {
     double t = sweep_curve_project(field->curve[branch], x, start, 2 * field->model->branch[branch].radius);
     *part = (SweepPart){.branch = branch, .share = 1, .sac = -1};
-    sweep_segment_evaluate(&field->segment[sweep_field_segment(field, branch, t)], x, t, part);
+    sweep_branch_evaluate(field, branch, &field->segment[sweep_field_segment(field, branch, t)], x, t, part);
 }
 
 // --- Blends ---

@@ -8,17 +8,7 @@
 
 #include "geom/sweep_curve.h"
 #include "geom/sweep_model.h"
-
-// Polynomials of t - origin on from <= t <= to. A branch has two segments before its start and two beyond its end, the outer ones without end.
-typedef struct SweepSegment {
-    Vec3 s[4], n[4], b[4];               // as in SweepInterval
-    double origin, rise, from, to;       // rise: w = rise (t - origin); 0: w = 0
-    double section[SWEEP_TERMS][4];      // the terms' polynomials
-    double largest;                      // [mm] upper bound of R on the segment
-    double unused[3];
-} __attribute__((aligned(64))) SweepSegment;
-
-enum { SWEEP_SEGMENT_ROW = sizeof(SweepSegment) / sizeof(double) };
+#include "geom/sweep_part.h"
 
 // A branch that is seen from a segment of another: its t near a place t' of the segment is about t + slope t', t' limited to 0 ... length of its own branch.
 typedef struct SweepCandidate {
@@ -79,17 +69,6 @@ typedef struct SweepPlace {
     int sac;                 // on a sac: a node of model->sac near the point
 } SweepPlace;
 
-// One branch or sac at X.
-typedef struct SweepPart {
-    int branch;              // -1: a sac
-    double t, n, b, w, rho;  // coordinates of X, see sweep_model.h
-    double f;                // [mm]
-    Vec3 gradient, t_gradient;
-    Sym3 hessian, t_hessian;
-    double share;            // dF/df of this part; the shares add up to 1
-    int sac;                 // of a sac: the node whose blobs were added
-} SweepPart;
-
 typedef struct SweepBlend {
     int count, largest;      // parts, and the one of largest share
     SweepPart part[SWEEP_CANDIDATES + 1];
@@ -101,6 +80,8 @@ typedef struct SweepBlend {
 // One branch alone at x; Newton for t starts from `start`.
 void sweep_field_branch(const SweepField *field, int branch, Vec3 x, double start, SweepPart *part);
 // The same at a known t, which the segment holds; leaves `branch`, `share` and `sac` unset.
+void sweep_branch_evaluate(const SweepField *field, int branch, const SweepSegment *segment, Vec3 x, double t, SweepPart *part);
+// The same of the rows alone, without sections of another kind.
 void sweep_segment_evaluate(const SweepSegment *segment, Vec3 x, double t, SweepPart *part);
 // A sac alone at x, from a node near x.
 void sweep_field_sac(const SweepField *field, int node, Vec3 x, SweepPart *part);

@@ -3,6 +3,7 @@
 
 #include <limits.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double BLEND = 0.6;
 // More of anything than a tree of vessels has: counts stay far from overflow.
@@ -34,6 +35,7 @@ void sweep_model_free(SweepModel *model)
 {
     if (!model)
         return;
+    sweep_model_set_stretches(model, 0, NULL, 0, NULL, 0, NULL, "", NULL);
     free(model->branch);
     free(model->knot);
     free(model->knot_node);
@@ -205,4 +207,134 @@ bool sweep_model_validate(const SweepModel *m, const char *file, Faults *faults)
     else if (m->sac && vessel_tree_validate(m->sac, file, faults))
         check_nodes(m->sac_node, m->sac->node_count, "sac_node", file, faults);
     return faults->count == before;
+}
+
+// --- Stretches ---
+
+enum { ROW_MOST = 4096 };    // stations of one stretch
+
+static void drop_stretches(SweepModel *m)
+{
+    for (int i = 0; m->section && i < m->station_count; i++)
+        section_free(m->section[i]);
+    free(m->stretch);
+    free(m->station);
+    free(m->station_t);
+    free(m->contour);
+    free(m->section);
+    m->stretch = NULL, m->station = NULL, m->station_t = NULL, m->contour = NULL, m->section = NULL;
+    m->stretch_count = m->station_count = m->contour_count = 0;
+}
+
+static bool check_stretch(const SweepModel *m, int index, const SweepStretch *s, const SweepStretch *last, const char *file, Faults *faults)
+{
+    if (s->branch < 0 || s->branch >= m->branch_count || (last && s->branch < last->branch)) {
+        faults_add(faults, file, 0, 0, "sweep/stretch[%d] lies on branch %d; expected a branch of the model, 0 to %d, in ascending order", index, s->branch,
+                   m->branch_count - 1);
+        return false;
+    }
+    double length = sweep_model_length(m, s->branch), least = last && last->branch == s->branch ? last->to : 0, range = s->to - s->from;
+    if (!(s->from >= least && s->to <= length * (1 + 1e-6) && range > 0 && s->fade > 0 && 2 * s->fade <= range * (1 + 1e-9))) {
+        faults_add(faults, file, 0, 0,
+                   "sweep/stretch[%d] reaches from t = %g to %g and fades over %g; expected a range within %g to %g, twice as long as the fade", index, s->from,
+                   s->to, s->fade, least, length);
+        return false;
+    }
+    const SectionOptions *o = &s->section;
+    bool sound = (int)o->kind >= 0 && o->kind < SECTION_KINDS && (o->form == SECTION_MENDED || o->form == SECTION_AS_PRINTED) && o->harmonics >= 0 &&
+                 o->harmonics <= 16 && o->stiffness >= 0 && o->stiffness < 1e6 && o->delta_mm >= 0 && o->delta_mm < 1e6 && o->voxel_mm > 0 &&
+                 o->voxel_mm < 1e6 && (s->weights == SECTION_CATMULL_ROM || s->weights == SECTION_PSP) && s->tension > 0 && s->tension <= 1 && s->width > 0 &&
+                 s->width <= 0.5;
+    if (!sound)
+        faults_add(
+            faults, file, 0, 0,
+            "sweep/stretch[%d] has kind %d, form %d, %d harmonics, stiffness %g, delta %g, voxel %g, weights %d, tension %g, width %g; expected kind 0 to 3, "
+            "form and weights 0 or 1, 0 to 16 harmonics, tension 0 to 1, width 0 to 0.5, lengths above 0",
+            index, (int)o->kind, (int)o->form, o->harmonics, o->stiffness, o->delta_mm, o->voxel_mm, (int)s->weights, s->tension, s->width);
+    return sound;
+}
+
+static bool check_stations(const SweepStretch *stretch, int index, const SweepStation *station, int *next_point, int contour_count, const char *file,
+                           Faults *faults)
+{
+    for (int k = stretch->first_station; k < stretch->first_station + stretch->station_count; k++) {
+        const SweepStation *s = &station[k];
+        bool in_order = k == stretch->first_station || s->t - s[-1].t > 1e-9;
+        if (!isfinite(s->t) || !in_order || s->first_point != *next_point || s->point_count < 3 || s->point_count > 4096 ||
+            s->point_count > contour_count - *next_point) {
+            faults_add(faults, file, 0, 0,
+                       "sweep/station[%d] of stretch %d lies at t = %g and has %d points from %d; expected increasing t and 3 to 4096 points from %d", k, index,
+                       s->t, s->point_count, s->first_point, *next_point);
+            return false;
+        }
+        *next_point += s->point_count;
+    }
+    return true;
+}
+
+static bool check_stretches(const SweepModel *m, int stretches, const SweepStretch *stretch, int stations, const SweepStation *station, int contours,
+                            const char *file, Faults *faults)
+{
+    int next_station = 0, next_point = 0;
+    for (int i = 0; i < stretches; i++) {
+        const SweepStretch *s = &stretch[i];
+        if (s->first_station != next_station || s->station_count < 1 || s->station_count > ROW_MOST || s->station_count > stations - next_station) {
+            faults_add(faults, file, 0, 0, "sweep/stretch[%d] has %d stations from %d; expected 1 to %d from %d", i, s->station_count, s->first_station,
+                       (int)ROW_MOST, next_station);
+            return false;
+        }
+        if (!check_stretch(m, i, s, i > 0 ? &stretch[i - 1] : NULL, file, faults) || !check_stations(s, i, station, &next_point, contours, file, faults))
+            return false;
+        next_station += s->station_count;
+    }
+    if (next_station != stations || next_point != contours)
+        faults_add(faults, file, 0, 0, "sweep: the stretches have %d stations and %d points; expected %d and %d", next_station, next_point, stations, contours);
+    return next_station == stations && next_point == contours;
+}
+
+bool sweep_model_set_stretches(SweepModel *m, int stretch_count, const SweepStretch *stretch, int station_count, const SweepStation *station, int contour_count,
+                               const SectionPoint *contour, const char *file, Faults *faults)
+{
+    drop_stretches(m);
+    if (stretch_count == 0)
+        return true;
+    if (!check_stretches(m, stretch_count, stretch, station_count, station, contour_count, file, faults))
+        return false;
+    size_t stretches = (size_t)stretch_count, stations = (size_t)station_count, points = (size_t)contour_count;
+    m->stretch = malloc(stretches * sizeof *m->stretch);
+    m->station = malloc(stations * sizeof *m->station);
+    m->station_t = malloc(stations * sizeof *m->station_t);
+    m->contour = malloc(points * sizeof *m->contour);
+    m->section = calloc(stations, sizeof *m->section);
+    if (!m->stretch || !m->station || !m->station_t || !m->contour || !m->section) {
+        drop_stretches(m);
+        faults_add(faults, file, 0, 0, "needs more memory than is available (%d stations of sections)", station_count);
+        return false;
+    }
+    memcpy(m->stretch, stretch, stretches * sizeof *stretch);
+    memcpy(m->station, station, stations * sizeof *station);
+    memcpy(m->contour, contour, points * sizeof *contour);
+    m->stretch_count = stretch_count, m->station_count = station_count, m->contour_count = contour_count;
+    for (int i = 0; i < stretch_count; i++)
+        for (int k = stretch[i].first_station; k < stretch[i].first_station + stretch[i].station_count; k++) {
+            m->station_t[k] = station[k].t;
+            m->section[k] = section_create(&stretch[i].section, station[k].point_count, contour + station[k].first_point);
+            if (!m->section[k]) {
+                faults_add(faults, file, 0, 0, "sweep/station[%d] at t = %g of branch %d: its %d points give no section of kind %s", k, station[k].t,
+                           stretch[i].branch, station[k].point_count, section_kind_name[stretch[i].section.kind]);
+                drop_stretches(m);
+                return false;
+            }
+        }
+    return true;
+}
+
+int sweep_model_harmonics(const SweepModel *m)
+{
+    int highest = 1;
+    for (int i = 0; i < m->row_count; i++)
+        for (int k = 1; k < SWEEP_TERMS; k++)
+            if (m->row[i * SWEEP_TERMS + k] != 0 && (k + 1) / 2 > highest)
+                highest = (k + 1) / 2;
+    return highest;
 }

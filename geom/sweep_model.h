@@ -22,6 +22,9 @@
 // Newton finds. (Radii at a fork are mean radii: the parent's at parent_t, the child's one r_p from its start.)
 // Sacs are taken last: f = (r/2) (sum a u^3 - 1), r the radius of the sac's largest node, and delta = blend/2 times the smaller of r and the mean radius of the
 // vessel's nodes beside the neck.
+// Sections of another kind (section.h), where polar ones cannot hold the lumen's shape: on from < t < to of a branch, f = (1 - m) f_rows + m C(n, b, t), C the row
+// of sections through the stretch's stations (section_row.h), m = 1 except within `fade` of both ends of the range, where it rises as 6 s^5 - 15 s^4 + 10 s^3. At
+// t = 0 of an open inlet there is no fade, and m = 1 upstream. The rows remain the nearest polar sections: their radii serve candidates and starts.
 // Candidates are given by topology (sweep_views.c): a child is followed from its start along the branches that are seen at its fork, as long as the tubes,
 // enlarged by the width of the blend, overlap; so vessels that touch elsewhere are never blended.
 //
@@ -29,6 +32,7 @@
 #ifndef SELDINGER_GEOM_SWEEP_MODEL_H
 #define SELDINGER_GEOM_SWEEP_MODEL_H
 
+#include "geom/section_row.h"
 #include "geom/vessel_tree.h"
 
 enum { SWEEP_HARMONICS = 8 };
@@ -51,6 +55,22 @@ typedef struct SweepBranch {
 // What crosses an open end. Ends without a tag: see sweep_model_tag.
 typedef enum { SWEEP_TAG_NONE, SWEEP_TAG_IN, SWEEP_TAG_OUT, SWEEP_TAGS } SweepTag;
 
+typedef struct SweepStation {
+    double t;                // [mm] on the branch's curve
+    int first_point, point_count;    // its contour in the plane (n, b): 3 to 4096 points, not crossing itself
+} SweepStation;
+
+typedef struct SweepStretch {
+    int branch;
+    double from, to;         // [mm] range of t
+    double fade;             // [mm] > 0, at most half the range
+    int first_station, station_count;        // >= 1 stations, t increasing
+    SectionOptions section;
+    SectionWeights weights;
+    double tension, width;   // of the weights, see SectionRow
+    bool is_straight;        // as in Hong et al. 2012: each section in the straight frame of its own station, PSP weights over its own interval only
+} SweepStretch;
+
 typedef struct SweepModel {
     int branch_count;        // >= 1; parents before children
     SweepBranch *branch;
@@ -61,6 +81,14 @@ typedef struct SweepModel {
     double *break_t;         // (breaks) [mm] increasing within a branch
     int row_count;
     double *row;             // (rows, SWEEP_TERMS) [mm]
+    int stretch_count;         // 0: rows alone; the stretches of a branch follow each other and do not overlap
+    SweepStretch *stretch;
+    int station_count;
+    SweepStation *station;
+    double *station_t;       // (stations) their t
+    int contour_count;
+    SectionPoint *contour;   // (contours) [mm]
+    Section **section;       // (stations) made from the contours
     double blend;            // delta at a fork relative to the child's radius; default 0.6, 0: plain maximum
     VesselTree *sac;         // shared blobs of the sacs and the vessels beside their necks; NULL: the tree has no sacs
     int32_t *sac_node;       // (nodes of `sac`) the node of the tree that each one is
@@ -72,10 +100,16 @@ typedef struct SweepModel {
 // or if out of memory. `sac` and `sac_node` are NULL; a model that is given them owns them.
 SweepModel *sweep_model_create(int branch_count, int knot_count, int break_count, int row_count);
 void sweep_model_free(SweepModel *model);
+// Gives the model sections of another kind: copies the arrays and makes the sections; stretches that it had are dropped. The model, without its stretches, is valid.
+// Returns false with faults (ranges, contours that give no section, out of memory).
+bool sweep_model_set_stretches(SweepModel *model, int stretch_count, const SweepStretch *stretch, int station_count, const SweepStation *station,
+                               int contour_count, const SectionPoint *contour, const char *file, Faults *faults);
 // Checks the properties stated above: ranges of branches follow each other and cover the arrays, parents come before children, places on parents exist, knots
 // are apart, breaks increase from 0 to the curve's length (to 1e-6 of it), numbers are finite, radii positive, sac nodes linked. Adds one fault per broken rule,
 // with the first offending index.
 bool sweep_model_validate(const SweepModel *model, const char *file, Faults *faults);
+// The highest harmonic that any row uses, at least 1.
+int sweep_model_harmonics(const SweepModel *model);
 // [mm] length of a branch's curve: t of its last knot.
 double sweep_model_length(const SweepModel *model, int branch);
 // delta at the fork of a branch relative to its radius.

@@ -3,6 +3,7 @@
 // B-splines over breaks t_0 … t_m, with knots k_i = t_(i-3), limited to t_0 and t_m: N_(i,0) = 1 on the span, and
 //   N_(i,p)(t) = (t - k_i) / (k_(i+p) - k_i) N_(i,p-1)(t) + (k_(i+p+1) - t) / (k_(i+p+1) - k_(i+1)) N_(i+1,p-1)(t).
 #include "geom/sweep_field.h"
+#include "geom/sweep_stretch.h"
 #include "geom/sweep_views.h"
 
 #include <stdlib.h>
@@ -196,8 +197,12 @@ static void fill_branch(SweepField *field, int branch)
     cut_branch(field, branch, s + first + 2);
     field->level_from[branch] = level_height(b, field->model->row[(size_t)b->first_row * SWEEP_TERMS]);
     field->level_to[branch] = level_height(b, field->model->row[(size_t)(b->first_row + b->break_count + 1) * SWEEP_TERMS]);
+    for (int i = first + 2; i <= last - 2; i++)
+        sweep_stretch_mark(field->model, branch, &s[i]);
     extend(&curve->interval[0], &s[first + 2], -1, field->level_from[branch], !b->open_start, &s[first + 1], &s[first]);
     extend(&curve->interval[curve->knot_count], &s[last - 2], 1, field->level_to[branch], true, &s[last - 1], &s[last]);
+    for (int i = first; i < first + 2 && b->open_start; i++)
+        sweep_stretch_mark(field->model, branch, &s[i]);
 }
 
 static void fill_forks(SweepField *field)

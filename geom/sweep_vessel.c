@@ -586,16 +586,6 @@ static void sweep_destroy(Vessel *vessel)
 
 // --- Creation ---
 
-static int highest_harmonic(const SweepModel *m)
-{
-    int highest = 1;
-    for (int i = 0; i < m->row_count; i++)
-        for (int k = 1; k < SWEEP_TERMS; k++)
-            if (m->row[i * SWEEP_TERMS + k] != 0 && (k + 1) / 2 > highest)
-                highest = (k + 1) / 2;
-    return highest;
-}
-
 static void fill_places(SweepVessel *v)
 {
     const SweepModel *m = v->model;
@@ -662,7 +652,7 @@ Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
         sweep_destroy(&v->vessel);
         return NULL;
     }
-    v->feet = (SweepFeet){.field = v->field, .kernels = sweep_kernels(isa), .harmonics = highest_harmonic(model)};
+    v->feet = (SweepFeet){.field = v->field, .kernels = sweep_kernels(isa), .harmonics = sweep_model_harmonics(model)};
     fill_places(v);
     if (!power_blocks_create(&v->blocks, v->knots) || !sweep_sac_points_create(v->field, &v->feet.sacs)) {
         sweep_destroy(&v->vessel);

@@ -184,12 +184,15 @@ VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 
 // --- writing ---
 
-static bool write_tree(hid_t file, const VesselTree *tree, const SweepModel *sweep, const TreeFileInfo *info)
+static bool write_tree(hid_t file, const VesselTree *tree, const SweepModels *sweep, const TreeFileInfo *info)
 {
     const int32_t version = FORMAT_VERSION;
     int64_t n = tree->node_count, p = tree->point_count, b = tree->blob_count;
+    bool has_sweep = false;
+    for (int i = 0; sweep && i < SECTION_KINDS; i++)
+        has_sweep |= sweep->of[i] != NULL;
     bool good = hdf5_make_group(file, "/nodes") && hdf5_make_group(file, "/points") &&
-                hdf5_write_text(file, "format", b > 0 || sweep ? "seldinger-model" : "seldinger-tree") &&
+                hdf5_write_text(file, "format", b > 0 || has_sweep ? "seldinger-model" : "seldinger-tree") &&
                 hdf5_write_scalar(file, "version", H5T_NATIVE_INT32, &version) && hdf5_write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) &&
                 hdf5_write_text(file, "kernel", kernel_name[vessel_tree_is_shared(tree) ? KERNEL_COMPACT : KERNEL_CAUCHY]) &&
                 hdf5_write_text(file, "source", info ? info->source : "") && hdf5_write_text(file, "parameters", info ? info->parameters : "") &&
@@ -208,7 +211,7 @@ static bool write_tree(hid_t file, const VesselTree *tree, const SweepModel *swe
                hdf5_write_column(file, "/blobs/offset", H5T_NATIVE_INT64, n + 1, 0, tree->blob_offset) &&
                hdf5_write_column(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, n, 0, tree->error) &&
                (!vessel_tree_is_shared(tree) || hdf5_write_column(file, "/blobs/amplitude", H5T_NATIVE_DOUBLE, b, 0, tree->blob_amplitude));
-    return good && (!sweep || sweep_file_write(file, sweep));
+    return good && (!sweep || sweep_models_write(file, sweep));
 }
 
 // The core driver frees the file's memory when the file is closed. The file is complete by then, so we take ownership of the memory. (H5Fget_file_image of an
@@ -267,7 +270,7 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
     return tree_file_save_with(tree, NULL, info, path, faults);
 }
 
-bool tree_file_save_with(const VesselTree *tree, const SweepModel *sweep, const TreeFileInfo *info, const char *path, Faults *faults)
+bool tree_file_save_with(const VesselTree *tree, const SweepModels *sweep, const TreeFileInfo *info, const char *path, Faults *faults)
 {
     if (!heap_can_allocate(HEAP_RESERVE_OF_HDF5)) {
         faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library is out of memory");

@@ -4,6 +4,7 @@
 #define SELDINGER_RECON_TREE_FILE_H
 
 #include "geom/geom.h"
+#include "recon/sweep_file.h"
 
 typedef struct TreeFileInfo {  // root attributes
     char *source;            // the input files
@@ -16,8 +17,8 @@ VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 // The same from memory, without the trial read in a child process (recon/hdf5_reader.h); `name` is used in messages.
 VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults);
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults);
-// The same with a swept model of the tree (recon/sweep_file.h) beside its blobs, if it has any. `sweep` may be NULL.
-bool tree_file_save_with(const VesselTree *tree, const SweepModel *sweep, const TreeFileInfo *info, const char *path, Faults *faults);
+// The same with swept models of the tree (recon/sweep_file.h) beside its blobs, if it has any. `sweep` may be NULL.
+bool tree_file_save_with(const VesselTree *tree, const SweepModels *sweep, const TreeFileInfo *info, const char *path, Faults *faults);
 void tree_file_info_free(TreeFileInfo *info);
 // Returns the number on the line `key: number` of the parameters (any indentation), or `otherwise` if there is none.
 double tree_file_number(const TreeFileInfo *info, const char *key, double otherwise);

@@ -42,7 +42,7 @@ static bool cache_folder(char folder[CACHE_PATH])
 // options. Returns false if the program cannot be read.
 static bool cache_key(const Scene *scene, char hex[65])
 {
-    int kind = contact_is_local(scene->contact) ? 1 : scene->contact == CONTACT_SWEEP ? 2 : 0;
+    int kind = contact_is_local(scene->contact) ? 1 : contact_is_swept(scene->contact) ? 2 + (int)contact_section(scene->contact) : 0;
     Sha256 sha;
     char program[65], path[CACHE_PATH];
     if (!process_code_file(path, sizeof path) || !sha256_of_file(path, program))
@@ -68,9 +68,10 @@ VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const Li
     return field_fit(sampled, &shared, progress, faults);
 }
 
-SweepModel *sweep_samples(const VesselTree *sampled, double voxel_mm, int threads, Faults *faults)
+SweepModel *sweep_samples(const VesselTree *sampled, SectionKind kind, double voxel_mm, int threads, Faults *faults)
 {
     SweepFitOptions options = sweep_fit_default_options();
+    options.section = section_default_options(kind, SECTION_MENDED);
     options.voxel_mm = voxel_mm;
     options.threads = threads;
     return sweep_fit(sampled, &options, NULL, faults);
@@ -84,7 +85,7 @@ static VesselTree *fit_shape(const Scene *scene, int threads, const Progress *pr
     options.threads = threads;
     VesselTree *sampled = shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
     if (sweep) {
-        *sweep = sampled ? sweep_samples(sampled, options.voxel_mm, threads, faults) : NULL;
+        *sweep = sampled ? sweep_samples(sampled, contact_section(scene->contact), options.voxel_mm, threads, faults) : NULL;
         if (*sweep)
             return sampled;
         vessel_tree_free(sampled);
@@ -96,11 +97,11 @@ static VesselTree *fit_shape(const Scene *scene, int threads, const Progress *pr
 }
 
 // The cached model. `sweep` may be NULL, see fitted_shape.
-static VesselTree *load_cached(const char *path, SweepModel **sweep, Faults *ignored)
+static VesselTree *load_cached(const char *path, SectionKind kind, SweepModel **sweep, Faults *ignored)
 {
     VesselTree *model = tree_file_load(path, NULL, ignored);
     if (model && sweep)
-        *sweep = sweep_file_load(path, model, ignored);
+        *sweep = sweep_file_load(path, kind, model, ignored);
     if (model && !(sweep ? *sweep != NULL : vessel_tree_is_model(model))) {
         vessel_tree_free(model);
         return NULL;
@@ -116,7 +117,7 @@ VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progre
     if (ignored && cache_folder(folder) && cache_key(scene, hex)) {
         snprintf(path, sizeof path, "%.4000s/fit-%.32s.h5", folder, hex);
         if (access(path, R_OK) == 0)
-            model = load_cached(path, sweep, ignored);
+            model = load_cached(path, contact_section(scene->contact), sweep, ignored);
     }
     if (!model) {
         model = fit_shape(scene, threads, progress, sweep, faults);
@@ -124,8 +125,11 @@ VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progre
         strcpy(source, scene->shape_name);
         char created_by[] = "seldinger " SELDINGER_VERSION, parameters[] = "";
         TreeFileInfo info = {.source = source, .parameters = parameters, .created_by = created_by};
+        SweepModels swept = {{NULL}};
+        if (sweep)
+            swept.of[contact_section(scene->contact)] = *sweep;
         if (model && *path)
-            tree_file_save_with(model, sweep ? *sweep : NULL, &info, path, ignored);
+            tree_file_save_with(model, &swept, &info, path, ignored);
     }
     free(ignored);
     return model;

@@ -13,6 +13,6 @@ VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progre
 // Fits shared blobs, or a local model for each node if the contact requires these. Returns NULL with faults; the caller frees.
 VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const LimFitOptions *options, const Progress *progress, Faults *faults);
 // Fits the swept model. Returns NULL with faults; the caller frees.
-SweepModel *sweep_samples(const VesselTree *sampled, double voxel_mm, int threads, Faults *faults);
+SweepModel *sweep_samples(const VesselTree *sampled, SectionKind kind, double voxel_mm, int threads, Faults *faults);
 
 #endif

@@ -54,21 +54,21 @@ static bool open_swept(VesselTree *tree, SweepModel *sweep, const char *path, Op
 static bool open_model(const Scene *scene, OpenVessel *out, Faults *faults)
 {
     VesselTree *tree = tree_file_load(scene->model_path, NULL, faults);
-    if (scene->contact != CONTACT_SWEEP)
+    if (!contact_is_swept(scene->contact))
         return open_tree(tree, scene->contact, scene->model_path, out, faults);
-    return open_swept(tree, tree ? sweep_file_load(scene->model_path, tree, faults) : NULL, scene->model_path, out, faults);
+    return open_swept(tree, tree ? sweep_file_load(scene->model_path, contact_section(scene->contact), tree, faults) : NULL, scene->model_path, out, faults);
 }
 
 static bool open_shape(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
 {
     SweepModel *sweep = NULL;
-    VesselTree *tree = fitted_shape(scene, options->threads, options->progress, scene->contact == CONTACT_SWEEP ? &sweep : NULL, faults);
-    if (scene->contact == CONTACT_SWEEP)
+    VesselTree *tree = fitted_shape(scene, options->threads, options->progress, contact_is_swept(scene->contact) ? &sweep : NULL, faults);
+    if (contact_is_swept(scene->contact))
         return open_swept(tree, sweep, scene->path, out, faults);
     return open_tree(tree, scene->contact, scene->path, out, faults);
 }
 
-// Contacts 'lim' and 'sweep' of a tube: samples the exact tube and replaces it by the fit.
+// Fitted contacts of a tube: samples the exact tube and replaces it by the fit.
 static bool fit_tube(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
 {
     LimFitOptions fit = lim_fit_default_options();
@@ -77,8 +77,10 @@ static bool fit_tube(const Scene *scene, const OpenVesselOptions *options, OpenV
     VesselTree *sampled = tube_tree(out->vessel, &scene->tube, scene->path, faults);
     out->vessel->destroy(out->vessel);
     out->vessel = NULL;
-    if (scene->contact == CONTACT_SWEEP)
-        return open_swept(sampled, sampled ? sweep_samples(sampled, fit.voxel_mm, options->threads, faults) : NULL, scene->path, out, faults);
+    if (contact_is_swept(scene->contact)) {
+        SweepModel *sweep = sampled ? sweep_samples(sampled, contact_section(scene->contact), fit.voxel_mm, options->threads, faults) : NULL;
+        return open_swept(sampled, sweep, scene->path, out, faults);
+    }
     VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &fit, options->progress, faults) : NULL;
     vessel_tree_free(sampled);
     return open_tree(model, scene->contact, scene->path, out, faults);
@@ -176,7 +178,7 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
         return true;
     if (scene->contact == CONTACT_TUBE && !exact)
         faults_add(faults, scene->path, 0, 0,
-                   "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, sweep, mesh, smooth_mesh, "
+                   "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, sweep, raster, rbf, pas, mesh, smooth_mesh, "
                    "flat_mesh and grid, a mesh the last four");
     else if (contact_is_fitted(scene->contact) && scene->source == SOURCE_MESH)
         faults_add(faults, scene->path, 0, 0,

@@ -5,7 +5,8 @@
 
 #include <stdlib.h>
 
-const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "flat_mesh", "grid", "lim_blend", "lim_switch", "sweep", NULL};
+const char *const contact_name[CONTACT_COUNT + 1] = {"lim",        "mesh",  "tube",   "smooth_mesh", "flat_mesh", "grid", "lim_blend",
+                                                     "lim_switch", "sweep", "raster", "rbf",         "pas",       NULL};
 
 const char *const tool_kind_name[TOOL_KIND_COUNT + 1] = {"guide_catheter", "catheter", "microcatheter", "wire", NULL};
 const char *const tool_core_name[CORE_COUNT + 1] = {"steel", "nitinol", NULL};

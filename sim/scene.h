@@ -23,11 +23,16 @@ typedef enum {
     CONTACT_GRID,
     CONTACT_LIM_BLEND,
     CONTACT_LIM_SWITCH,
-    CONTACT_SWEEP,
+    CONTACT_SWEEP,           // the swept models follow in the order of SectionKind
+    CONTACT_RASTER,
+    CONTACT_RBF,
+    CONTACT_PAS,
     CONTACT_COUNT
 } ContactKind;
 static inline bool contact_is_local(ContactKind contact) { return contact == CONTACT_LIM_BLEND || contact == CONTACT_LIM_SWITCH; }
-static inline bool contact_is_fitted(ContactKind contact) { return contact == CONTACT_LIM || contact == CONTACT_SWEEP || contact_is_local(contact); }
+static inline bool contact_is_swept(ContactKind contact) { return contact >= CONTACT_SWEEP && contact <= CONTACT_PAS; }
+static inline SectionKind contact_section(ContactKind contact) { return (SectionKind)(contact - CONTACT_SWEEP); }
+static inline bool contact_is_fitted(ContactKind contact) { return contact == CONTACT_LIM || contact_is_swept(contact) || contact_is_local(contact); }
 extern const char *const contact_name[CONTACT_COUNT + 1];  // as written in files; NULL at the end
 
 typedef struct SceneTarget {

@@ -129,7 +129,7 @@ static void read_contact(const YamlMap *map, Scene *scene)
     if (choice >= 0)
         scene->contact = (ContactKind)choice;
     if (choice == CONTACT_TUBE && (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE || scene->source == SOURCE_MESH))
-        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, sweep, mesh, "
+        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, sweep, raster, rbf, pas, mesh, "
                             "smooth_mesh, flat_mesh or grid");
     else if (choice >= 0 && contact_is_fitted((ContactKind)choice) && scene->source == SOURCE_MESH)
         yaml_fault(contact, "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, flat_mesh or grid",

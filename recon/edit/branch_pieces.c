@@ -10,10 +10,41 @@ BranchPiece *branch_pieces(const SweepModel *m, int more)
     BranchPiece *piece = calloc((size_t)m->branch_count + (size_t)more, sizeof *piece);
     for (int i = 0; piece && i < m->branch_count; i++) {
         const SweepBranch *b = &m->branch[i];
-        piece[i] =
-            (BranchPiece){*b, m->knot + b->first_knot, m->knot_node + b->first_knot, m->break_t + b->first_break, m->row + (size_t)b->first_row * SWEEP_TERMS};
+        piece[i] = (BranchPiece){
+            *b, i, m->knot + b->first_knot, m->knot_node + b->first_knot, m->break_t + b->first_break, m->row + (size_t)b->first_row * SWEEP_TERMS};
     }
     return piece;
+}
+
+// Copies the stretches of branches that are kept, with their new numbers.
+static bool keep_stretches(const SweepModel *like, int count, const BranchPiece *piece, SweepModel *m)
+{
+    Faults ignored;
+    SweepStretch *stretch = calloc((size_t)like->stretch_count, sizeof *stretch);
+    SweepStation *station = calloc((size_t)like->station_count, sizeof *station);
+    SectionPoint *contour = calloc((size_t)like->contour_count + 1, sizeof *contour);
+    int stretches = 0, stations = 0, points = 0;
+    bool good = stretch && station && contour;
+    for (int i = 0; good && i < count; i++)
+        for (int k = 0; k < like->stretch_count; k++) {
+            const SweepStretch *s = &like->stretch[k];
+            if (s->branch != piece[i].from)
+                continue;
+            stretch[stretches] = *s;
+            stretch[stretches].branch = i, stretch[stretches++].first_station = stations;
+            for (int j = s->first_station; j < s->first_station + s->station_count; j++) {
+                const SweepStation *t = &like->station[j];
+                station[stations++] = (SweepStation){t->t, points, t->point_count};
+                memcpy(contour + points, like->contour + t->first_point, (size_t)t->point_count * sizeof *contour);
+                points += t->point_count;
+            }
+        }
+    faults_clear(&ignored);
+    good = good && (stretches == 0 || sweep_model_set_stretches(m, stretches, stretch, stations, station, points, contour, "the edited model", &ignored));
+    free(stretch);
+    free(station);
+    free(contour);
+    return good;
 }
 
 SweepModel *branch_pieces_join(const SweepModel *like, int count, const BranchPiece *piece)
@@ -37,5 +68,8 @@ SweepModel *branch_pieces_join(const SweepModel *like, int count, const BranchPi
     }
     m->blend = like->blend;
     m->sac = like->sac, m->sac_node = like->sac_node, m->borrows_sac = true;
-    return m;
+    if (like->stretch_count == 0 || keep_stretches(like, count, piece, m))
+        return m;
+    sweep_model_free(m);
+    return NULL;
 }

@@ -1,19 +1,21 @@
 // See edit_file.h.
 #include "recon/edit/edit_file.h"
 
-#include "recon/sweep_file.h"
-
 bool edit_file_load(const char *path, EditFile *file, Faults *faults)
 {
     *file = (EditFile){0};
     file->tree = tree_file_load(path, &file->info, faults);
-    file->model = file->tree ? sweep_file_load(path, file->tree, faults) : NULL;
+    if (!file->tree || !sweep_models_load(path, file->tree, &file->models, faults))
+        return false;
+    file->model = file->models.of[SECTION_POLAR];
+    if (!file->model)
+        faults_add(faults, path, 0, 0, "has no swept model with polar sections; `seldinger fit %s --model sweep -o OUT.h5` makes one", path);
     return file->model != NULL;
 }
 
 void edit_file_free(EditFile *file)
 {
-    sweep_model_free(file->model);
+    sweep_models_free(&file->models);
     vessel_tree_free(file->tree);
     tree_file_info_free(&file->info);
     *file = (EditFile){0};
@@ -29,7 +31,9 @@ bool edit_file_save(const EditFile *file, SweepEditor *editor, const char *path,
     }
     const TreeFileInfo info = {
         .source = file->info.source, .parameters = file->info.parameters, .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " edit"};
-    return tree_file_save_with(file->tree, model, &info, path, faults);
+    SweepModels models = file->models;
+    models.of[SECTION_POLAR] = (SweepModel *)(size_t)model;
+    return tree_file_save_with(file->tree, &models, &info, path, faults);
 }
 
 void edit_file_list(const SweepModel *m, FILE *out)

@@ -3,13 +3,15 @@
 #define SELDINGER_RECON_EDIT_EDIT_FILE_H
 
 #include "recon/edit/sweep_edit.h"
+#include "recon/sweep_file.h"
 #include "recon/tree_file.h"
 
 #include <stdio.h>
 
 typedef struct EditFile {
     VesselTree *tree;
-    SweepModel *model;       // as the file has it
+    SweepModels models;      // all that the file has
+    const SweepModel *model; // the one with polar sections, which is edited
     TreeFileInfo info;
 } EditFile;
 

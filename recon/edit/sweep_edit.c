@@ -271,7 +271,7 @@ static SweepModel *edit_branch(const Work *w)
     }
     if (good && apart) {
         SweepBranch branch = {.parent = e->branch, .parent_t = e->t, .radius = mean, .knot_count = knots, .break_count = rows.breaks};
-        piece[w->model->branch_count] = (BranchPiece){branch, knot, node, rows.at, rows.row};
+        piece[w->model->branch_count] = (BranchPiece){branch, -1, knot, node, rows.at, rows.row};
         m = branch_pieces_join(w->model, w->model->branch_count + 1, piece);
         *w->change = (EditChange){.branch = w->model->branch_count, .to = curve->length};
     }
@@ -421,6 +421,15 @@ static bool check_place(const Work *w)
     if (has_t && !(e->t >= 0 && e->t <= length)) {
         refuse(w, "t_mm %g is beyond branch %d; expected 0 to %.6g", e->t, e->branch, length);
         return false;
+    }
+    bool is_section = e->kind == EDIT_SECTION || e->kind == EDIT_DELETE_SECTION || (has_t && e->kind == EDIT_SMOOTH);
+    for (int i = 0; i < w->model->stretch_count; i++) {
+        const SweepStretch *s = &w->model->stretch[i];
+        if (s->branch == e->branch && ((is_section && e->t > s->from && e->t < s->to) || (e->kind == EDIT_CUT && e->t < s->to))) {
+            refuse(w, "branch %d has %s sections from %.6g to %.6g mm, which cannot be edited yet; expected a place outside", e->branch,
+                   section_kind_name[s->section.kind], s->from, s->to);
+            return false;
+        }
     }
     return true;
 }

@@ -27,7 +27,6 @@ typedef struct SweepDraft {
     bool *is_hidden;         // (rows) within the parent's lumen, where no point is
     uint8_t *harmonics;      // (rows) highest harmonic that is not held at 0
 
-    int64_t second_sheets;   // points on tubes where sections are not star-shaped
     int64_t point_count, vessel_point_count;     // wall points: first those of vessel nodes, branch by branch, then those of sacs
     Vec3 *point;
     int *owner;              // (points) branch, -1: a sac

@@ -2,7 +2,10 @@
 #ifndef SELDINGER_RECON_FIT_SWEEP_OPTIONS_H
 #define SELDINGER_RECON_FIT_SWEEP_OPTIONS_H
 
+#include "geom/geom.h"
+
 typedef struct SweepFitOptions {
+    SectionOptions section;  // kind and form of the sections; default: polar, mended
     double spacing;          // of sections along a tube, in local radii; default 1
     double fork_spacing;     // the same at forks; default 0.4
     int harmonics;           // highest harmonic along tubes, 1 to 8; default 8. At forks 8

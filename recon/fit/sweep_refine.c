@@ -69,7 +69,7 @@ static void see_guard(void *context, long index)
     r->sight[p][0] = sweep_sight_of(r->field, &part, 1);
     r->count[p] = 1;
     r->system->distance[p] = part.f;
-    r->system->trust[p] = deepest > DEEP * guard->rho ? fmax(LEAST, same_square(r->system->noise / (LOOSE * guard->rho))) : 0;
+    r->system->trust[p] = deepest > DEEP * guard->rho ? fmin(1, fmax(LEAST, same_square(r->system->noise / (LOOSE * guard->rho)))) : 0;
 }
 
 static bool look_at_blend(Refinement *r, double knee)
@@ -182,7 +182,7 @@ static bool run_round(Refinement *r, int k)
     return good;
 }
 
-bool sweep_refine(SweepDraft *d, SweepSystem *system, Faults *faults)
+bool sweep_refine(SweepDraft *d, SweepSystem *system, int rounds, Faults *faults)
 {
     size_t points = (size_t)system->count + 1;
     Refinement r = {d, system, NULL, malloc(points * sizeof *r.sight), malloc(points * sizeof *r.count), malloc((size_t)d->tree->node_count * sizeof *r.sac_of),
@@ -191,7 +191,7 @@ bool sweep_refine(SweepDraft *d, SweepSystem *system, Faults *faults)
     sweep_system_soften_forks(system);
     for (int i = 0; good && d->model->sac && i < d->model->sac->node_count; i++)
         r.sac_of[d->model->sac_node[i]] = i;
-    int rounds = d->options->rounds, refit = rounds - 2 > REFIT ? REFIT : rounds - 2;
+    int refit = rounds - 2 > REFIT ? REFIT : rounds - 2;
     double before = HUGE_VAL;
     for (int k = 0; good && k < rounds; k++) {
         if (k == refit && d->model->sac)

@@ -4,7 +4,7 @@
 
 #include "recon/fit/sweep_rows.h"
 
-// The system's distances are those of the refined model. Fits the sacs again, if there are any. Returns false if out of memory, or with faults.
-bool sweep_refine(SweepDraft *draft, SweepSystem *system, Faults *faults);
+// The system's distances are those of the refined model. rounds: at most so many; 0 only measures. Fits the sacs again, if there are any. Returns false if out of memory, or with faults.
+bool sweep_refine(SweepDraft *draft, SweepSystem *system, int rounds, Faults *faults);
 
 #endif

@@ -84,47 +84,6 @@ static void measure_sections(Sections *s, double knee, int every)
     }
 }
 
-typedef struct Bin {
-    int64_t key;             // of the place along a branch and around it
-    double rho;              // [radii]
-} Bin;
-
-static int compare_bins(const void *a, const void *b)
-{
-    const Bin *p = a, *q = b;
-    return p->key != q->key ? (p->key > q->key) - (p->key < q->key) : (p->rho > q->rho) - (p->rho < q->rho);
-}
-
-// Points on tubes where the wall has two sheets: seen from the curve, in one direction, some are much further than the others. At forks that is no finding.
-static int64_t count_second_sheets(const Sections *s)
-{
-    static const double ALONG = 0.3, APART = 0.35;   // [radii]
-    enum { AROUND = 16 };
-    const SweepDraft *d = s->draft;
-    Bin *bin = malloc(((size_t)d->vessel_point_count + 1) * sizeof *bin);
-    int64_t bins = 0, found = 0;
-    for (int64_t p = 0; bin && p < d->vessel_point_count; p++) {
-        const SweepSight *sight = &s->system->sight[p];
-        double r = d->tree->radius[d->node[p]], angle = same_atan2(sight->zeta[1], sight->zeta[0]), length = d->curve[sight->branch]->length;
-        if (!(d->t[p] > 0 && d->t[p] < length) || sweep_is_at_fork(d, sight->branch, d->t[p]))
-            continue;
-        int64_t place = (int64_t)(d->t[p] / (ALONG * d->branches->branch[sight->branch].radius_least)), around = (int64_t)((angle / (2 * PI) + 0.5) * AROUND);
-        bin[bins++] = (Bin){((int64_t)sight->branch << 40) + place * (AROUND + 1) + around, s->rho[p] / r};
-    }
-    if (bins > 0)
-        qsort(bin, (size_t)bins, sizeof *bin, compare_bins);
-    for (int64_t from = 0, to; from < bins; from = to) {
-        int64_t step = -1;
-        for (to = from + 1; to < bins && bin[to].key == bin[from].key; to++)
-            if (bin[to].rho - bin[to - 1].rho > APART)
-                step = to;
-        if (step >= 0)
-            found += step - from < to - step ? step - from : to - step;
-    }
-    free(bin);
-    return found;
-}
-
 // Fits all rows to the branches' own points; if not `tuned`, roughly, with every third point and the strengths of the start. `system` is created here.
 bool sweep_sections_fit(SweepDraft *d, SweepSystem *system, bool tuned)
 {
@@ -150,8 +109,6 @@ bool sweep_sections_fit(SweepDraft *d, SweepSystem *system, bool tuned)
         measure_sections(&s, section_knee[SECTION_ROUNDS - 1], 1);
         good = sweep_system_tune(system) && sweep_system_step(system, false);
     }
-    if (good && tuned)
-        d->second_sheets = count_second_sheets(&s);
     sweep_field_free(s.field);
     free(s.rho);
     return good;

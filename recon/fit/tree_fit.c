@@ -25,16 +25,32 @@ static FieldFitOptions shared_options(const TreeFitOptions *options)
     return field;
 }
 
+static SweepFitOptions swept_options(const TreeFitOptions *options)
+{
+    SweepFitOptions sweep = options->sweep;
+    SectionKind kind = fit_model_section(options->model);
+    if (options->preset == FIT_PAPER)
+        sweep = sweep_fit_paper_options(kind == SECTION_POLAR ? SECTION_RASTER : kind);
+    else
+        sweep.section = section_default_options(kind, SECTION_MENDED);
+    sweep.threads = options->local.threads;
+    sweep.voxel_mm = options->local.voxel_mm;
+    if (sweep.voxel_mm > 0)
+        sweep.section.voxel_mm = sweep.voxel_mm;
+    return sweep;
+}
+
 static int describe_fit(const TreeFitOptions *options, char *text, size_t capacity)
 {
     const LimFitOptions *o = &options->local;
-    if (options->model == FIT_MODEL_SWEEP) {
-        const SweepFitOptions *w = &options->sweep;
-        return snprintf(
-            text, capacity,
-            "fit:\n  model: sweep\n  edge_blur_mm: %g\n  voxel_mm: %g\n  spacing_radii: %g\n  fork_spacing_radii: %g\n  harmonics: %d\n  rounds: %d\n"
-            "  blend: %g\ntree:\n",
-            options->edge_blur, o->voxel_mm, w->spacing, w->fork_spacing, w->harmonics, w->rounds, w->blend);
+    if (fit_model_is_swept(options->model)) {
+        SweepFitOptions w = swept_options(options);
+        return snprintf(text, capacity,
+                        "fit:\n  model: %s\n  preset: %s\n  section: %s\n  edge_blur_mm: %g\n  voxel_mm: %g\n  spacing_radii: %g\n  fork_spacing_radii: %g\n  "
+                        "harmonics: %d\n  rounds: %d\n"
+                        "  blend: %g\ntree:\n",
+                        sweep_file_group(fit_model_section(options->model)), fit_preset_name[options->preset], section_kind_name[w.section.kind],
+                        options->edge_blur, o->voxel_mm, w.spacing, w.fork_spacing, w.harmonics, w.rounds, w.blend);
     }
     if (options->preset == FIT_DEFAULT) {
         FieldFitOptions f = shared_options(options);
@@ -96,10 +112,8 @@ bool tree_fit(VesselTree *tree, const char *path, const TreeFitOptions *options,
         return false;
     }
     double begin = seconds_now();
-    if (options->model == FIT_MODEL_SWEEP) {
-        SweepFitOptions sweep = options->sweep;
-        sweep.threads = options->local.threads;
-        sweep.voxel_mm = options->local.voxel_mm;
+    if (fit_model_is_swept(options->model)) {
+        SweepFitOptions sweep = swept_options(options);
         fit->sweep = sweep_fit(tree, &sweep, &fit->figures, faults);
         fit->left_out = fit->figures.left_out;
     } else if (options->preset == FIT_DEFAULT) {

@@ -10,14 +10,16 @@
 typedef enum {
     FIT_DEFAULT,             // one field of shared blobs
     FIT_LOCAL,               // a local model for each node
-    FIT_PAPER                // local models with the published values and method
+    FIT_PAPER                // the published values and method
 } FitPreset;
 
-typedef enum { FIT_MODEL_LIM, FIT_MODEL_SWEEP } FitModel;
+typedef enum { FIT_MODEL_LIM, FIT_MODEL_SWEEP, FIT_MODEL_RASTER, FIT_MODEL_RBF, FIT_MODEL_PAS } FitModel;  // swept models in the order of SectionKind
+static inline bool fit_model_is_swept(FitModel model) { return model != FIT_MODEL_LIM; }
+static inline SectionKind fit_model_section(FitModel model) { return (SectionKind)(model - FIT_MODEL_SWEEP); }
 
 typedef struct TreeFitOptions {
     FitModel model;
-    SweepFitOptions sweep;   // takes voxel_mm and threads from `local`
+    SweepFitOptions sweep;   // takes the sections from `model` and `preset`, voxel_mm and threads from `local`
     FitPreset preset;
     LimFitOptions local;     // options of local models; the shared field takes its target_mm, voxel_mm and threads from them
     bool has_voxel;          // local.voxel_mm is given; else it is taken from the tree's file, 0 if the file does not give it

@@ -21,11 +21,33 @@ static double radius_at(ShapedTube tube, double t, double theta)
     return 1 / sqrt(x * x + y * y);
 }
 
+// The kidney's wall at the way `share` (0 … 1) around: outer arc, end, inner arc, end; about the middle of its area.
+static void kidney_at(double share, double *n, double *b)
+{
+    static const double RING = 0.9, HALF = 0.5, MIDDLE = 0.4484;
+    double outer = PI * (RING + HALF), end = PI * HALF, inner = PI * (RING - HALF), way = share * (outer + 2 * end + inner);
+    if (way < outer) {
+        double a = way / (RING + HALF) - PI / 2;
+        *n = (RING + HALF) * same_cos(a) - MIDDLE, *b = (RING + HALF) * same_sin(a);
+    } else if (way < outer + end) {
+        double a = (way - outer) / HALF + PI / 2;
+        *n = HALF * same_cos(a) - MIDDLE, *b = RING + HALF * same_sin(a);
+    } else if (way < outer + end + inner) {
+        double a = PI / 2 - (way - outer - end) / (RING - HALF);
+        *n = (RING - HALF) * same_cos(a) - MIDDLE, *b = (RING - HALF) * same_sin(a);
+    } else {
+        double a = (way - outer - end - inner) / HALF + PI / 2;
+        *n = HALF * same_cos(a) - MIDDLE, *b = -RING + HALF * same_sin(a);
+    }
+}
+
 static Vec3 wall_at(ShapedTube tube, double t, double theta)
 {
     Vec3 tangent, n, s = curve_at(t, &tangent, &n), b = vec3_cross(tangent, n);
-    double r = radius_at(tube, t, theta);
-    return vec3_add(s, vec3_add(vec3_scale(n, r * same_cos(theta)), vec3_scale(b, r * same_sin(theta))));
+    double r = radius_at(tube, t, theta), across = r * same_cos(theta), up = r * same_sin(theta);
+    if (tube == SHAPED_KIDNEY)
+        kidney_at(theta / (2 * PI) - floor(theta / (2 * PI)), &across, &up);
+    return vec3_add(s, vec3_add(vec3_scale(n, across), vec3_scale(b, up)));
 }
 
 Vec3 shaped_tube_wall(ShapedTube tube, double t, double theta, Vec3 *normal)

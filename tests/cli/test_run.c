@@ -87,7 +87,7 @@ static void bad_input_ends_with_2_and_says_where(void **state)
     expect_bad(GOOD, "run bad.yaml --script back.csv", "back.csv:4:1: t_s 1 does not follow 2");
     expect_bad(GOOD, "run bad.yaml --script short.csv", "short.csv:1:14");
     expect_bad(GOOD, "run bad.yaml --script nowhere.csv", "nowhere.csv: cannot be opened");
-    expect_bad(GOOD, "run bad.yaml --contact wall", "valid: lim, lim_blend, lim_switch, sweep, mesh, smooth_mesh, flat_mesh, grid, tube");
+    expect_bad(GOOD, "run bad.yaml --contact wall", "valid: lim, lim_blend, lim_switch, sweep, raster, rbf, pas, mesh, smooth_mesh, flat_mesh, grid, tube");
     expect_bad(GOOD, "run bad.yaml --duration-s -1", "--duration-s: '-1' is not valid");
     expect_bad(GOOD, "run bad.yaml --settle-s soon", "--settle-s: 'soon' is not valid");
     expect_bad(GOOD, "run bad.yaml --banana", "see `seldinger run --help`");
@@ -404,19 +404,24 @@ static void a_swept_model_is_fitted_kept_and_used(void **state)
     "seldinger: 1\nvessel: {" vessel ", contact: sweep}\nwire: {elements: 20, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"        \
     "sheath: {inlet: root, inserted_mm: 1}\nscript: [[0, 30, 0], [0.2, 0, 0]]\n"
     put("file.yaml", SWEPT_SCENE("model: both.h5"));
+    put("rbf.yaml",
+        "seldinger: 1\nvessel: {model: all.h5, contact: rbf}\nwire: {elements: 20, sections: [{length_mm: 30, diameter_mm: 0.36, young_modulus_gpa: "
+        "80}]}\nsheath: {inlet: root, inserted_mm: 1}\nscript: [[0, 30, 0], [0.2, 0, 0]]\n");
     put("none.yaml", SWEPT_SCENE("model: lim.h5"));
     put("shape.yaml", SWEPT_SCENE("shape: {name: open-capsule, length_mm: 20}"));
     put("tube.yaml", SCENE("80", "0.68", "40", "  contact: sweep\n", SCRIPT));
     assert_int_equal(run("synth open-capsule --length-mm 20 -o tree.h5 --quiet"), 0);
     assert_int_equal(run("fit tree.h5 -o lim.h5 --quiet"), 0);
     assert_int_equal(run("fit lim.h5 -o both.h5 --model sweep"), 0);
-    assert_non_null(strstr(output, "swept model: 1 branches"));
+    assert_non_null(strstr(output, "sections of kind polar: 1 branches"));
     assert_int_equal(run("fit both.h5 -o again.h5 --model lim --quiet"), 0);
-    assert_int_equal(run("info again.h5"), 0);       // blobs and swept model are both there: the file opens as either
+    assert_int_equal(run("fit again.h5 -o rbf.h5 --model rbf --quiet"), 0);
+    assert_int_equal(run("fit rbf.h5 -o all.h5 --model pas --preset paper --quiet"), 0);
+    assert_int_equal(run("info all.h5"), 0);       // blobs and swept model are both there: the file opens as either
     assert_non_null(strstr(output, "model"));
-    for (int i = 0; i < 3; i++) {
-        static const char *const scene[] = {"run file.yaml --summary s.json --quiet", "run shape.yaml --summary s.json --quiet",
-                                            "run tube.yaml --summary s.json --quiet"};
+    for (int i = 0; i < 4; i++) {
+        static const char *const scene[] = {"run rbf.yaml --summary s.json --quiet", "run file.yaml --summary s.json --quiet",
+                                            "run shape.yaml --summary s.json --quiet", "run tube.yaml --summary s.json --quiet"};
         int code = run(scene[i]);
         if (code != 0)
             fail_msg("`%s` ended with %d: %s", scene[i], code, output);
@@ -424,7 +429,7 @@ static void a_swept_model_is_fitted_kept_and_used(void **state)
     expect_bad(NULL, "run none.yaml", "seldinger fit");
     expect_bad(NULL, "run none.yaml", "--model sweep -o");
     assert_int_equal(run("fit tree.h5 -o x.h5 --model sweep --preset local"), 2);
-    assert_non_null(strstr(output, "--preset needs --model lim"));
+    assert_non_null(strstr(output, "--preset local needs --model lim"));
 }
 
 int main(void)

@@ -182,10 +182,12 @@ static void pas_is_an_indicator_away_from_its_contour(void **state)
 static void pas_keeps_the_contours_area(void **state)
 {
     (void)state;
+    // the area of the smooth curve that 48 points of it stand for: the polygon through many
     SectionPoint contour[48], curve[MOST];
     double radius[MOST], area = 0;
+    star(MOST, curve);
+    area = polygon_area(MOST, curve);
     star(48, contour);
-    area = polygon_area(48, contour);
     for (int form = 0; form < 2; form++) {
         Section *s = make(SECTION_PAS, (SectionForm)form, 48, contour);
         section_radii(s, 0, 0, MOST, radius);

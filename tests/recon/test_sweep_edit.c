@@ -337,7 +337,8 @@ static void a_saved_session_replays_to_the_same_bytes(void **state)
     VesselTree *tree = vessel_tree_create(40, 0, 0);
     for (int i = 0; i < 40; i++)
         tree->center[i] = vec3(i, 0, 0), tree->radius[i] = 1, tree->direction[i] = vec3(1, 0, 0), tree->parent[i] = i - 1;
-    EditFile made = {.tree = tree, .model = fork_model(1)}, first, second;
+    EditFile made = {.tree = tree, .models = {{fork_model(1)}}}, first, second;
+    made.model = made.models.of[SECTION_POLAR];
     SweepEditor *e = editor_of(made.model);
     assert_true(edit_file_save(&made, e, in_folder("fit.h5"), &faults));
     EditList *list = list_of(session);

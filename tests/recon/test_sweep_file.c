@@ -41,6 +41,14 @@ static int remove_all(void **state)
     return remove_folder(state);
 }
 
+// Saves the tree with a model of a kind.
+static bool save(const VesselTree *of, SweepModel *swept_model, SectionKind kind, const char *path)
+{
+    SweepModels models = {{NULL}};
+    models.of[kind] = swept_model;
+    return tree_file_save_with(of, &models, NULL, path, &faults);
+}
+
 static void assert_same(const SweepModel *a, const SweepModel *b)
 {
     assert_int_equal(a->branch_count, b->branch_count);
@@ -75,14 +83,13 @@ static void save_load_is_equality(void **state)
 {
     (void)state;
     faults_clear(&faults);
-    assert_true(tree_file_save_with(tree, model, NULL, in_folder("a.h5"), &faults));
+    assert_true(save(tree, model, SECTION_POLAR, in_folder("a.h5")));
     VesselTree *back = tree_file_load(in_folder("a.h5"), NULL, &faults);
     assert_non_null(back);
-    assert_true(sweep_file_is_in(in_folder("a.h5"), &faults));
-    SweepModel *swept_back = sweep_file_load(in_folder("a.h5"), back, &faults);
+    SweepModel *swept_back = sweep_file_load(in_folder("a.h5"), SECTION_POLAR, back, &faults);
     assert_non_null(swept_back);
     assert_same(model, swept_back);
-    assert_true(tree_file_save_with(back, swept_back, NULL, in_folder("b.h5"), &faults));
+    assert_true(save(back, swept_back, SECTION_POLAR, in_folder("b.h5")));
     size_t na, nb;
     char *a = whole_file_read(in_folder("a.h5"), &na, &faults), *b = whole_file_read(in_folder("b.h5"), &nb, &faults);
     assert_int_equal(na, nb);
@@ -107,16 +114,21 @@ static void a_file_without_the_model_says_how_to_make_it(void **state)
     (void)state;
     faults_clear(&faults);
     assert_true(tree_file_save(tree, NULL, in_folder("bare.h5"), &faults));
-    assert_false(sweep_file_is_in(in_folder("bare.h5"), &faults));
-    assert_int_equal(faults.count, 0);
-    assert_null(sweep_file_load(in_folder("bare.h5"), tree, &faults));
+    SweepModels models;
+    assert_true(sweep_models_load(in_folder("bare.h5"), tree, &models, &faults));
+    for (int kind = 0; kind < SECTION_KINDS; kind++)
+        assert_null(models.of[kind]);
+    assert_null(sweep_file_load(in_folder("bare.h5"), SECTION_POLAR, tree, &faults));
     assert_true(has_fault("--model sweep -o"));
+    faults_clear(&faults);
+    assert_null(sweep_file_load(in_folder("bare.h5"), SECTION_RBF, tree, &faults));
+    assert_true(has_fault("--model rbf -o"));
 }
 
 static hid_t fresh_file(const char *path)
 {
     faults_clear(&faults);
-    assert_true(tree_file_save_with(tree, model, NULL, path, &faults));
+    assert_true(save(tree, model, SECTION_POLAR, path));
     hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
     assert_true(file >= 0);
     return file;
@@ -125,7 +137,7 @@ static hid_t fresh_file(const char *path)
 static void expect_fault(const char *path, const char *words)
 {
     faults_clear(&faults);
-    assert_null(sweep_file_load(path, tree, &faults));
+    assert_null(sweep_file_load(path, SECTION_POLAR, tree, &faults));
     assert_true(has_fault(words));
 }
 
@@ -213,7 +225,7 @@ static void every_part_of_a_file_is_refused(void **state)
     char *bytes = whole_file_read(in_folder("cut.h5"), &length, &faults);
     for (size_t n = 0; n < length; n += length / 100) {
         faults_clear(&faults);
-        assert_null(sweep_file_parse(bytes, n, "cut.h5", tree, &faults));
+        assert_null(sweep_file_parse(bytes, n, "cut.h5", SECTION_POLAR, tree, &faults));
         assert_true(faults.count > 0);
     }
     free(bytes);

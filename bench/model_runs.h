@@ -1,0 +1,24 @@
+// What a vessel model does under a tool, for `bench models`: jumps of its wall, the time of queries, and runs of the wire.
+#ifndef SELDINGER_BENCH_MODEL_RUNS_H
+#define SELDINGER_BENCH_MODEL_RUNS_H
+
+#include "bench/vessel_models.h"
+
+// Largest jump of the wall's normal along the vessels [deg]: lines beside the wall are walked from node to node, and where the normal turns fast the turn is
+// followed down to 1e-7 of their distance. What is left is no bend but an edge.
+double model_jump_deg(const FittedModel *model, const VesselTree *tree);
+
+// Median time [us] of 80 queries: points 0.3 radii inside the wall, which move 0.05 mm along it between queries.
+double model_query_us(const FittedModel *model, const VesselTree *tree);
+
+typedef struct ModelLoop {
+    double deepest_mm;       // of a node outside the true wall
+    double push_over_exact;  // mean push without friction relative to that on the exact wall, less 1
+    double jitter_rms;       // change of the push from step to step over its mean
+    double work_n;           // lost along the true wall for each millimetre fed, without friction: should be 0
+    bool survived;
+} ModelLoop;
+// Runs a scene of `bench collision` without friction, in the model fitted to the scene's shape and in the exact shape. False with faults.
+bool model_loop(const char *scene_path, const ModelKind *kind, int threads, ModelLoop *out, Faults *faults);
+
+#endif

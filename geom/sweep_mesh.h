@@ -1,0 +1,45 @@
+// Triangle mesh of a swept model's wall, F = 0 (sweep_model.h): rings along the branches, and patches where branches or sacs blend. Kretschmer et al. 2013
+// polygonise the whole field; here the lattice is used only where it is needed.
+//
+// A ring is the section at one t, with vertices at equal angles. Beyond a closed end rings follow the dome up to its pole. Where F is not the branch's own
+// field, or the section cannot carry rings (sweep_mesh_carries_rings), the wall is a patch: marching cubes, the vertices moved onto F = 0, cut off at the planes of
+// the nearest rings, t = constant. The cut edge replaces the ring there, so that the mesh is closed. Open starts are closed by a flat cap.
+//
+// The mesh is closed, and faces outwards. Lengths mm. Owns its memory; depends on the field only while it is created or updated.
+#ifndef SELDINGER_GEOM_SWEEP_MESH_H
+#define SELDINGER_GEOM_SWEEP_MESH_H
+
+#include "geom/isosurface.h"
+#include "geom/sweep_field.h"
+
+typedef struct SweepMeshOptions {
+    int around;              // edges around a section, 6 … 256, default 18: so edges are about a third of the local radius
+    double edge_mm;          // > 0: length of all edges instead (at least 6 around a section); default 0
+    bool flat_ends;          // branches end flat at their last section instead of with a dome; default false
+    int isa;                 // as LimVesselOptions.isa; default 0
+} SweepMeshOptions;
+SweepMeshOptions sweep_mesh_default_options(void);
+
+typedef struct SweepMesh {
+    TriangleMesh *surface;   // `node` is the nearest knot's knot_node (or sac_node)
+    int *branch;             // (V) branch of the vertex; -1: on a sac
+    double *along;           // (V) [mm] t on the branch; on a sac 0
+    int *boundary;           // (V) 0: wall; 1: on the flat cap of the open start; 2, 3 …: on the flat end of a branch, in the order of the branches. A triangle
+                             // belongs to a cap if its three vertices have the same number > 0
+    int boundaries;          // highest number used
+    int rings, patches;
+    int failures;            // patches that could not be joined to their rings; expected 0. Holes are closed there
+    int remade_rings, remade_patches;        // by the last update
+    struct SweepMeshParts *parts;            // rings and patches, see sweep_mesh_parts.h
+} SweepMesh;
+
+// `options` may be NULL. Returns NULL if the mesh would have more than 1e8 triangles.
+SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *options);
+// Makes the mesh that of a changed model: rings and patches on parts of the field that are the same as before are kept. The result is the same to the bit as a
+// fresh mesh. Returns false, with the mesh unchanged, if the model has another number of branches, or as above.
+bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field);
+void sweep_mesh_free(SweepMesh *mesh);
+// Whether the sections of a segment may carry rings: each ray from the curve meets the contour once.
+bool sweep_mesh_carries_rings(const SweepField *field, int segment);
+
+#endif
