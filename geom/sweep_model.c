@@ -41,8 +41,11 @@ void sweep_model_free(SweepModel *model)
     free(model->knot_node);
     free(model->break_t);
     free(model->row);
-    vessel_tree_free(model->sac);
-    free(model->sac_node);
+    if (!model->borrows_sac) {
+        vessel_tree_free(model->sac);
+        free(model->sac_node);
+    }
+    free(model->edits);
     free(model);
 }
 
@@ -54,6 +57,15 @@ double sweep_model_length(const SweepModel *model, int branch)
     for (int i = b->first_knot + 1; i < b->first_knot + b->knot_count; i++)
         length += vec3_distance(model->knot[i], model->knot[i - 1]);
     return length;
+}
+
+SweepTag sweep_model_tag(const SweepModel *model, int branch, int end)
+{
+    SEL_ASSERT(branch >= 0 && branch < model->branch_count && (end == 0 || end == 1), "a branch of the model has two ends");
+    if (end == 0 && model->branch[branch].parent >= 0)
+        return SWEEP_TAG_NONE;
+    SweepTag tag = (SweepTag)model->branch[branch].tag[end];
+    return tag != SWEEP_TAG_NONE ? tag : end == 0 ? SWEEP_TAG_IN : SWEEP_TAG_OUT;
 }
 
 // Ranges: each branch's begins where the last one's ends, and has its least length. Nothing else can be checked if this fails.
@@ -136,6 +148,14 @@ static void check_branches(const SweepModel *m, const char *file, Faults *faults
         }
         if (!(b->radius > 0 && b->radius < 1e6)) {
             faults_add(faults, file, 0, 0, "sweep/branch[%d] has radius %g; expected a length above 0", i, b->radius);
+            return;
+        }
+        if (b->has_blend && !(b->blend >= 0 && b->blend <= 2)) {
+            faults_add(faults, file, 0, 0, "sweep/branch[%d] has blend %g; expected 0 to 2", i, b->blend);
+            return;
+        }
+        if (b->tag[0] >= SWEEP_TAGS || b->tag[1] >= SWEEP_TAGS) {
+            faults_add(faults, file, 0, 0, "sweep/branch[%d] has tags %d and %d; expected 0 (none), 1 (in) or 2 (out)", i, b->tag[0], b->tag[1]);
             return;
         }
     }

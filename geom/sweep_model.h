@@ -47,7 +47,13 @@ typedef struct SweepBranch {
     int first_knot, knot_count;      // >= 2 knots of the curve
     int first_break, break_count;    // >= 2 breaks of the B-splines; the first is t = 0 and the last t = length
     int first_row;                   // its break_count + 2 rows of coefficients
+    bool has_blend;          // delta at its fork relative to its radius is `blend`, 0 to 2; false: that of the model
+    double blend;
+    uint8_t tag[2];          // SweepTag of its start and of its end
 } SweepBranch;
+
+// What crosses an open end. Ends without a tag: see sweep_model_tag.
+typedef enum { SWEEP_TAG_NONE, SWEEP_TAG_IN, SWEEP_TAG_OUT, SWEEP_TAGS } SweepTag;
 
 typedef struct SweepStation {
     double t;                // [mm] on the branch's curve
@@ -86,6 +92,8 @@ typedef struct SweepModel {
     double blend;            // delta at a fork relative to the child's radius; default 0.6, 0: plain maximum
     VesselTree *sac;         // shared blobs of the sacs and the vessels beside their necks; NULL: the tree has no sacs
     int32_t *sac_node;       // (nodes of `sac`) the node of the tree that each one is
+    bool borrows_sac;        // another model owns `sac` and `sac_node`, and lives longer
+    char *edits;             // YAML of the edits that made it from its fit (docs/file-formats.md, "Edits"); NULL: none
 } SweepModel;
 
 // Allocates all arrays for the counts, zeroed, and sets blend to its default. Returns NULL if a count is out of range (branches, knots and breaks at least one)
@@ -104,5 +112,13 @@ bool sweep_model_validate(const SweepModel *model, const char *file, Faults *fau
 int sweep_model_harmonics(const SweepModel *model);
 // [mm] length of a branch's curve: t of its last knot.
 double sweep_model_length(const SweepModel *model, int branch);
+// delta at the fork of a branch relative to its radius.
+static inline double sweep_model_blend(const SweepModel *model, int branch)
+{
+    return model->branch[branch].has_blend ? model->branch[branch].blend : model->blend;
+}
+// What crosses the start (end = 0) or the end (end = 1) of a branch: its tag, otherwise what the centreline suggests (Kretschmer et al. 2013, section 5.1):
+// blood enters at the root and leaves at every end. A child's start is no end: SWEEP_TAG_NONE.
+SweepTag sweep_model_tag(const SweepModel *model, int branch, int end);
 
 #endif

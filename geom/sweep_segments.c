@@ -211,7 +211,7 @@ static void fill_forks(SweepField *field)
         const SweepBranch *b = &field->model->branch[i];
         double parent = fmax(sweep_field_mean(field, b->parent, b->parent_t), 1e-3 * b->radius);
         double child = sweep_field_mean(field, i, fmin(parent, field->curve[i]->length));
-        field->fork[i] = (SweepFork){.delta = field->model->blend * fmax(child, 0), .reach = 3 * parent};
+        field->fork[i] = (SweepFork){.delta = sweep_model_blend(field->model, i) * fmax(child, 0), .reach = 3 * parent};
     }
 }
 

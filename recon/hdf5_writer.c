@@ -34,6 +34,20 @@ bool hdf5_write_text(hid_t object, const char *key, const char *text)
     return good;
 }
 
+bool hdf5_write_long_text(hid_t file, const char *path, const char *text)
+{
+    hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), plist = H5Pcreate(H5P_DATASET_CREATE);
+    bool good = H5Tset_size(type, strlen(text) + 1) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0 && H5Pset_obj_track_times(plist, false) >= 0;
+    hid_t dataset = good ? H5Dcreate2(file, path, type, space, H5P_DEFAULT, plist, H5P_DEFAULT) : -1;
+    good = dataset >= 0 && H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) >= 0;
+    if (dataset >= 0)
+        good = H5Dclose(dataset) >= 0 && good;
+    H5Pclose(plist);
+    H5Sclose(space);
+    H5Tclose(type);
+    return good;
+}
+
 bool hdf5_write_scalar(hid_t file, const char *key, hid_t type, const void *value)
 {
     hid_t space = H5Screate(H5S_SCALAR), attribute = H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT);

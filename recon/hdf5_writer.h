@@ -11,6 +11,8 @@
 bool hdf5_write_column(hid_t file, const char *path, hid_t type, int64_t rows, int columns, const void *data);
 // An attribute of text; NULL is the empty text.
 bool hdf5_write_text(hid_t object, const char *key, const char *text);
+// A dataset of one text, which may be long.
+bool hdf5_write_long_text(hid_t file, const char *path, const char *text);
 bool hdf5_write_scalar(hid_t file, const char *key, hid_t type, const void *value);
 bool hdf5_make_group(hid_t file, const char *path);
 

@@ -24,6 +24,11 @@
 #include "recon/fit/measure_report.h"
 #include "recon/fit/reach_report.h"
 
+// edits of swept models
+#include "recon/edit/edit_list.h"
+#include "recon/edit/sweep_edit.h"
+#include "recon/edit/edit_file.h"
+
 // surfaces and centrelines
 #include "recon/surface/centreline_file.h"
 #include "recon/surface/centreline_write.h"

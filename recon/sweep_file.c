@@ -1,6 +1,7 @@
 #include "recon/sweep_file.h"
 
 #include "base/base.h"
+#include "recon/edit/edit_list.h"
 #include "recon/hdf5_reader.h"
 #include "recon/hdf5_writer.h"
 
@@ -35,6 +36,11 @@ enum {
     CONTOUR,
     COLUMNS
 };
+// what only edited models have; the paths are within the group
+static const Hdf5Dataset branch_blend = {"/branch/blend", HDF5_DOUBLE, 1, {0}, true};
+static const Hdf5Dataset branch_tag = {"/branch/tag", HDF5_UINT8, 2, {0, 2}, false};
+static const char edits_rest[] = "/edits";
+
 // Columns of stretch/range, stretch/kind and stretch/parameter.
 enum { FROM, TO, FADE, RANGES };
 enum { KIND, FORM, HARMONICS, WEIGHTS, IS_STRAIGHT, KINDS };
@@ -282,6 +288,39 @@ static bool read_sacs(const Reader *r, SweepModel *m)
     return good;
 }
 
+// A dataset with a row for each branch. Returns NULL if the file lacks it, or with a fault.
+static void *read_for_branches(const Reader *r, const SweepModel *m, const Hdf5Dataset *column)
+{
+    Hdf5Dataset found = *column;
+    char path[PATH];
+    found.path = path_in(r->kind, column->path, path);
+    if (!hdf5_has(r->file, path))
+        return NULL;
+    found.size[0] = (uint64_t)m->branch_count;
+    return hdf5_read(r->file, &found);
+}
+
+static bool read_edits(const Reader *r, SweepModel *m)
+{
+    char path[PATH];
+    int before = r->faults->count;
+    double *blend = read_for_branches(r, m, &branch_blend);
+    uint8_t *tag = read_for_branches(r, m, &branch_tag);
+    for (int i = 0; i < m->branch_count; i++) {
+        SweepBranch *b = &m->branch[i];
+        if (blend && blend[i] != -1)
+            b->has_blend = true, b->blend = blend[i];
+        if (tag)
+            b->tag[0] = tag[2 * i], b->tag[1] = tag[2 * i + 1];
+    }
+    free(blend);
+    free(tag);
+    m->edits = hdf5_text(r->file, path_in(r->kind, edits_rest, path));
+    EditList *list = m->edits ? edit_list_parse(m->edits, strlen(m->edits), r->name, r->faults) : NULL;
+    edit_list_free(list);
+    return r->faults->count == before;
+}
+
 typedef struct StretchColumns {
     int32_t *branch, *kind, *station_offset, *contour_offset;
     double *range, *parameter, *t;
@@ -376,8 +415,8 @@ static SweepModel *read_model(Reader *r)
         faults_add(r->faults, r->name, 0, 0, "needs more memory than is available (%" PRIu64 " rows of sections)", size_of(r, ROW));
         return NULL;
     }
-    bool good =
-        read_branches(r, m) && (!r->has_sac || read_sacs(r, m)) && sweep_model_validate(m, r->name, r->faults) && (!r->has_stretch || read_stretches(r, m));
+    bool good = read_branches(r, m) && (!r->has_sac || read_sacs(r, m)) && read_edits(r, m) && sweep_model_validate(m, r->name, r->faults) &&
+                (!r->has_stretch || read_stretches(r, m));
     if (good)
         return m;
     sweep_model_free(m);
@@ -492,6 +531,34 @@ static bool write_branches(const Writer *w, const SweepModel *m)
     return good;
 }
 
+static bool write_for_branches(const Writer *w, const SweepModel *m)
+{
+    char path[PATH];
+    size_t n = (size_t)m->branch_count;
+    double *blend = calloc(n, sizeof *blend);
+    uint8_t *tag = calloc(2 * n, 1);
+    bool good = blend && tag, has_blend = false, has_tag = false;
+    for (size_t i = 0; good && i < n; i++) {
+        const SweepBranch *b = &m->branch[i];
+        blend[i] = b->has_blend ? b->blend : -1;
+        memcpy(tag + 2 * i, b->tag, 2);
+        has_blend |= b->has_blend, has_tag |= b->tag[0] || b->tag[1];
+    }
+    if (good && has_blend)
+        good = hdf5_write_column(w->file, path_in(w->kind, branch_blend.path, path), H5T_NATIVE_DOUBLE, m->branch_count, 0, blend);
+    if (good && has_tag)
+        good = hdf5_write_column(w->file, path_in(w->kind, branch_tag.path, path), H5T_NATIVE_UINT8, m->branch_count, 2, tag);
+    free(blend);
+    free(tag);
+    return good;
+}
+
+static bool write_edits(const Writer *w, const SweepModel *m)
+{
+    char path[PATH];
+    return write_for_branches(w, m) && (!m->edits || hdf5_write_long_text(w->file, path_in(w->kind, edits_rest, path), m->edits));
+}
+
 static bool write_sacs(const Writer *w, const SweepModel *m)
 {
     const VesselTree *s = m->sac;
@@ -541,7 +608,7 @@ static bool write_model(const Writer *w, const SweepModel *m)
     return make_group(w, "") && write_profile(w) && make_group(w, "/branch") && make_group(w, "/curve") && make_group(w, "/section") && write_branches(w, m) &&
            write_at(w, KNOT, m->knot_count, m->knot) && write_at(w, KNOT_NODE, m->knot_count, m->knot_node) &&
            write_at(w, BREAK_T, m->break_count, m->break_t) && write_at(w, ROW, m->row_count, m->row) && write_at(w, BLEND, 1, &m->blend) &&
-           (!m->sac || write_sacs(w, m)) && (m->stretch_count == 0 || write_stretches(w, m));
+           write_edits(w, m) && (!m->sac || write_sacs(w, m)) && (m->stretch_count == 0 || write_stretches(w, m));
 }
 
 bool sweep_models_write(int64_t file, const SweepModels *models)
