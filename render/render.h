@@ -15,6 +15,7 @@
 #include "render/run_chart.h"
 
 // the window
+#include "render/edit_window.h"
 #include "render/replay_window.h"
 #include "render/trainer.h"
 #include "render/trainer_figures.h"

@@ -1,0 +1,172 @@
+// See edit_panel.h.
+#include "render/edit_panel.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const key_help[][2] = {{"click on the wall", "goes there"},
+                                          {"left, right drag, wheel", "turns, moves, zooms the surface"},
+                                          {"wheel on the section", "next station (with Ctrl: zooms)"},
+                                          {"Page Up, Page Down", "next station"},
+                                          {"Left, Right", "0.1 mm along the branch"},
+                                          {"[ and ]", "next branch"},
+                                          {"drag a handle", "moves the contour"},
+                                          {"Tab, then Up, Down", "chooses a handle, moves it by 0.02 mm; Enter keeps it"},
+                                          {"Shift and drag", "draws a new contour around the vessel"},
+                                          {"+ and -", "makes the section 2 % larger, smaller"},
+                                          {"Delete", "deletes the section"},
+                                          {"E, O", "extent and shape of the smoothing"},
+                                          {", and .", "weaker, stronger; A applies it"},
+                                          {"J, K", "narrower, wider blend at the fork"},
+                                          {"B", "draws a new branch from the point clicked"},
+                                          {"X", "cuts the branch here"},
+                                          {"T", "turns the flow of the nearer end"},
+                                          {"Ctrl+Z, Ctrl+Y", "undoes, does again"},
+                                          {"Ctrl+S", "saves"},
+                                          {"F, Home", "looks at the place, at everything"},
+                                          {"Esc", "leaves"}};
+
+static void row(Gui *gui, const char *label, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static void row(Gui *gui, const char *label, const char *format, ...)
+{
+    char text[80];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    gui_row(gui, GUI_NORMAL, label, gui_colors.text, text);
+}
+
+static void heading(Gui *gui, const char *text)
+{
+    gui_space(gui, floorf(3 * gui_scale(gui)));
+    gui_text(gui, GUI_SMALL, gui_colors.dim, text);
+}
+
+static void show_place(Gui *gui, const EditState *s)
+{
+    const SweepModel *m = sweep_editor_model(s->editor);
+    double term[SWEEP_TERMS];
+    char title[80];
+    sweep_edit_terms(m, s->branch, s->t, term);
+    snprintf(title, sizeof title, "Branch %d at %.2f mm", s->branch, s->t);
+    gui_text(gui, GUI_LARGE, gui_colors.text, title);
+    row(gui, edit_state_at_station(s) ? "a section of the model" : "between two sections", "%d branches", m->branch_count);
+    row(gui, "mean radius, area", "%.3f mm, %.2f mm²", term[0], sweep_terms_area(term));
+    row(gui, "surface follows in", "%.1f ms, at most %.1f", s->update_ms, s->worst_ms);
+}
+
+static void show_smoothing(Gui *gui, EditState *s)
+{
+    static const char *const extents[] = {"section", "", "branch", "tree"};
+    float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2), third = floorf((gui_width(gui) - 2 * gap) / 3);
+    heading(gui, "SMOOTH TOWARDS");
+    if (gui_button(gui, "circle", "Circle", "O", half, s->shape == SMOOTH_CIRCLE).pressed)
+        s->shape = SMOOTH_CIRCLE;
+    gui_beside(gui, gap);
+    if (gui_button(gui, "ellipse", "Ellipse", "O", half, s->shape == SMOOTH_ELLIPSE).pressed)
+        s->shape = SMOOTH_ELLIPSE;
+    for (int i = 0; i < 4; i++) {
+        if (i == SMOOTH_RANGE)
+            continue;
+        if (gui_button(gui, extents[i], extents[i], NULL, third, (int)s->extent == i).pressed)
+            s->extent = (SmoothExtent)i;
+        if (i != SMOOTH_TREE)
+            gui_beside(gui, gap);
+    }
+    if (gui_slider(gui, "strength", &s->strength, 0, 1, "strength %.2f", 0))
+        edit_state_smooth(s, false);
+    if (gui_button(gui, "smooth", "Smooth", "A", 0, false).pressed)
+        edit_state_smooth(s, true);
+}
+
+static void show_fork(Gui *gui, EditState *s)
+{
+    heading(gui, "BLEND AT THE FORK (J, K)");
+    if (sweep_editor_model(s->editor)->branch[s->branch].parent < 0)
+        gui_text(gui, GUI_NORMAL, gui_colors.dim, "this branch is the root");
+    else if (gui_slider(gui, "blend", &s->blend, 0, 2, "%.2f radii", 0))
+        edit_state_blend(s, false);
+}
+
+static void show_branches(Gui *gui, EditState *s)
+{
+    float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
+    heading(gui, "BRANCHES");
+    if (gui_button(gui, "draw", s->draws_branch ? "End the branch" : "Draw one", s->draws_branch ? "Enter" : "B", half, s->draws_branch).pressed) {
+        if (s->draws_branch)
+            edit_state_draw_end(s, true);
+        else
+            edit_state_draw_begin(s);
+    }
+    gui_beside(gui, gap);
+    if (gui_button(gui, "cut", "Cut here", "X", half, false).pressed)
+        edit_state_cut(s);
+    if (s->draws_branch)
+        gui_slider(gui, "radius", &s->drawn_radius, 0.1f, 5, "radius %.2f mm", 0);
+    if (gui_button(gui, "delete", "Delete section", "Del", half, false).pressed)
+        edit_state_delete(s);
+    gui_beside(gui, gap);
+    if (gui_button(gui, "flip", "Flip the flow", "T", half, false).pressed)
+        edit_state_flip(s);
+}
+
+static void show_edits(Gui *gui, const EditState *s, GuiRect at)
+{
+    const EditList *list = sweep_editor_list(s->editor);
+    gui_window_begin(gui, "edits", at, GUI_SCROLL_TO_END);
+    if (list->count == 0)
+        gui_text(gui, GUI_SMALL, gui_colors.dim, "no edits yet");
+    for (int i = list->count > 200 ? list->count - 200 : 0; i < list->count; i++) {
+        char *line = edit_line(&list->edit[i]), text[200];
+        bool is_long = line && strlen(line) > 130;
+        snprintf(text, sizeof text, "- %.130s%s", line ? line : "", is_long ? " …" : "");
+        gui_text_wrapped(gui, GUI_SMALL, i + 1 > s->saved_count ? gui_colors.text : gui_colors.dim, text);
+        free(line);
+    }
+    gui_window_end(gui);
+}
+
+EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_help)
+{
+    EditPanelActions actions = {0};
+    float k = gui_scale(gui), gap = floorf(6 * k), list_height = floorf(at.height * 0.28f);
+    char title[80];
+    const int edits = sweep_editor_list(s->editor)->count;
+    gui_window_begin(gui, "panel", (GuiRect){at.x, at.y, at.width, at.height - list_height}, 0);
+    show_place(gui, s);
+    show_smoothing(gui, s);
+    show_fork(gui, s);
+    show_branches(gui, s);
+    heading(gui, "EDITS");
+    float third = floorf((gui_width(gui) - 2 * gap) / 3);
+    if (gui_button(gui, "undo", "Undo", "^Z", third, false).pressed)
+        edit_state_undo(s);
+    gui_beside(gui, gap);
+    if (gui_button(gui, "redo", "Redo", "^Y", third, false).pressed)
+        edit_state_redo(s);
+    gui_beside(gui, gap);
+    actions.save = gui_button(gui, "save", "Save", "^S", third, false).pressed;
+    actions.help = gui_button(gui, "help", "All keys", "H", 0, shows_help).pressed;
+    gui_space(gui, floorf(2 * k));
+    gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, s->message);
+    gui_window_end(gui);
+    snprintf(title, sizeof title, "%d edits, %s", edits, edits == s->saved_count ? "saved" : "not saved");
+    show_edits(gui, s, (GuiRect){at.x, at.y + at.height - list_height, at.width, list_height});
+    return actions;
+}
+
+void edit_panel_help(Gui *gui, const WindowInput *input)
+{
+    enum { ROWS = sizeof key_help / sizeof key_help[0] };
+    float k = gui_scale(gui), width = floorf(520 * k), height = floorf((gui_line_height(gui, GUI_NORMAL) + 3 * k) * ROWS + 50 * k);
+    GuiRect at = {floorf(((float)input->width - width) / 2), floorf(((float)input->height - height) / 2), width, height};
+    gui_window_begin(gui, "keys", at, GUI_ON_TOP | GUI_FRAMED);
+    gui_text(gui, GUI_LARGE, gui_colors.text, "Keys and mouse");
+    for (int i = 0; i < ROWS; i++)
+        gui_row(gui, GUI_NORMAL, key_help[i][0], gui_colors.text, key_help[i][1]);
+    gui_window_end(gui);
+}

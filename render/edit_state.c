@@ -1,0 +1,307 @@
+// See edit_state.h. Numbers of an edit are rounded to 0.0001 mm before it is applied, so that its line of YAML is short and replays to the same bits.
+#include "render/edit_state.h"
+
+#include "sim/sim.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static double short_number(double x) { return floor(x * 1e4 + 0.5) / 1e4; }
+static Vec3 short_point(Vec3 x) { return vec3(short_number(x.x), short_number(x.y), short_number(x.z)); }
+
+static const SweepModel *model(const EditState *s) { return sweep_editor_model(s->editor); }
+static const SweepCurve *curve(const EditState *s, int branch) { return sweep_editor_field(s->editor)->curve[branch]; }
+
+void edit_state_say(EditState *s, bool is_fault, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(s->message, sizeof s->message, format, arguments);
+    va_end(arguments);
+    s->message_is_fault = is_fault;
+}
+
+// The mesh follows the model: locally, or anew if it has other branches.
+static void follow(EditState *s)
+{
+    const SweepField *field = sweep_editor_field(s->editor);
+    if (!s->mesh || !sweep_mesh_update(s->mesh, field)) {
+        SweepMesh *mesh = sweep_mesh_create(field, NULL);
+        if (!mesh) {
+            edit_state_say(s, true, "the surface cannot be drawn: out of memory");
+            return;
+        }
+        sweep_mesh_free(s->mesh);
+        s->mesh = mesh;
+    }
+    s->mesh_is_new = true;
+}
+
+static void measure(EditState *s, double since)
+{
+    s->update_ms = 1e3 * (clock_s(CLOCK_MONOTONIC) - since);
+    s->worst_ms = fmax(s->worst_ms, s->update_ms);
+}
+
+bool edit_state_begin(EditState *s, SweepEditor *editor)
+{
+    *s = (EditState){.editor = editor, .snaps = true, .strength = 0.5f, .drawn_radius = 0.5f, .saved_count = 0};
+    follow(s);
+    s->extent = SMOOTH_SECTION;
+    if (s->mesh)
+        edit_state_go(s, 0, 0.5 * curve(s, 0)->length);
+    edit_state_step(s, 1);
+    edit_state_say(s, false, "click on the wall, or move along the branch with the wheel or Page Up and Page Down");
+    return s->mesh != NULL;
+}
+
+void edit_state_end(EditState *s)
+{
+    sweep_mesh_free(s->mesh);
+    s->mesh = NULL;
+}
+
+// --- the place ---
+
+static void take_contour(EditState *s)
+{
+    sweep_edit_contour(model(s), s->branch, s->t, EDIT_CONTOUR, s->contour);
+    s->is_moved = false;
+    s->stroke_count = 0;
+    s->blend = (float)sweep_model_blend(model(s), s->branch);
+}
+
+void edit_state_go(EditState *s, int branch, double t)
+{
+    if (s->looks) {
+        sweep_editor_try(s->editor, NULL, NULL, NULL);
+        s->looks = false;
+        follow(s);
+    }
+    s->branch = branch < 0 ? 0 : branch >= model(s)->branch_count ? model(s)->branch_count - 1 : branch;
+    s->t = fmax(0, fmin(curve(s, s->branch)->length, t));
+    take_contour(s);
+    s->wall = edit_state_in_space(s, s->contour[0]);
+}
+
+void edit_state_step(EditState *s, int stations)
+{
+    const SweepBranch *b = &model(s)->branch[s->branch];
+    const double *at = model(s)->break_t + b->first_break;
+    int next = 0;
+    while (next < b->break_count && at[next] <= s->t + 1e-9)
+        next++;
+    // next: the first station beyond t
+    int target = stations > 0 ? next + stations - 1 : at[next > 0 ? next - 1 : 0] < s->t - 1e-9 ? next + stations : next - 1 + stations;
+    target = target < 0 ? 0 : target > b->break_count - 1 ? b->break_count - 1 : target;
+    edit_state_go(s, s->branch, at[target]);
+}
+
+void edit_state_move(EditState *s, double by) { edit_state_go(s, s->branch, s->t + by); }
+
+void edit_state_branch(EditState *s, int by)
+{
+    int count = model(s)->branch_count, branch = (s->branch + by + count) % count;
+    edit_state_go(s, branch, 0.5 * curve(s, branch)->length);
+    edit_state_step(s, 1);
+}
+
+Vec3 edit_state_in_space(const EditState *s, Vec3 nb)
+{
+    SweepJet j = sweep_curve_at(curve(s, s->branch), s->t);
+    return vec3_add_scaled(vec3_add_scaled(j.s, nb.x, j.n), nb.y, j.b);
+}
+
+bool edit_state_at_station(const EditState *s)
+{
+    double within;
+    return fabs(sweep_edit_station(model(s), s->branch, s->t, &within) - s->t) <= within;
+}
+
+// --- edits ---
+
+static void apply(EditState *s, const SweepEdit *edit, bool is_kept)
+{
+    static Faults faults;
+    EditChange change;
+    faults_clear(&faults);
+    double since = clock_s(CLOCK_MONOTONIC);
+    bool good = is_kept ? sweep_editor_do(s->editor, edit, "edit", &change, &faults) : sweep_editor_try(s->editor, edit, &change, &faults);
+    if (!good) {
+        const char *text = faults.count > 0 ? faults.text[0] : "the edit cannot be applied";
+        edit_state_say(s, true, "%s", strncmp(text, "edit: ", 6) ? (strncmp(text, "the edit: ", 10) ? text : text + 10) : text + 6);
+    }
+    s->looks = !is_kept;
+    follow(s);
+    measure(s, since);
+    if (good && is_kept) {
+        if (edit->kind == EDIT_SECTION)
+            edit_state_say(s, false, "section set; the contour departs from it by %.3f mm at most", change.misfit);
+        else
+            edit_state_say(s, false, "done");
+    }
+    if (is_kept)
+        edit_state_go(s, s->branch, s->t);
+}
+
+static double short_t(const EditState *s)
+{
+    double t = short_number(s->t);
+    return t > curve(s, s->branch)->length ? s->t : t;
+}
+
+static SweepEdit section_of(EditState *s, Vec3 point[EDIT_STROKE], int count, const Vec3 *from)
+{
+    for (int i = 0; i < count; i++)
+        point[i] = short_point(from[i]);
+    return (SweepEdit){.kind = EDIT_SECTION, .branch = s->branch, .t = short_t(s), .count = count, .point = point};
+}
+
+static void show_contour(EditState *s, bool is_kept)
+{
+    static Vec3 point[EDIT_STROKE];
+    SweepEdit edit = section_of(s, point, EDIT_CONTOUR, s->contour);
+    apply(s, &edit, is_kept);
+}
+
+void edit_state_drag(EditState *s, Vec3 nb)
+{
+    enum { STEP = EDIT_CONTOUR / EDIT_HANDLES, REACH = 2 * STEP };
+    int at = s->handle * STEP;
+    Vec3 here = s->contour[at];
+    double grown = vec3_norm(nb) - vec3_norm(here);
+    // along the rays, so that the contour stays a star; a smooth bump over the neighbours
+    for (int k = -REACH + 1; k < REACH; k++) {
+        Vec3 *p = &s->contour[(at + k + EDIT_CONTOUR) % EDIT_CONTOUR];
+        double far = (double)k / REACH, bump = (1 - far * far) * (1 - far * far), r = vec3_norm(*p);
+        *p = vec3_scale(*p, fmax(0.1 * r, r + bump * grown) / r);
+    }
+    s->is_moved = true;
+    show_contour(s, false);
+}
+
+void edit_state_scale(EditState *s, double factor)
+{
+    for (int i = 0; i < EDIT_CONTOUR; i++)
+        s->contour[i] = vec3_scale(s->contour[i], factor);
+    show_contour(s, true);
+}
+
+void edit_state_keep(EditState *s)
+{
+    if (s->is_moved)
+        show_contour(s, true);
+}
+
+// Points of a stroke closer than a 200th of its extent are left out.
+void edit_state_stroke_end(EditState *s)
+{
+    static Vec3 point[EDIT_STROKE];
+    Vec3 *kept = s->stroke;
+    int count = 0;
+    double extent = 0;
+    for (int i = 0; i < s->stroke_count; i++)
+        extent = fmax(extent, vec3_norm(s->stroke[i]));
+    for (int i = 0; i < s->stroke_count; i++)
+        if (count == 0 || vec3_distance(s->stroke[i], kept[count - 1]) > extent / 50)
+            kept[count++] = s->stroke[i];
+    while (count > 3 && vec3_distance(kept[count - 1], kept[0]) < extent / 50)
+        count--;
+    s->stroke_count = 0;
+    if (count < 6) {
+        edit_state_say(s, true, "the stroke is too short; draw once around the vessel with Shift and the left button held");
+        return;
+    }
+    SweepEdit edit = section_of(s, point, count, kept);
+    apply(s, &edit, true);
+}
+
+void edit_state_delete(EditState *s)
+{
+    SweepEdit edit = {.kind = EDIT_DELETE_SECTION, .branch = s->branch, .t = short_t(s)};
+    apply(s, &edit, true);
+}
+
+void edit_state_smooth(EditState *s, bool is_kept)
+{
+    SweepEdit edit = {.kind = EDIT_SMOOTH,
+                      .branch = s->branch,
+                      .t = short_t(s),
+                      .extent = s->extent,
+                      .shape = s->shape,
+                      .amount = floor((double)s->strength * 100 + 0.5) / 100};
+    apply(s, &edit, is_kept);
+    if (!is_kept)
+        sweep_edit_contour(model(s), s->branch, s->t, EDIT_CONTOUR, s->contour);
+}
+
+void edit_state_blend(EditState *s, bool is_kept)
+{
+    float wanted = s->blend;
+    SweepEdit edit = {.kind = EDIT_BLEND, .branch = s->branch, .amount = floor((double)wanted * 100 + 0.5) / 100};
+    apply(s, &edit, is_kept);
+}
+
+void edit_state_flip(EditState *s)
+{
+    bool is_far = s->t > 0.5 * curve(s, s->branch)->length || model(s)->branch[s->branch].parent >= 0;
+    SweepEdit edit = {.kind = EDIT_TAG, .branch = s->branch, .end = is_far, .tag = EDIT_TAG_FLIP};
+    apply(s, &edit, true);
+    edit_state_say(s, false, "%s of branch %d: %s", is_far ? "end" : "start", s->branch,
+                   sweep_model_tag(model(s), s->branch, is_far) == SWEEP_TAG_IN ? "blood flows in" : "blood flows out");
+}
+
+void edit_state_cut(EditState *s)
+{
+    SweepEdit edit = {.kind = EDIT_CUT, .branch = s->branch, .t = short_t(s)};
+    apply(s, &edit, true);
+}
+
+void edit_state_draw_begin(EditState *s)
+{
+    s->draws_branch = true;
+    s->drawn_count = 0;
+    edit_state_draw_add(s, s->wall);
+    edit_state_say(s, false, "click points of the new branch; Enter ends it, Esc drops it");
+}
+
+void edit_state_draw_add(EditState *s, Vec3 x)
+{
+    if (s->drawn_count < EDIT_DRAWN)
+        s->drawn[s->drawn_count++] = short_point(x);
+}
+
+void edit_state_draw_end(EditState *s, bool is_kept)
+{
+    double radius[EDIT_DRAWN];
+    s->draws_branch = false;
+    if (!is_kept || s->drawn_count < 2) {
+        edit_state_say(s, is_kept, is_kept ? "a new branch needs one point beyond its start" : "the new branch was dropped");
+        return;
+    }
+    for (int i = 0; i < s->drawn_count; i++)
+        radius[i] = short_number((double)s->drawn_radius);
+    SweepEdit edit = {.kind = EDIT_BRANCH, .branch = s->branch, .t = short_t(s), .count = s->drawn_count, .point = s->drawn, .radius = radius};
+    int before = model(s)->branch_count;
+    apply(s, &edit, true);
+    if (model(s)->branch_count > before)
+        edit_state_go(s, before, 0.5 * curve(s, before)->length);
+}
+
+static void go_back(EditState *s, bool (*go)(SweepEditor *, EditChange *), const char *none)
+{
+    EditChange change;
+    double since = clock_s(CLOCK_MONOTONIC);
+    if (!go(s->editor, &change)) {
+        edit_state_say(s, true, "%s", none);
+        return;
+    }
+    follow(s);
+    measure(s, since);
+    edit_state_go(s, s->branch, s->t);
+    edit_state_say(s, false, "%d edits", sweep_editor_list(s->editor)->count);
+}
+
+void edit_state_undo(EditState *s) { go_back(s, sweep_editor_undo, "there is no edit to undo"); }
+void edit_state_redo(EditState *s) { go_back(s, sweep_editor_redo, "there is no edit to do again"); }
