@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-SweepMeshOptions sweep_mesh_default_options(void) { return (SweepMeshOptions){.around = 18}; }
+SweepMeshOptions sweep_mesh_default_options(void) { return (SweepMeshOptions){.around = 24}; }
 
 // --- Which gaps belong to patches ---
 
@@ -204,6 +204,26 @@ static MeshPatch *define_patches(const SweepMeshParts *parts, int *count)
     free(run);
     free(parent);
     return patch;
+}
+
+// A patch that cannot be joined to its rings is left out: the rings run through, and what should be blended there stays apart.
+static void drop_failures(SweepMeshParts *parts)
+{
+    int kept = 0;
+    parts->failures = 0;
+    for (int p = 0; p < parts->patch_count; p++) {
+        MeshPatch *patch = &parts->patch[p];
+        if (patch->failures == 0) {
+            parts->patch[kept++] = *patch;
+            continue;
+        }
+        parts->failures += patch->failures;
+        for (int r = 0; r < patch->run_count; r++)
+            for (int j = patch->run[r].from; j <= patch->run[r].to; j++)
+                parts->rings[patch->run[r].branch].in_patch[j] = false;
+        mesh_patch_free(patch);
+    }
+    parts->patch_count = kept;
 }
 
 // --- Assembly ---
@@ -416,12 +436,11 @@ static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
     Row high = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
     count_vertices(&a);
     put_vertices(&a);
-    mesh->boundaries = 0, mesh->failures = 0, mesh->patches = parts->patch_count;
+    mesh->boundaries = 0, mesh->failures = parts->failures, mesh->patches = parts->patch_count;
     for (int i = 0; i < parts->branch_count; i++)
         put_strips(&a, i, &low, &high);
     for (int p = 0; p < parts->patch_count; p++) {
         const MeshPatch *patch = &parts->patch[p];
-        mesh->failures += patch->failures;
         for (int t = 0; t < patch->triangles; t++)
             put_triangle(&a, a.patch_first[p] + patch->triangle[t][0], a.patch_first[p] + patch->triangle[t][1], a.patch_first[p] + patch->triangle[t][2]);
     }
@@ -487,6 +506,7 @@ SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *op
     parts->patch = define_patches(parts, &parts->patch_count);
     for (int p = 0; p < parts->patch_count; p++)
         mesh_patch_fill(parts, &parts->patch[p]);
+    drop_failures(parts);
     mesh->parts = parts;
     mesh->remade_patches = parts->patch_count;
     for (int i = 0; i < parts->branch_count; i++)

@@ -13,7 +13,7 @@
 #include "geom/sweep_field.h"
 
 typedef struct SweepMeshOptions {
-    int around;              // edges around a section, 6 … 256, default 18: so edges are about a third of the local radius
+    int around;              // edges around a section, 6 … 256, default 24: edges are about a quarter of the local radius
     double edge_mm;          // > 0: length of all edges instead (at least 6 around a section); default 0
     bool flat_ends;          // branches end flat at their last section instead of with a dome; default false
     int isa;                 // as LimVesselOptions.isa; default 0
@@ -28,7 +28,7 @@ typedef struct SweepMesh {
                              // belongs to a cap if its three vertices have the same number > 0
     int boundaries;          // highest number used
     int rings, patches;
-    int failures;            // patches that could not be joined to their rings; expected 0. Holes are closed there
+    int failures;            // patches that could not be joined to their rings; expected 0. There the rings run through, so the mesh has several closed parts or crosses itself
     int remade_rings, remade_patches;        // by the last update
     struct SweepMeshParts *parts;            // rings and patches, see sweep_mesh_parts.h
 } SweepMesh;
