@@ -377,7 +377,7 @@ static void put_vertices(Assembly *a)
     size_t n = (size_t)s->vertex_count + 1;
     s->vertex = HEAP_ZEROED(n, sizeof *s->vertex), s->normal = HEAP_ZEROED(n, sizeof *s->normal), s->node = HEAP_ZEROED(n, sizeof *s->node);
     mesh->branch = HEAP_ZEROED(n, sizeof *mesh->branch), mesh->along = HEAP_ZEROED(n, sizeof *mesh->along);
-    mesh->boundary = HEAP_ZEROED(n, sizeof *mesh->boundary);
+    mesh->boundary = HEAP_ZEROED(n, sizeof *mesh->boundary), mesh->sac = HEAP_ZEROED(n, sizeof *mesh->sac);
     for (int i = 0; i < parts->branch_count; i++) {
         const MeshRings *r = &parts->rings[i];
         for (int k = 0, knot = 0; k < r->count; k++) {
@@ -388,7 +388,7 @@ static void put_vertices(Assembly *a)
             for (int v = 0; v < ring->count; v++) {
                 int to = a->ring_first[i][k] + v;
                 s->vertex[to] = r->at[ring->first + v], s->normal[to] = r->normal[ring->first + v], s->node[to] = node;
-                mesh->branch[to] = i, mesh->along[to] = ring->t;
+                mesh->branch[to] = i, mesh->along[to] = ring->t, mesh->sac[to] = -1;
             }
         }
     }
@@ -400,7 +400,7 @@ static void put_vertices(Assembly *a)
             s->vertex[to] = patch->at[v], s->normal[to] = patch->normal[v];
             knot = branch >= 0 && knot < field->curve[branch]->knot_count ? knot : 0;
             s->node[to] = branch >= 0 ? node_at(field, branch, t, &knot) : field->model->sac_node[patch->sac_node[v]];
-            mesh->branch[to] = branch, mesh->along[to] = t;
+            mesh->branch[to] = branch, mesh->along[to] = t, mesh->sac[to] = branch >= 0 ? -1 : patch->sac_node[v];
         }
     }
 }
@@ -480,6 +480,7 @@ void sweep_mesh_free(SweepMesh *mesh)
     triangle_mesh_free(mesh->surface);
     free(mesh->branch);
     free(mesh->along);
+    free(mesh->sac);
     free(mesh->boundary);
     free(mesh);
 }
@@ -515,4 +516,16 @@ SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *op
         return mesh;
     sweep_mesh_free(mesh);
     return NULL;
+}
+
+TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options)
+{
+    SweepField *field = sweep_field_create(model);
+    SweepMesh *mesh = field ? sweep_mesh_create(field, options) : NULL;
+    TriangleMesh *surface = mesh ? mesh->surface : NULL;
+    if (mesh)
+        mesh->surface = NULL;
+    sweep_mesh_free(mesh);
+    sweep_field_free(field);
+    return surface;
 }
