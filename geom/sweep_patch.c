@@ -600,6 +600,29 @@ static bool read_loops(Cutter *c)
     return good;
 }
 
+// Evens out the angles of the cuts' vertices, which lie as close together as the lattice happened to put them, and puts them onto their rings again.
+static void space_cuts(Cutter *c)
+{
+    enum { ROUNDS = 12 };
+    static const double TURN = 6.283185307179586476925;
+    for (int i = 0; i < c->p->out->cut_count; i++) {
+        const MeshCut *cut = &c->p->out->cut[i];
+        const MeshPlane *plane = &c->plane[i];
+        int n = cut->count;
+        double *next = HEAP_ZEROED((size_t)n, sizeof *next);
+        for (int round = 0; round < ROUNDS; round++) {
+            for (int k = 0; k < n; k++) {
+                double before = k > 0 ? cut->angle[k - 1] : cut->angle[n - 1] - TURN, after = k + 1 < n ? cut->angle[k + 1] : cut->angle[0] + TURN;
+                next[k] = 0.25 * (before + after) + 0.5 * cut->angle[k];
+            }
+            memcpy(cut->angle, next, (size_t)n * sizeof *next);
+        }
+        for (int k = 0; k < n && !c->is_blended[i]; k++)
+            c->at[cut->vertex[k]] = mesh_plane_point(plane, same_cos(cut->angle[k]), same_sin(cut->angle[k]));
+        free(next);
+    }
+}
+
 static void clear_cuts(MeshPatch *out)
 {
     for (int i = 0; i < out->cut_count; i++) {
@@ -717,7 +740,7 @@ static bool try_patch(const SweepMeshParts *parts, MeshPatch *out, double cell, 
             for (int v = 0; v < mesh->vertex_count; v++)
                 normal[v] = mesh->normal[v];
             if (good)
-                even_out(&c, normal);
+                space_cuts(&c), even_out(&c, normal);
             else
                 c.triangles = 0;
             keep_result(&c, normal);
