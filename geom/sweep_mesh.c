@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-SweepMeshOptions sweep_mesh_default_options(void) { return (SweepMeshOptions){.around = 18}; }
+SweepMeshOptions sweep_mesh_default_options(void) { return (SweepMeshOptions){.around = 24}; }
 
 // --- Which gaps belong to patches ---
 
@@ -210,6 +210,26 @@ static MeshPatch *define_patches(const SweepMeshParts *parts, int *count)
     return patch;
 }
 
+// A patch that cannot be joined to its rings is left out: the rings run through, and what should be blended there stays apart.
+static void drop_failures(SweepMeshParts *parts)
+{
+    int kept = 0;
+    parts->failures = 0;
+    for (int p = 0; p < parts->patch_count; p++) {
+        MeshPatch *patch = &parts->patch[p];
+        if (patch->failures == 0) {
+            parts->patch[kept++] = *patch;
+            continue;
+        }
+        parts->failures += patch->failures;
+        for (int r = 0; r < patch->run_count; r++)
+            for (int j = patch->run[r].from; j <= patch->run[r].to; j++)
+                parts->rings[patch->run[r].branch].in_patch[j] = false;
+        mesh_patch_free(patch);
+    }
+    parts->patch_count = kept;
+}
+
 // --- Assembly ---
 
 // A closed row of vertices of the mesh, by increasing angle; of one vertex: a pole.
@@ -358,7 +378,7 @@ static void put_vertices(Assembly *a)
     size_t n = (size_t)s->vertex_count + 1;
     s->vertex = HEAP_ZEROED(n, sizeof *s->vertex), s->normal = HEAP_ZEROED(n, sizeof *s->normal), s->node = HEAP_ZEROED(n, sizeof *s->node);
     mesh->branch = HEAP_ZEROED(n, sizeof *mesh->branch), mesh->along = HEAP_ZEROED(n, sizeof *mesh->along);
-    mesh->boundary = HEAP_ZEROED(n, sizeof *mesh->boundary);
+    mesh->boundary = HEAP_ZEROED(n, sizeof *mesh->boundary), mesh->sac = HEAP_ZEROED(n, sizeof *mesh->sac);
     for (int i = 0; i < parts->branch_count; i++) {
         const MeshRings *r = &parts->rings[i];
         for (int k = 0, knot = 0; k < r->count; k++) {
@@ -369,7 +389,7 @@ static void put_vertices(Assembly *a)
             for (int v = 0; v < ring->count; v++) {
                 int to = a->ring_first[i][k] + v;
                 s->vertex[to] = r->at[ring->first + v], s->normal[to] = r->normal[ring->first + v], s->node[to] = node;
-                mesh->branch[to] = i, mesh->along[to] = ring->t;
+                mesh->branch[to] = i, mesh->along[to] = ring->t, mesh->sac[to] = -1;
             }
         }
     }
@@ -381,7 +401,7 @@ static void put_vertices(Assembly *a)
             s->vertex[to] = patch->at[v], s->normal[to] = patch->normal[v];
             knot = branch >= 0 && knot < field->curve[branch]->knot_count ? knot : 0;
             s->node[to] = branch >= 0 ? node_at(field, branch, t, &knot) : field->model->sac_node[patch->sac_node[v]];
-            mesh->branch[to] = branch, mesh->along[to] = t;
+            mesh->branch[to] = branch, mesh->along[to] = t, mesh->sac[to] = branch >= 0 ? -1 : patch->sac_node[v];
         }
     }
 }
@@ -420,12 +440,11 @@ static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
     Row high = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
     count_vertices(&a);
     put_vertices(&a);
-    mesh->boundaries = 0, mesh->failures = 0, mesh->patches = parts->patch_count;
+    mesh->boundaries = 0, mesh->failures = parts->failures, mesh->patches = parts->patch_count;
     for (int i = 0; i < parts->branch_count; i++)
         put_strips(&a, i, &low, &high);
     for (int p = 0; p < parts->patch_count; p++) {
         const MeshPatch *patch = &parts->patch[p];
-        mesh->failures += patch->failures;
         for (int t = 0; t < patch->triangles; t++)
             put_triangle(&a, a.patch_first[p] + patch->triangle[t][0], a.patch_first[p] + patch->triangle[t][1], a.patch_first[p] + patch->triangle[t][2]);
     }
@@ -465,6 +484,7 @@ void sweep_mesh_free(SweepMesh *mesh)
     triangle_mesh_free(mesh->surface);
     free(mesh->branch);
     free(mesh->along);
+    free(mesh->sac);
     free(mesh->boundary);
     free(mesh);
 }
@@ -491,6 +511,7 @@ SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *op
     parts->patch = define_patches(parts, &parts->patch_count);
     for (int p = 0; p < parts->patch_count; p++)
         mesh_patch_fill(parts, &parts->patch[p]);
+    drop_failures(parts);
     mesh->parts = parts;
     mesh->remade_patches = parts->patch_count;
     for (int i = 0; i < parts->branch_count; i++)
@@ -499,4 +520,16 @@ SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *op
         return mesh;
     sweep_mesh_free(mesh);
     return NULL;
+}
+
+TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options)
+{
+    SweepField *field = sweep_field_create(model);
+    SweepMesh *mesh = field ? sweep_mesh_create(field, options) : NULL;
+    TriangleMesh *surface = mesh ? mesh->surface : NULL;
+    if (mesh)
+        mesh->surface = NULL;
+    sweep_mesh_free(mesh);
+    sweep_field_free(field);
+    return surface;
 }

@@ -22,20 +22,32 @@ void edit_state_say(EditState *s, bool is_fault, const char *format, ...)
     s->message_is_fault = is_fault;
 }
 
-// The mesh follows the model: locally, or anew if it has other branches.
-static void follow(EditState *s)
+// The mesh follows the model within a box, or anew if the model has other branches.
+static void follow(EditState *s, Vec3 low, Vec3 high)
 {
     const SweepField *field = sweep_editor_field(s->editor);
-    if (!s->mesh || !sweep_mesh_update(s->mesh, field)) {
-        SweepMesh *mesh = sweep_mesh_create(field, NULL);
+    if (!s->mesh || !edit_mesh_update(s->mesh, field, low, high)) {
+        EditMesh *mesh = edit_mesh_create(field);
         if (!mesh) {
             edit_state_say(s, true, "the surface cannot be drawn: out of memory");
             return;
         }
-        sweep_mesh_free(s->mesh);
+        edit_mesh_free(s->mesh);
         s->mesh = mesh;
     }
     s->mesh_is_new = true;
+}
+
+// The same, and undoes the changes of what was looked at before.
+static void follow_change(EditState *s, const EditChange *change)
+{
+    Vec3 low = change ? change->low : s->looked_low, high = change ? change->high : s->looked_high;
+    if (change && s->looks) {
+        low = vec3(fmin(low.x, s->looked_low.x), fmin(low.y, s->looked_low.y), fmin(low.z, s->looked_low.z));
+        high = vec3(fmax(high.x, s->looked_high.x), fmax(high.y, s->looked_high.y), fmax(high.z, s->looked_high.z));
+    }
+    if (change || s->looks)
+        follow(s, low, high);
 }
 
 static void measure(EditState *s, double since)
@@ -47,7 +59,7 @@ static void measure(EditState *s, double since)
 bool edit_state_begin(EditState *s, SweepEditor *editor)
 {
     *s = (EditState){.editor = editor, .snaps = true, .strength = 0.5f, .drawn_radius = 0.5f, .saved_count = 0};
-    follow(s);
+    follow(s, vec3(0, 0, 0), vec3(0, 0, 0));
     s->extent = SMOOTH_SECTION;
     if (s->mesh)
         edit_state_go(s, 0, 0.5 * curve(s, 0)->length);
@@ -58,7 +70,7 @@ bool edit_state_begin(EditState *s, SweepEditor *editor)
 
 void edit_state_end(EditState *s)
 {
-    sweep_mesh_free(s->mesh);
+    edit_mesh_free(s->mesh);
     s->mesh = NULL;
 }
 
@@ -76,8 +88,8 @@ void edit_state_go(EditState *s, int branch, double t)
 {
     if (s->looks) {
         sweep_editor_try(s->editor, NULL, NULL, NULL);
+        follow_change(s, NULL);
         s->looks = false;
-        follow(s);
     }
     s->branch = branch < 0 ? 0 : branch >= model(s)->branch_count ? model(s)->branch_count - 1 : branch;
     s->t = fmax(0, fmin(curve(s, s->branch)->length, t));
@@ -132,8 +144,10 @@ static void apply(EditState *s, const SweepEdit *edit, bool is_kept)
         const char *text = faults.count > 0 ? faults.text[0] : "the edit cannot be applied";
         edit_state_say(s, true, "%s", strncmp(text, "edit: ", 6) ? (strncmp(text, "the edit: ", 10) ? text : text + 10) : text + 6);
     }
-    s->looks = !is_kept;
-    follow(s);
+    follow_change(s, good ? &change : NULL);
+    s->looks = good && !is_kept;
+    if (s->looks)
+        s->looked_low = change.low, s->looked_high = change.high;
     measure(s, since);
     if (good && is_kept) {
         if (edit->kind == EDIT_SECTION)
@@ -297,7 +311,8 @@ static void go_back(EditState *s, bool (*go)(SweepEditor *, EditChange *), const
         edit_state_say(s, true, "%s", none);
         return;
     }
-    follow(s);
+    follow_change(s, &change);
+    s->looks = false;
     measure(s, since);
     edit_state_go(s, s->branch, s->t);
     edit_state_say(s, false, "%d edits", sweep_editor_list(s->editor)->count);

@@ -3,12 +3,14 @@
 #define SELDINGER_RENDER_EDIT_STATE_H
 
 #include "recon/recon.h"
+#include "render/edit_mesh.h"
 
 enum { EDIT_CONTOUR = 48, EDIT_HANDLES = 16, EDIT_STROKE = 2000, EDIT_DRAWN = 64 };
 
 typedef struct EditState {
     SweepEditor *editor;
-    SweepMesh *mesh;
+    EditMesh *mesh;
+    Vec3 looked_low, looked_high;    // box of the edit that is looked at [mm]
     bool mesh_is_new;        // to be drawn anew
     int branch;              // the place looked at …
     double t;                // … [mm]

@@ -1,0 +1,30 @@
+// The surface that the editor shows: rings along each branch, moved outwards onto the blended wall, and the sacs. For display only: near a fork, rings lie inside
+// the other vessel, hidden. Where nothing changed, an update keeps the vertices; the result is that of a new mesh. (geom/sweep_mesh.h makes a closed mesh, which
+// takes longer.)
+#ifndef SELDINGER_RENDER_EDIT_MESH_H
+#define SELDINGER_RENDER_EDIT_MESH_H
+
+#include "recon/recon.h"
+
+typedef struct EditRing {
+    int branch, first;       // its vertices
+    double t;                // [mm]; beyond an end: of the end
+    double polar;            // of a dome's ring: angle over the end's plane [rad]
+} EditRing;
+
+typedef struct EditMesh {
+    TriangleMesh *surface;
+    int *branch;             // (V) -1: on a sac
+    double *along;           // (V) [mm]
+    int ring_count;
+    EditRing *ring;
+    int made;                // rings made by the last call
+} EditMesh;
+
+// NULL if out of memory.
+EditMesh *edit_mesh_create(const SweepField *field);
+// Follows a change within a box. False, with the mesh unchanged, if the model has other branches or lengths.
+bool edit_mesh_update(EditMesh *mesh, const SweepField *field, Vec3 low, Vec3 high);
+void edit_mesh_free(EditMesh *mesh);
+
+#endif
