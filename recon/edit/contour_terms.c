@@ -124,7 +124,6 @@ const char *contour_terms(int count, const Vec3 *point, double term[SWEEP_TERMS]
         return memory;
     }
     const char *wrong = NULL;
-    // A contour that is not a star would become a raster section (geom/section.h) here.
     if (!polygon_contains(n, p, 0, 0))
         wrong = "the contour does not go around the branch's curve; expected a closed curve around n = 0, b = 0";
     else if (!unwind(n, p, theta, theta + n))

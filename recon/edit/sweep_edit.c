@@ -4,6 +4,7 @@
 #include "recon/edit/branch_pieces.h"
 #include "recon/edit/contour_terms.h"
 #include "recon/edit/edit_rows.h"
+#include "recon/edit/edit_stretch.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -91,6 +92,39 @@ static SweepModel *set_section(const Work *w, EditRows *rows, double t, const do
     return refuse(w, "the section at %g mm differs too much from those beside it; expected one of similar size, or edit those first", t);
 }
 
+// Gives a contour that the row cannot hold to a stretch of the model, which is freed if that fails.
+static SweepModel *set_stretch(const Work *w, SweepModel *m, double within, const SectionPoint *contour)
+{
+    const SweepEdit *e = w->edit;
+    if (edit_stretch_set(m, e->branch, e->t, within, e->count, contour, w->name, w->faults)) {
+        const SweepStretch *s = &m->stretch[edit_stretch_at(m, e->branch, e->t, e->t)];
+        w->change->from = fmin(w->change->from, s->from), w->change->to = fmax(w->change->to, s->to);
+        w->change->misfit = 0;
+        return m;
+    }
+    sweep_model_free(m);
+    return NULL;
+}
+
+// The nearest polar section to a contour that is none: through the outermost points of the rays. False if the contour has no area or does not go around the curve.
+static bool outermost_terms(int count, const SectionPoint *contour, double term[SWEEP_TERMS])
+{
+    enum { RAYS = 64 };
+    double radius[RAYS];
+    SectionOptions options = section_default_options(SECTION_RASTER, SECTION_MENDED);
+    Section *section = section_create(&options, count, contour);
+    bool good = section && section_radii(section, 0, 0, RAYS, radius) >= 0;
+    section_free(section);
+    for (int k = 0; good && k < SWEEP_TERMS; k++) {
+        term[k] = 0;
+        for (int i = 0; i < RAYS; i++) {
+            double angle = 2 * PI * i / RAYS * ((k + 1) / 2);
+            term[k] += radius[i] * (k % 2 ? same_cos(angle) : k > 0 ? same_sin(angle) : 0.5) * 2 / RAYS;
+        }
+    }
+    return good;
+}
+
 static SweepModel *edit_section(const Work *w)
 {
     const SweepEdit *e = w->edit;
@@ -105,13 +139,25 @@ static SweepModel *edit_section(const Work *w)
         Vec3 u = vec3_sub(e->point[i], j.s);
         flat[i] = e->in_space ? vec3(vec3_dot(u, j.n), vec3_dot(u, j.b), 0) : e->point[i];
     }
-    double term[SWEEP_TERMS];
+    double term[SWEEP_TERMS], within;
     const char *wrong = contour_terms(e->count, flat, term, &w->change->misfit);
+    SectionPoint *contour = (SectionPoint *)calloc((size_t)e->count, sizeof *contour);
+    for (int i = 0; contour && i < e->count; i++)
+        contour[i] = (SectionPoint){flat[i].x, flat[i].y};
     free(flat);
-    if (!wrong)
-        return set_section(w, &rows, e->t, term);
-    edit_rows_free(&rows);
-    return refuse(w, "%s", wrong);
+    edit_rows_station(&rows, e->t, &within);
+    bool is_raster = wrong && contour && outermost_terms(e->count, contour, term);
+    SweepModel *m = NULL;
+    if (wrong && !is_raster) {
+        edit_rows_free(&rows);
+        refuse(w, "%s", wrong);
+    } else {
+        m = contour ? set_section(w, &rows, e->t, term) : refuse(w, "%s", no_memory);
+    }
+    if (m && (is_raster || edit_stretch_at(m, e->branch, e->t, e->t) >= 0))
+        m = set_stretch(w, m, within, contour);
+    free(contour);
+    return m;
 }
 
 static SweepModel *edit_delete(const Work *w)
@@ -135,8 +181,14 @@ static SweepModel *edit_delete(const Work *w)
             hold_now(&rows, rows.at[i], &held);
     mark_rows(w, &rows, at - 1, at + 3);
     edit_rows_remove(&rows, at);
-    if (edit_rows_hold(&rows, at - 1, at + 2, &held))
-        return with_rows(w, &rows);
+    if (edit_rows_hold(&rows, at - 1, at + 2, &held)) {
+        SweepModel *m = with_rows(w, &rows);
+        if (!m || edit_stretch_at(m, w->edit->branch, w->edit->t, w->edit->t) < 0 ||
+            edit_stretch_delete(m, w->edit->branch, w->edit->t, within, w->name, w->faults))
+            return m;
+        sweep_model_free(m);
+        return NULL;
+    }
     edit_rows_free(&rows);
     return refuse(w, "the section at %g mm cannot be deleted without changing those beside it", w->edit->t);
 }
@@ -182,6 +234,20 @@ static SweepModel *copy_of(const Work *w)
 static SweepModel *edit_smooth(const Work *w)
 {
     const SweepEdit *e = w->edit;
+    bool is_tree = e->extent == SMOOTH_TREE;
+    double from = e->extent == SMOOTH_SECTION ? e->t
+                  : e->extent == SMOOTH_RANGE ? e->from
+                                              : 0,
+           to = e->extent == SMOOTH_SECTION ? e->t
+                : e->extent == SMOOTH_RANGE ? e->to
+                                            : HUGE_VAL;
+    int at = is_tree ? (w->model->stretch_count > 0 ? 0 : -1) : edit_stretch_at(w->model, e->branch, from, to);
+    if (at >= 0) {
+        const SweepStretch *s = &w->model->stretch[at];
+        return refuse(w,
+                      "branch %d has sections of kind %s from %g to %g mm, which are not smoothed; expected a place without them, or draw their contours anew",
+                      s->branch, section_kind_name[s->section.kind], s->from, s->to);
+    }
     if (e->extent == SMOOTH_SECTION)
         return smooth_section(w);
     SweepModel *m = copy_of(w);

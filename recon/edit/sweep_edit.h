@@ -3,6 +3,8 @@
 // Section. The contour's terms are the Fourier terms of least squares at its points (see contour_terms.h). If a station (a break) is within a quarter of the
 // spacing there, it is replaced; otherwise a break is inserted first, which changes no section. Then the rows around t change by the smallest amount (sum of
 // squares) that gives the section at t and keeps those at the next two stations on both sides: at most five rows, so nothing changes beyond four stations.
+// A contour that polar terms cannot hold becomes a station of a stretch with raster sections, which reaches to the stations beside it; the rows there get the
+// terms of its outermost points.
 // Deleting removes a break; the rows there are settled in the same way, so that the two stations on both sides keep their sections.
 // Smoothing by s of a row: c_k (1 - s) for k >= 1, and c_0 such that the area pi (c_0^2 + sum |c_k|^2 / 2) stays. Towards an ellipse: (1 - s) c + s e, with e the
 // terms of the ellipse that has the same centre, directions and ratio of second moments, and area; c_0 again keeps the area. A branch or the tree: every row;

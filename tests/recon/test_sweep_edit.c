@@ -531,6 +531,89 @@ static int measure(const char *path)
     return 0;
 }
 
+// Half a ring with round ends around the curve's point.
+static void make_kidney(int count, Vec3 *point)
+{
+    double outer = PI * 1.4, end = PI * 0.5, inner = PI * 0.4;
+    for (int i = 0; i < count; i++) {
+        double way = (outer + 2 * end + inner) * i / count, a = way / 1.4 - PI / 2, r = 1.4, up = 0;
+        if (way >= outer + end + inner)
+            a = (way - outer - end - inner) / 0.5 + PI / 2, r = 0.5, up = -0.9;
+        else if (way >= outer + end)
+            a = PI / 2 - (way - outer - end) / 0.4, r = 0.4;
+        else if (way >= outer)
+            a = (way - outer) / 0.5 + PI / 2, r = 0.5, up = 0.9;
+        point[i] = vec3(r * same_cos(a) - 0.7, up + r * same_sin(a), 0);
+    }
+}
+
+static double field_at(const SweepField *f, double t, Vec3 nb)
+{
+    SweepJet j = sweep_curve_at(f->curve[0], t);
+    SweepPart part;
+    sweep_field_branch(f, 0, vec3_add_scaled(vec3_add_scaled(j.s, nb.x, j.n), nb.y, j.b), t, &part);
+    return part.f;
+}
+
+// Contours that polar terms cannot hold become a stretch of rasters: between equal ones the wall passes through their points, elsewhere it is that of the rows, and
+// a tool feels the notch. Smoothing is refused there; deleting them takes the stretch away.
+static void a_kidney_becomes_a_raster(void **state)
+{
+    (void)state;
+    enum { POINTS = 64, DRAWN = 3 };
+    SweepModel *m = fork_model(1);
+    SweepEditor *e = editor_of(m);
+    Vec3 point[POINTS];
+    double t[DRAWN], within, worst = 0;
+    EditChange change;
+    make_kidney(POINTS, point);
+    for (int i = 0; i < DRAWN; i++) {
+        t[i] = sweep_edit_station(m, 0, 4 + i, &within);
+        SweepEdit edit = {.kind = EDIT_SECTION, .t = t[i], .count = POINTS, .point = point};
+        assert_true(sweep_editor_do(e, &edit, "test", &change, &faults));
+        const SweepModel *now = sweep_editor_model(e);
+        assert_int_equal(now->stretch_count, 1);
+        assert_int_equal(now->stretch[0].station_count, 3 + i);
+        assert_true(change.from <= now->stretch[0].from && change.to >= now->stretch[0].to && now->stretch[0].to > t[i]);
+    }
+    const SweepModel *now = sweep_editor_model(e);
+    const SweepField *field = sweep_editor_field(e);
+    for (int i = 0; i < POINTS; i++)
+        worst = fmax(worst, fabs(field_at(field, t[1], point[i])));
+    print_message("kidney: the wall passes by its points within %.4f mm\n", worst);
+    assert_true(worst < 0.02);
+    assert_true(field_at(field, t[1], vec3(-0.55, 0, 0)) < 0);
+    SweepField *old = sweep_field_create(m);
+    for (double at = 12; at < 20; at += 0.37) {     // rows change up to four stations away
+        Vec3 nb = vec3(0.7 * same_cos(at), 0.7 * same_sin(at), 0);
+        assert_true(fabs(field_at(old, at, nb) - field_at(field, at, nb)) < 1e-12);
+    }
+    sweep_field_free(old);
+    Vessel *vessel = sweep_vessel_create(now);
+    SweepJet j = sweep_curve_at(field->curve[0], t[1]);
+    Vec3 x = vec3_add_scaled(j.s, -0.15, j.n);
+    VesselMemory memory = {.node = vessel->locate(vessel, x, -1)};
+    VesselHit hit;
+    vessel_query(vessel, 1, &x, HUGE_VAL, &memory, &hit);
+    assert_true(hit.gap > 0 && hit.gap < 0.25 && !(hit.flags & VESSEL_UNSURE));
+    vessel->destroy(vessel);
+    faults_clear(&faults);
+    SweepEdit smooth = {.kind = EDIT_SMOOTH, .extent = SMOOTH_BRANCH, .branch = 0, .amount = 0.5};
+    assert_false(sweep_editor_do(e, &smooth, "test", &change, &faults));
+    assert_non_null(strstr(faults.text[0], "raster"));
+    faults_clear(&faults);
+    for (int i = 0; i < DRAWN; i++) {
+        SweepEdit remove = {.kind = EDIT_DELETE_SECTION, .t = t[i]};
+        assert_true(sweep_editor_do(e, &remove, "test", &change, &faults));
+    }
+    assert_int_equal(sweep_editor_model(e)->stretch_count, 0);
+    for (int i = 0; i < DRAWN; i++)
+        assert_true(sweep_editor_undo(e, &change));
+    assert_int_equal(sweep_editor_model(e)->stretch[0].station_count, 2 + DRAWN);
+    sweep_editor_free(e);
+    sweep_model_free(m);
+}
+
 int main(int argc, char **argv)
 {
     if (argc > 1)
@@ -543,6 +626,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(a_saved_session_replays_to_the_same_bytes),
                                        cmocka_unit_test(branches_are_cut_and_drawn),
                                        cmocka_unit_test(a_mirrored_model_is_edited_alike),
+                                       cmocka_unit_test(a_kidney_becomes_a_raster),
                                        cmocka_unit_test(every_fault_is_reported_and_changes_nothing)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
