@@ -488,16 +488,13 @@ static bool check_place(const Work *w)
         refuse(w, "t_mm %g is beyond branch %d; expected 0 to %.6g", e->t, e->branch, length);
         return false;
     }
-    bool is_section = e->kind == EDIT_SECTION || e->kind == EDIT_DELETE_SECTION || (has_t && e->kind == EDIT_SMOOTH);
-    for (int i = 0; i < w->model->stretch_count; i++) {
-        const SweepStretch *s = &w->model->stretch[i];
-        if (s->branch == e->branch && ((is_section && e->t > s->from && e->t < s->to) || (e->kind == EDIT_CUT && e->t < s->to))) {
-            refuse(w, "branch %d has %s sections from %.6g to %.6g mm, which cannot be edited yet; expected a place outside", e->branch,
-                   section_kind_name[s->section.kind], s->from, s->to);
-            return false;
-        }
+    int at = e->kind == EDIT_CUT ? edit_stretch_at(w->model, e->branch, e->t, HUGE_VAL) : -1;
+    if (at >= 0) {
+        const SweepStretch *s = &w->model->stretch[at];
+        refuse(w, "branch %d has %s sections from %.6g to %.6g mm, through or before which it cannot be cut; expected a place beyond, or delete them first",
+               e->branch, section_kind_name[s->section.kind], s->from, s->to);
     }
-    return true;
+    return at < 0;
 }
 
 SweepModel *sweep_edit_apply(const SweepModel *model, const SweepField *field, const SweepEdit *edit, const char *name, EditChange *change, Faults *faults)
