@@ -22,7 +22,9 @@ typedef struct ExportOptions {
 } ExportOptions;
 
 #define AT(member) OPTION_AT(ExportOptions, member)
-static const char *const whats[] = {"surface", "centreline", "centerline", NULL}, *const frames[] = {"LPS", "RAS", NULL}, *const models[] = {"lim", "sweep", "raster", "rbf", "pas", NULL};
+static const char *const whats[] = {"surface", "centreline", "centerline", NULL}, *const frames[] = {"LPS", "RAS", NULL}, *const models[] = {"lim",    "sweep",
+                                                                                                                                             "raster", "rbf",
+                                                                                                                                             "pas",    NULL};
 static const Option rows[] = {
     {"what", "surface|centreline", OPTION_CHOICE, AT(what), "what a .vtp holds", .choices = whats,
      .otherwise = "the surface of a model, the centreline of a tree"},
@@ -131,12 +133,13 @@ static bool export_tree(const ExportOptions *options, const char *extension, Fau
         faults_add(faults, options->in, 0, 0, "has no model of the kind '%s'; `seldinger fit --model %s` makes one", models[options->model],
                    models[options->model]);
     else if (options->surface.tags && (!surface || !strcmp(extension, ".stl") || !strcmp(extension, ".obj")))
-        faults_add(faults, options->out, 0, 0, "'%s' cannot hold --tags, which are data of a surface's vertices; valid: .ply .vtp", surface ? extension : "a centreline");
+        faults_add(faults, options->out, 0, 0, "'%s' cannot hold --tags, which are data of a surface's vertices; valid: .ply .vtp",
+                   surface ? extension : "a centreline");
     else if (surface && !model)
         faults_add(faults, options->in, 0, 0, "is a tree without a model, so it has no surface; `seldinger fit` makes one, or export the centreline");
     else
-        good =
-            surface ? export_surface(options, extension, tree, chosen > 0 ? swept.of[chosen - 1] : NULL, faults) : centreline_write_file(options->out, extension, tree, frames[options->frame], faults);
+        good = surface ? export_surface(options, extension, tree, chosen > 0 ? swept.of[chosen - 1] : NULL, faults)
+                       : centreline_write_file(options->out, extension, tree, frames[options->frame], faults);
     sweep_models_free(&swept);
     vessel_tree_free(tree);
     return good;

@@ -118,7 +118,11 @@ static int find_runs(const SweepMeshParts *parts, MeshRun **runs, int *first_run
                 capacity = capacity > 0 ? 2 * capacity : 64;
                 *runs = HEAP_GROWN(*runs, (size_t)capacity, sizeof **runs);
             }
-            (*runs)[count++] = (MeshRun){.branch = i, .from = j, .to = to, .cut_from = -1, .cut_to = -1,
+            (*runs)[count++] = (MeshRun){.branch = i,
+                                         .from = j,
+                                         .to = to,
+                                         .cut_from = -1,
+                                         .cut_to = -1,
                                          .t_from = is_free(r->ring[j].kind) ? -HUGE_VAL : r->ring[j].t,
                                          .t_to = is_free(r->ring[to + 1].kind) ? HUGE_VAL : r->ring[to + 1].t};
             j = to;
@@ -330,10 +334,7 @@ static void row_at(const Assembly *a, int branch, int ring, bool is_cut, Row *ro
         }
 }
 
-static bool is_used(const MeshRings *r, int ring)
-{
-    return !(ring > 0 && r->in_patch[ring - 1]) && !(ring < r->count - 1 && r->in_patch[ring]);
-}
+static bool is_used(const MeshRings *r, int ring) { return !(ring > 0 && r->in_patch[ring - 1]) && !(ring < r->count - 1 && r->in_patch[ring]); }
 
 static void count_vertices(Assembly *a)
 {
@@ -430,7 +431,10 @@ static void put_strips(Assembly *a, int branch, Row *low, Row *high)
 static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
 {
     mesh->surface = HEAP_ZEROED(1, sizeof *mesh->surface);
-    Assembly a = {.parts = parts, .mesh = mesh, .good = true, .ring_first = HEAP_ZEROED((size_t)parts->branch_count, sizeof *a.ring_first),
+    Assembly a = {.parts = parts,
+                  .mesh = mesh,
+                  .good = true,
+                  .ring_first = HEAP_ZEROED((size_t)parts->branch_count, sizeof *a.ring_first),
                   .patch_first = HEAP_ZEROED((size_t)parts->patch_count + 1, sizeof *a.patch_first)};
     Row low = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
     Row high = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
@@ -535,7 +539,8 @@ static Changes find_changes(const SweepMeshParts *parts, const SweepField *field
     Changes c = {.segment = HEAP_ZEROED((size_t)segments, 1), .branch = HEAP_ZEROED((size_t)field->branch_count, 1)};
     for (int i = 0; i < field->branch_count; i++) {
         int first = field->first_segment[i], count = field->first_segment[i + 1] - first, before = parts->first_segment[i];
-        bool whole = count != parts->first_segment[i + 1] - before || field->fork[i].delta != parts->fork[i].delta || field->fork[i].reach != parts->fork[i].reach;
+        bool whole =
+            count != parts->first_segment[i + 1] - before || field->fork[i].delta != parts->fork[i].delta || field->fork[i].reach != parts->fork[i].reach;
         for (int k = 0; k < count; k++) {
             const SweepSegment *s = &field->segment[first + k];
             // sections of another kind are not in the row
@@ -565,7 +570,7 @@ static bool is_changed(const SweepField *field, const Changes *c, int branch, do
 // Whether something changed that can be seen from a branch between two places.
 static bool sees_change(const SweepField *field, const Changes *c, int branch, double from, double to)
 {
-    static const double ASIDE = 3;           // radii beside the place at which a candidate is expected
+    static const double ASIDE = 1.5;         // radii beside the place at which a candidate is expected
     for (int s = sweep_field_segment(field, branch, from), last = sweep_field_segment(field, branch, to); s <= last; s++) {
         const SweepView *view = &field->view[s];
         double near = fmax(0, field->segment[s].from), far = fmin(field->curve[branch]->length, field->segment[s].to);
@@ -597,7 +602,7 @@ static bool same_patch(const MeshPatch *a, const MeshPatch *b)
 // Whether a patch is the same in both fields: its definition, and what can be seen from it.
 static bool is_kept(const SweepField *field, const Changes *c, const MeshPatch *old, const MeshPatch *now)
 {
-    static const double BEYOND = 4;          // [radii] beyond the cuts, where the lattice still lies
+    static const double BEYOND = 1;          // [radii] beyond the cuts, more than a cell
     if (!same_patch(old, now) || (now->sac_count > 0 && c->sacs))
         return false;
     for (int i = 0; i < now->run_count; i++) {

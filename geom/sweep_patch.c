@@ -321,7 +321,8 @@ static void project(Patch *p, int count, Vec3 *at, Vec3 *normal, SweepPlace *pla
             sweep_block_sample(&p->parts->feet, &b, FOOT_ALL);
             close = true;
             for (int i = 0; i < lanes; i++) {
-                double slope2 = fmax(f->gx[i] * f->gx[i] + f->gy[i] * f->gy[i] + f->gz[i] * f->gz[i], 1e-6), step = -f->f[i] / slope2, far = fabs(step) * sqrt(slope2);
+                double slope2 = fmax(f->gx[i] * f->gx[i] + f->gy[i] * f->gy[i] + f->gz[i] * f->gz[i], 1e-6), step = -f->f[i] / slope2,
+                       far = fabs(step) * sqrt(slope2);
                 if (far > LONGEST * p->cell)
                     step *= LONGEST * p->cell / far;
                 f->x[i] += step * f->gx[i], f->y[i] += step * f->gy[i], f->z[i] += step * f->gz[i];
@@ -520,7 +521,7 @@ static int compare_edges(const void *a, const void *b)
 // next[v]: the vertex that follows v on the rim, against the direction of the triangles there; -1. Returns false if the rim touches itself.
 static bool rim_of(const Cutter *c, int *next)
 {
-    int (*edge)[3] = HEAP_ZEROED((size_t)c->triangles * 3 + 1, sizeof *edge), count = 0;
+    int(*edge)[3] = HEAP_ZEROED((size_t)c->triangles * 3 + 1, sizeof *edge), count = 0;
     bool good = true;
     for (int t = 0; t < c->triangles; t++)
         for (int k = 0; k < 3; k++) {

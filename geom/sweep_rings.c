@@ -276,7 +276,8 @@ static void add_dome(const SweepMeshParts *parts, int branch, double side, Circl
 {
     enum { ROUNDS = 60 };
     const SweepField *field = parts->feet.field;
-    int first = field->first_segment[branch], last = field->first_segment[branch + 1] - 1, near = side > 0 ? last - 1 : first + 1, far = side > 0 ? last : first;
+    int first = field->first_segment[branch], last = field->first_segment[branch + 1] - 1, near = side > 0 ? last - 1 : first + 1,
+        far = side > 0 ? last : first;
     const SweepSegment *s = &field->segment[near];
     double end = side > 0 ? field->curve[branch]->length : 0;
     int around = mesh_around(parts, branch, end), quarter = around > 7 ? (around + 2) / 4 : 2;
