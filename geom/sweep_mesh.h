@@ -36,8 +36,9 @@ typedef struct SweepMesh {
 
 // `options` may be NULL. Returns NULL if the mesh would have more than 1e8 triangles.
 SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *options);
-// Makes the mesh that of a changed model: rings and patches on parts of the field that are the same as before are kept. The result is the same to the bit as a
-// fresh mesh. Returns false, with the mesh unchanged, if the model has another number of branches, or as above.
+// Makes the mesh that of a changed model. What changed is found by comparing the fields' segments: patches from which no change can be seen are kept, and so are
+// the rings of branches from which none can be seen. The result is the same to the bit as a fresh mesh. Returns false, with the mesh unchanged, if the model has
+// another number of branches. `field` need not outlive the call.
 bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field);
 void sweep_mesh_free(SweepMesh *mesh);
 // The surface alone. `options` may be NULL. Returns NULL as above, or if out of memory.
