@@ -27,7 +27,7 @@ static void follow(EditState *s, Vec3 low, Vec3 high)
 {
     const SweepField *field = sweep_editor_field(s->editor);
     if (!s->mesh || !edit_mesh_update(s->mesh, field, low, high)) {
-        EditMesh *mesh = edit_mesh_create(field);
+        EditMesh *mesh = edit_mesh_create(field, s->mesh, low, high);
         if (!mesh) {
             edit_state_say(s, true, "the surface cannot be drawn: out of memory");
             return;
