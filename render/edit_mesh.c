@@ -24,6 +24,7 @@ static void place_rings(const SweepField *field, EditMesh *m)
         bool open = field->model->branch[i].open_start;
         int count = rings_of(field, i), before = open ? 0 : DOME_RINGS, sections = count - DOME_RINGS - before;
         double length = field->curve[i]->length;
+        m->of[i] = (struct EditMeshBranch){at, count, sweep_curve_at(field->curve[i], 0).s, sweep_curve_at(field->curve[i], length).s};
         for (int k = 0; k < count; k++, at++) {
             EditRing *r = &m->ring[at];
             int section = k - before;
@@ -77,31 +78,27 @@ static void make_ring(const SweepField *field, EditMesh *m, const EditRing *r)
 
 // --- the mesh ---
 
-// The sacs' part of the closed mesh.
-static SweepMesh *sacs_of(const SweepField *field, int *triangles)
+// The sacs' part of the closed mesh: three vertices a triangle. Returns the number of triangles; the caller frees the mesh.
+static int find_sacs(const SweepField *field, SweepMesh **all)
 {
-    SweepMesh *all = field->model->sac ? sweep_mesh_create(field, NULL) : NULL;
-    *triangles = 0;
-    for (int i = 0; all && i < all->surface->triangle_count; i++) {
-        const int *t = all->surface->triangle[i];
-        *triangles += all->branch[t[0]] < 0 || all->branch[t[1]] < 0 || all->branch[t[2]] < 0;
+    int triangles = 0;
+    *all = field->model->sac ? sweep_mesh_create(field, NULL) : NULL;
+    for (int i = 0; *all && i < (*all)->surface->triangle_count; i++) {
+        const int *t = (*all)->surface->triangle[i];
+        triangles += (*all)->branch[t[0]] < 0 || (*all)->branch[t[1]] < 0 || (*all)->branch[t[2]] < 0;
     }
-    return all;
+    return triangles;
 }
 
-static void add_sacs(const SweepMesh *sacs, EditMesh *m, int vertex, int triangle)
+static void add_sacs(const SweepMesh *sacs, EditMesh *m, int vertex)
 {
     const TriangleMesh *from = sacs->surface;
     for (int i = 0; i < from->triangle_count; i++) {
         const int *t = from->triangle[i];
         if (sacs->branch[t[0]] >= 0 && sacs->branch[t[1]] >= 0 && sacs->branch[t[2]] >= 0)
             continue;
-        for (int k = 0; k < 3; k++, vertex++) {
+        for (int k = 0; k < 3; k++, vertex++)
             m->surface->vertex[vertex] = from->vertex[t[k]], m->surface->normal[vertex] = from->normal[t[k]];
-            m->branch[vertex] = sacs->branch[t[k]], m->along[vertex] = sacs->along[t[k]];
-            m->surface->triangle[triangle][k] = vertex;
-        }
-        triangle++;
     }
 }
 
@@ -121,41 +118,90 @@ static int add_strips(EditMesh *m)
     return count;
 }
 
-EditMesh *edit_mesh_create(const SweepField *field)
+static EditMesh *allocate(int branches, int rings, int sac_triangles)
 {
-    int rings = 0, sac_triangles;
-    for (int i = 0; i < field->branch_count; i++)
-        rings += rings_of(field, i);
-    SweepMesh *sacs = sacs_of(field, &sac_triangles);
     size_t vertices = (size_t)rings * AROUND + 3 * (size_t)sac_triangles, triangles = 2 * (size_t)rings * AROUND + (size_t)sac_triangles;
     EditMesh *m = calloc(1, sizeof *m);
     TriangleMesh *surface = calloc(1, sizeof *surface);
     if (m && surface) {
-        m->surface = surface;
+        *m = (EditMesh){.surface = surface, .ring_count = rings, .branch_count = branches, .sac_triangles = sac_triangles};
         m->ring = calloc((size_t)rings, sizeof *m->ring);
+        m->of = calloc((size_t)branches, sizeof *m->of);
         m->branch = calloc(vertices, sizeof *m->branch);
         m->along = calloc(vertices, sizeof *m->along);
         surface->vertex = calloc(vertices, sizeof *surface->vertex);
         surface->normal = calloc(vertices, sizeof *surface->normal);
         surface->node = calloc(vertices, sizeof *surface->node);
         surface->triangle = calloc(triangles, sizeof *surface->triangle);
+        surface->vertex_count = (int)vertices;
     } else {
         free(surface);
     }
-    if (!m || !m->ring || !m->branch || !m->along || !surface->vertex || !surface->normal || !surface->node || !surface->triangle) {
+    if (m && m->ring && m->of && m->branch && m->along && surface->vertex && surface->normal && surface->node && surface->triangle)
+        return m;
+    edit_mesh_free(m);
+    return NULL;
+}
+
+static bool is_apart(const SweepField *field, const EditRing *r, Vec3 low, Vec3 high)
+{
+    Vec3 x = sweep_curve_at(field->curve[r->branch], r->t).s;
+    double reach = 1.5 * sweep_field_largest(field, r->branch, r->t);
+    return x.x + reach < low.x || x.y + reach < low.y || x.z + reach < low.z || x.x - reach > high.x || x.y - reach > high.y || x.z - reach > high.z;
+}
+
+// The old mesh's branch with the same rings; NULL if there is none.
+static const struct EditMeshBranch *known(const EditMesh *old, const struct EditMeshBranch *b)
+{
+    for (int i = 0; old && i < old->branch_count; i++)
+        if (old->of[i].ring_count == b->ring_count && vec3_distance(old->of[i].start, b->start) == 0 && vec3_distance(old->of[i].end, b->end) == 0)
+            return &old->of[i];
+    return NULL;
+}
+
+static void make_branch(const SweepField *field, const EditMesh *old, Vec3 low, Vec3 high, EditMesh *m, int branch)
+{
+    const struct EditMeshBranch *b = &m->of[branch], *same = known(old, b);
+    for (int i = 0; i < b->ring_count; i++) {
+        const EditRing *r = &m->ring[b->first_ring + i];
+        if (!same || !is_apart(field, r, low, high)) {
+            make_ring(field, m, r);
+            m->made++;
+            continue;
+        }
+        int from = old->ring[same->first_ring + i].first;
+        memcpy(m->surface->vertex + r->first, old->surface->vertex + from, AROUND * sizeof *m->surface->vertex);
+        memcpy(m->surface->normal + r->first, old->surface->normal + from, AROUND * sizeof *m->surface->normal);
+        for (int k = 0; k < AROUND; k++)
+            m->branch[r->first + k] = branch, m->along[r->first + k] = r->t;
+    }
+}
+
+EditMesh *edit_mesh_create(const SweepField *field, const EditMesh *old, Vec3 low, Vec3 high)
+{
+    int rings = 0;
+    for (int i = 0; i < field->branch_count; i++)
+        rings += rings_of(field, i);
+    SweepMesh *sacs = NULL;
+    int sac_triangles = old ? old->sac_triangles : find_sacs(field, &sacs);
+    EditMesh *m = allocate(field->branch_count, rings, sac_triangles);
+    if (!m) {
         sweep_mesh_free(sacs);
-        edit_mesh_free(m);
         return NULL;
     }
-    m->ring_count = m->made = rings;
     place_rings(field, m);
-    for (int i = 0; i < rings; i++)
-        make_ring(field, m, &m->ring[i]);
-    int strips = add_strips(m);
+    for (int i = 0; i < field->branch_count; i++)
+        make_branch(field, old, low, high, m, i);
+    int strips = add_strips(m), first = rings * AROUND;
     if (sacs)
-        add_sacs(sacs, m, rings * AROUND, strips);
-    surface->vertex_count = (int)vertices;
-    surface->triangle_count = strips + sac_triangles;
+        add_sacs(sacs, m, first);
+    for (int i = 0; old && i < 3 * sac_triangles; i++) {
+        int from = old->ring_count * AROUND + i;
+        m->surface->vertex[first + i] = old->surface->vertex[from], m->surface->normal[first + i] = old->surface->normal[from];
+    }
+    for (int i = 0; i < 3 * sac_triangles; i++)
+        m->branch[first + i] = -1, m->surface->triangle[strips + i / 3][i % 3] = first + i;
+    m->surface->triangle_count = strips + sac_triangles;
     sweep_mesh_free(sacs);
     return m;
 }
@@ -180,10 +226,8 @@ bool edit_mesh_update(EditMesh *m, const SweepField *field, Vec3 low, Vec3 high)
         return false;
     m->made = 0;
     for (int i = 0; i < m->ring_count; i++) {
-        EditRing *r = &m->ring[i];
-        Vec3 x = sweep_curve_at(field->curve[r->branch], r->t).s;
-        double reach = 1.5 * sweep_field_largest(field, r->branch, r->t);
-        if (x.x + reach < low.x || x.y + reach < low.y || x.z + reach < low.z || x.x - reach > high.x || x.y - reach > high.y || x.z - reach > high.z)
+        const EditRing *r = &m->ring[i];
+        if (is_apart(field, r, low, high))
             continue;
         make_ring(field, m, r);
         m->made++;
@@ -200,5 +244,6 @@ void edit_mesh_free(EditMesh *m)
     free(m->branch);
     free(m->along);
     free(m->ring);
+    free(m->of);
     free(m);
 }

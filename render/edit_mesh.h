@@ -18,11 +18,17 @@ typedef struct EditMesh {
     double *along;           // (V) [mm]
     int ring_count;
     EditRing *ring;
+    int branch_count;
+    struct EditMeshBranch {
+        int first_ring, ring_count;
+        Vec3 start, end;     // of its curve: by these it is known again
+    } * of;              // (branch_count)
+    int sac_triangles;       // the last ones
     int made;                // rings made by the last call
 } EditMesh;
 
-// NULL if out of memory.
-EditMesh *edit_mesh_create(const SweepField *field);
+// NULL if out of memory. `old` may be NULL: else the mesh before a change within a box, of which it keeps what is outside, and the sacs.
+EditMesh *edit_mesh_create(const SweepField *field, const EditMesh *old, Vec3 low, Vec3 high);
 // Follows a change within a box. False, with the mesh unchanged, if the model has other branches or lengths.
 bool edit_mesh_update(EditMesh *mesh, const SweepField *field, Vec3 low, Vec3 high);
 void edit_mesh_free(EditMesh *mesh);

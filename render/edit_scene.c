@@ -65,15 +65,16 @@ static void add_ends(EditScene *scene, const EditState *s)
 {
     const SweepModel *m = sweep_editor_model(s->editor);
     const SweepField *field = sweep_editor_field(s->editor);
+    double least = 0.006 * vec3_distance(scene->camera.low, scene->camera.high);
     for (int i = 0; i < m->branch_count; i++)
         for (int end = 0; end < 2; end++) {
             SweepTag tag = sweep_model_tag(m, i, end);
             if (tag == SWEEP_TAG_NONE)
                 continue;
-            double length = field->curve[i]->length, r = fmax(0.4, sweep_field_mean(field, i, end ? length : 0));
+            double length = field->curve[i]->length, r = fmax(least, sweep_field_mean(field, i, end ? length : 0));
             SweepJet j = sweep_curve_at(field->curve[i], end ? length : 0);
-            Vec3 out = vec3_scale(vec3_unit(j.s1), end ? 1 : -1), near = vec3_add_scaled(j.s, 1.6 * r, out), far = vec3_add_scaled(j.s, 6.5 * r, out);
-            primitives_arrow(&scene->primitives, tag == SWEEP_TAG_IN ? far : near, tag == SWEEP_TAG_IN ? near : far, 0.45 * r,
+            Vec3 out = vec3_scale(vec3_unit(j.s1), end ? 1 : -1), near = vec3_add_scaled(j.s, 1.6 * r, out), far = vec3_add_scaled(j.s, 7.5 * r, out);
+            primitives_arrow(&scene->primitives, tag == SWEEP_TAG_IN ? far : near, tag == SWEEP_TAG_IN ? near : far, 0.35 * r,
                              tag == SWEEP_TAG_IN ? in_color : out_color);
         }
 }

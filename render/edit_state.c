@@ -27,7 +27,7 @@ static void follow(EditState *s, Vec3 low, Vec3 high)
 {
     const SweepField *field = sweep_editor_field(s->editor);
     if (!s->mesh || !edit_mesh_update(s->mesh, field, low, high)) {
-        EditMesh *mesh = edit_mesh_create(field);
+        EditMesh *mesh = edit_mesh_create(field, s->mesh, low, high);
         if (!mesh) {
             edit_state_say(s, true, "the surface cannot be drawn: out of memory");
             return;
@@ -193,6 +193,8 @@ void edit_state_drag(EditState *s, Vec3 nb)
     }
     s->is_moved = true;
     show_contour(s, false);
+    if (s->looks)
+        edit_state_say(s, false, "Enter keeps the contour, Esc drops it");
 }
 
 void edit_state_scale(EditState *s, double factor)
@@ -246,6 +248,8 @@ void edit_state_smooth(EditState *s, bool is_kept)
                       .shape = s->shape,
                       .amount = floor((double)s->strength * 100 + 0.5) / 100};
     apply(s, &edit, is_kept);
+    if (s->looks)
+        edit_state_say(s, false, "A keeps the smoothed wall, Esc drops it");
     if (!is_kept)
         sweep_edit_contour(model(s), s->branch, s->t, EDIT_CONTOUR, s->contour);
 }

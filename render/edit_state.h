@@ -5,7 +5,7 @@
 #include "recon/recon.h"
 #include "render/edit_mesh.h"
 
-enum { EDIT_CONTOUR = 48, EDIT_HANDLES = 16, EDIT_STROKE = 2000, EDIT_DRAWN = 64 };
+enum { EDIT_CONTOUR = 32, EDIT_HANDLES = 16, EDIT_STROKE = 2000, EDIT_DRAWN = 64 };
 
 typedef struct EditState {
     SweepEditor *editor;

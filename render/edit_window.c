@@ -188,6 +188,7 @@ static void mouse_down(EditWindow *w, const WindowInput *input, double x, double
     EditState *s = &w->state;
     w->held = is_in(w->scene_at, x, y) ? OVER_SCENE : is_in(w->section_at, x, y) ? OVER_SECTION : OVER_PANEL;
     w->travel = 0;
+    w->x = x, w->y = y;      // a way before the press is no drag
     if (w->held != OVER_SECTION || !(input->mouse_buttons & WINDOW_MOUSE_LEFT))
         return;
     w->draws_stroke = shift;

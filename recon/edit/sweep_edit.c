@@ -458,7 +458,8 @@ static SweepModel *edit_cut(const Work *w)
         }
         int left = leave_out(piece, m->branch_count, is_out);
         result = left > 0 ? branch_pieces_join(m, left, piece) : NULL;
-        *w->change = (EditChange){.branch = -1};
+        // the end's condition reaches along the whole curve, ever less
+        *w->change = (EditChange){.branch = w->edit->branch, .to = curve->length};
     }
     free(is_out);
     free(piece);

@@ -106,11 +106,22 @@ static void add_change(const SweepField *field, EditChange *c)
             add_tube(field, i, 0, fmin(field->curve[i]->length, field->fork[i].reach), c);
 }
 
+static bool descends(const SweepModel *m, int branch, int from)
+{
+    while (branch >= 0 && branch != from)
+        branch = m->branch[branch].parent;
+    return branch == from;
+}
+
 static void measure_change(const SweepField *before, const SweepField *after, EditChange *c)
 {
     c->low = vec3(HUGE_VAL, HUGE_VAL, HUGE_VAL), c->high = vec3(-HUGE_VAL, -HUGE_VAL, -HUGE_VAL);
     add_change(before, c);
     add_change(after, c);
+    // what was cut off
+    for (int i = 0; after->branch_count < before->branch_count && i < before->branch_count; i++)
+        if (descends(before->model, i, c->branch))
+            add_tube(before, i, 0, before->curve[i]->length, c);
 }
 
 // --- applying ---
