@@ -10,7 +10,10 @@ static const double KNOTS_APART = 0.85;      // [radii]
 // A fork's zone: from where the child's wall leaves the parent's lumen to where the two walls are apart, and this much further [child's and parent's radii].
 static const double ZONE_CHILD = 1.2, ZONE_PARENT = 0.5, ZONE_MOST = 12;
 static const double GRADE = 0.35;            // growth of the spacing away from a zone
-enum { SMOOTHINGS = 2 };
+enum { SMOOTHINGS = 2, RELAXATIONS = 60 };
+// A bend whose radius of curvature is less than the vessel's has places with two feet on the curve. A section may have any shape, so the curve need not be central:
+// it is relaxed to this curvature [1/radii], as long as no knot moves further than this [radii].
+static const double MOST_BEND = 0.75, FURTHEST = 0.5;
 
 typedef struct Zone {
     int branch;
@@ -109,12 +112,77 @@ static bool lay_knots(SweepDraft *d, int branch)
     return d->knot[branch] != NULL;
 }
 
+static int nearest_on_branch(const SweepDraft *d, int branch, Vec3 x)
+{
+    const VesselBranch *b = &d->branches->branch[branch];
+    int best = d->branches->node[b->first];
+    for (int k = 1; k < b->count; k++) {
+        int node = d->branches->node[b->first + k];
+        if (vec3_distance(d->tree->center[node], x) < vec3_distance(d->tree->center[best], x))
+            best = node;
+    }
+    return best;
+}
+
+// [1/mm] at the start of an interval.
+static double curvature_at(const SweepInterval *at)
+{
+    Vec3 bend = vec3_scale(at->s[2], 2);
+    double speed = vec3_norm(at->s[1]);
+    return vec3_norm(vec3_cross(at->s[1], bend)) / (speed * speed * speed);
+}
+
+// Moves knots where the curve bends too much towards the chord of their neighbours. Returns false if out of memory.
+static bool relax_bends(SweepDraft *d, int branch, const double *radius, Vec3 *first)
+{
+    static const double PART = 0.2;
+    int count = d->knot_count[branch];
+    Vec3 *knot = d->knot[branch];
+    memcpy(first, knot, (size_t)count * sizeof *first);
+    for (int pass = 0; pass < RELAXATIONS; pass++) {
+        SweepCurve *curve = sweep_curve_create(count, knot);
+        bool moved = false;
+        if (!curve)
+            return false;
+        for (int k = 1; k < count - 1; k++) {
+            double before = curve->knot_t[k] - curve->knot_t[k - 1], after = curve->knot_t[k + 1] - curve->knot_t[k];
+            if (curvature_at(&curve->interval[k + 1]) * radius[k] < MOST_BEND)
+                continue;
+            Vec3 chord = vec3_mix(curve->interval[k].s[0], curve->interval[k + 2].s[0], before / (before + after));
+            Vec3 to = vec3_mix(knot[k], chord, PART);
+            if (vec3_distance(to, first[k]) > FURTHEST * radius[k])
+                continue;
+            knot[k] = to;
+            moved = true;
+        }
+        sweep_curve_free(curve);
+        if (!moved)
+            break;
+    }
+    return true;
+}
+
+static bool relax_branch(SweepDraft *d, int branch)
+{
+    int count = d->knot_count[branch];
+    double *radius = malloc((size_t)count * sizeof *radius);
+    Vec3 *first = malloc((size_t)count * sizeof *first);
+    bool good = radius && first;
+    for (int k = 0; good && k < count; k++)
+        radius[k] = d->tree->radius[nearest_on_branch(d, branch, d->knot[branch][k])];
+    good = good && relax_bends(d, branch, radius, first);
+    free(radius);
+    free(first);
+    return good;
+}
+
 bool sweep_draft_curves(SweepDraft *d)
 {
     for (int i = 0; i < d->count; i++) {
         SEL_ASSERT(d->knot_count[i] >= 2, "a curve has two knots");
         sweep_curve_free(d->curve[i]);
-        if (!(d->curve[i] = sweep_curve_create(d->knot_count[i], d->knot[i])))
+        d->curve[i] = NULL;
+        if (!relax_branch(d, i) || !(d->curve[i] = sweep_curve_create(d->knot_count[i], d->knot[i])))
             return false;
         const VesselBranch *b = &d->branches->branch[i];
         double t = 0, length = d->curve[i]->length, whole = b->length;
