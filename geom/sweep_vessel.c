@@ -549,14 +549,18 @@ static int sweep_locate(const Vessel *vessel, Vec3 x, int from)
     }
     double t = fmax(0, fmin(v->field->curve[start.branch]->length, start.t)), radius = v->model->branch[start.branch].radius;
     walk_branch(&walk, start.branch, t, 2 * vec3_distance(x, sweep_curve_at(v->field->curve[start.branch], t).s) + 4 * radius, -1);
-    for (int i = 0; sac >= 0 && i < v->model->sac->node_count; i++) {
-        if (v->field->sac_group[i] != v->field->sac_group[sac] || v->model->sac->kind[i] != NODE_ANEURYSM)
-            continue;
-        double r = v->model->sac->radius[i], power = vec3_norm2(vec3_sub(x, v->model->sac->center[i])) - r * r;
-        if (power < walk.least)
-            walk.least = power, walk.best = v->model->sac_node[i];
+    if (sac < 0)
+        return walk.best;
+    // balls are too coarse where a vessel touches a sac: the fields decide
+    SweepPart inside;
+    SweepPlace place = v->place[walk.best];
+    double deepest = -HUGE_VAL;
+    if (place.branch >= 0) {
+        sweep_field_branch(v->field, place.branch, x, place.t, &inside);
+        deepest = inside.f;
     }
-    return walk.best;
+    sweep_field_sac(v->field, sac, x, &inside);
+    return inside.f > deepest ? v->model->sac_node[inside.sac] : walk.best;
 }
 
 static bool sweep_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
