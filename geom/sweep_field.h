@@ -15,7 +15,9 @@ typedef struct SweepSegment {
     double origin, rise, from, to;       // rise: w = rise (t - origin); 0: w = 0
     double section[SWEEP_TERMS][4];      // the terms' polynomials
     double largest;                      // [mm] upper bound of R on the segment
-    double unused[3];
+    double around;                       // [mm] the largest `largest` of the branch within its mean radius of the segment
+    double harmonics;                    // the highest harmonic whose terms are not 0
+    double unused;
 } __attribute__((aligned(64))) SweepSegment;
 
 enum { SWEEP_SEGMENT_ROW = sizeof(SweepSegment) / sizeof(double) };

@@ -11,10 +11,10 @@ static const double KNOTS_APART = 0.85;      // [radii]
 // A fork's zone: from where the child's wall leaves the parent's lumen to where the two walls are apart, and this much further [child's and parent's radii].
 static const double ZONE_CHILD = 1.2, ZONE_PARENT = 0.5, ZONE_MOST = 12;
 static const double GRADE = 0.35;            // growth of the spacing away from a zone
-enum { SMOOTHINGS = 2, RELAXATIONS = 30 };
+enum { SMOOTHINGS = 2, RELAXATIONS = 60 };
 // A bend whose radius of curvature is less than the vessel's has places with two feet on the curve. A section may have any shape, so the curve need not be central:
 // where it bends more than SHARP_BEND [1/radii], it is relaxed to less than MOST_BEND, as long as no knot moves further than this [radii].
-static const double SHARP_BEND = 1, MOST_BEND = 0.85, FURTHEST = 0.5, TIGHT = 1e3;
+static const double SHARP_BEND = 1.1, MOST_BEND = 0.85, FURTHEST = 0.5, TIGHT = 1e3;
 
 typedef struct Zone {
     int branch;
@@ -148,12 +148,12 @@ static bool loosen(Relaxation *r, const SweepCurve *curve, const Vec3 *knot)
     bool any = false;
     for (int k = 1; k < r->count - 1; k++) {
         // the wall on the inner side is nearer to a curve that has moved inwards
-        double moved = vec3_distance(knot[k], r->first[k]), bend = curvature_at(&curve->interval[k + 1]) * (r->radius[k] - moved);
-        if (bend < (r->hold[k] < TIGHT ? MOST_BEND : SHARP_BEND) || moved > FURTHEST * r->radius[k])
+        double moved = vec3_distance(knot[k], r->first[k]), bend = curvature_at(&curve->interval[k + 1]) * (r->radius[k] - 0.5 * moved);
+        if (r->hold[k] > TIGHT || bend < (r->hold[k] < TIGHT ? MOST_BEND : SHARP_BEND) || moved > FURTHEST * r->radius[k])
             continue;
         any = true;
         for (int i = k > 2 ? k - 2 : 1; i <= k + 2 && i < r->count - 1; i++)
-            r->hold[i] *= i == k ? BY : i == k - 1 || i == k + 1 ? 0.5 * (1 + BY) : 0.75 + 0.25 * BY;
+            r->hold[i] *= r->hold[i] > TIGHT ? 1 : i == k ? BY : i == k - 1 || i == k + 1 ? 0.5 * (1 + BY) : 0.75 + 0.25 * BY;
     }
     return any;
 }
@@ -209,10 +209,11 @@ static bool relax_branch(SweepDraft *d, int branch)
     bool good = r.radius && r.first;
     if (good)
         r.hold = r.radius + count, r.apart = r.hold + count;
+    size_t held = branch == 0 ? 2 : 1;       // the root's direction is that of the lumen upstream
     for (size_t k = 0; good && k < count; k++) {
         r.radius[k] = d->tree->radius[nearest_on_branch(d, branch, d->knot[branch][k])];
         r.first[k] = d->knot[branch][k];
-        r.hold[k] = k == 0 || k == count - 1 ? 1e3 * TIGHT : TIGHT;
+        r.hold[k] = k < held || k == count - 1 ? 1e3 * TIGHT : TIGHT;
         r.apart[k] = k > 0 ? vec3_distance(d->knot[branch][k], d->knot[branch][k - 1]) : 0;
     }
     good = good && relax_bends(&r, d->knot[branch]);
