@@ -10,12 +10,25 @@
 #include <stdlib.h>
 #include <string.h>
 
+// The branch whose own view the segment has.
+static int branch_of_segment(const SweepField *field, int segment)
+{
+    SEL_ASSERT(segment >= 0, "a branch that is alone has a segment");
+    const SweepView *view = &field->view[segment];
+    for (int k = 0; k < view->count; k++)
+        if (segment >= field->first_segment[view->of[k].branch] && segment < field->first_segment[view->of[k].branch + 1])
+            return view->of[k].branch;
+    return 0;
+}
+
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int i, int segment, int sac, double t)
 {
     SEL_ASSERT(segment >= 0 || sac >= 0, "a place lies on a branch or on a sac");
     const SweepField *field = feet->field;
     b->segment[i] = segment;
     b->view[i] = segment >= 0 ? &field->view[segment] : &field->sac[sac].view;
+    if (b->alone[i])
+        b->view[i] = &feet->alone[branch_of_segment(field, segment)];
     b->sac[i] = segment >= 0 ? b->view[i]->sac : sac;
     b->own_t[i] = t;
     b->own[i] = -1;
@@ -110,11 +123,16 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
     SweepPartLanes *p = &b->part[k];
     SweepLane own;
     bool any = false;
+    int harmonics = 1;
     for (int i = 0; i < FOOT_BLOCK; i++) {
         own[i] = b->own[i] == k && (lanes >> i & 1) ? 1 : 0;
         any |= own[i] > 0;
+        if (p->absent[i] == 0 && p->segment[i]->harmonics > harmonics)
+            harmonics = (int)p->segment[i]->harmonics;
     }
-    feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, feet->harmonics, any ? &b->ring : NULL, own);
+    if (any)
+        harmonics = b->harmonics = harmonics > b->harmonics ? harmonics : b->harmonics;
+    feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, harmonics, any ? &b->ring : NULL, own);
     if (feet->field->model->stretch_count > 0)
         apply_stretches(feet, b, k, lanes);
     for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -127,7 +145,7 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
 }
 
 // Blends the sacs of the lanes in.
-static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, unsigned sacs)
+static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, unsigned sacs, SweepPartLanes *sac)
 {
     SweepPartLanes p = {.f = {0}};
     SweepLane share;
@@ -149,6 +167,7 @@ static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, uns
     for (int i = 0; i < FOOT_BLOCK; i++)
         if ((sacs & lanes) >> i & 1 && share[i] > 0.5)
             b->owner[i] = -1;
+    *sac = p;
 }
 
 // Returns whether a part other than the own one may matter in a lane. Exact: see the head of the file.
@@ -165,6 +184,23 @@ static bool lanes_need(const SweepBlock *b, int k, unsigned lanes, const double 
             return true;
     }
     return false;
+}
+
+// How far the foot of a pure lane may move until another part can matter. With its motion m, that part's distance falls by no more than m; the rest of the
+// factor is for what `most` and the own field change.
+static double lane_apart(const SweepFeet *feet, const SweepBlock *b, int i, double most, const SweepPartLanes *sac)
+{
+    static const double FACTOR = 3;
+    double least = 0.25 * b->foot.radius[i] * FACTOR;
+    for (int k = 0; k < b->view[i]->count; k++) {
+        const SweepPartLanes *p = &b->part[k];
+        const SweepSegment *s = p->segment[i];
+        if (k != b->own[i])
+            least = fmin(least, 0.998 * same_hypot(p->away[i], s->rise * (p->t[i] - s->origin)) - s->around - most);
+    }
+    if (b->sac[i] >= 0)
+        least = fmin(least, sac ? -sac->f[i] - 2 * feet->field->sac[b->sac[i]].delta - most : 0);
+    return fmax(0, least / FACTOR);
 }
 
 static void clear_sum(FootSample *s)
@@ -185,10 +221,9 @@ static void copy_part(FootSample *s, const SweepPartLanes *p)
 }
 
 // The own parts of all lanes first, whose fields show which other parts matter.
-static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, unsigned lanes)
+static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, unsigned lanes, double *most)
 {
     unsigned own = 0, evaluated = 0;
-    SweepLane most;
     for (int i = 0; i < FOOT_BLOCK; i++)
         if (lanes >> i & 1 && b->own[i] >= 0)
             own |= 1u << b->own[i];
@@ -217,7 +252,8 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
 {
     int parts = 0;
     unsigned sacs = 0;
-    SweepLane share;
+    SweepLane share, most;
+    SweepPartLanes sac;
     SEL_ASSERT(lanes != 0, "a sample has lanes");
     // the own branch first: its segment determines what is seen
     SweepPartLanes first;
@@ -253,12 +289,12 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
         if (parts > 1)
             feet->kernels->width(&b->part[k]);
     }
-    unsigned evaluated = evaluate_parts(feet, b, parts, lanes);
+    unsigned evaluated = evaluate_parts(feet, b, parts, lanes, most);
     if (parts == 1 && sacs == 0) {
         copy_part(&b->foot.at, &b->part[0]);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if (lanes >> i & 1)
-                b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true;
+                b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true, b->apart[i] = 0;
         return;
     }
     clear_sum(&b->foot.at);
@@ -271,11 +307,12 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
                 b->owner[i] = k;
     }
     if (sacs != 0)
-        blend_sacs(feet, b, lanes, sacs);
+        blend_sacs(feet, b, lanes, sacs, &sac);
     for (int i = 0; i < FOOT_BLOCK; i++)
         if (lanes >> i & 1) {
             b->keeps_t[i] = true;
             b->pure[i] = b->owner[i] >= 0 && b->foot.at.f[i] == b->part[b->owner[i]].f[i];
+            b->apart[i] = b->pure[i] && b->owner[i] == b->own[i] ? lane_apart(feet, b, i, most[i] - b->foot.at.f[i], sacs != 0 ? &sac : NULL) : 0;
         }
 }
 
@@ -348,9 +385,11 @@ static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, con
 {
     FootBatch *f = &b->foot;
     memset(&b->ring, 0, sizeof b->ring);
+    b->harmonics = 1;
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int from = i < count ? i : 0;
         const SweepStart *s = &start[from];
+        b->alone[i] = false;
         sweep_block_place(feet, b, i, s->segment, s->sac, s->t);
         sweep_block_set_point(feet, b, i, x[from]);
         f->at.x[i] = s->at.x, f->at.y[i] = s->at.y, f->at.z[i] = s->at.z;
@@ -563,6 +602,16 @@ static void least_around(const Rings *r, double least[RINGS][SWEEP_RING])
     }
 }
 
+// How much shorter the wall is than the curve on x's side of a bend: there, the walls near x lie further away along the curve.
+static double inner_share(const SweepSegment *s, double t, Vec3 x)
+{
+    static const double LEAST = 0.4;
+    double at = t - s->origin;
+    Vec3 s1 = curve_slope(s->s, at), out = vec3_unit_or(vec3_sub(x, curve_part(s->s, at)), vec3(0, 0, 0)),
+         bend = vec3_add_scaled(vec3_scale(s->s[2], 2), 6 * at, s->s[3]);
+    return fmax(LEAST, fmin(1, 1 - s->largest * vec3_dot(out, bend) / vec3_norm2(s1)));
+}
+
 static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, const SweepSearch *search, SweepStart *start, int *count)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
@@ -570,9 +619,9 @@ static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which
     double least[RINGS][SWEEP_RING], limit2 = search->limit * search->limit, own2 = search->own * search->own, zone2 = search->zone * search->zone;
     const SweepSegment *near = &feet->field->segment[seen->segment[which]];
     double half_angle = 0.2 * near->largest, half_step = 0.5 * ASIDE * reach, slack2 = half_angle * half_angle + half_step * half_step;
-    double beyond2 = search->beyond * search->beyond;
+    double beyond2 = search->beyond * search->beyond, apart = ASIDE * reach / inner_share(near, seen->t[which], x);
     for (int i = 0; i < RINGS; i++)
-        fill_ring(feet, x, near, seen->t[which] + ASIDE * (i - RINGS / 2) * reach, &rings, i);
+        fill_ring(feet, x, near, seen->t[which] + (i - RINGS / 2) * apart, &rings, i);
     for (int i = 0; i < seen->count; i++)
         if (i != which)
             drop_inner(feet, &rings, limit2, &seen->near[i], -1);

@@ -17,6 +17,7 @@ typedef struct SweepFeet {
     const SweepKernels *kernels;
     int harmonics;           // highest harmonic that any row uses
     SweepSacPoints sacs;
+    SweepView *alone;        // (branches) views of one branch only
 } SweepFeet;
 
 // Returns false if out of memory; sweep_sac_points_free must be called in either case.
@@ -35,14 +36,18 @@ typedef struct SweepBlock {
     int owner[FOOT_BLOCK];               // after a sample: index of the part of largest share in the view; -1: the sac
     bool pure[FOOT_BLOCK];               // after a sample: the owner alone, nothing is blended
     bool keeps_t[FOOT_BLOCK];            // the parts' t are near the feet; else they start from the view
+    bool alone[FOOT_BLOCK];              // the own branch is evaluated alone, whatever is seen
+    double apart[FOOT_BLOCK];            // after a sample of a pure lane: see VesselSweepMemory
     SweepLane own_t;                     // t on the own branch
     SweepLane is_flat;                   // 1: the ring holds (the own segment is no dome)
     SweepPartLanes part[SWEEP_PARTS];
     SweepRingLanes ring;
+    int harmonics;                       // highest harmonic of the ring so far
     SweepLane ring_x, ring_y, ring_z;    // the foot that the ring belongs to
 } SweepBlock;
 
 // Sets a lane's place; the parts' t are found from it.
+// With b->alone[lane] set before, of the branch alone.
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int lane, int segment, int sac, double t);
 enum { FOOT_ALL = (1 << FOOT_BLOCK) - 1 };
 // F, gradient and Hessian at the feet of the lanes in `lanes` (bits). The first sample of a block is one of FOOT_ALL; lanes that are left out later keep their

@@ -12,7 +12,8 @@ typedef struct SweepSegment {
     double section[SWEEP_TERMS][4];      // the terms' polynomials
     double largest;                      // [mm] upper bound of R on the segment
     double is_shaped;                    // 1: sections of another kind reach into the segment (sweep_stretch.h)
-    double unused[2];
+    double around;                       // [mm] the largest `largest` of the branch within its mean radius of the segment
+    double harmonics;                    // the highest harmonic whose terms are not 0
 } __attribute__((aligned(64))) SweepSegment;
 
 enum { SWEEP_SEGMENT_ROW = sizeof(SweepSegment) / sizeof(double) };

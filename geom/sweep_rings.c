@@ -107,6 +107,7 @@ Vec3 mesh_plane_blended(const SweepFeet *feet, const MeshPlane *plane, Vec3 x)
 
 void mesh_set_place(const SweepFeet *feet, SweepBlock *b, int lane, const SweepPlace *place)
 {
+    b->alone[lane] = false, b->harmonics = 1;
     if (place->branch >= 0)
         sweep_block_place(feet, b, lane, sweep_field_segment(feet->field, place->branch, place->t), -1, place->t);
     else

@@ -215,6 +215,24 @@ static void fill_forks(SweepField *field)
     }
 }
 
+static void fill_around(SweepField *field, int branch)
+{
+    double near = field->model->branch[branch].radius;
+    int first = field->first_segment[branch], end = field->first_segment[branch + 1];
+    for (int i = first; i < end; i++) {
+        SweepSegment *s = &field->segment[i];
+        s->around = s->largest;
+        s->harmonics = 1;
+        for (int k = 3; k < SWEEP_TERMS; k++)
+            for (int power = 0; power < 4; power++)
+                s->harmonics = s->section[k][power] != 0 ? (k + 1) / 2 : s->harmonics;
+        for (int k = i - 1; k >= first && field->segment[k].to >= s->from - near; k--)
+            s->around = fmax(s->around, field->segment[k].largest);
+        for (int k = i + 1; k < end && field->segment[k].from <= s->to + near; k++)
+            s->around = fmax(s->around, field->segment[k].largest);
+    }
+}
+
 SweepField *sweep_field_create(const SweepModel *model)
 {
     SweepField *field = calloc(1, sizeof *field);
@@ -255,6 +273,8 @@ SweepField *sweep_field_create(const SweepModel *model)
     }
     for (int i = 0; i < model->branch_count; i++)
         fill_branch(field, i);
+    for (int i = 0; i < model->branch_count; i++)
+        fill_around(field, i);
     fill_forks(field);
     sweep_field_fill_views(field);
     return field;

@@ -101,7 +101,7 @@ static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMe
     m->foot = foot->at, m->place = x, m->normal = foot->normal, m->hessian = foot->hessian;
     m->clearance = foot->sure && foot->gap > 0 ? 0.999 * foot->gap : 0;
     m->clear_place = x;
-    m->sweep.segment = foot->segment, m->sweep.sac = foot->sac, m->sweep.own_t = foot->t, m->sweep.is_known = 0;
+    m->sweep.segment = foot->segment, m->sweep.sac = foot->sac, m->sweep.own_t = foot->t, m->sweep.is_known = 0, m->sweep.apart = 0;
     set_flags(v, x, foot, hit);
 }
 
@@ -305,10 +305,11 @@ static bool answer_cheaply(const SweepVessel *v, Vec3 x, double reach, VesselMem
 
 // --- Feet that are followed ---
 
-static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const VesselMemory *m)
+static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const VesselMemory *m, bool alone)
 {
     FootBatch *f = &b->foot;
     SEL_ASSERT(m->has_foot && m->sweep.segment < v->field->first_segment[v->model->branch_count], "a foot that is followed lies on the model");
+    b->alone[i] = alone;
     sweep_block_place(&v->feet, b, i, m->sweep.segment, m->sweep.sac, m->sweep.own_t);
     sweep_block_set_point(&v->feet, b, i, x);
     f->at.x[i] = m->foot.x, f->at.y[i] = m->foot.y, f->at.z[i] = m->foot.z;
@@ -317,7 +318,7 @@ static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const 
     f->axx[i] = m->hessian.xx, f->axy[i] = m->hessian.xy, f->axz[i] = m->hessian.xz;
     f->ayy[i] = m->hessian.yy, f->ayz[i] = m->hessian.yz, f->azz[i] = m->hessian.zz;
     f->unique[i] = 0;
-    b->keeps_t[i] = m->sweep.is_known != 0;
+    b->keeps_t[i] = m->sweep.is_known != 0 && !alone;
     for (int k = 0; b->keeps_t[i] && k < b->view[i]->count; k++)
         b->part[k].t[i] = m->sweep.t[k];
 }
@@ -325,7 +326,14 @@ static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const 
 static void store_lane(const SweepVessel *v, const SweepBlock *b, int i, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     SweepFoot foot = sweep_block_foot(&v->feet, b, i);
+    double moved = vec3_distance(foot.at, m->foot), apart = b->alone[i] ? m->sweep.apart - moved : b->apart[i];
+    bool known = m->sweep.is_known && m->sweep.segment == foot.segment;
     answer(v, x, &foot, m, hit);
+    m->sweep.apart = fmax(0, apart);
+    if (b->alone[i]) {       // t of the others are those of the last full evaluation
+        m->sweep.is_known = known;
+        return;
+    }
     bool same = b->owner[i] == b->own[i] && foot.segment == b->segment[i];
     m->sweep.is_known = same;
     for (int k = 0; same && k < b->view[i]->count; k++)
@@ -341,7 +349,7 @@ typedef struct Batch {
     const Vec3 *point;
     VesselMemory *memory;
     VesselHit *hit;
-    Queue alone, among;      // feet that are followed: those that see one branch, and those that see several
+    Queue alone, among;      // feet that are followed: those that see one branch, or near which no other matters; and the rest
     Queue sought;            // feet that are not reached by one or two steps: careful steps from where they were
     Queue beside;            // feet whose rivals are followed, too
     int checks;              // feet that may not be the nearest
@@ -362,36 +370,54 @@ static void put_check(const SweepVessel *v, Batch *batch, int point, const Sweep
     begin_check(v, batch->point[point], check);
 }
 
-static void follow_block(const SweepVessel *v, Batch *batch, const int *which, int count)
+// Returns whether the memory's foot lies where one branch is seen and nothing else.
+static bool is_single(const SweepVessel *v, const VesselMemory *m)
 {
-    enum { ROUNDS = 2 };
+    return m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0;
+}
+
+static void follow_block(const SweepVessel *v, Batch *batch, const int *which, int count, bool alone)
+{
+    enum { ROUNDS = 3, USUAL = 2 };
     static const double NEARER = 1e-6;       // [mm]
     SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "a block has a point, and no more than lanes");
     SweepBlock b;
     FootBatch *f = &b.foot;
     unsigned all = (1u << count) - 1, done = 0;
     memset(&b.ring, 0, sizeof b.ring);
+    b.harmonics = 1;
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int p = which[i < count ? i : 0];
-        load_lane(v, &b, i, batch->point[p], &batch->memory[p]);
+        load_lane(v, &b, i, batch->point[p], &batch->memory[p], alone);
     }
     v->feet.kernels->predict(f, REST);
+    Vec3 first[FOOT_BLOCK];
+    for (int i = 0; i < FOOT_BLOCK; i++)
+        first[i] = vec3(f->at.x[i], f->at.y[i], f->at.z[i]);
+    unsigned usual = 0;
     for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
         sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
         done = v->feet.kernels->newton(f, false);
+        usual = round < USUAL ? done : usual;
     }
     v->feet.kernels->finish(f);
-    v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, v->feet.harmonics);
+    v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, b.harmonics);
     for (int i = 0; i < count; i++) {
         int p = which[i];
         VesselMemory *m = &batch->memory[p];
+        Vec3 last = vec3(f->at.x[i], f->at.y[i], f->at.z[i]);
+        if (b.alone[i] && !is_single(v, m) && !(vec3_distance(first[i], m->foot) + vec3_distance(first[i], last) < m->sweep.apart)) {
+            put(&batch->among, p);
+            continue;
+        }
         if (!(done >> i & 1)) {
             put(&batch->sought, p);
             continue;
         }
         double size = fabs(f->gap[i]) - NEARER, travel = m->trust;
         bool nearer = b.own[i] >= 0 && b.is_flat[i] > 0 && size > 0 && b.ring.near2[i] < size * size;
-        if ((nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(batch->point[p], m->bound_at)) < travel * travel)) {
+        // a foot that moved further than was predicted may have a rival
+        if (!(usual >> i & 1) || (nearer && !m->sweep.open) || !(vec3_norm2(vec3_sub(batch->point[p], m->bound_at)) < travel * travel)) {
             SweepFoot foot = sweep_block_foot(&v->feet, &b, i);
             put_check(v, batch, p, &foot, nearer);
             continue;
@@ -455,6 +481,9 @@ static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, 
     }
 }
 
+static void follow_alone(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, true); }
+static void follow_among(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, false); }
+
 static void in_blocks(const SweepVessel *v, Batch *batch, const Queue *queue, void (*treat)(const SweepVessel *v, Batch *batch, const int *which, int count))
 {
     for (int i = 0; i < queue->count; i += FOOT_BLOCK)
@@ -474,13 +503,13 @@ static void query_batch(const SweepVessel *v, int count, const Vec3 *point, doub
         double far = m->has_foot ? FOLLOWED * sweep_place_radius(&v->feet, m->sweep.segment, m->sweep.sac) : 0;
         if (!(vec3_norm2(vec3_sub(point[i], m->place)) < far * far))
             answer_afresh(v, point[i], m, &hit[i]);
-        else if (m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0)
+        else if (is_single(v, m) || m->sweep.apart > vec3_distance(point[i], m->place))
             put(&batch.alone, i);
         else
             put(&batch.among, i);
     }
-    in_blocks(v, &batch, &batch.alone, follow_block);
-    in_blocks(v, &batch, &batch.among, follow_block);
+    in_blocks(v, &batch, &batch.alone, follow_alone);
+    in_blocks(v, &batch, &batch.among, follow_among);
     in_blocks(v, &batch, &batch.sought, seek_block);
     in_blocks(v, &batch, &batch.beside, follow_rivals);
     run_checks(v, point, batch.check, batch.checks);
@@ -549,14 +578,18 @@ static int sweep_locate(const Vessel *vessel, Vec3 x, int from)
     }
     double t = fmax(0, fmin(v->field->curve[start.branch]->length, start.t)), radius = v->model->branch[start.branch].radius;
     walk_branch(&walk, start.branch, t, 2 * vec3_distance(x, sweep_curve_at(v->field->curve[start.branch], t).s) + 4 * radius, -1);
-    for (int i = 0; sac >= 0 && i < v->model->sac->node_count; i++) {
-        if (v->field->sac_group[i] != v->field->sac_group[sac] || v->model->sac->kind[i] != NODE_ANEURYSM)
-            continue;
-        double r = v->model->sac->radius[i], power = vec3_norm2(vec3_sub(x, v->model->sac->center[i])) - r * r;
-        if (power < walk.least)
-            walk.least = power, walk.best = v->model->sac_node[i];
+    if (sac < 0)
+        return walk.best;
+    // balls are too coarse where a vessel touches a sac: the fields decide
+    SweepPart inside;
+    SweepPlace place = v->place[walk.best];
+    double deepest = -HUGE_VAL;
+    if (place.branch >= 0) {
+        sweep_field_branch(v->field, place.branch, x, place.t, &inside);
+        deepest = inside.f;
     }
-    return walk.best;
+    sweep_field_sac(v->field, sac, x, &inside);
+    return inside.f > deepest ? v->model->sac_node[inside.sac] : walk.best;
 }
 
 static bool sweep_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
@@ -581,6 +614,7 @@ static void sweep_destroy(Vessel *vessel)
     free(v->nodes);
     free(v->first_child);
     free(v->next_child);
+    free(v->feet.alone);
     free(v);
 }
 
@@ -653,6 +687,13 @@ Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
         return NULL;
     }
     v->feet = (SweepFeet){.field = v->field, .kernels = sweep_kernels(isa), .harmonics = sweep_model_harmonics(model)};
+    v->feet.alone = calloc((size_t)model->branch_count, sizeof *v->feet.alone);
+    if (!v->feet.alone) {
+        sweep_destroy(&v->vessel);
+        return NULL;
+    }
+    for (int i = 0; i < model->branch_count; i++)
+        v->feet.alone[i] = (SweepView){.count = 1, .sac = -1, .of[0] = {i, 0, 1}};
     fill_places(v);
     if (!power_blocks_create(&v->blocks, v->knots) || !sweep_sac_points_create(v->field, &v->feet.sacs)) {
         sweep_destroy(&v->vessel);

@@ -179,17 +179,27 @@ static SweepPlace place_of(const SweepField *field, int node)
     return place;
 }
 
-// Returns whether a blob of the sac reaches the tube at t.
-static bool is_reached(const SweepField *field, int group, const int *group_of_node, int branch, double t)
+// Returns whether the sac's wall, enlarged by the width of the blend, reaches the tube's at t. Blobs reach much further than the wall that they make: by them, a
+// vessel that leaves the neck and passes the sac's flank would blend with it there.
+static bool is_reached(const SweepField *field, int group, int branch, double t)
 {
-    const VesselTree *sac = field->model->sac;
-    Vec3 x = sweep_curve_at(field->curve[branch], t).s;
-    double largest = sweep_field_largest(field, branch, t);
-    for (int i = 0; i < sac->node_count; i++)
-        for (int64_t k = sac->blob_offset[i]; group_of_node[i] == group && k < sac->blob_offset[i + 1]; k++)
-            if (vec3_distance(x, sac->blob_center[k]) < sac->blob_width[k] + largest)
-                return true;
-    return false;
+    enum { AROUND = 16 };
+    const SweepSac *sac = &field->sac[group];
+    const SweepSegment *s = &field->segment[sweep_field_segment(field, branch, t)];
+    SweepJet jet = sweep_curve_at(field->curve[branch], t);
+    double radius[SWEEP_TERMS], x = t - s->origin, near = -(2 * sac->delta + MARGIN * fmin(sac->scale, field->model->branch[branch].radius));
+    SweepPart part;
+    for (int k = 0; k < SWEEP_TERMS; k++)
+        radius[k] = s->section[k][0] + x * (s->section[k][1] + x * (s->section[k][2] + x * s->section[k][3]));
+    sweep_field_sac(field, group, jet.s, &part);
+    for (int i = 0; i < AROUND && !(part.f > near); i++) {
+        double angle = 2 * PI * i / AROUND, r = radius[0];
+        for (int k = 1; k <= SWEEP_HARMONICS; k++)
+            r += radius[2 * k - 1] * same_cos(k * angle) + radius[2 * k] * same_sin(k * angle);
+        Vec3 out = vec3_add(vec3_scale(jet.n, same_cos(angle)), vec3_scale(jet.b, same_sin(angle)));
+        sweep_field_sac(field, group, vec3_add_scaled(jet.s, r, out), &part);
+    }
+    return part.f > near;
 }
 
 static void mark_sac(SweepField *field, int group, const int *group_of_node, int branch, double start)
@@ -198,7 +208,7 @@ static void mark_sac(SweepField *field, int group, const int *group_of_node, int
     const VesselTree *sac = field->model->sac;
     double step = fmax(STEP * field->model->branch[branch].radius, LEAST_STEP * curve->length);
     for (int side = -1; side <= 1; side += 2)
-        for (double t = fmax(0, fmin(curve->length, start)); is_reached(field, group, group_of_node, branch, t);) {
+        for (double t = fmax(0, fmin(curve->length, start)); is_reached(field, group, branch, t);) {
             int from = sweep_field_segment(field, branch, t - step), to = sweep_field_segment(field, branch, t + step);
             for (int s = from; s <= to; s++) {
                 SweepView *view = &field->view[s];
@@ -234,10 +244,12 @@ static void fill_sac(SweepField *field, int group, const int *group_of_node)
     }
     largest = largest > 0 ? largest : vessel / vessels;
     double width = field->model->blend * 0.5 * (vessels > 0 ? fmin(largest, vessel / vessels) : largest);
+    for (int i = 0; i < sac->node_count; i++)
+        if (group_of_node[i] == group)
+            field->sac[i].scale = 0.5 * largest, field->sac[i].delta = width;
     for (int i = 0; i < sac->node_count; i++) {
         if (group_of_node[i] != group)
             continue;
-        field->sac[i].scale = 0.5 * largest, field->sac[i].delta = width;
         // a sac without vessel nodes hangs on the branch nearest to its first node
         if (sac->kind[i] != NODE_VESSEL && (vessels > 0 || places > 0))
             continue;

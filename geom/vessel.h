@@ -24,6 +24,7 @@ typedef struct VesselSweepMemory {
     int32_t rival_segment, rival_sac;
     int32_t is_known;        // 0: t are not set
     int32_t open;            // 1: points of the rings are nearer than the foot, but are no wall
+    double apart;            // [mm] way of the foot within which only its own branch matters; 0: unknown
 } VesselSweepMemory;
 
 // What is stored for a tool point between steps. The closest point on the wall is called the foot.

@@ -1,6 +1,7 @@
 // Curves, breaks and wall points of the swept model's fit. See sweep_draft.h.
 #include "recon/fit/sweep_draft.h"
 
+#include "recon/fit/band_matrix.h"
 #include "recon/fit/sweep_spline.h"
 
 #include <stdlib.h>
@@ -10,7 +11,10 @@ static const double KNOTS_APART = 0.85;      // [radii]
 // A fork's zone: from where the child's wall leaves the parent's lumen to where the two walls are apart, and this much further [child's and parent's radii].
 static const double ZONE_CHILD = 1.2, ZONE_PARENT = 0.5, ZONE_MOST = 12;
 static const double GRADE = 0.35;            // growth of the spacing away from a zone
-enum { SMOOTHINGS = 2 };
+enum { SMOOTHINGS = 2, RELAXATIONS = 60 };
+// A bend whose radius of curvature is less than the vessel's has places with two feet on the curve. A section may have any shape, so the curve need not be central:
+// where it bends more than SHARP_BEND [1/radii], it is relaxed to less than MOST_BEND, as long as no knot moves further than this [radii].
+static const double SHARP_BEND = 1.1, MOST_BEND = 0.85, FURTHEST = 0.5, TIGHT = 1e3;
 
 typedef struct Zone {
     int branch;
@@ -107,6 +111,123 @@ static bool lay_knots(SweepDraft *d, int branch)
     free(center);
     free(radius);
     return d->knot[branch] != NULL;
+}
+
+static int nearest_on_branch(const SweepDraft *d, int branch, Vec3 x)
+{
+    const VesselBranch *b = &d->branches->branch[branch];
+    int best = d->branches->node[b->first];
+    for (int k = 1; k < b->count; k++) {
+        int node = d->branches->node[b->first + k];
+        if (vec3_distance(d->tree->center[node], x) < vec3_distance(d->tree->center[best], x))
+            best = node;
+    }
+    return best;
+}
+
+// [1/mm] at the start of an interval.
+static double curvature_at(const SweepInterval *at)
+{
+    Vec3 bend = vec3_scale(at->s[2], 2);
+    double speed = vec3_norm(at->s[1]);
+    return vec3_norm(vec3_cross(at->s[1], bend)) / (speed * speed * speed);
+}
+
+// Knots near which the curve bends too much are moved to the minimum of sum w_k |x_k - x_k0|^2 / r_k^2 + sum |turn of the chords at k|^2; where a bend remains
+// sharp, w is reduced.
+typedef struct Relaxation {
+    int count;
+    double *radius, *hold, *apart;   // (knots) w; [mm] from the knot before
+    Vec3 *first;             // (knots) x_0
+} Relaxation;
+
+// Returns whether a bend is sharp and can still give way.
+static bool loosen(Relaxation *r, const SweepCurve *curve, const Vec3 *knot)
+{
+    static const double BY = 0.5;
+    bool any = false;
+    for (int k = 1; k < r->count - 1; k++) {
+        // the wall on the inner side is nearer to a curve that has moved inwards
+        double moved = vec3_distance(knot[k], r->first[k]), bend = curvature_at(&curve->interval[k + 1]) * (r->radius[k] - 0.5 * moved);
+        if (r->hold[k] > TIGHT || bend < (r->hold[k] < TIGHT ? MOST_BEND : SHARP_BEND) || moved > FURTHEST * r->radius[k])
+            continue;
+        any = true;
+        for (int i = k > 2 ? k - 2 : 1; i <= k + 2 && i < r->count - 1; i++)
+            r->hold[i] *= r->hold[i] > TIGHT ? 1 : i == k ? BY : i == k - 1 || i == k + 1 ? 0.5 * (1 + BY) : 0.75 + 0.25 * BY;
+    }
+    return any;
+}
+
+// Returns false if out of memory.
+static bool settle(const Relaxation *r, Vec3 *knot)
+{
+    enum { W = 2 };
+    int n = r->count;
+    double *band = calloc((size_t)n * (W + 1), sizeof *band), *x = malloc((size_t)n * sizeof *x);
+    bool good = band && x;
+    for (int k = 0; good && k < n; k++)
+        band[k * (W + 1)] = r->hold[k] / same_square(r->radius[k]);
+    for (int k = 1; good && k < n - 1; k++) {
+        double c[3] = {1 / r->apart[k], -1 / r->apart[k] - 1 / r->apart[k + 1], 1 / r->apart[k + 1]};
+        for (int i = 0; i < 3; i++)
+            for (int j = i; j < 3; j++)
+                band[(k - 1 + i) * (W + 1) + j - i] += c[i] * c[j];
+    }
+    good = good && band_factor(band, n, W);
+    for (int axis = 0; good && axis < 3; axis++) {
+        for (int k = 0; k < n; k++)
+            x[k] = r->hold[k] / same_square(r->radius[k]) * (axis == 0 ? r->first[k].x : axis == 1 ? r->first[k].y : r->first[k].z);
+        band_solve(band, n, W, x);
+        for (int k = 1; k < n - 1; k++)
+            *(axis == 0 ? &knot[k].x : axis == 1 ? &knot[k].y : &knot[k].z) = x[k];
+    }
+    free(band);
+    free(x);
+    return good;
+}
+
+static bool relax_bends(Relaxation *r, Vec3 *knot)
+{
+    for (int pass = 0; pass < RELAXATIONS; pass++) {
+        SweepCurve *curve = sweep_curve_create(r->count, knot);
+        if (!curve)
+            return false;
+        bool any = loosen(r, curve, knot);
+        sweep_curve_free(curve);
+        if (!any)
+            break;
+        if (!settle(r, knot))
+            return false;
+    }
+    return true;
+}
+
+static bool relax_branch(SweepDraft *d, int branch)
+{
+    size_t count = (size_t)d->knot_count[branch];
+    Relaxation r = {(int)count, malloc(3 * count * sizeof *r.radius), NULL, NULL, malloc(count * sizeof *r.first)};
+    bool good = r.radius && r.first;
+    if (good)
+        r.hold = r.radius + count, r.apart = r.hold + count;
+    size_t held = branch == 0 ? 2 : 1;       // the root's direction is that of the lumen upstream
+    for (size_t k = 0; good && k < count; k++) {
+        r.radius[k] = d->tree->radius[nearest_on_branch(d, branch, d->knot[branch][k])];
+        r.first[k] = d->knot[branch][k];
+        r.hold[k] = k < held || k == count - 1 ? 1e3 * TIGHT : TIGHT;
+        r.apart[k] = k > 0 ? vec3_distance(d->knot[branch][k], d->knot[branch][k - 1]) : 0;
+    }
+    good = good && relax_bends(&r, d->knot[branch]);
+    free(r.radius);
+    free(r.first);
+    return good;
+}
+
+bool sweep_draft_relax(SweepDraft *d)
+{
+    bool good = true;
+    for (int i = 0; i < d->count && good; i++)
+        good = relax_branch(d, i);
+    return good;
 }
 
 bool sweep_draft_curves(SweepDraft *d)

@@ -39,6 +39,8 @@ typedef struct SweepDraft {
 // Lays the curves of all branches through the smoothed and thinned centres. Returns false if out of memory.
 bool sweep_draft_create(SweepDraft *draft, const VesselTree *tree, const SweepFitOptions *options);
 void sweep_draft_free(SweepDraft *draft);
+// Moves knots so that no bend is sharper than the vessel is wide, as far as it can be done. Returns false if out of memory.
+bool sweep_draft_relax(SweepDraft *draft);
 // Makes curves anew after knots have moved, and places nodes on them.
 bool sweep_draft_curves(SweepDraft *draft);
 // Divides the curves into intervals, `spacing` [radii] on tubes and the option's at forks, and makes an empty model.

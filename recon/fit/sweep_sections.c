@@ -182,7 +182,8 @@ bool sweep_sections_lay_curves(SweepDraft *d, SweepSystem *system)
             centre_knots(d, system, i, k == 0);
             space_knots(d, i);
         }
-        good = good && sweep_draft_curves(d);
+        // once the curves are laid: centring would undo it
+        good = good && (k + 1 < CENTRINGS || sweep_draft_relax(d)) && sweep_draft_curves(d);
     }
     return good;
 }
