@@ -10,14 +10,8 @@
 #define SELDINGER_GEOM_SWEEP_MESH_H
 
 #include "geom/isosurface.h"
-#include "geom/sweep_field.h"
+#include "geom/sweep_mesh_options.h"
 
-typedef struct SweepMeshOptions {
-    int around;              // edges around a section, 6 … 256, default 24: edges are about a quarter of the local radius
-    double edge_mm;          // > 0: length of all edges instead (at least 6 around a section); default 0
-    bool flat_ends;          // branches end flat at their last section instead of with a dome; default false
-    int isa;                 // as LimVesselOptions.isa; default 0
-} SweepMeshOptions;
 SweepMeshOptions sweep_mesh_default_options(void);
 
 typedef struct SweepMesh {
@@ -43,7 +37,4 @@ bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field);
 void sweep_mesh_free(SweepMesh *mesh);
 // The surface alone. `options` may be NULL. Returns NULL as above, or if out of memory.
 TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options);
-// Whether the sections of a segment may carry rings: each ray from the curve meets the contour once.
-bool sweep_mesh_carries_rings(const SweepField *field, int segment);
-
 #endif

@@ -3,7 +3,7 @@
 #define SELDINGER_GEOM_SWEEP_MESH_PARTS_H
 
 #include "geom/sweep_feet.h"
-#include "geom/sweep_mesh.h"
+#include "geom/sweep_mesh_options.h"
 
 typedef enum {
     RING_SECTION,            // at t on the branch

@@ -216,6 +216,7 @@ static void finish_ring(const SweepMeshParts *parts, int branch, MeshRings *ring
             if (s->rise == 0)
                 p->segment[i] = s;
             p->t[i] = there, p->absent[i] = 0;
+            b.alone[i] = false, b.harmonics = 1;
             if (!alone)
                 sweep_block_place(&parts->feet, &b, i, (int)(p->segment[i] - field->segment), -1, there);
         }

@@ -2,7 +2,6 @@
 // int R^4/4 (cos, sin)(cos, sin)'. The ellipse (x - centre)' M^-1 (x - centre) <= 4 has the same centre and moments; it is scaled to the area.
 #include "recon/edit/contour_terms.h"
 
-#include "recon/edit/sweep_edit.h"
 #include "recon/fit/band_matrix.h"
 
 #include <stdlib.h>
@@ -26,7 +25,7 @@ double terms_radius(const double term[SWEEP_TERMS], double theta)
     return sum;
 }
 
-double sweep_terms_area(const double term[SWEEP_TERMS])
+double terms_area(const double term[SWEEP_TERMS])
 {
     double sum = term[0] * term[0];
     for (int k = 1; k < SWEEP_TERMS; k++)
@@ -174,7 +173,7 @@ static bool ellipse_terms(const double term[SWEEP_TERMS], double ellipse[SWEEP_T
 
 void terms_smooth(double term[SWEEP_TERMS], bool ellipse, double strength)
 {
-    double target[SWEEP_TERMS] = {term[0]}, area = sweep_terms_area(term), waves = 0;
+    double target[SWEEP_TERMS] = {term[0]}, area = terms_area(term), waves = 0;
     SEL_ASSERT(strength >= 0 && strength <= 1, "smoothing goes from none to all");
     if (strength == 0 || (ellipse && !ellipse_terms(term, target)))
         return;

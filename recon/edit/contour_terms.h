@@ -8,6 +8,7 @@
 // their discrete Fourier transform. If neighbours are more than a 24th of a turn apart, the points are those of the Catmull-Rom curve through the contour.
 // `point`: (count >= 3) (n, b, 0), in either direction. `misfit` [mm]: the largest |R(theta_i) - rho_i|. Returns NULL, or what is wrong and what is valid.
 const char *contour_terms(int count, const Vec3 *point, double term[SWEEP_TERMS], double *misfit);
+double terms_area(const double term[SWEEP_TERMS]);       // [mm^2]
 // R at an angle.
 double terms_radius(const double term[SWEEP_TERMS], double theta);
 // Smoothing towards a circle, or the ellipse of the same moments, by `strength` 0 to 1; the area stays.

@@ -1,7 +1,8 @@
 // See edit_stretch.h.
 #include "recon/edit/edit_stretch.h"
 
-#include "recon/edit/sweep_edit.h"
+#include "recon/edit/contour_terms.h"
+#include "recon/edit/edit_rows.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -57,11 +58,15 @@ static void add_stretch(Draft *d, const SweepModel *m, const SweepStretch *s)
 
 static void add_row_station(Draft *d, const SweepModel *m, int branch, double t)
 {
-    Vec3 point[ROW_POINTS];
+    const SweepBranch *b = &m->branch[branch];
+    const EditRows rows = {b->break_count, m->break_t + b->first_break, m->row + (size_t)b->first_row * SWEEP_TERMS};
     SectionPoint contour[ROW_POINTS];
-    sweep_edit_contour(m, branch, t, ROW_POINTS, point);
-    for (int i = 0; i < ROW_POINTS; i++)
-        contour[i] = (SectionPoint){point[i].x, point[i].y};
+    double term[SWEEP_TERMS];
+    edit_rows_section(&rows, t, term);
+    for (int i = 0; i < ROW_POINTS; i++) {
+        double angle = 2 * PI * i / ROW_POINTS, r = terms_radius(term, angle);
+        contour[i] = (SectionPoint){r * same_cos(angle), r * same_sin(angle)};
+    }
     add_station(d, t, ROW_POINTS, contour);
 }
 
