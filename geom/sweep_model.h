@@ -21,12 +21,13 @@
 // 0.2 instead of the bracket beyond 3 r_p: where branches part at a small angle, their walls still meet there, and an edge without any blending has no foot that
 // Newton finds. (Radii at a fork are mean radii: the parent's at parent_t, the child's one r_p from its start.)
 // Sacs are taken last: f = (r/2) (sum a u^3 - 1), r the radius of the sac's largest node, and delta = blend/2 times the smaller of r and the mean radius of the
-// vessel's nodes beside the neck.
+// vessel's nodes beside the neck, at most 0.225 r: f does not fall below -r/2, and where it is that low, it must not matter at the vessel's wall.
 // Sections of another kind (section.h), where polar ones cannot hold the lumen's shape: on from < t < to of a branch, f = (1 - m) f_rows + m C(n, b, t), C the row
 // of sections through the stretch's stations (section_row.h), m = 1 except within `fade` of both ends of the range, where it rises as 6 s^5 - 15 s^4 + 10 s^3. At
 // t = 0 of an open inlet there is no fade, and m = 1 upstream. The rows remain the nearest polar sections: their radii serve candidates and starts.
 // Candidates are given by topology (sweep_views.c): a child is followed from its start along the branches that are seen at its fork, as long as the tubes,
-// enlarged by the width of the blend, overlap; so vessels that touch elsewhere are never blended.
+// enlarged by the width of the blend, overlap; so vessels that touch elsewhere are never blended. In the same way, a sac is seen along the vessel from its neck on
+// as long as its wall is near the vessel's.
 //
 // Lengths mm. A model owns its arrays. It is evaluated through a SweepField (sweep_field.h), which is made from it and borrows it.
 #ifndef SELDINGER_GEOM_SWEEP_MODEL_H

@@ -9,6 +9,7 @@ enum { PASSES = 4 };
 static const double STEP = 0.25;             // of a walk, relative to the narrower tube
 static const double LEAST_STEP = 1e-4;       // … but at least this, relative to the length
 static const double MARGIN = 0.25;           // relative to the narrower tube's radius: what is further apart is not seen
+static const double LOWEST = 0.995, MOST_DELTA = 0.45;    // of a sac's scale, below which its field does not fall
 static const double ASIDE = 1.5;             // how much longer the overlap may be on the parent's curve, on the inner side of a bend
 
 // Branches stay in ascending order; one that is already listed keeps its first place.
@@ -187,7 +188,7 @@ static bool is_reached(const SweepField *field, int group, int branch, double t)
     const SweepSac *sac = &field->sac[group];
     const SweepSegment *s = &field->segment[sweep_field_segment(field, branch, t)];
     SweepJet jet = sweep_curve_at(field->curve[branch], t);
-    double radius[SWEEP_TERMS], x = t - s->origin, near = -(2 * sac->delta + MARGIN * fmin(sac->scale, field->model->branch[branch].radius));
+    double radius[SWEEP_TERMS], x = t - s->origin, near = -fmin(2 * sac->delta + MARGIN * field->model->branch[branch].radius, LOWEST * sac->scale);
     SweepPart part;
     for (int k = 0; k < SWEEP_TERMS; k++)
         radius[k] = s->section[k][0] + x * (s->section[k][1] + x * (s->section[k][2] + x * s->section[k][3]));
@@ -209,7 +210,8 @@ static void mark_sac(SweepField *field, int group, const int *group_of_node, int
     double step = fmax(STEP * field->model->branch[branch].radius, LEAST_STEP * curve->length);
     for (int side = -1; side <= 1; side += 2)
         for (double t = fmax(0, fmin(curve->length, start)); is_reached(field, group, branch, t);) {
-            int from = sweep_field_segment(field, branch, t - step), to = sweep_field_segment(field, branch, t + step);
+            // a little further, for points outside the wall
+            int from = sweep_field_segment(field, branch, t - 2 * step), to = sweep_field_segment(field, branch, t + 2 * step);
             for (int s = from; s <= to; s++) {
                 SweepView *view = &field->view[s];
                 if (view->sac < 0)
@@ -246,7 +248,7 @@ static void fill_sac(SweepField *field, int group, const int *group_of_node)
     double width = field->model->blend * 0.5 * (vessels > 0 ? fmin(largest, vessel / vessels) : largest);
     for (int i = 0; i < sac->node_count; i++)
         if (group_of_node[i] == group)
-            field->sac[i].scale = 0.5 * largest, field->sac[i].delta = width;
+            field->sac[i].scale = 0.5 * largest, field->sac[i].delta = fmin(width, MOST_DELTA * field->sac[i].scale);
     for (int i = 0; i < sac->node_count; i++) {
         if (group_of_node[i] != group)
             continue;

@@ -275,6 +275,36 @@ static void derivatives_at_a_fork(void **state)
     }
 }
 
+// A sac is seen where its wall is near the tube's, not as far as its blobs reach; elsewhere the field is the tube's own to the bit.
+static void a_sac_is_seen_near_its_wall(void **state)
+{
+    (void)state;
+    SweepShape s = {.pitch = 0.2, .parent = -1, .radius = 1, .open_start = true};
+    sweep_shape_line(&s, vec3(-6, 0, 0), vec3(6, 0, 0), 61);
+    SweepModel *m = sweep_model_of(&s, 1);
+    Vec3 center = vec3(0.2, 1.7, 0.3);
+    sweep_add_sac(m, 31, center, 1.4);
+    SweepField *f = sweep_field_create(m);
+    int seen = 0, least = 0;
+    assert_true(2 * f->sac[1].delta < f->sac[1].scale);
+    for (int i = 0; i < f->first_segment[1]; i++) {
+        if (!isfinite(f->segment[i].from) || !isfinite(f->segment[i].to))
+            continue;
+        double t = 0.5 * (f->segment[i].from + f->segment[i].to), far = same_hypot(t - 6.2, same_hypot(1.7, 0.3) - 1);
+        seen += f->view[i].sac >= 0;
+        least += far < 1.4;
+        assert_true(f->view[i].sac < 0 || far < 3.3);
+        assert_true(far > 1.4 || f->view[i].sac >= 0);
+        SweepBlend blend;
+        sweep_field_blend(f, (SweepPlace){.branch = 0, .t = t, .sac = -1}, vec3(t - 6, 0.7, 0.6), &blend);
+        assert_true(far < 3.3 || blend.f == blend.part[0].f);
+    }
+    print_message("sac: seen from %d segments, its wall reaches %d\n", seen, least);
+    assert_true(seen >= least && least > 5);
+    sweep_field_free(f);
+    sweep_model_free(m);
+}
+
 static void derivatives_at_a_sac(void **state)
 {
     (void)state;
@@ -408,9 +438,10 @@ static void faults_are_found(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spline_and_frame_converge), cmocka_unit_test(curve_derivatives),       cmocka_unit_test(sections_are_precise),
-        cmocka_unit_test(basis_gives_the_field),     cmocka_unit_test(derivatives_of_a_branch), cmocka_unit_test(derivatives_at_a_fork),
-        cmocka_unit_test(derivatives_at_a_sac),      cmocka_unit_test(faults_are_found),        cmocka_unit_test(same_wall_from_every_branch),
+        cmocka_unit_test(spline_and_frame_converge),   cmocka_unit_test(curve_derivatives),           cmocka_unit_test(sections_are_precise),
+        cmocka_unit_test(basis_gives_the_field),       cmocka_unit_test(derivatives_of_a_branch),     cmocka_unit_test(derivatives_at_a_fork),
+        cmocka_unit_test(derivatives_at_a_sac),        cmocka_unit_test(a_sac_is_seen_near_its_wall), cmocka_unit_test(faults_are_found),
+        cmocka_unit_test(same_wall_from_every_branch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
