@@ -15,8 +15,8 @@ static const char *const whats[] = {"surface", "centreline", "centerline", NULL}
 static const Option rows[] = {
     {"what", "surface|centreline", OPTION_CHOICE, AT(what), "what a .vtp holds", .choices = whats,
      .otherwise = "the surface of a model, the centreline of a tree"},
-    {"model", "KIND", OPTION_CHOICE, AT(model), "the model whose surface is written: lim (blobs) or a swept one: sweep, raster, rbf, pas", .choices = export_models,
-     .otherwise = "the first of these that FILE has"},
+    {"model", "KIND", OPTION_CHOICE, AT(model), "the model whose surface is written: lim (blobs) or a swept one: sweep, raster, rbf, pas",
+     .choices = export_models, .otherwise = "the first of these that FILE has"},
     {"cell-mm", "X", OPTION_NUMBER, AT(surface.cell_mm), "cell size of the surface, or edges of a swept model's [mm]", .least = 0.001, .most = 1000,
      .otherwise = "about ten to twenty cells around the thinnest branch; swept: 24 edges around each section"},
     {"tags", NULL, OPTION_FLAG, AT(surface.tags),
@@ -24,9 +24,12 @@ static const Option rows[] = {
     {"keep-floating", NULL, OPTION_FLAG, AT(surface.keep_floating),
      "keeps parts of the surface that are not connected to the inlet; by default they are dropped and reported"},
     {"open-inlet", NULL, OPTION_FLAG, AT(surface.open_inlet), "cuts the surface open at the plane of the root; otherwise blobs close it"},
-    {"mask", "F.nrrd", OPTION_FILE, AT(mask), "of a model: voxels, 0 outside, 1 + branch inside, 1 + number of branches inside an aneurysm; -o may be absent then"},
-    {"spacing-mm", "X", OPTION_NUMBER, AT(spacing), "edge of the mask's voxels [mm]", .least = 0.001, .most = 1000, .otherwise = "a sixth of the median radius"},
-    {"frame", "RAS|LPS", OPTION_CHOICE, AT(frame), "coordinate system written into a .mrk.json or a mask; coordinates are never converted", .choices = export_frames},
+    {"mask", "F.nrrd", OPTION_FILE, AT(mask),
+     "of a model: voxels, 0 outside, 1 + branch inside, 1 + number of branches inside an aneurysm; -o may be absent then"},
+    {"spacing-mm", "X", OPTION_NUMBER, AT(spacing), "edge of the mask's voxels [mm]", .least = 0.001, .most = 1000,
+     .otherwise = "a sixth of the median radius"},
+    {"frame", "RAS|LPS", OPTION_CHOICE, AT(frame), "coordinate system written into a .mrk.json or a mask; coordinates are never converted",
+     .choices = export_frames},
     {"output", "OUT", OPTION_FILE, AT(out), "the file to write", .letter = 'o'},
     CLI_QUIET(ExportOptions, quiet, "does not print the figures of a surface: parts, open edges, Euler characteristic, area, volume"),
     {"threads", "N", OPTION_INT, AT(threads), "accepted for uniformity, has no effect", .most = 256, .otherwise = ""},
@@ -34,7 +37,8 @@ static const Option rows[] = {
 
 static void set_defaults(void *structure) { *(ExportOptions *)structure = (ExportOptions){.what = -1, .model = -1}; }
 
-static const char *check(void *structure) {
+static const char *check(void *structure)
+{
     const ExportOptions *options = structure;
     return options->out || options->mask ? NULL : "expected one file and `-o OUT`";
 }

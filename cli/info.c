@@ -112,8 +112,8 @@ static void plan_files(const InfoCommand *command, FileKind kind, Faults *faults
         faults_add(faults, command->file, 0, 0, "is no tree or model; %s is made of those",
                    command->report     ? "--report"
                    : command->sections ? "--sections"
-                   : command->picture ? "--picture"
-                                      : "--junctions");
+                   : command->picture  ? "--picture"
+                                       : "--junctions");
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--report", command->report);
     output_plan_write(&plan, "--sections", command->sections);

@@ -43,7 +43,9 @@ static void add_swept(Mask *m)
             const SweepView *view = &field->view[sweep_field_segment(field, i, t)];
             for (int k = 0; k < view->count; k++)
                 blend = fmax(blend, field->fork[view->of[k].branch].delta);
-            add_ball(m, (Ball){.center = sweep_curve_at(field->curve[i], t).s, .radius = largest, .reach = 1.3 * largest + blend,
+            add_ball(m, (Ball){.center = sweep_curve_at(field->curve[i], t).s,
+                               .radius = largest,
+                               .reach = 1.3 * largest + blend,
                                .place = {.branch = i, .t = t, .sac = -1}});
             if (t == length)
                 break;
@@ -136,7 +138,8 @@ bool model_mask_write(const char *path, const VesselTree *tree, const char *name
     for (int b = 0; b < m.balls; b++) {
         Vec3 c = m.ball[b].center;
         double r = m.ball[b].reach;
-        low = vec3(fmin(low.x, c.x - r), fmin(low.y, c.y - r), fmin(low.z, c.z - r)), high = vec3(fmax(high.x, c.x + r), fmax(high.y, c.y + r), fmax(high.z, c.z + r));
+        low = vec3(fmin(low.x, c.x - r), fmin(low.y, c.y - r), fmin(low.z, c.z - r)),
+        high = vec3(fmax(high.x, c.x + r), fmax(high.y, c.y + r), fmax(high.z, c.z + r));
     }
     double span[3] = {(high.x - low.x) / spacing, (high.y - low.y) / spacing, (high.z - low.z) / spacing};
     Volume *volume = NULL;

@@ -16,8 +16,8 @@ bool section_table_write(const char *path, const SweepModel *model, Faults *faul
         for (int k = 0; k < model->branch[i].break_count; k++) {
             double t = fmin(model->break_t[model->branch[i].first_break + k], field->curve[i]->length);
             SweepSection s = sweep_section_at(field, i, t);
-            fprintf(text.stream, "%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n", i, s.t, s.centre.x, s.centre.y, s.centre.z, s.normal.x,
-                    s.normal.y, s.normal.z, s.area, s.mean, s.least, s.largest, s.perimeter, s.circularity);
+            fprintf(text.stream, "%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n", i, s.t, s.centre.x, s.centre.y, s.centre.z,
+                    s.normal.x, s.normal.y, s.normal.z, s.area, s.mean, s.least, s.largest, s.perimeter, s.circularity);
         }
     sweep_field_free(field);
     return output_text_write(&text, path, faults);
