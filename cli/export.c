@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "base/base.h"
+#include "cli/export_tree.h"
 #include "cli/file_kind.h"
 #include "cli/output_plan.h"
 #include "recon/recon.h"
@@ -9,27 +10,13 @@
 
 #include <string.h>
 
-typedef enum { WHAT_SURFACE, WHAT_CENTRELINE, WHAT_CENTERLINE } What;
-
-typedef struct ExportOptions {
-    const char *in, *out;
-    int what;                // -1: by the file's extension
-    int model;               // index in `models`; -1: the first that the file has
-    int frame;               // index in `frames`
-    int threads;
-    ModelSurfaceOptions surface;
-    bool quiet;
-} ExportOptions;
-
 #define AT(member) OPTION_AT(ExportOptions, member)
-static const char *const whats[] = {"surface", "centreline", "centerline", NULL}, *const frames[] = {"LPS", "RAS", NULL}, *const models[] = {"lim",    "sweep",
-                                                                                                                                             "raster", "rbf",
-                                                                                                                                             "pas",    NULL};
+static const char *const whats[] = {"surface", "centreline", "centerline", NULL};
 static const Option rows[] = {
     {"what", "surface|centreline", OPTION_CHOICE, AT(what), "what a .vtp holds", .choices = whats,
      .otherwise = "the surface of a model, the centreline of a tree"},
-    {"model", "KIND", OPTION_CHOICE, AT(model), "the model whose surface is written: lim (blobs) or a swept one: sweep, raster, rbf, pas", .choices = models,
-     .otherwise = "the first of these that FILE has"},
+    {"model", "KIND", OPTION_CHOICE, AT(model), "the model whose surface is written: lim (blobs) or a swept one: sweep, raster, rbf, pas",
+     .choices = export_models, .otherwise = "the first of these that FILE has"},
     {"cell-mm", "X", OPTION_NUMBER, AT(surface.cell_mm), "cell size of the surface, or edges of a swept model's [mm]", .least = 0.001, .most = 1000,
      .otherwise = "about ten to twenty cells around the thinnest branch; swept: 24 edges around each section"},
     {"tags", NULL, OPTION_FLAG, AT(surface.tags),
@@ -37,7 +24,12 @@ static const Option rows[] = {
     {"keep-floating", NULL, OPTION_FLAG, AT(surface.keep_floating),
      "keeps parts of the surface that are not connected to the inlet; by default they are dropped and reported"},
     {"open-inlet", NULL, OPTION_FLAG, AT(surface.open_inlet), "cuts the surface open at the plane of the root; otherwise blobs close it"},
-    {"frame", "RAS|LPS", OPTION_CHOICE, AT(frame), "coordinate system written into a .mrk.json; coordinates are never converted", .choices = frames},
+    {"mask", "F.nrrd", OPTION_FILE, AT(mask),
+     "of a model: voxels, 0 outside, 1 + branch inside, 1 + number of branches inside an aneurysm; -o may be absent then"},
+    {"spacing-mm", "X", OPTION_NUMBER, AT(spacing), "edge of the mask's voxels [mm]", .least = 0.001, .most = 1000,
+     .otherwise = "a sixth of the median radius"},
+    {"frame", "RAS|LPS", OPTION_CHOICE, AT(frame), "coordinate system written into a .mrk.json or a mask; coordinates are never converted",
+     .choices = export_frames},
     {"output", "OUT", OPTION_FILE, AT(out), "the file to write", .letter = 'o'},
     CLI_QUIET(ExportOptions, quiet, "does not print the figures of a surface: parts, open edges, Euler characteristic, area, volume"),
     {"threads", "N", OPTION_INT, AT(threads), "accepted for uniformity, has no effect", .most = 256, .otherwise = ""},
@@ -45,7 +37,11 @@ static const Option rows[] = {
 
 static void set_defaults(void *structure) { *(ExportOptions *)structure = (ExportOptions){.what = -1, .model = -1}; }
 
-static const char *check(void *structure) { return ((ExportOptions *)structure)->out ? NULL : "expected one file and `-o OUT`"; }
+static const char *check(void *structure)
+{
+    const ExportOptions *options = structure;
+    return options->out || options->mask ? NULL : "expected one file and `-o OUT`";
+}
 
 static const OptionTable table = {
     .program = "seldinger export",
@@ -75,76 +71,6 @@ static const OptionTable table = {
     .too_many = "expected one file and `-o OUT`, not also ",
 };
 
-// The model to write: 0 blobs, 1 + kind a swept one; -1: the file lacks it.
-static int model_of(const ExportOptions *options, const VesselTree *tree, const SweepModels *swept)
-{
-    for (int i = 0; i <= SECTION_KINDS; i++)
-        if ((options->model < 0 || options->model == i) && (i == 0 ? vessel_tree_is_model(tree) : swept->of[i - 1] != NULL))
-            return i;
-    return -1;
-}
-
-static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, const SweepModel *sweep, Faults *faults)
-{
-    ModelSurfaceOptions wanted = options->surface;
-    wanted.sweep = sweep;
-    SurfaceFigures surface;
-    OutputText text;
-    void (*print)(FILE *, const SurfaceFigures *) = !strcmp(extension, ".stl")   ? surface_print_stl
-                                                    : !strcmp(extension, ".ply") ? surface_print_ply
-                                                    : !strcmp(extension, ".obj") ? surface_print_obj
-                                                                                 : surface_print_vtp;
-    wanted.with_error = print == surface_print_ply || print == surface_print_vtp;
-    wanted.figures = options->quiet || cli_is_standard_output(options->out) ? NULL : stdout;
-    wanted.warnings = stderr;
-    bool good = model_surface(tree, options->in, &wanted, &surface, faults);
-    if (good && output_text_open(&text)) {
-        print(text.stream, &surface);
-        good = output_text_write(&text, options->out, faults);
-    } else if (good) {
-        faults_add(faults, options->out, 0, 0, "cannot be written: out of memory");
-        good = false;
-    }
-    model_surface_free(&surface);
-    return good;
-}
-
-static bool export_tree(const ExportOptions *options, const char *extension, Faults *faults)
-{
-    VesselTree *tree = tree_file_load(options->in, NULL, faults);
-    if (!tree)
-        return false;
-    SweepModels swept = {0};
-    if (!sweep_models_load(options->in, tree, &swept, faults)) {
-        vessel_tree_free(tree);
-        return false;
-    }
-    int chosen = model_of(options, tree, &swept);
-    bool model = chosen >= 0, good = false;
-    bool line_only = !strcmp(extension, ".swc") || !strcmp(extension, ".json");
-    bool surface_only = !strcmp(extension, ".stl") || !strcmp(extension, ".ply") || !strcmp(extension, ".obj");
-    bool surface = options->what >= 0 ? options->what == WHAT_SURFACE : surface_only || (model && !line_only);
-    if (!line_only && !surface_only && strcmp(extension, ".vtp"))
-        faults_add(faults, options->out, 0, 0, "unknown extension '%s' for a tree or model; expected .stl .ply .obj .vtp .mrk.json .swc", extension);
-    else if (surface ? line_only : surface_only)
-        faults_add(faults, options->out, 0, 0, "'%s' cannot hold a %s; valid: %s", extension, surface ? "surface" : "centreline",
-                   surface ? ".stl .ply .obj .vtp" : ".vtp .mrk.json .swc");
-    else if (surface && !model && options->model >= 0)
-        faults_add(faults, options->in, 0, 0, "has no model of the kind '%s'; `seldinger fit --model %s` makes one", models[options->model],
-                   models[options->model]);
-    else if (options->surface.tags && (!surface || !strcmp(extension, ".stl") || !strcmp(extension, ".obj")))
-        faults_add(faults, options->out, 0, 0, "'%s' cannot hold --tags, which are data of a surface's vertices; valid: .ply .vtp",
-                   surface ? extension : "a centreline");
-    else if (surface && !model)
-        faults_add(faults, options->in, 0, 0, "is a tree without a model, so it has no surface; `seldinger fit` makes one, or export the centreline");
-    else
-        good = surface ? export_surface(options, extension, tree, chosen > 0 ? swept.of[chosen - 1] : NULL, faults)
-                       : centreline_write_file(options->out, extension, tree, frames[options->frame], faults);
-    sweep_models_free(&swept);
-    vessel_tree_free(tree);
-    return good;
-}
-
 static bool export_recording(const ExportOptions *options, const char *extension, Faults *faults)
 {
     bool is_table = !strcmp(extension, ".csv"), series = !strcmp(extension, ".vtp") || !strcmp(extension, ".pvd");
@@ -163,10 +89,13 @@ static int call(void *structure, Faults *faults)
 {
     const ExportOptions *options = structure;
     char extension[16];
-    output_extension(options->out, extension);
+    extension[0] = 0;
+    if (options->out)
+        output_extension(options->out, extension);
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "-o", options->out);
     output_plan_series(&plan, "-o", ".vtp");
+    output_plan_write_file(&plan, "--mask", options->mask);
     output_plan_read(&plan, "the file", options->in);
     if (faults->count > 0)
         return EXIT_BAD_INPUT;

@@ -2,7 +2,7 @@
 // polygonise the whole field; here the lattice is used only where it is needed.
 //
 // A ring is the section at one t, with vertices at equal angles. Beyond a closed end rings follow the dome up to its pole. Where F is not the branch's own
-// field, or the section cannot carry rings (sweep_mesh_carries_rings), the wall is a patch: marching cubes, the vertices moved onto F = 0, cut off at the planes of
+// field, or the section cannot carry rings (mesh_carries_rings), the wall is a patch: marching cubes, the vertices moved onto F = 0, cut off at the planes of
 // the nearest rings, t = constant. The cut edge replaces the ring there, so that the mesh is closed. Open starts are closed by a flat cap.
 //
 // The mesh is closed, and faces outwards. Lengths mm. Owns its memory; depends on the field only while it is created or updated.
@@ -10,9 +10,8 @@
 #define SELDINGER_GEOM_SWEEP_MESH_H
 
 #include "geom/isosurface.h"
+#include "geom/sweep_field.h"
 #include "geom/sweep_mesh_options.h"
-
-SweepMeshOptions sweep_mesh_default_options(void);
 
 typedef struct SweepMesh {
     TriangleMesh *surface;   // `node` is the nearest knot's knot_node (or sac_node)
@@ -28,6 +27,7 @@ typedef struct SweepMesh {
     struct SweepMeshParts *parts;            // rings and patches, see sweep_mesh_parts.h
 } SweepMesh;
 
+SweepMeshOptions sweep_mesh_default_options(void);
 // `options` may be NULL. Returns NULL if the mesh would have more than 1e8 triangles.
 SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *options);
 // Makes the mesh that of a changed model. What changed is found by comparing the fields' segments: patches from which no change can be seen are kept, and so are
@@ -37,4 +37,5 @@ bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field);
 void sweep_mesh_free(SweepMesh *mesh);
 // The surface alone. `options` may be NULL. Returns NULL as above, or if out of memory.
 TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options);
+
 #endif

@@ -1,8 +1,8 @@
-// Options of the mesh of a swept model, for sweep_mesh.h and its parts.
+// Options of the swept model's mesh (sweep_mesh.h).
 #ifndef SELDINGER_GEOM_SWEEP_MESH_OPTIONS_H
 #define SELDINGER_GEOM_SWEEP_MESH_OPTIONS_H
 
-#include "geom/sweep_field.h"
+#include <stdbool.h>
 
 typedef struct SweepMeshOptions {
     int around;              // edges around a section, 6 … 256, default 24: edges are about a quarter of the local radius
@@ -10,8 +10,5 @@ typedef struct SweepMeshOptions {
     bool flat_ends;          // branches end flat at their last section instead of with a dome; default false
     int isa;                 // as LimVesselOptions.isa; default 0
 } SweepMeshOptions;
-
-// Whether the sections of a segment may carry rings: each ray from the curve meets the contour once.
-bool sweep_mesh_carries_rings(const SweepField *field, int segment);
 
 #endif

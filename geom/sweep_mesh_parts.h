@@ -108,6 +108,8 @@ SweepPlace mesh_owner(const SweepBlock *b, int lane);
 // Outward normals of F at points with places; `place` is moved to the part of largest share.
 void mesh_normals(const SweepFeet *feet, int count, const Vec3 *at, SweepPlace *place, Vec3 *normal);
 
+// Whether the sections of a segment may carry rings: each ray from the curve meets the contour once.
+bool mesh_carries_rings(const SweepField *field, int segment);
 // Fills the rings of a branch, `rings` being zeroed.
 void mesh_rings_fill(const SweepMeshParts *parts, int branch, MeshRings *rings);
 void mesh_rings_free(MeshRings *rings);

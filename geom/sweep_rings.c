@@ -30,7 +30,7 @@ int mesh_around(const SweepMeshParts *parts, int branch, double t)
     return count > LEAST ? count < MOST ? (int)(count + 0.5) : MOST : LEAST;
 }
 
-bool sweep_mesh_carries_rings(const SweepField *field, int segment)
+bool mesh_carries_rings(const SweepField *field, int segment)
 {
     SEL_ASSERT(segment >= 0 && segment < field->first_segment[field->branch_count], "the segment is one of the field");
     return field->segment[segment].is_shaped == 0;
@@ -270,7 +270,7 @@ static void add_section(const SweepMeshParts *parts, int branch, double t, Circl
         add_mark(rings, (MeshMark){.ring = rings->count - 1, .branch = branch, .sac = -1, .from = t - plane.term[0], .to = t + plane.term[0]});
     }
     finish_ring(parts, branch, rings, ring, plane.segment_index, t);
-    ring->is_blended |= !sweep_mesh_carries_rings(parts->feet.field, plane.segment_index);
+    ring->is_blended |= !mesh_carries_rings(parts->feet.field, plane.segment_index);
 }
 
 // Rings of the dome over an end, from the first ring inwards of the pole to the one next to the section; side -1: before the start.

@@ -363,6 +363,81 @@ static void a_sac_is_part_of_the_mesh(void **state)
     sweep_model_free(model);
 }
 
+// --- Sections and masks ---
+
+static double semi_axis[2];
+
+// R = a b / sqrt((b cos)^2 + (a sin)^2), its first 16 harmonics by sums over 256 angles.
+static void ellipse(double t, double length, double *term)
+{
+    enum { ANGLES = 256 };
+    (void)t, (void)length;
+    for (int i = 0; i < ANGLES; i++) {
+        double angle = 2 * PI * i / ANGLES, r = semi_axis[0] * semi_axis[1] / hypot(semi_axis[1] * cos(angle), semi_axis[0] * sin(angle));
+        term[0] += r / ANGLES;
+        for (int k = 1; k <= SWEEP_HARMONICS; k++)
+            term[2 * k - 1] += 2 * r * cos(k * angle) / ANGLES, term[2 * k] += 2 * r * sin(k * angle) / ANGLES;
+    }
+}
+
+// Harmonics beyond the eighth are missing: of an ellipse, about ((a - b) / (a + b))^5 of the radius.
+static void figures_of_an_ellipse_are_exact(void **state)
+{
+    (void)state;
+    static const double axes[][2] = {{1.1, 1}, {1.5, 1}};
+    for (int i = 0; i < 2; i++) {
+        double a = semi_axis[0] = axes[i][0], b = semi_axis[1] = axes[i][1], perimeter = 0, flat = (a - b) / (a + b), missing = 2 * pow(flat, 5);
+        for (int k = 0; k < 4000; k++)
+            perimeter += 2 * PI / 4000 * hypot(a * sin(2 * PI * k / 4000), b * cos(2 * PI * k / 4000));
+        SweepShape shape;
+        straight(&shape);
+        shape.section = ellipse;
+        SweepModel *model = sweep_model_of(&shape, 1);
+        SweepField *field = sweep_field_create(model);
+        for (double t = 0; t <= 8; t += 4) {
+            SweepSection s = sweep_section_at(field, 0, t);
+            assert_true(vec3_distance(s.centre, vec3(1 + t, 2, 3)) < 1e-12 && vec3_distance(s.normal, vec3(1, 0, 0)) < 1e-12);
+            assert_true(fabs(s.area - PI * a * b) < 2 * PI * missing);
+            assert_true(fabs(s.perimeter - perimeter) < 2 * PI * missing);
+            assert_true(fabs(s.least - b) < missing && fabs(s.largest - a) < missing);
+            assert_true(fabs(s.circularity - 4 * PI * PI * a * b / (perimeter * perimeter)) < 4 * missing);
+        }
+        sweep_field_free(field);
+        sweep_model_free(model);
+    }
+}
+
+// Voxels of each label, times their volume, against the exact cylinder with a dome: first order in the voxel at most.
+static void a_mask_has_the_volume(void **state)
+{
+    (void)state;
+    SweepShape shape;
+    straight(&shape);
+    SweepModel *model = sweep_model_of(&shape, 1);
+    VesselTree *tree = vessel_tree_create(1, 0, 0);
+    tree->center[0] = vec3(1, 2, 3), tree->radius[0] = 1, tree->direction[0] = vec3(1, 0, 0), tree->parent[0] = -1;
+    assert_true(vessel_tree_link(tree));
+    ModelMaskOptions options = {.sweep = model, .spacing_mm = 0.1, .frame = "RAS"};
+    static const char path[] = "/tmp/test_sweep_mesh.nrrd";
+    faults_clear(&faults);
+    assert_true(model_mask_write(path, tree, "model", &options, &faults));
+    Volume *volume = volume_load(path, &faults);
+    assert_non_null(volume);
+    assert_string_equal(volume->frame, "RAS");
+    int64_t count = (int64_t)volume->size[0] * volume->size[1] * volume->size[2], inside = 0;
+    for (int64_t i = 0; i < count; i++) {
+        assert_true(volume->value[i] == 0 || volume->value[i] == 1);
+        inside += volume->value[i] > 0;
+    }
+    double exact = 8 * PI + 2 * PI / 3;
+    print_message("mask: %.3f of %.3f mm3\n", (double)inside * 1e-3, exact);
+    assert_true(fabs((double)inside * 1e-3 - exact) < 0.02 * exact);
+    volume_free(volume);
+    unlink(path);
+    vessel_tree_free(tree);
+    sweep_model_free(model);
+}
+
 // --- Larger models ---
 
 static void report(const char *name, const SweepModel *model, int off_allowed)
@@ -415,13 +490,9 @@ int main(int count, char **argument)
 {
     all = count > 1 && !strcmp(argument[1], "--all");
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distance_and_volume_are_of_second_order),
-        cmocka_unit_test(forks_are_closed),
-        cmocka_unit_test(moved_models_have_the_same_volume),
-        cmocka_unit_test(an_update_gives_the_fresh_mesh),
-        cmocka_unit_test(ends_are_numbered),
-        cmocka_unit_test(a_sac_is_part_of_the_mesh),
-        cmocka_unit_test(larger_models_are_closed),
+        cmocka_unit_test(distance_and_volume_are_of_second_order), cmocka_unit_test(forks_are_closed),      cmocka_unit_test(moved_models_have_the_same_volume),
+        cmocka_unit_test(an_update_gives_the_fresh_mesh),          cmocka_unit_test(ends_are_numbered),     cmocka_unit_test(a_sac_is_part_of_the_mesh),
+        cmocka_unit_test(figures_of_an_ellipse_are_exact),         cmocka_unit_test(a_mask_has_the_volume), cmocka_unit_test(larger_models_are_closed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
