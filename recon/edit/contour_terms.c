@@ -2,7 +2,6 @@
 // int R^4/4 (cos, sin)(cos, sin)'. The ellipse (x - centre)' M^-1 (x - centre) <= 4 has the same centre and moments; it is scaled to the area.
 #include "recon/edit/contour_terms.h"
 
-#include "recon/edit/sweep_edit.h"
 #include "recon/fit/band_matrix.h"
 
 #include <stdlib.h>
