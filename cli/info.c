@@ -12,7 +12,7 @@
 #include <stdlib.h>
 
 typedef struct InfoCommand {
-    const char *file, *report, *picture;
+    const char *file, *report, *picture, *sections;
     JunctionPages junctions;    // and the radius of the tool that is led through the model
     char *reach;                 // comes out: where a tool gets to, as text
     bool json, quiet;
@@ -27,6 +27,8 @@ static const Option options[] = {
     {"picture", "F.png", OPTION_FILE, AT(picture), "of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram"},
     {"junctions", "F.png", OPTION_FILE, AT(junctions.picture),
      "of a model: a section through each junction, the narrowest first; further pages are F-2.png and so on"},
+    {"sections", "F.csv", OPTION_FILE, AT(sections),
+     "of a swept model (fit --model sweep): its sections, a row each: branch, way along it, centre, normal, area, radii, perimeter, circularity"},
     {"volume", "V", OPTION_FILE, AT(junctions.volume), "the angiogram behind these"},
     {"before", "M.h5", OPTION_FILE, AT(junctions.before), "another model of the same vessels: the ten narrowest junctions in that, beside what they are now"},
     {"tool-radius-mm", "X", OPTION_NUMBER, AT(junctions.tool_radius), "of the tool that is led from a model's inlet through the tree", .least = 0.01,
@@ -75,7 +77,7 @@ static bool describe_tree_file(cJSON *object, InfoCommand *command, Faults *faul
     VesselTree *tree = tree_file_load(command->file, &info, faults);
     if (tree)
         describe_tree(object, tree, &info);
-    bool good = tree && add_reach(object, tree, command, faults);
+    bool good = tree && section_table_of_file(command->sections, command->file, tree, faults) && add_reach(object, tree, command, faults);
     good = good && (!command->report || tree_page_write(command->report, command->file, tree, &info, faults));
     good = good && junction_pages_draw(&command->junctions, command->file, tree, faults) && draw(command, tree, &info, faults);
     tree_file_info_free(&info);
@@ -106,13 +108,15 @@ static bool describe(cJSON *object, FileKind kind, InfoCommand *command, Faults 
 static void plan_files(const InfoCommand *command, FileKind kind, Faults *faults)
 {
     const JunctionPages *junctions = &command->junctions;
-    if ((command->report || command->picture || junctions->picture) && kind != FILE_TREE && kind != FILE_MISSING)
+    if ((command->report || command->sections || command->picture || junctions->picture) && kind != FILE_TREE && kind != FILE_MISSING)
         faults_add(faults, command->file, 0, 0, "is no tree or model; %s is made of those",
-                   command->report    ? "--report"
+                   command->report     ? "--report"
+                   : command->sections ? "--sections"
                    : command->picture ? "--picture"
                                       : "--junctions");
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--report", command->report);
+    output_plan_write(&plan, "--sections", command->sections);
     output_plan_picture(&plan, "--picture", command->picture);
     output_plan_picture(&plan, "--junctions", junctions->picture);
     output_plan_series(&plan, "--junctions", ".png");

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-SweepMeshOptions sweep_mesh_default_options(void) { return (SweepMeshOptions){.around = 18}; }
+SweepMeshOptions sweep_mesh_default_options(void) { return (SweepMeshOptions){.around = 24}; }
 
 // --- Which gaps belong to patches ---
 
@@ -210,6 +210,26 @@ static MeshPatch *define_patches(const SweepMeshParts *parts, int *count)
     return patch;
 }
 
+// A patch that cannot be joined to its rings is left out: the rings run through, and what should be blended there stays apart.
+static void drop_failures(SweepMeshParts *parts)
+{
+    int kept = 0;
+    parts->failures = 0;
+    for (int p = 0; p < parts->patch_count; p++) {
+        MeshPatch *patch = &parts->patch[p];
+        if (patch->failures == 0) {
+            parts->patch[kept++] = *patch;
+            continue;
+        }
+        parts->failures += patch->failures;
+        for (int r = 0; r < patch->run_count; r++)
+            for (int j = patch->run[r].from; j <= patch->run[r].to; j++)
+                parts->rings[patch->run[r].branch].in_patch[j] = false;
+        mesh_patch_free(patch);
+    }
+    parts->patch_count = kept;
+}
+
 // --- Assembly ---
 
 // A closed row of vertices of the mesh, by increasing angle; of one vertex: a pole.
@@ -358,7 +378,7 @@ static void put_vertices(Assembly *a)
     size_t n = (size_t)s->vertex_count + 1;
     s->vertex = HEAP_ZEROED(n, sizeof *s->vertex), s->normal = HEAP_ZEROED(n, sizeof *s->normal), s->node = HEAP_ZEROED(n, sizeof *s->node);
     mesh->branch = HEAP_ZEROED(n, sizeof *mesh->branch), mesh->along = HEAP_ZEROED(n, sizeof *mesh->along);
-    mesh->boundary = HEAP_ZEROED(n, sizeof *mesh->boundary);
+    mesh->boundary = HEAP_ZEROED(n, sizeof *mesh->boundary), mesh->sac = HEAP_ZEROED(n, sizeof *mesh->sac);
     for (int i = 0; i < parts->branch_count; i++) {
         const MeshRings *r = &parts->rings[i];
         for (int k = 0, knot = 0; k < r->count; k++) {
@@ -369,7 +389,7 @@ static void put_vertices(Assembly *a)
             for (int v = 0; v < ring->count; v++) {
                 int to = a->ring_first[i][k] + v;
                 s->vertex[to] = r->at[ring->first + v], s->normal[to] = r->normal[ring->first + v], s->node[to] = node;
-                mesh->branch[to] = i, mesh->along[to] = ring->t;
+                mesh->branch[to] = i, mesh->along[to] = ring->t, mesh->sac[to] = -1;
             }
         }
     }
@@ -381,7 +401,7 @@ static void put_vertices(Assembly *a)
             s->vertex[to] = patch->at[v], s->normal[to] = patch->normal[v];
             knot = branch >= 0 && knot < field->curve[branch]->knot_count ? knot : 0;
             s->node[to] = branch >= 0 ? node_at(field, branch, t, &knot) : field->model->sac_node[patch->sac_node[v]];
-            mesh->branch[to] = branch, mesh->along[to] = t;
+            mesh->branch[to] = branch, mesh->along[to] = t, mesh->sac[to] = branch >= 0 ? -1 : patch->sac_node[v];
         }
     }
 }
@@ -420,12 +440,11 @@ static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
     Row high = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
     count_vertices(&a);
     put_vertices(&a);
-    mesh->boundaries = 0, mesh->failures = 0, mesh->patches = parts->patch_count;
+    mesh->boundaries = 0, mesh->failures = parts->failures, mesh->patches = parts->patch_count;
     for (int i = 0; i < parts->branch_count; i++)
         put_strips(&a, i, &low, &high);
     for (int p = 0; p < parts->patch_count; p++) {
         const MeshPatch *patch = &parts->patch[p];
-        mesh->failures += patch->failures;
         for (int t = 0; t < patch->triangles; t++)
             put_triangle(&a, a.patch_first[p] + patch->triangle[t][0], a.patch_first[p] + patch->triangle[t][1], a.patch_first[p] + patch->triangle[t][2]);
     }
@@ -436,8 +455,6 @@ static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
     free(low.vertex), free(low.angle), free(high.vertex), free(high.angle);
     return a.good;
 }
-
-// --- Creation ---
 
 static void free_parts(SweepMeshParts *parts)
 {
@@ -457,18 +474,6 @@ static void free_parts(SweepMeshParts *parts)
     free(parts);
 }
 
-void sweep_mesh_free(SweepMesh *mesh)
-{
-    if (!mesh)
-        return;
-    free_parts(mesh->parts);
-    triangle_mesh_free(mesh->surface);
-    free(mesh->branch);
-    free(mesh->along);
-    free(mesh->boundary);
-    free(mesh);
-}
-
 static SweepMeshParts *create_parts(const SweepField *field, const SweepMeshOptions *options)
 {
     SweepMeshParts *parts = HEAP_ZEROED(1, sizeof *parts);
@@ -480,23 +485,239 @@ static SweepMeshParts *create_parts(const SweepField *field, const SweepMeshOpti
     return parts;
 }
 
+// --- What the mesh was made from ---
+
+static int sac_numbers(const VesselTree *sac) { return sac ? (int)(5 * sac->blob_count) : 0; }
+
+static void list_sacs(const VesselTree *sac, double *numbers)
+{
+    for (int64_t i = 0; sac && i < sac->blob_count; i++) {
+        Vec3 c = sac->blob_center[i];
+        double row[5] = {c.x, c.y, c.z, sac->blob_width[i], sac->blob_amplitude[i]};
+        memcpy(numbers + 5 * i, row, sizeof row);
+    }
+}
+
+static void keep_source(SweepMeshParts *parts)
+{
+    const SweepField *field = parts->feet.field;
+    int segments = field->first_segment[field->branch_count];
+    free(parts->first_segment), free(parts->segment), free(parts->view), free(parts->fork), free(parts->sacs);
+    parts->segment_count = segments;
+    parts->first_segment = HEAP_ZEROED((size_t)field->branch_count + 1, sizeof *parts->first_segment);
+    // rows of doubles need no alignment here: they are only compared
+    parts->segment = HEAP_ZEROED((size_t)segments, sizeof(SweepSegment));
+    parts->view = HEAP_ZEROED((size_t)segments, sizeof *parts->view);
+    parts->fork = HEAP_ZEROED((size_t)field->branch_count, sizeof *parts->fork);
+    parts->sac_numbers = sac_numbers(field->model->sac);
+    parts->sacs = HEAP_ZEROED((size_t)parts->sac_numbers, sizeof *parts->sacs);
+    memcpy(parts->first_segment, field->first_segment, ((size_t)field->branch_count + 1) * sizeof *parts->first_segment);
+    memcpy((void *)parts->segment, field->segment, (size_t)segments * sizeof(SweepSegment));
+    memcpy(parts->view, field->view, (size_t)segments * sizeof *parts->view);
+    memcpy(parts->fork, field->fork, (size_t)field->branch_count * sizeof *parts->fork);
+    list_sacs(field->model->sac, parts->sacs);
+}
+
+static bool same_view(const SweepView *a, const SweepView *b)
+{
+    bool same = a->count == b->count && a->sac == b->sac;
+    for (int i = 0; same && i < a->count; i++)
+        same = a->of[i].branch == b->of[i].branch && a->of[i].t == b->of[i].t && a->of[i].slope == b->of[i].slope;
+    return same;
+}
+
+// What differs between the field that the parts were made from and another one.
+typedef struct Changes {
+    bool *segment;           // (segments) of the new field
+    bool *branch;            // (branches) some segment
+    bool sacs;
+} Changes;
+
+static Changes find_changes(const SweepMeshParts *parts, const SweepField *field)
+{
+    int segments = field->first_segment[field->branch_count];
+    Changes c = {.segment = HEAP_ZEROED((size_t)segments, 1), .branch = HEAP_ZEROED((size_t)field->branch_count, 1)};
+    for (int i = 0; i < field->branch_count; i++) {
+        int first = field->first_segment[i], count = field->first_segment[i + 1] - first, before = parts->first_segment[i];
+        bool whole =
+            count != parts->first_segment[i + 1] - before || field->fork[i].delta != parts->fork[i].delta || field->fork[i].reach != parts->fork[i].reach;
+        for (int k = 0; k < count; k++) {
+            const SweepSegment *s = &field->segment[first + k];
+            // sections of another kind are not in the row
+            c.segment[first + k] = whole || s->is_shaped > 0 || memcmp(s, (const char *)parts->segment + (size_t)(before + k) * sizeof *s, sizeof *s) != 0 ||
+                                   !same_view(&field->view[first + k], &parts->view[before + k]);
+            c.branch[i] |= c.segment[first + k];
+        }
+    }
+    double *sacs = HEAP_ZEROED((size_t)sac_numbers(field->model->sac), sizeof *sacs);
+    list_sacs(field->model->sac, sacs);
+    c.sacs = sac_numbers(field->model->sac) != parts->sac_numbers || memcmp(sacs, parts->sacs, (size_t)parts->sac_numbers * sizeof *sacs) != 0;
+    free(sacs);
+    return c;
+}
+
+// Whether something changed on a branch between two places.
+static bool is_changed(const SweepField *field, const Changes *c, int branch, double from, double to)
+{
+    if (!c->branch[branch])
+        return false;
+    for (int s = sweep_field_segment(field, branch, from), last = sweep_field_segment(field, branch, to); s <= last; s++)
+        if (c->segment[s])
+            return true;
+    return false;
+}
+
+// Whether something changed that can be seen from a branch between two places.
+static bool sees_change(const SweepField *field, const Changes *c, int branch, double from, double to)
+{
+    static const double ASIDE = 1.5;         // radii beside the place at which a candidate is expected
+    for (int s = sweep_field_segment(field, branch, from), last = sweep_field_segment(field, branch, to); s <= last; s++) {
+        const SweepView *view = &field->view[s];
+        double near = fmax(0, field->segment[s].from), far = fmin(field->curve[branch]->length, field->segment[s].to);
+        if (c->segment[s] || (view->sac >= 0 && c->sacs))
+            return true;
+        for (int i = 0; i < view->count; i++) {
+            const SweepCandidate *other = &view->of[i];
+            if (other->branch == branch || !c->branch[other->branch])
+                continue;
+            double a = other->t + other->slope * near, b = other->t + other->slope * far;
+            double aside = ASIDE * (field->segment[s].largest + sweep_field_largest(field, other->branch, 0.5 * (a + b)));
+            if (is_changed(field, c, other->branch, fmin(a, b) - aside, fmax(a, b) + aside))
+                return true;
+        }
+    }
+    return false;
+}
+
+static bool same_patch(const MeshPatch *a, const MeshPatch *b)
+{
+    bool same = a->run_count == b->run_count && a->sac_count == b->sac_count && a->cut_count == b->cut_count;
+    for (int i = 0; same && i < a->run_count; i++)
+        same = a->run[i].branch == b->run[i].branch && a->run[i].t_from == b->run[i].t_from && a->run[i].t_to == b->run[i].t_to;
+    for (int i = 0; same && i < a->sac_count; i++)
+        same = a->sac[i] == b->sac[i];
+    return same;
+}
+
+// Whether a patch is the same in both fields: its definition, and what can be seen from it.
+static bool is_kept(const SweepField *field, const Changes *c, const MeshPatch *old, const MeshPatch *now)
+{
+    static const double BEYOND = 1;          // [radii] beyond the cuts, more than a cell
+    if (!same_patch(old, now) || (now->sac_count > 0 && c->sacs))
+        return false;
+    for (int i = 0; i < now->run_count; i++) {
+        const MeshRun *run = &now->run[i];
+        double length = field->curve[run->branch]->length, from = fmax(0, run->t_from), to = fmin(length, run->t_to);
+        from -= BEYOND * sweep_field_largest(field, run->branch, from), to += BEYOND * sweep_field_largest(field, run->branch, to);
+        if (sees_change(field, c, run->branch, from, to))
+            return false;
+    }
+    return true;
+}
+
+// Takes what an old patch holds. The rings of its cuts may have other indices now.
+static void take_patch(MeshPatch *now, MeshPatch *old)
+{
+    for (int i = 0; i < now->cut_count; i++)
+        old->cut[i].branch = now->cut[i].branch, old->cut[i].ring = now->cut[i].ring;
+    for (int i = 0; i < now->run_count; i++)
+        old->run[i] = now->run[i];
+    MeshPatch empty = *now;
+    *now = *old;
+    *old = empty;
+}
+
+// --- Creation ---
+
+// Rings, patches and strips, with patches taken from `before` where nothing changed.
+static bool fill_mesh(SweepMesh *mesh, SweepMeshParts *parts, const Changes *changes, int before_count, MeshPatch *before)
+{
+    const SweepField *field = parts->feet.field;
+    mesh->remade_rings = mesh->remade_patches = 0;
+    for (int i = 0; i < parts->branch_count; i++) {
+        if (changes && !sees_change(field, changes, i, -HUGE_VAL, HUGE_VAL))
+            continue;
+        mesh_rings_free(&parts->rings[i]);
+        mesh_rings_fill(parts, i, &parts->rings[i]);
+        mesh->remade_rings += parts->rings[i].count;
+    }
+    mark_gaps(parts);
+    parts->patch = define_patches(parts, &parts->patch_count);
+    for (int p = 0; p < parts->patch_count; p++) {
+        MeshPatch *now = &parts->patch[p];
+        int found = -1;
+        for (int k = 0; changes && found < 0 && k < before_count; k++)
+            found = before[k].vertices > 0 && is_kept(field, changes, &before[k], now) ? k : -1;
+        if (found >= 0) {
+            take_patch(now, &before[found]);
+        } else {
+            mesh_patch_fill(parts, now);
+            mesh->remade_patches++;
+        }
+    }
+    drop_failures(parts);
+    keep_source(parts);
+    return assemble(mesh, parts);
+}
+
 SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *options)
 {
     SweepMeshOptions defaults = sweep_mesh_default_options();
     SweepMeshParts *parts = create_parts(field, options ? options : &defaults);
     SweepMesh *mesh = HEAP_ZEROED(1, sizeof *mesh);
-    for (int i = 0; i < parts->branch_count; i++)
-        mesh_rings_fill(parts, i, &parts->rings[i]);
-    mark_gaps(parts);
-    parts->patch = define_patches(parts, &parts->patch_count);
-    for (int p = 0; p < parts->patch_count; p++)
-        mesh_patch_fill(parts, &parts->patch[p]);
     mesh->parts = parts;
-    mesh->remade_patches = parts->patch_count;
-    for (int i = 0; i < parts->branch_count; i++)
-        mesh->remade_rings += parts->rings[i].count;
-    if (assemble(mesh, parts))
+    if (fill_mesh(mesh, parts, NULL, 0, NULL))
         return mesh;
     sweep_mesh_free(mesh);
     return NULL;
+}
+
+static void free_surface(SweepMesh *mesh)
+{
+    triangle_mesh_free(mesh->surface);
+    free(mesh->branch);
+    free(mesh->along);
+    free(mesh->sac);
+    free(mesh->boundary);
+}
+
+bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field)
+{
+    SweepMeshParts *parts = mesh->parts;
+    if (field->branch_count != parts->branch_count)
+        return false;
+    Changes changes = find_changes(parts, field);
+    MeshPatch *before = parts->patch;
+    int before_count = parts->patch_count;
+    parts->feet.field = field;
+    parts->feet.harmonics = sweep_model_harmonics(field->model);
+    free_surface(mesh);
+    bool good = fill_mesh(mesh, parts, &changes, before_count, before);
+    for (int i = 0; i < before_count; i++)
+        mesh_patch_free(&before[i]);
+    free(before);
+    free(changes.segment);
+    free(changes.branch);
+    return good;
+}
+
+void sweep_mesh_free(SweepMesh *mesh)
+{
+    if (!mesh)
+        return;
+    free_parts(mesh->parts);
+    free_surface(mesh);
+    free(mesh);
+}
+
+TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options)
+{
+    SweepField *field = sweep_field_create(model);
+    SweepMesh *mesh = field ? sweep_mesh_create(field, options) : NULL;
+    TriangleMesh *surface = mesh ? mesh->surface : NULL;
+    if (mesh)
+        mesh->surface = NULL;
+    sweep_mesh_free(mesh);
+    sweep_field_free(field);
+    return surface;
 }

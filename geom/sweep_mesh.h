@@ -13,7 +13,7 @@
 #include "geom/sweep_field.h"
 
 typedef struct SweepMeshOptions {
-    int around;              // edges around a section, 6 … 256, default 18: so edges are about a third of the local radius
+    int around;              // edges around a section, 6 … 256, default 24: edges are about a quarter of the local radius
     double edge_mm;          // > 0: length of all edges instead (at least 6 around a section); default 0
     bool flat_ends;          // branches end flat at their last section instead of with a dome; default false
     int isa;                 // as LimVesselOptions.isa; default 0
@@ -24,21 +24,25 @@ typedef struct SweepMesh {
     TriangleMesh *surface;   // `node` is the nearest knot's knot_node (or sac_node)
     int *branch;             // (V) branch of the vertex; -1: on a sac
     double *along;           // (V) [mm] t on the branch; on a sac 0
+    int *sac;                // (V) on a sac: the node of model->sac; else -1
     int *boundary;           // (V) 0: wall; 1: on the flat cap of the open start; 2, 3 …: on the flat end of a branch, in the order of the branches. A triangle
                              // belongs to a cap if its three vertices have the same number > 0
     int boundaries;          // highest number used
     int rings, patches;
-    int failures;            // patches that could not be joined to their rings; expected 0. Holes are closed there
+    int failures;            // patches that could not be joined to their rings; expected 0. There the rings run through, so the mesh has several closed parts or crosses itself
     int remade_rings, remade_patches;        // by the last update
     struct SweepMeshParts *parts;            // rings and patches, see sweep_mesh_parts.h
 } SweepMesh;
 
 // `options` may be NULL. Returns NULL if the mesh would have more than 1e8 triangles.
 SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *options);
-// Makes the mesh that of a changed model: rings and patches on parts of the field that are the same as before are kept. The result is the same to the bit as a
-// fresh mesh. Returns false, with the mesh unchanged, if the model has another number of branches, or as above.
+// Makes the mesh that of a changed model. What changed is found by comparing the fields' segments: patches from which no change can be seen are kept, and so are
+// the rings of branches from which none can be seen. The result is the same to the bit as a fresh mesh. Returns false, with the mesh unchanged, if the model has
+// another number of branches. `field` need not outlive the call.
 bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field);
 void sweep_mesh_free(SweepMesh *mesh);
+// The surface alone. `options` may be NULL. Returns NULL as above, or if out of memory.
+TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options);
 // Whether the sections of a segment may carry rings: each ray from the curve meets the contour once.
 bool sweep_mesh_carries_rings(const SweepField *field, int segment);
 

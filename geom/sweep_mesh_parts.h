@@ -73,7 +73,7 @@ typedef struct SweepMeshParts {
     SweepFeet feet;
     int branch_count;
     MeshRings *rings;        // (branches)
-    int patch_count;
+    int patch_count, failures;
     MeshPatch *patch;
     // what the mesh was made from
     int segment_count;

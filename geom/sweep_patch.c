@@ -24,7 +24,7 @@ typedef struct Patch {
     March march;             // must be first: callbacks convert their March * to Patch *
     const SweepMeshParts *parts;
     MeshPatch *out;
-    double cell;
+    double cell, widest;     // widest: of the blends [mm]
     int samples, sample_capacity;
     Sample *sample;
     SweepPlace of_point[MARCH_POINTS];   // of the current block's lattice points
@@ -62,14 +62,15 @@ static void add_place(Patch *p, int branch, double t)
     const SweepField *field = field_of(p);
     double length = field->curve[branch]->length;
     t = fmax(0, fmin(length, t));
-    double largest = sweep_field_largest(field, branch, t);
+    double largest = sweep_field_largest(field, branch, t), blend = widest_blend(field, branch, t);
+    p->widest = fmax(p->widest, blend);
     // beyond an end the section runs on with its slope
     if (t >= length)
         largest = fmax(largest, fmax(sweep_field_largest(field, branch, 2 * length + largest), sweep_field_largest(field, branch, length * (1 - 1e-12))));
     add_sample(p, (Sample){.place = {.branch = branch, .t = t, .sac = -1},
                            .center = sweep_curve_at(field->curve[branch], t).s,
                            .radius = largest,
-                           .reach = 1.1 * largest + widest_blend(field, branch, t) + 2 * p->cell});
+                           .reach = 1.1 * largest + blend + 2 * p->cell});
 }
 
 // Places along the patch's runs, and two steps beyond its cuts.
@@ -97,18 +98,24 @@ static void fill_samples(Patch *p)
         }
 }
 
+// The least edge at a cut; ends without a cut may lie deep inside. Not below a sixth of the largest, for a thread on a wide vessel.
 static double cell_of(const Patch *p)
 {
+    static const double LEAST = 1.0 / 6;
     const SweepField *field = field_of(p);
-    double least = HUGE_VAL;
+    double least = HUGE_VAL, most = 0;
     for (int r = 0; r < p->out->run_count; r++) {
         const MeshRun *run = &p->out->run[r];
-        double length = field->curve[run->branch]->length, to = fmin(length, run->t_to);
-        if (isfinite(run->t_from))
-            least = fmin(least, mesh_edge(p->parts, run->branch, run->t_from));
-        least = fmin(least, mesh_edge(p->parts, run->branch, to));
+        double length = field->curve[run->branch]->length, from = fmax(0, run->t_from), to = fmin(length, run->t_to);
+        bool whole = !isfinite(run->t_from) && !isfinite(run->t_to);
+        for (int end = 0; end < 2; end++) {
+            double edge = mesh_edge(p->parts, run->branch, whole ? 0.5 * length : end ? to : from);
+            most = fmax(most, edge);
+            if (whole || isfinite(end ? run->t_to : run->t_from))
+                least = fmin(least, edge);
+        }
     }
-    return least;
+    return fmax(least, LEAST * most);
 }
 
 // --- The lattice ---
@@ -157,38 +164,44 @@ static void run_queue(Patch *p, Queue *q, Queue *again)
     q->count = 0;
 }
 
-// Values of a block's lattice points. Returns whether both signs occur.
-static bool fill_block(Patch *p, const MarchBlock *block, int *near)
+// The place from which F is seen at a lattice point: the sample in whose tube the point lies deepest. Returns -1, and a bound of F, where it is certainly
+// negative.
+static int best_sample(const Patch *p, Vec3 x, const int *near, int nears, double *bound)
 {
-    static const double FAR = 3;             // [cells] outside every tube: F is certainly negative
+    double deepest = -HUGE_VAL;
+    int best = -1;
+    bool reached = false;
+    for (int n = 0; n < nears; n++) {
+        const Sample *s = &p->sample[near[n]];
+        double far2 = vec3_norm2(vec3_sub(x, s->center));
+        reached |= far2 < s->reach * s->reach;
+        if (s->radius < 0 || (deepest > -HUGE_VAL && s->radius - deepest > 0 && far2 > same_square(s->radius - deepest)))
+            continue;
+        double deep = s->radius - sqrt(far2);
+        if (deep > deepest)
+            deepest = deep, best = near[n];
+    }
+    *bound = fmin(-p->cell, deepest + p->widest);
+    // a sac's blobs may reach where no other sample is near
+    if (best < 0 && nears > 0)
+        best = near[0];
+    return reached ? best : -1;
+}
+
+// Evaluates the lattice points of a block that are `wanted`.
+static void fill_points(Patch *p, const MarchBlock *block, const int *near, int nears, const bool *wanted)
+{
     March *march = &p->march;
     Queue queue = {.count = 0}, again = {.count = 0};
-    int nears = 0;
-    for (int link = block->first; link >= 0; link = march->link[link].next)
-        near[nears++] = march->link[link].ball;
     for (int i = 0; i < MARCH_SIDE; i++)
         for (int j = 0; j < MARCH_SIDE; j++)
             for (int k = 0; k < MARCH_SIDE; k++) {
-                int at = march_index(i, j, k), best = -1;
+                int at = march_index(i, j, k);
+                if (!wanted[at])
+                    continue;
                 Vec3 x = march_point(march, block, i, j, k);
-                double deepest = -HUGE_VAL;
-                bool reached = false;
-                for (int n = 0; n < nears; n++) {
-                    const Sample *s = &p->sample[near[n]];
-                    double far2 = vec3_norm2(vec3_sub(x, s->center));
-                    reached |= far2 < s->reach * s->reach;
-                    if (s->radius < 0)
-                        continue;
-                    double deep = s->radius - sqrt(far2);
-                    if (deep > deepest)
-                        deepest = deep, best = near[n];
-                }
-                march->owner[at] = at;
-                march->value[at] = -FAR * p->cell;
-                // a sac's blobs may reach where no other sample is near
-                for (int n = 0; best < 0 && n < nears; n++)
-                    best = near[n];
-                if (!reached || best < 0)
+                int best = best_sample(p, x, near, nears, &march->value[at]);
+                if (best < 0)
                     continue;
                 p->of_point[at] = p->sample[best].place;
                 queue.index[queue.count] = at, queue.at[queue.count++] = x;
@@ -198,7 +211,54 @@ static bool fill_block(Patch *p, const MarchBlock *block, int *near)
     run_queue(p, &queue, &again);
     if (again.count > 0)
         sample_queue(p, &again);
-    int inside = 0;
+}
+
+enum { STRIDE = MARCH_BLOCK / 2 };
+
+// Marks the points of the eighth of a block at (i, j, k) as wanted if the wall may run through it; else gives them the sign of its corners.
+static void want_eighth(Patch *p, int i, int j, int k, const double *coarse, bool *wanted)
+{
+    static const double STEEPEST = 1.5;      // of F
+    double least = HUGE_VAL, most = -HUGE_VAL, far = STEEPEST * 0.5 * sqrt(3) * STRIDE * p->cell;
+    for (int c = 0; c < 8; c++) {
+        double value = coarse[march_index(i + (c & 1) * STRIDE, j + (c >> 1 & 1) * STRIDE, k + (c >> 2 & 1) * STRIDE)];
+        least = fmin(least, value), most = fmax(most, value);
+    }
+    bool skip = least > far || most < -far;
+    for (int x = i; x <= i + STRIDE; x++)
+        for (int y = j; y <= j + STRIDE; y++)
+            for (int z = k; z <= k + STRIDE; z++) {
+                int at = march_index(x, y, z);
+                if (skip)
+                    p->march.value[at] = wanted[at] ? p->march.value[at] : least;
+                else
+                    wanted[at] = true;
+            }
+}
+
+// Values of a block's lattice points: first every fourth one. Returns whether both signs occur.
+static bool fill_block(Patch *p, const MarchBlock *block, int *near)
+{
+    March *march = &p->march;
+    bool wanted[MARCH_POINTS] = {false};
+    double coarse[MARCH_POINTS];
+    int nears = 0, inside = 0;
+    for (int link = block->first; link >= 0; link = march->link[link].next)
+        near[nears++] = march->link[link].ball;
+    for (int i = 0; i < MARCH_SIDE; i += STRIDE)
+        for (int j = 0; j < MARCH_SIDE; j += STRIDE)
+            for (int k = 0; k < MARCH_SIDE; k += STRIDE)
+                wanted[march_index(i, j, k)] = true;
+    for (int i = 0; i < MARCH_POINTS; i++)
+        march->owner[i] = i;
+    fill_points(p, block, near, nears, wanted);
+    memcpy(coarse, march->value, sizeof coarse);
+    memset(wanted, 0, sizeof wanted);
+    for (int i = 0; i < MARCH_BLOCK; i += STRIDE)
+        for (int j = 0; j < MARCH_BLOCK; j += STRIDE)
+            for (int k = 0; k < MARCH_BLOCK; k += STRIDE)
+                want_eighth(p, i, j, k, coarse, wanted);
+    fill_points(p, block, near, nears, wanted);
     for (int i = 0; i < MARCH_POINTS; i++)
         inside += march->value[i] > 0;
     return inside > 0 && inside < MARCH_POINTS;
@@ -541,6 +601,29 @@ static bool read_loops(Cutter *c)
     return good;
 }
 
+// Evens out the angles of the cuts' vertices, which lie as close together as the lattice happened to put them, and puts them onto their rings again.
+static void space_cuts(Cutter *c)
+{
+    enum { ROUNDS = 12 };
+    static const double TURN = 6.283185307179586476925;
+    for (int i = 0; i < c->p->out->cut_count; i++) {
+        const MeshCut *cut = &c->p->out->cut[i];
+        const MeshPlane *plane = &c->plane[i];
+        int n = cut->count;
+        double *next = HEAP_ZEROED((size_t)n, sizeof *next);
+        for (int round = 0; round < ROUNDS; round++) {
+            for (int k = 0; k < n; k++) {
+                double before = k > 0 ? cut->angle[k - 1] : cut->angle[n - 1] - TURN, after = k + 1 < n ? cut->angle[k + 1] : cut->angle[0] + TURN;
+                next[k] = 0.25 * (before + after) + 0.5 * cut->angle[k];
+            }
+            memcpy(cut->angle, next, (size_t)n * sizeof *next);
+        }
+        for (int k = 0; k < n && !c->is_blended[i]; k++)
+            c->at[cut->vertex[k]] = mesh_plane_point(plane, same_cos(cut->angle[k]), same_sin(cut->angle[k]));
+        free(next);
+    }
+}
+
 static void clear_cuts(MeshPatch *out)
 {
     for (int i = 0; i < out->cut_count; i++) {
@@ -658,7 +741,7 @@ static bool try_patch(const SweepMeshParts *parts, MeshPatch *out, double cell, 
             for (int v = 0; v < mesh->vertex_count; v++)
                 normal[v] = mesh->normal[v];
             if (good)
-                even_out(&c, normal);
+                space_cuts(&c), even_out(&c, normal);
             else
                 c.triangles = 0;
             keep_result(&c, normal);

@@ -256,11 +256,16 @@ static void add_section(const SweepMeshParts *parts, int branch, double t, Circl
     turn_circle(circle, mesh_around(parts, branch, t));
     MeshRing *ring = add_ring(rings, (MeshRing){.kind = RING_SECTION, .t = t, .count = circle->count});
     double speed2 = vec3_norm2(plane.s1);
+    bool is_folded = false;
     for (int i = 0; i < circle->count; i++) {
         Vec3 x = mesh_plane_point(&plane, circle->cosine[i], circle->sine[i]);
         rings->at[ring->first + i] = x;
-        if (speed2 - vec3_dot(vec3_sub(x, plane.s), plane.s2) < LEAST * speed2)
-            ring->is_blended = true;
+        is_folded |= speed2 - vec3_dot(vec3_sub(x, plane.s), plane.s2) < LEAST * speed2;
+    }
+    // the planes of the rings at the cuts must not meet inside the bend
+    if (is_folded) {
+        ring->is_blended = true;
+        add_mark(rings, (MeshMark){.ring = rings->count - 1, .branch = branch, .sac = -1, .from = t - plane.term[0], .to = t + plane.term[0]});
     }
     finish_ring(parts, branch, rings, ring, plane.segment_index, t);
     ring->is_blended |= !sweep_mesh_carries_rings(parts->feet.field, plane.segment_index);

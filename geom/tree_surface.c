@@ -453,7 +453,8 @@ static int64_t nearest_point(const VesselTree *tree, const int *around, int coun
     return nearest;
 }
 
-bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, double *error, double *distance)
+bool surface_point_error_from(const TriangleMesh *mesh, const VesselTree *tree, double (*of_wall)(const void *wall, int vertex, Vec3 point), const void *wall,
+                              double *error, double *distance)
 {
     int around[NODES_MAX], count = 0, of = -1;
     if (tree->point_count < 1)
@@ -467,10 +468,26 @@ bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, doubl
         int64_t nearest = nearest_point(tree, around, count, x);
         if (distance)
             distance[v] = nearest < 0 ? NAN : vec3_distance(x, tree->point[nearest]);
-        if (!error)
-            continue;
-        Blobby model = blobby_of(tree, of);
-        error[v] = nearest < 0 ? NAN : blobby_project(&model, tree->point[nearest], x).distance;
+        if (error)
+            error[v] = nearest < 0 ? NAN : of_wall(wall, v, tree->point[nearest]);
     }
     return true;
+}
+
+typedef struct BlobWall {
+    const TriangleMesh *mesh;
+    const VesselTree *tree;
+} BlobWall;
+
+static double of_blobs(const void *wall, int vertex, Vec3 point)
+{
+    const BlobWall *w = wall;
+    Blobby model = blobby_of(w->tree, w->mesh->node[vertex]);
+    return blobby_project(&model, point, w->mesh->vertex[vertex]).distance;
+}
+
+bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, double *error, double *distance)
+{
+    BlobWall wall = {mesh, tree};
+    return surface_point_error_from(mesh, tree, of_blobs, &wall, error, distance);
 }

@@ -35,5 +35,8 @@ bool surface_open_inlet(TriangleMesh *mesh, const VesselTree *tree);
 //   distance[v]  [mm] from the vertex to it: large where there are no data, as on the caps of open ends
 // Either array may be NULL. Both are NaN where none of the 64 surrounding nodes has points. Returns false if the tree has no points.
 bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, double *error, double *distance);
+// The same for a wall of any kind: `of_wall` returns the signed distance of a data point, > 0 inside, from the wall near a vertex.
+bool surface_point_error_from(const TriangleMesh *mesh, const VesselTree *tree, double (*of_wall)(const void *wall, int vertex, Vec3 point), const void *wall,
+                              double *error, double *distance);
 
 #endif

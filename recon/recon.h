@@ -37,7 +37,9 @@
 #include "recon/surface/import_surface.h"
 #include "recon/surface/mesh_centreline.h"
 #include "recon/surface/mesh_check.h"
+#include "recon/surface/model_mask.h"
 #include "recon/surface/model_surface.h"
+#include "recon/surface/section_table.h"
 #include "recon/surface/surface_file.h"
 #include "recon/surface/vtp_write.h"
 

@@ -201,11 +201,9 @@ const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)
 {
     if (open->mesh)
         return open->mesh;
-    if (open->tree && open->sweep) {
-        Faults ignored;
-        faults_clear(&ignored);
-        open->mesh = contact_surface_mesh(open->vessel, open->tree, false, isosurface_cell_for(open->tree), scene->path, NULL, &ignored);
-    } else if (open->tree)
+    if (open->tree && open->sweep)
+        open->mesh = triangle_mesh_of_sweep(open->sweep, NULL);
+    else if (open->tree)
         open->mesh = isosurface_of_tree(open->tree, isosurface_cell_for(open->tree));
     else if (scene->source == SOURCE_TUBE)
         open->mesh = triangle_mesh_of_tube(&scene->tube);

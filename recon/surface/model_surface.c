@@ -4,10 +4,15 @@
 
 #include <inttypes.h>
 #include <stdlib.h>
+#include <string.h>
 
 static void print_census(FILE *out, const SurfaceCensus *c, double cell_mm, int bubbles)
 {
-    fprintf(out, "surface        %d vertices, %d triangles, cells of %.3g mm\n", c->vertices, c->triangles, cell_mm);
+    fprintf(out, "surface        %d vertices, %d triangles", c->vertices, c->triangles);
+    if (cell_mm > 0)
+        fprintf(out, ", cells of %.3g mm\n", cell_mm);
+    else
+        fprintf(out, ", edges of about a quarter of the local radius\n");
     fprintf(out, "parts          %d, Euler characteristic %" PRId64 "%s\n", c->parts, c->euler,
             bubbles ? "; bubbles inside the lumen and specks beside it were removed" : "");
     fprintf(out, "edges          %" PRId64 " open, %" PRId64 " non-manifold, %" PRId64 " between inconsistently oriented triangles\n", c->open_edges,
@@ -68,32 +73,120 @@ static bool drop_parts(const ModelSurfaceOptions *options, const char *name, dou
     return good;
 }
 
-bool model_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults)
+// --- Swept models ---
+
+typedef struct SweptWall {
+    const SweepField *field;
+    const SweepMesh *mesh;
+} SweptWall;
+
+static double of_swept(const void *wall, int v, Vec3 point)
 {
-    *surface = (SurfaceFigures){0};
-    double cell = options->cell_mm > 0 ? options->cell_mm : isosurface_cell_for(tree);
+    const SweptWall *w = wall;
+    bool on_branch = w->mesh->branch[v] >= 0;
+    // on a sac, the nearest node is found from any
+    SweepPlace place = {.branch = w->mesh->branch[v], .t = w->mesh->along[v], .sac = on_branch ? -1 : w->mesh->sac[v]};
+    SweepBlend blend;
+    sweep_field_blend(w->field, place, point, &blend);
+    return blend.f / vec3_norm(blend.gradient);
+}
+
+// Returns whether memory sufficed.
+static bool sweep_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface)
+{
+    SweepMeshOptions wanted = sweep_mesh_default_options();
+    wanted.edge_mm = options->cell_mm, wanted.flat_ends = options->tags;
+    SweepField *field = sweep_field_create(options->sweep);
+    SweepMesh *mesh = field ? sweep_mesh_create(field, &wanted) : NULL;
+    bool good = mesh != NULL;
+    if (good && options->with_error && tree->point_count > 0) {
+        size_t count = (size_t)mesh->surface->vertex_count + 1;
+        SweptWall wall = {field, mesh};
+        surface->error = HEAP_ZEROED(count, sizeof *surface->error), surface->distance = HEAP_ZEROED(count, sizeof *surface->distance);
+        good = surface_point_error_from(mesh->surface, tree, of_swept, &wall, surface->error, surface->distance);
+    }
+    if (good && options->open_inlet) {
+        TriangleMesh *all = mesh->surface;
+        bool *keep = HEAP_ZEROED((size_t)all->triangle_count + 1, sizeof *keep);
+        for (int t = 0; t < all->triangle_count; t++)
+            for (int k = 0; k < 3; k++)
+                keep[t] |= mesh->boundary[all->triangle[t][k]] != 1;
+        int kept = 0;
+        for (int t = 0; t < all->triangle_count; t++)
+            if (keep[t])
+                memmove(all->triangle[kept++], all->triangle[t], sizeof *all->triangle);
+        all->triangle_count = kept;
+        free(keep);
+    }
+    if (good && mesh->failures > 0 && options->warnings)
+        fprintf(options->warnings, "%s: at %d place%s the branches could not be joined to one surface; there they cross each other\n", name, mesh->failures,
+                mesh->failures == 1 ? "" : "s");
+    if (good) {
+        surface->mesh = mesh->surface, mesh->surface = NULL;
+        if (options->tags) {
+            surface->branch = mesh->branch, surface->along = mesh->along, surface->boundary = mesh->boundary;
+            mesh->branch = mesh->boundary = NULL, mesh->along = NULL;
+        }
+    }
+    sweep_mesh_free(mesh);
+    sweep_field_free(field);
+    return good;
+}
+
+// --- Blobs ---
+
+static bool tag_blobs(const VesselTree *tree, SurfaceFigures *surface)
+{
+    VesselBranches *branches = vessel_branches_create(tree);
+    if (!branches)
+        return false;
+    double *along = HEAP_ZEROED((size_t)tree->node_count, sizeof *along);
+    for (int b = 0; b < branches->count; b++)
+        for (int i = branches->branch[b].first; i < branches->branch[b].first + branches->branch[b].count; i++)
+            along[branches->node[i]] = branches->along[i];
+    size_t count = (size_t)surface->mesh->vertex_count + 1;
+    surface->branch = HEAP_ZEROED(count, sizeof *surface->branch), surface->boundary = HEAP_ZEROED(count, sizeof *surface->boundary);
+    surface->along = HEAP_ZEROED(count, sizeof *surface->along);
+    for (int v = 0; v < surface->mesh->vertex_count; v++)
+        surface->branch[v] = branches->of_node[surface->mesh->node[v]], surface->along[v] = along[surface->mesh->node[v]];
+    free(along);
+    vessel_branches_free(branches);
+    return true;
+}
+
+static bool blob_surface(const VesselTree *tree, const char *name, double cell, const ModelSurfaceOptions *options, SurfaceFigures *surface, int *bubbles,
+                         Faults *faults)
+{
     TriangleMesh *mesh = surface->mesh = isosurface_of_tree(tree, cell);
     if (!mesh || mesh->triangle_count < 1) {
         faults_add(faults, name, 0, 0, "cannot make a surface: %s",
                    mesh ? "the model is empty at this --cell-mm" : "not enough memory; try a larger --cell-mm");
         return false;
     }
-    SurfaceCensus census;
-    int bubbles;
-    bool good = drop_parts(options, name, cell, tree, mesh, &bubbles);
+    bool good = drop_parts(options, name, cell, tree, mesh, bubbles);
     if (options->open_inlet && !surface_open_inlet(mesh, tree)) {
         faults_add(faults, name, 0, 0, "has no inlet to open: the tree continues upstream of its root, or the root's points close it; omit --open-inlet");
         return false;
     }
-    good = good && surface_census(mesh, &census);
     if (good && options->with_error && tree->point_count > 0) {
         surface->error = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->error);
         surface->distance = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->distance);
         good = surface->error && surface->distance && surface_point_error(mesh, tree, surface->error, surface->distance);
     }
-    if (!good)
+    return good && (!options->tags || tag_blobs(tree, surface));
+}
+
+bool model_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults)
+{
+    *surface = (SurfaceFigures){0};
+    double cell = options->cell_mm > 0 || options->sweep ? options->cell_mm : isosurface_cell_for(tree);
+    int bubbles = 0, before = faults->count;
+    SurfaceCensus census;
+    bool good = options->sweep ? sweep_surface(tree, name, options, surface) : blob_surface(tree, name, cell, options, surface, &bubbles, faults);
+    good = good && surface_census(surface->mesh, &census);
+    if (!good && faults->count == before)
         faults_add(faults, name, 0, 0, "cannot make a surface: not enough memory; try a larger --cell-mm");
-    else if (options->figures)
+    else if (good && options->figures)
         print_census(options->figures, &census, cell, bubbles);
     return good;
 }
@@ -103,4 +196,7 @@ void model_surface_free(SurfaceFigures *surface)
     triangle_mesh_free(surface->mesh);
     free(surface->error);
     free(surface->distance);
+    free(surface->branch);
+    free(surface->boundary);
+    free(surface->along);
 }

@@ -6,7 +6,9 @@
 #include "recon/surface/surface_write.h"
 
 typedef struct ModelSurfaceOptions {
-    double cell_mm;          // [mm] grid spacing; 0: chosen for the thinnest branch
+    const SweepModel *sweep; // the swept model to mesh (geom/sweep_mesh.h); NULL: the tree's blobs
+    double cell_mm;          // [mm] grid spacing, or the edges of a swept model; 0: chosen for the thinnest branch, or by the local radius
+    bool tags;               // branch, way along it and boundary of each vertex; the ends of a swept model are flat
     bool open_inlet;         // cut the surface open at the root's plane
     bool keep_floating;      // keep parts that no point can reach from the inlet
     bool with_error;         // compute the signed distance and the distance of the nearest data point for each vertex

@@ -44,14 +44,17 @@ void surface_print_ply(FILE *out, const SurfaceFigures *surface)
     const TriangleMesh *mesh = surface->mesh;
     fprintf(out,
             "ply\nformat ascii 1.0\ncomment seldinger " SELDINGER_VERSION ", mm\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
-            "property float nx\nproperty float ny\nproperty float nz\nproperty int node\n%selement face %d\nproperty list uchar int vertex_indices\n"
+            "property float nx\nproperty float ny\nproperty float nz\nproperty int node\n%s%selement face %d\nproperty list uchar int vertex_indices\n"
             "end_header\n",
-            mesh->vertex_count, surface->error ? "property float error_mm\nproperty float data_mm\n" : "", mesh->triangle_count);
+            mesh->vertex_count, surface->error ? "property float error_mm\nproperty float data_mm\n" : "",
+            surface->branch ? "property int branch\nproperty float along_mm\nproperty int boundary\n" : "", mesh->triangle_count);
     for (int i = 0; i < mesh->vertex_count; i++) {
         fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g %d", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
                 mesh->normal[i].z, mesh->node[i]);
         if (surface->error)
             fprintf(out, " %.6g %.6g", surface->error[i], surface->distance[i]);
+        if (surface->branch)
+            fprintf(out, " %d %.9g %d", surface->branch[i], surface->along[i], surface->boundary[i]);
         fputc('\n', out);
     }
     for (int i = 0; i < mesh->triangle_count; i++)
@@ -72,6 +75,14 @@ void surface_print_obj(FILE *out, const SurfaceFigures *surface)
     }
 }
 
+static void print_tags(FILE *out, const char *name, const int *tag, int count)
+{
+    vtp_array(out, "Int32", name, 1);
+    for (int i = 0; i < count; i++)
+        fprintf(out, "%d\n", tag[i]);
+    vtp_array_end(out);
+}
+
 void surface_print_vtp(FILE *out, const SurfaceFigures *surface)
 {
     const TriangleMesh *mesh = surface->mesh;
@@ -85,6 +96,11 @@ void surface_print_vtp(FILE *out, const SurfaceFigures *surface)
     if (surface->error) {
         vtp_numbers(out, "error_mm", surface->error, mesh->vertex_count);
         vtp_numbers(out, "data_mm", surface->distance, mesh->vertex_count);
+    }
+    if (surface->branch) {
+        print_tags(out, "branch", surface->branch, mesh->vertex_count);
+        vtp_numbers(out, "along_mm", surface->along, mesh->vertex_count);
+        print_tags(out, "boundary", surface->boundary, mesh->vertex_count);
     }
     fprintf(out, "</PointData>\n");
     vtp_points(out, mesh->vertex, mesh->vertex_count);

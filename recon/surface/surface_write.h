@@ -9,6 +9,8 @@
 typedef struct SurfaceFigures {
     TriangleMesh *mesh;
     double *error, *distance;   // (V) [mm], both NULL if the tree has no points
+    int *branch, *boundary;     // (V) tags, NULL if not wanted: branch (-1: a sac); 0 wall, 1 flat cap at the inlet, 2, 3 … at the outlets
+    double *along;              // (V) [mm] way along the branch
 } SurfaceFigures;
 
 void surface_print_stl(FILE *out, const SurfaceFigures *surface);

@@ -1,0 +1,34 @@
+#include "recon/surface/section_table.h"
+
+#include "recon/sweep_file.h"
+
+bool section_table_write(const char *path, const SweepModel *model, Faults *faults)
+{
+    OutputText text;
+    SweepField *field = sweep_field_create(model);
+    if (!field || !output_text_open(&text)) {
+        faults_add(faults, path, 0, 0, "cannot be written: out of memory");
+        sweep_field_free(field);
+        return false;
+    }
+    fprintf(text.stream, "branch,t_mm,x_mm,y_mm,z_mm,nx,ny,nz,area_mm2,mean_radius_mm,least_radius_mm,largest_radius_mm,perimeter_mm,circularity\n");
+    for (int i = 0; i < model->branch_count; i++)
+        for (int k = 0; k < model->branch[i].break_count; k++) {
+            double t = fmin(model->break_t[model->branch[i].first_break + k], field->curve[i]->length);
+            SweepSection s = sweep_section_at(field, i, t);
+            fprintf(text.stream, "%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n", i, s.t, s.centre.x, s.centre.y, s.centre.z, s.normal.x,
+                    s.normal.y, s.normal.z, s.area, s.mean, s.least, s.largest, s.perimeter, s.circularity);
+        }
+    sweep_field_free(field);
+    return output_text_write(&text, path, faults);
+}
+
+bool section_table_of_file(const char *path, const char *file, const VesselTree *tree, Faults *faults)
+{
+    if (!path)
+        return true;
+    SweepModel *model = sweep_file_load(file, SECTION_POLAR, tree, faults);
+    bool good = model && section_table_write(path, model, faults);
+    sweep_model_free(model);
+    return good;
+}

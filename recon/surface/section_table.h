@@ -1,0 +1,13 @@
+// The sections of a swept model as a table (CSV).
+#ifndef SELDINGER_RECON_SURFACE_SECTION_TABLE_H
+#define SELDINGER_RECON_SURFACE_SECTION_TABLE_H
+
+#include "base/base.h"
+#include "geom/geom.h"
+
+// One row for each break of the sections' B-splines: branch, t_mm, centre, normal, area_mm2, radii, perimeter_mm, circularity (geom/sweep_section.h).
+bool section_table_write(const char *path, const SweepModel *model, Faults *faults);
+// The table of the polar model of a file whose tree is `tree`. True if `path` is NULL.
+bool section_table_of_file(const char *path, const char *file, const VesselTree *tree, Faults *faults);
+
+#endif
