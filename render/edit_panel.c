@@ -133,7 +133,7 @@ static void show_edits(Gui *gui, const EditState *s, GuiRect at)
 EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_help)
 {
     EditPanelActions actions = {0};
-    float k = gui_scale(gui), gap = floorf(6 * k), list_height = floorf(at.height * 0.28f);
+    float k = gui_scale(gui), gap = floorf(6 * k), list_height = floorf(fmaxf(at.height * 0.2f, at.height - 480 * k));
     char title[80];
     const int edits = sweep_editor_list(s->editor)->count;
     gui_window_begin(gui, "panel", (GuiRect){at.x, at.y, at.width, at.height - list_height}, 0);

@@ -25,7 +25,7 @@ double terms_radius(const double term[SWEEP_TERMS], double theta)
     return sum;
 }
 
-double terms_area(const double term[SWEEP_TERMS])
+double sweep_terms_area(const double term[SWEEP_TERMS])
 {
     double sum = term[0] * term[0];
     for (int k = 1; k < SWEEP_TERMS; k++)
@@ -56,14 +56,15 @@ static bool unwind(int count, const SectionPoint *p, double *theta, double *rho)
     return fabs(turn - 2 * PI) < 1e-6;
 }
 
+static double around(double angle) { return angle - 2 * PI * floor(angle / (2 * PI)); }
+
 // Weighted normal equations; band_matrix holds their lower half.
 static bool solve_terms(int count, const double *theta, const double *rho, double term[SWEEP_TERMS])
 {
     double a[SWEEP_TERMS * SWEEP_TERMS] = {0}, factor[SWEEP_TERMS];
     memset(term, 0, SWEEP_TERMS * sizeof *term);
     for (int i = 0; i < count; i++) {
-        double gap = theta[(i + 1) % count] - theta[(i + count - 1) % count];
-        gap -= 2 * PI * floor(gap / (2 * PI));
+        double gap = around(theta[(i + 1) % count] - theta[(i + count - 1) % count]);
         fill_factors(theta[i], factor);
         for (int j = 0; j < SWEEP_TERMS; j++) {
             term[j] += gap * factor[j] * rho[i];
@@ -87,53 +88,61 @@ static bool is_dense(int count, const SectionPoint *p)
     return true;
 }
 
-// Copies the contour, counter-clockwise, and smooths it if it has few points.
-static SectionPoint *prepare(int count, const Vec3 *point, int *prepared)
+// The contour, counter-clockwise. NULL if out of memory.
+static SectionPoint *turn_left(int count, const Vec3 *point)
 {
     SectionPoint *p = calloc((size_t)count, sizeof *p);
-    if (!p)
-        return NULL;
-    for (int i = 0; i < count; i++)
+    for (int i = 0; p && i < count; i++)
         p[i] = (SectionPoint){point[i].x, point[i].y};
-    if (polygon_area(count, p) < 0)
+    if (p && polygon_area(count, p) < 0)
         for (int i = 0; i < count / 2; i++) {
             SectionPoint kept = p[i];
             p[i] = p[count - 1 - i], p[count - 1 - i] = kept;
         }
-    *prepared = count;
-    if (is_dense(count, p))
-        return p;
-    SectionPoint *fine = calloc((size_t)count * FINE, sizeof *fine);
-    if (fine)
-        polygon_smooth(count, p, 0.5, FINE, fine);
-    *prepared = count * FINE;
-    free(p);
-    return fine;
+    return p;
+}
+
+// FINE points for each, on the cubic Hermite curve rho(theta) whose slopes are those of the parabolas through three neighbours.
+static void refine(int count, const double *theta, const double *rho, double *fine_theta, double *fine_rho)
+{
+    for (int i = 0; i < count; i++) {
+        int at[4] = {(i + count - 1) % count, i, (i + 1) % count, (i + 2) % count};
+        double h[3], rise[3];
+        for (int k = 0; k < 3; k++)
+            h[k] = around(theta[at[k + 1]] - theta[at[k]]), rise[k] = (rho[at[k + 1]] - rho[at[k]]) / h[k];
+        double from = (h[1] * rise[0] + h[0] * rise[1]) / (h[0] + h[1]), to = (h[2] * rise[1] + h[1] * rise[2]) / (h[1] + h[2]);
+        for (int k = 0; k < FINE; k++) {
+            double x = (double)k / FINE, y = 1 - x;
+            fine_theta[i * FINE + k] = theta[i] + x * h[1];
+            fine_rho[i * FINE + k] = y * y * (1 + 2 * x) * rho[i] + x * x * (1 + 2 * y) * rho[at[2]] + h[1] * x * y * (y * from - x * to);
+        }
+    }
 }
 
 const char *contour_terms(int count, const Vec3 *point, double term[SWEEP_TERMS], double *misfit)
 {
-    static const char memory[] = "the contour needs more memory than is available";
     SEL_ASSERT(count >= 3, "a contour has three points or more");
-    int n;
-    SectionPoint *p = prepare(count, point, &n);
-    double *theta = p ? calloc(2 * (size_t)n, sizeof *theta) : NULL;
-    if (!theta) {
-        free(p);
-        return memory;
-    }
+    size_t n = (size_t)count;
+    SectionPoint *p = turn_left(count, point);
+    double *memory = p ? calloc(n * 2 * (1 + FINE), sizeof *memory) : NULL, *theta = memory, *rho = memory + n;
     const char *wrong = NULL;
-    if (!polygon_contains(n, p, 0, 0))
+    if (!memory)
+        wrong = "the contour needs more memory than is available";
+    else if (!polygon_contains(count, p, 0, 0))
         wrong = "the contour does not go around the branch's curve; expected a closed curve around n = 0, b = 0";
-    else if (!unwind(n, p, theta, theta + n))
+    else if (!unwind(count, p, theta, rho))
         wrong = "the contour is not star-shaped about the branch's curve: a ray from the curve meets it more than once; expected one point in each direction";
-    else if (!solve_terms(n, theta, theta + n, term) || !terms_are_open(term))
+    else if (!is_dense(count, p)) {
+        refine(count, theta, rho, memory + 2 * n, memory + 2 * n + n * FINE);
+        theta = memory + 2 * n, rho = theta + n * FINE, count *= FINE;
+    }
+    if (!wrong && (!solve_terms(count, theta, rho, term) || !terms_are_open(term)))
         wrong = "the contour has a notch or a spike too sharp for 8 harmonics, or comes too close to the branch's curve; expected a smoother one";
     *misfit = 0;
-    for (int i = 0; !wrong && i < n; i++)
-        *misfit = fmax(*misfit, fabs(terms_radius(term, theta[i]) - theta[n + i]));
+    for (int i = 0; !wrong && i < count; i++)
+        *misfit = fmax(*misfit, fabs(terms_radius(term, theta[i]) - rho[i]));
     free(p);
-    free(theta);
+    free(memory);
     return wrong;
 }
 
@@ -173,7 +182,7 @@ static bool ellipse_terms(const double term[SWEEP_TERMS], double ellipse[SWEEP_T
 
 void terms_smooth(double term[SWEEP_TERMS], bool ellipse, double strength)
 {
-    double target[SWEEP_TERMS] = {term[0]}, area = terms_area(term), waves = 0;
+    double target[SWEEP_TERMS] = {term[0]}, area = sweep_terms_area(term), waves = 0;
     SEL_ASSERT(strength >= 0 && strength <= 1, "smoothing goes from none to all");
     if (strength == 0 || (ellipse && !ellipse_terms(term, target)))
         return;

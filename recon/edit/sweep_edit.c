@@ -33,8 +33,6 @@ __attribute__((format(printf, 2, 3))) static SweepModel *refuse(const Work *w, c
     return NULL;
 }
 
-double sweep_terms_area(const double term[SWEEP_TERMS]) { return terms_area(term); }
-
 static const char no_memory[] = "the edit needs more memory than is available";
 
 // --- sections ---

@@ -56,6 +56,5 @@ void sweep_edit_contour(const SweepModel *model, int branch, double t, int count
 void sweep_edit_terms(const SweepModel *model, int branch, double t, double term[SWEEP_TERMS]);
 // Nearest station to t, and how far an edit at t may be from it to replace it instead of inserting another [mm].
 double sweep_edit_station(const SweepModel *model, int branch, double t, double *within);
-double sweep_terms_area(const double term[SWEEP_TERMS]);     // [mm^2]
 
 #endif

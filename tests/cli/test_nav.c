@@ -19,6 +19,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-nav-XXXXXX";
+#include "tests/cli/display.h"
 #include "tests/folder.h"
 
 static const char scene[] = "seldinger: 1\n"
@@ -39,63 +40,18 @@ static const char coaxial[] =
     "  - {name: thread, kind: wire, elements: 25, sections: [{length_mm: 110, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n";
 
-static pid_t server;
-
-static bool is_installed(const char *program)
-{
-    char command[200];
-    snprintf(command, sizeof command, "command -v %s >/dev/null 2>&1", program);
-    return system(command) == 0;
-}
-
-// Xvfb finds a free display number and prints it.
 static int open_display(void **state)
 {
-    int message[2];
-    char number[16] = ":", display[32] = "-displayfd";
     assert_int_equal(make_folder(state), 0);
     put("scene.yaml", scene);
     put("coaxial.yaml", coaxial);
-#ifdef KEEP_LIBRARIES
-    // LeakSanitizer's reports are then about our code; it must accept not being the first library
-    setenv("LD_PRELOAD", KEEP_LIBRARIES, 1);
-    setenv("ASAN_OPTIONS", "verify_asan_link_order=0", 1);
-#endif
-    if (!is_installed("Xvfb") || !is_installed("xdotool"))
-        return 0;
-    assert_int_equal(pipe(message), 0);
-    server = fork();
-    if (server == 0) {
-        char descriptor[16];
-        snprintf(descriptor, sizeof descriptor, "%d", message[1]);
-        if (!freopen("/dev/null", "w", stderr))
-            _exit(1);
-        execlp("Xvfb", "Xvfb", display, descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", (char *)NULL);
-        _exit(1);
-    }
-    close(message[1]);
-    ssize_t length = read(message[0], number + 1, sizeof number - 2);
-    close(message[0]);
-    assert_true(length > 0);
-    number[strcspn(number, "\n")] = 0;
-    return setenv("DISPLAY", number, 1);
+    return display_start();
 }
 
 static int close_display(void **state)
 {
-    if (server > 0) {
-        kill(server, SIGTERM);
-        waitpid(server, NULL, 0);
-    }
+    display_stop();
     return remove_folder(state);
-}
-
-static void need_display(void)
-{
-    if (server <= 0) {
-        print_message("skipped: Xvfb or xdotool is not installed\n");
-        skip();
-    }
 }
 
 static int run(const char *format, ...)

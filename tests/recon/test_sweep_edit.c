@@ -105,6 +105,12 @@ static void a_contour_becomes_its_fourier_terms(void **state)
     make_ellipse(1.3, 0.9, 360, point);
     assert_null(contour_terms(360, point, term, &misfit));
     assert_true(misfit < 1e-3 && fabs(sweep_terms_area(term) - PI * 1.3 * 0.9) < 1e-4);
+    // a few points of a circle, unevenly apart: still the circle
+    const double few[] = {0, 0.03, 1.1, 2.9, 3.7, 5.2};
+    for (int i = 0; i < 6; i++)
+        point[i] = vec3(1.5 * same_cos(few[i]), 1.5 * same_sin(few[i]), 0);
+    assert_null(contour_terms(6, point, term, &misfit));
+    assert_true(fabs(term[0] - 1.5) < 1e-9 && fabs(term[3]) < 1e-9 && misfit < 1e-9);
     // a kidney is no star
     for (int i = 0; i < 60; i++) {
         double theta = 2 * PI * i / 60;
