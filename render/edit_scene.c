@@ -35,6 +35,10 @@ EditScene *edit_scene_create(const EditState *state, char *message, size_t capac
         return NULL;
     }
     scene->camera = free_camera_framing(mesh->vertex_count, mesh->vertex);
+    // room for the arrows
+    static const double room = 1.1;
+    scene->camera.width_mm *= room, scene->camera.height_mm *= room;
+    scene->camera.home_width_mm *= room, scene->camera.home_height_mm *= room;
     scene->depth = vec3_distance(scene->camera.low, scene->camera.high) + 10;
     scene->is_stale = true;
     return scene;
