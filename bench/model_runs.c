@@ -112,6 +112,47 @@ double model_query_us(const FittedModel *model, const VesselTree *tree)
     return us[ROUNDS / 2];
 }
 
+// --- Meshes ---
+
+static double cpu_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static bool update_mesh(const FittedModel *model, SweepMesh *mesh, double *seconds)
+{
+    const SweepBranch *b = &model->sweep->branch[0];
+    double *row = model->sweep->row + (size_t)(b->first_row + b->break_count / 2) * SWEEP_TERMS, before = row[0], begin = cpu_seconds();
+    row[0] *= 1.01;
+    SweepField *changed = sweep_field_create(model->sweep);
+    bool good = changed && sweep_mesh_update(mesh, changed);
+    *seconds = cpu_seconds() - begin;
+    row[0] = before;
+    sweep_field_free(changed);
+    return good;
+}
+
+bool model_mesh(const FittedModel *model, const VesselTree *tree, ModelMesh *out)
+{
+    double begin = cpu_seconds();
+    *out = (ModelMesh){NAN, NAN, 0};
+    if (model->lim) {
+        TriangleMesh *mesh = isosurface_of_tree(model->lim, isosurface_cell_for(tree));
+        *out = (ModelMesh){cpu_seconds() - begin, NAN, mesh ? mesh->triangle_count : 0};
+        triangle_mesh_free(mesh);
+        return mesh != NULL;
+    }
+    SweepMesh *mesh = sweep_mesh_create(model->field, NULL);
+    bool good = mesh != NULL;
+    if (good)
+        *out = (ModelMesh){cpu_seconds() - begin, NAN, mesh->surface->triangle_count};
+    good = good && update_mesh(model, mesh, &out->update_s);
+    sweep_mesh_free(mesh);
+    return good;
+}
+
 // --- Runs ---
 
 // One run; the pushes are in push_n. stop: at the first failure, because a published model that is unfit for contact takes minutes to go on.

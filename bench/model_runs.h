@@ -11,6 +11,13 @@ double model_jump_deg(const FittedModel *model, const VesselTree *tree);
 // Median time [us] of 80 queries: points 0.3 radii inside the wall, which move 0.05 mm along it between queries.
 double model_query_us(const FittedModel *model, const VesselTree *tree);
 
+typedef struct ModelMesh {
+    double seconds, update_s;        // of the whole mesh; of its update after the section in the middle of the first branch grew by a hundredth, NAN: has none
+    int64_t triangles;
+} ModelMesh;
+// The mesh that `export` writes. False if out of memory. A swept model's rows are changed for the update, and restored.
+bool model_mesh(const FittedModel *model, const VesselTree *tree, ModelMesh *out);
+
 typedef struct ModelLoop {
     double deepest_mm;       // of a node outside the true wall
     double push_over_exact;  // mean push without friction relative to that on the exact wall, less 1

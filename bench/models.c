@@ -194,6 +194,7 @@ typedef struct Row {
     double mean, p99, most, bias, normal_deg, bulge;
     double bending;          // mean |mean curvature| over that of the true wall, less 1 (AUMC times 2r, relative to truth's)
     double jump_deg, query_us;
+    ModelMesh mesh;
     int64_t count;
 } Row;
 
@@ -241,6 +242,9 @@ static bool measure(const ModelsBench *bench, const Subject *subject, const Fitt
     }
     row->jump_deg = model_jump_deg(fitted, subject->tree);
     row->query_us = model_query_us(fitted, subject->tree);
+    // published forms have no wall that is fit for a mesh
+    if (!fitted->kind->is_printed)
+        good = good && model_mesh(fitted, subject->tree, &row->mesh);
     free(m.gap);
     free(m.turn);
     free(m.curvature);
@@ -252,6 +256,8 @@ static void report(const ModelsBench *bench, const char *name, const FittedModel
     FILE *text = bench_text(&bench->common);
     fprintf(text, "%-12.12s %-11s %8.5f %8.5f %8.5f %+9.5f %7.3f %7.4f %+7.3f %7.2f %8lld %7.2f %7.1f", name, fitted->kind->name, row->mean, row->p99,
             row->most, row->bias, row->normal_deg, row->bulge, row->bending, row->jump_deg, (long long)fitted->numbers, fitted->seconds, row->query_us);
+    if (!fitted->kind->is_printed)
+        fprintf(text, " %7.3f %7lld %7.2f", row->mesh.seconds, (long long)row->mesh.triangles, 1000 * row->mesh.update_s);
     if (fitted->kind->is_swept)
         fprintf(text, "   noise %.5f, %lld left out, %lld folded, %lld not star-shaped, %d not polar", fitted->figures.noise,
                 (long long)fitted->figures.left_out, (long long)fitted->figures.folded, (long long)fitted->figures.not_star_shaped, fitted->figures.shaped);
@@ -271,6 +277,9 @@ static void report(const ModelsBench *bench, const char *name, const FittedModel
     cJSON_AddNumberToObject(out, "numbers", (double)fitted->numbers);
     cJSON_AddNumberToObject(out, "build_s", fitted->seconds);
     cJSON_AddNumberToObject(out, "query_80_us", row->query_us);
+    cJSON_AddNumberToObject(out, "mesh_s", row->mesh.seconds);
+    cJSON_AddNumberToObject(out, "triangles", (double)row->mesh.triangles);
+    cJSON_AddNumberToObject(out, "update_s", row->mesh.update_s);
     cJSON_AddItemToArray(rows, out);
 }
 
@@ -349,8 +358,8 @@ static int call(void *structure, Faults *faults)
     ModelsBench *bench = structure;
     cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "rows");
     FILE *text = bench_text(&bench->common);
-    fprintf(text, "%s\n%-12s %-11s %8s %8s %8s %9s %7s %7s %7s %7s %8s %7s %7s\n", bench_processor(), "case", "model", "mean mm", "p99", "max", "bias",
-            "nrm deg", "bulge r", "bending", "jump", "numbers", "build s", "us/80");
+    fprintf(text, "%s\n%-12s %-11s %8s %8s %8s %9s %7s %7s %7s %7s %8s %7s %7s %7s %7s %7s\n", bench_processor(), "case", "model", "mean mm", "p99", "max",
+            "bias", "nrm deg", "bulge r", "bending", "jump", "numbers", "build s", "us/80", "mesh s", "faces", "upd ms");
     ModelsPicture picture = {0};
     bool good = !bench->picture || models_picture_open(&picture, bench->picture, faults);
     int count = (int)(sizeof cases / sizeof cases[0]) - (bench->common.quick ? 2 : 0);
@@ -430,8 +439,8 @@ static const OptionTable table = {
              "(+: too wide), "
              "root mean square of the normal's error, largest bulge outside the true wall at forks in local radii, mean absolute mean curvature over the true "
              "wall's less 1 "
-             "(bending; away from forks), largest jump of the normal along the vessels, numbers stored, seconds of the fit, and microseconds for 80 contact "
-             "queries. Then a "
+             "(bending; away from forks), largest jump of the normal along the vessels, numbers stored, seconds of the fit, microseconds for 80 contact "
+             "queries, CPU seconds and triangles of the mesh, and milliseconds of its update. Then a "
              "wire without friction is pushed through two shapes on each model and on the exact wall.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, ModelsBench),
