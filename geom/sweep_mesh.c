@@ -8,6 +8,7 @@
 #include "base/base.h"
 #include "geom/sweep_mesh_parts.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -537,6 +538,7 @@ static Changes find_changes(const SweepMeshParts *parts, const SweepField *field
 {
     int segments = field->first_segment[field->branch_count];
     Changes c = {.segment = HEAP_ZEROED((size_t)segments, 1), .branch = HEAP_ZEROED((size_t)field->branch_count, 1)};
+    const size_t field_part = offsetof(SweepSegment, around);    // what follows does not change the field
     for (int i = 0; i < field->branch_count; i++) {
         int first = field->first_segment[i], count = field->first_segment[i + 1] - first, before = parts->first_segment[i];
         bool whole =
@@ -544,7 +546,7 @@ static Changes find_changes(const SweepMeshParts *parts, const SweepField *field
         for (int k = 0; k < count; k++) {
             const SweepSegment *s = &field->segment[first + k];
             // sections of another kind are not in the row
-            c.segment[first + k] = whole || s->is_shaped > 0 || memcmp(s, (const char *)parts->segment + (size_t)(before + k) * sizeof *s, sizeof *s) != 0 ||
+            c.segment[first + k] = whole || s->is_shaped > 0 || memcmp(s, (const char *)parts->segment + (size_t)(before + k) * sizeof *s, field_part) != 0 ||
                                    !same_view(&field->view[first + k], &parts->view[before + k]);
             c.branch[i] |= c.segment[first + k];
         }

@@ -724,7 +724,7 @@ static bool try_patch(const SweepMeshParts *parts, MeshPatch *out, double cell, 
     bool good = march_patch(p);
     if (good) {
         TriangleMesh *mesh = p->march.mesh;
-        project(p, mesh->vertex_count, mesh->vertex, mesh->normal, p->place, NULL, 4);
+        project(p, mesh->vertex_count, mesh->vertex, mesh->normal, p->place, NULL, 20);
         Cutter c = {.p = p, .plane = HEAP_ZEROED((size_t)out->cut_count + 1, sizeof *c.plane), .is_blended = HEAP_ZEROED((size_t)out->cut_count + 1, 1)};
         for (int i = 0; i < out->cut_count; i++) {
             const MeshRing *ring = &parts->rings[out->cut[i].branch].ring[out->cut[i].ring];

@@ -103,11 +103,15 @@ static void move(Stepper *s, double part)
     for (int i = 0; i < held; i++) {
         // exactly on the line, regardless of rounding
         const double *u = s->system.u + row_of(s, i);
-        double *k = s->iterate.moved + row_of(s, i), turn = fmax(-NODE_TURN_MAX, fmin(NODE_TURN_MAX, part * (u[3] - k[3])));
+        double *k = s->iterate.moved + row_of(s, i), turn = part * (u[3] - k[3]);
         k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
         k[3] += turn;
         double along = vec3_dot(vec3_sub(s->start.position[i], s->entry.mouth), s->entry.axis[0]) + k[0];
         w->position[i] = vec3_add_scaled(s->entry.mouth, along, s->entry.axis[0]);
+        if (fabs(turn) > NODE_TURN_MAX) {    // an iterate of a tool that is let go may turn far
+            w->orientation[i] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(s->entry.axis[0], turn)), w->orientation[i]));
+            turn = 0;
+        }
         rx[i] = turn * s->entry.axis[0].x, ry[i] = turn * s->entry.axis[0].y, rz[i] = turn * s->entry.axis[0].z;
     }
     for (int i = held; i < nodes; i++) {

@@ -80,7 +80,7 @@ ContactProblem step_contacts(Stepper *s)
                             .u = s->system.u};
 }
 
-static const double IMPLAUSIBLE = 1e9;       // [mm], [rad] in one step
+static const double IMPLAUSIBLE = 1e100;     // [mm], [rad]: squares stay finite
 
 bool stepper_take_contacts(Stepper *s, const ContactReport *solved)
 {
