@@ -21,6 +21,13 @@ static int branch_of_segment(const SweepField *field, int segment)
     return 0;
 }
 
+void sweep_block_begin(SweepBlock *b)
+{
+    memset(&b->ring, 0, sizeof b->ring);
+    memset(b->alone, 0, sizeof b->alone);
+    b->harmonics = 1;
+}
+
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int i, int segment, int sac, double t)
 {
     SEL_ASSERT(segment >= 0 || sac >= 0, "a place lies on a branch or on a sac");
@@ -384,12 +391,10 @@ static const double REST_FRESH = 1e-10;      // [mm] error of the gap that Newto
 static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, const SweepStart *start, int count)
 {
     FootBatch *f = &b->foot;
-    memset(&b->ring, 0, sizeof b->ring);
-    b->harmonics = 1;
+    sweep_block_begin(b);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int from = i < count ? i : 0;
         const SweepStart *s = &start[from];
-        b->alone[i] = false;
         sweep_block_place(feet, b, i, s->segment, s->sac, s->t);
         sweep_block_set_point(feet, b, i, x[from]);
         f->at.x[i] = s->at.x, f->at.y[i] = s->at.y, f->at.z[i] = s->at.z;

@@ -46,6 +46,8 @@ typedef struct SweepBlock {
     SweepLane ring_x, ring_y, ring_z;    // the foot that the ring belongs to
 } SweepBlock;
 
+// Prepares a new block: no lane is alone, and the ring is empty.
+void sweep_block_begin(SweepBlock *b);
 // Sets a lane's place; the parts' t are found from it.
 // With b->alone[lane] set before, of the branch alone.
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int lane, int segment, int sac, double t);

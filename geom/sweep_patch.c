@@ -131,7 +131,7 @@ static unsigned sample_queue(Patch *p, const Queue *q)
 {
     SweepBlock b;
     unsigned other = 0;
-    memset(&b.ring, 0, sizeof b.ring);
+    sweep_block_begin(&b);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int k = i < q->count ? i : 0;
         mesh_set_place(&p->parts->feet, &b, i, &p->of_point[q->index[k]]);
@@ -310,7 +310,7 @@ static void project(Patch *p, int count, Vec3 *at, Vec3 *normal, SweepPlace *pla
             return;
         SweepBlock b;
         FootSample *f = &b.foot.at;
-        memset(&b.ring, 0, sizeof b.ring);
+        sweep_block_begin(&b);
         for (int i = 0; i < FOOT_BLOCK; i++) {
             int v = which[i < lanes ? i : 0];
             mesh_set_place(&p->parts->feet, &b, i, &place[v]);

@@ -107,7 +107,6 @@ Vec3 mesh_plane_blended(const SweepFeet *feet, const MeshPlane *plane, Vec3 x)
 
 void mesh_set_place(const SweepFeet *feet, SweepBlock *b, int lane, const SweepPlace *place)
 {
-    b->alone[lane] = false, b->harmonics = 1;
     if (place->branch >= 0)
         sweep_block_place(feet, b, lane, sweep_field_segment(feet->field, place->branch, place->t), -1, place->t);
     else
@@ -126,7 +125,7 @@ void mesh_normals(const SweepFeet *feet, int count, const Vec3 *at, SweepPlace *
 {
     for (int first = 0; first < count; first += FOOT_BLOCK) {
         SweepBlock b;
-        memset(&b.ring, 0, sizeof b.ring);
+        sweep_block_begin(&b);
         for (int i = 0; i < FOOT_BLOCK; i++) {
             int v = first + i < count ? first + i : first;
             mesh_set_place(feet, &b, i, &place[v]);
@@ -202,7 +201,7 @@ static void finish_ring(const SweepMeshParts *parts, int branch, MeshRings *ring
     bool alone = field->view[segment].count == 1 && field->view[segment].sac < 0;
     for (int first = 0; first < ring->count; first += FOOT_BLOCK) {
         SweepBlock b;
-        memset(&b.ring, 0, sizeof b.ring);
+        sweep_block_begin(&b);
         FootSample *at = &b.foot.at;
         SweepPartLanes *p = &b.part[0];
         SweepLane own = {0};
@@ -216,7 +215,6 @@ static void finish_ring(const SweepMeshParts *parts, int branch, MeshRings *ring
             if (s->rise == 0)
                 p->segment[i] = s;
             p->t[i] = there, p->absent[i] = 0;
-            b.alone[i] = false, b.harmonics = 1;
             if (!alone)
                 sweep_block_place(&parts->feet, &b, i, (int)(p->segment[i] - field->segment), -1, there);
         }

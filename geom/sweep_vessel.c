@@ -384,8 +384,7 @@ static void follow_block(const SweepVessel *v, Batch *batch, const int *which, i
     SweepBlock b;
     FootBatch *f = &b.foot;
     unsigned all = (1u << count) - 1, done = 0;
-    memset(&b.ring, 0, sizeof b.ring);
-    b.harmonics = 1;
+    sweep_block_begin(&b);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int p = which[i < count ? i : 0];
         load_lane(v, &b, i, batch->point[p], &batch->memory[p], alone);
