@@ -20,30 +20,18 @@ BranchPiece *branch_pieces(const SweepModel *m, int more)
 static bool keep_stretches(const SweepModel *like, int count, const BranchPiece *piece, SweepModel *m)
 {
     Faults ignored;
-    SweepStretch *stretch = calloc((size_t)like->stretch_count, sizeof *stretch);
-    SweepStation *station = calloc((size_t)like->station_count, sizeof *station);
-    SectionPoint *contour = calloc((size_t)like->contour_count + 1, sizeof *contour);
-    int stretches = 0, stations = 0, points = 0;
-    bool good = stretch && station && contour;
-    for (int i = 0; good && i < count; i++)
+    StretchList list = {0};
+    for (int i = 0; i < count; i++)
         for (int k = 0; k < like->stretch_count; k++) {
-            const SweepStretch *s = &like->stretch[k];
-            if (s->branch != piece[i].from)
+            SweepStretch s = like->stretch[k];
+            if (s.branch != piece[i].from)
                 continue;
-            stretch[stretches] = *s;
-            stretch[stretches].branch = i, stretch[stretches++].first_station = stations;
-            for (int j = s->first_station; j < s->first_station + s->station_count; j++) {
-                const SweepStation *t = &like->station[j];
-                station[stations++] = (SweepStation){t->t, points, t->point_count};
-                memcpy(contour + points, like->contour + t->first_point, (size_t)t->point_count * sizeof *contour);
-                points += t->point_count;
-            }
+            s.branch = i;
+            stretch_list_copy(&list, &s, like->station, like->contour);
         }
     faults_clear(&ignored);
-    good = good && (stretches == 0 || sweep_model_set_stretches(m, stretches, stretch, stations, station, points, contour, "the edited model", &ignored));
-    free(stretch);
-    free(station);
-    free(contour);
+    bool good = stretch_list_give(&list, m, "the edited model", &ignored);
+    stretch_list_free(&list);
     return good;
 }
 

@@ -246,13 +246,13 @@ static void mean_distances(const Stations *s, int station, const Section *sectio
     }
 }
 
-// A section of the station's contour, at first through its points if the rows miss them. NULL with faults.
-static Section *make_section(Stations *s, int branch, int station)
+// A section of the station's contour, at first through its points if the rows missed them. NULL with faults.
+static Section *make_section(Stations *s, int branch, int station, bool missed)
 {
     SectionOptions options = station_options(s);
     SweepStation *at = &s->station[station];
     Section *section = NULL;
-    if (rows_miss_points(s, station)) {
+    if (missed) {
         double of_section, of_rows;
         int kept = s->contour_count;
         if (!contour_of_points(s, branch, station, fmax(TOUR_APART, TOUR_NOISE * s->system->noise / station_radius(s, station))))
@@ -279,9 +279,10 @@ static bool fit_station(Stations *s, int branch, int station)
 {
     SweepStretchFigures *f = s->figures;
     f->second_sheets += count_second_sheets(s, station);
-    if (s->draft->options->section.kind == SECTION_POLAR && !rows_miss_points(s, station))
+    bool missed = rows_miss_points(s, station);
+    if (s->draft->options->section.kind == SECTION_POLAR && !missed)
         return contour_of_rows(s, branch, station);
-    Section *section = make_section(s, branch, station);
+    Section *section = make_section(s, branch, station, missed);
     if (!section)
         return false;
     if (s->draft->options->section.kind == SECTION_POLAR) {
@@ -378,39 +379,24 @@ static SweepStretch whole_branch(const Stations *s, int branch)
                           .is_straight = kind == SECTION_PAS};
 }
 
-// Copies the stations of the stretches one after another, as the model wants them, and gives them to the model.
-static bool set_stretches(Stations *s, int count, SweepStretch *stretch)
+// Gives the model the stretches, whose first stations are those of the breaks.
+static bool set_stretches(Stations *s, int count, const SweepStretch *stretch)
 {
-    int stations = 0, contours = 0;
-    SweepModel *m = s->draft->model;
-    SweepStation *station = malloc(((size_t)m->break_count + 1) * sizeof *station);
-    SectionPoint *contour = malloc(((size_t)s->contour_count + 1) * sizeof *contour);
-    bool good = station && contour;
-    for (int i = 0; good && i < count; i++) {
-        int from = stretch[i].first_station;
-        stretch[i].first_station = stations;
-        for (int k = from; k < from + stretch[i].station_count; k++) {
-            SweepStation at = s->station[k];
-            memcpy(contour + contours, s->contour + at.first_point, (size_t)at.point_count * sizeof *contour);
-            at.first_point = contours;
-            contours += at.point_count;
-            station[stations++] = at;
-        }
-    }
-    s->figures->stations = stations;
-    good = good && sweep_model_set_stretches(m, count, stretch, stations, station, contours, contour, "fit", s->faults);
-    free(station);
-    free(contour);
+    StretchList list = {0};
+    for (int i = 0; i < count; i++)
+        stretch_list_copy(&list, &stretch[i], s->station, s->contour);
+    s->figures->stations = list.stations;
+    bool good = stretch_list_give(&list, s->draft->model, "fit", s->faults);
+    stretch_list_free(&list);
     return good;
 }
 
 static bool fit_mended(Stations *s)
 {
     SweepModel *m = s->draft->model;
-    bool good = true;
     SweepStretch *stretch = malloc(((size_t)m->break_count + 1) * sizeof *stretch);
     int stretches = 0;
-    good = stretch != NULL;
+    bool good = stretch != NULL;
     for (int i = 0; good && i < m->branch_count; i++) {
         for (int q = m->branch[i].first_break; good && q < m->branch[i].first_break + m->branch[i].break_count; q++)
             good = fit_station(s, i, q);
@@ -443,38 +429,20 @@ static bool fit_printed(Stations *s)
 int sweep_stretches_keep_better(SweepDraft *d, const SweepSystem *system, const double *before, SweepStretchFigures *figures, Faults *faults)
 {
     SweepModel *m = d->model;
-    int kept = 0, stations = 0, contours = 0, dropped;
-    SweepStretch *stretch = malloc(((size_t)m->stretch_count + 1) * sizeof *stretch);
-    SweepStation *station = malloc(((size_t)m->station_count + 1) * sizeof *station);
-    SectionPoint *contour = malloc(((size_t)m->contour_count + 1) * sizeof *contour);
-    bool good = stretch && station && contour;
-    for (int i = 0; good && i < m->stretch_count; i++) {
+    StretchList list = {0};
+    for (int i = 0; i < m->stretch_count; i++) {
         double with = 0, without = 0;
-        SweepStretch s = m->stretch[i];
+        const SweepStretch *s = &m->stretch[i];
         for (int64_t p = 0; p < d->vessel_point_count; p++)
-            if (d->owner[p] == s.branch && d->t[p] > s.from && d->t[p] < s.to)
+            if (d->owner[p] == s->branch && d->t[p] > s->from && d->t[p] < s->to)
                 with += fabs(system->distance[p]), without += fabs(before[p]);
-        if (!(with < NEARER * without))
-            continue;
-        int first = s.first_station;
-        s.first_station = stations;
-        for (int k = first; k < first + s.station_count; k++) {
-            SweepStation at = m->station[k];
-            memcpy(contour + contours, m->contour + at.first_point, (size_t)at.point_count * sizeof *contour);
-            at.first_point = contours, contours += at.point_count;
-            station[stations++] = at;
-        }
-        stretch[kept++] = s;
+        if (with < NEARER * without)
+            stretch_list_copy(&list, s, m->station, m->contour);
     }
-    dropped = m->stretch_count - kept;
-    if (!good)
-        faults_add(faults, "fit", 0, 0, "not enough memory");
-    if (good && dropped > 0)
-        good = sweep_model_set_stretches(m, kept, stretch, stations, station, contours, contour, "fit", faults);
+    int dropped = m->stretch_count - list.stretches;
+    bool good = dropped == 0 || stretch_list_give(&list, m, "fit", faults);
     figures->stations = m->station_count;
-    free(stretch);
-    free(station);
-    free(contour);
+    stretch_list_free(&list);
     return good ? dropped : -1;
 }
 
