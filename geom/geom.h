@@ -16,6 +16,7 @@
 // the swept model: branches with cross-sections along them
 #include "geom/sweep_model.h"
 #include "geom/stretch_list.h"
+#include "geom/sweep_terms.h"
 #include "geom/sweep_field.h"
 #include "geom/sweep_section.h"
 

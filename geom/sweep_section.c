@@ -2,7 +2,8 @@
 // interval between knots, which are left out here. The trapezoidal rule converges faster than any power for a periodic function without corners.
 #include "geom/sweep_section.h"
 
-static const double FULL_TURN = 6.283185307179586476925;
+#include "geom/sweep_terms.h"
+
 enum { ANGLES = 512 };
 
 // The extreme value of a parabola through three neighbouring values at equal distances.
@@ -24,19 +25,16 @@ SweepSection sweep_section_at(const SweepField *field, int branch, double t)
     for (int k = 0; k < SWEEP_TERMS; k++)
         term[k] = s->section[k][0] + x * (s->section[k][1] + x * (s->section[k][2] + x * s->section[k][3]));
     out.mean = term[0];
-    out.area = term[0] * term[0];
-    for (int k = 1; k < SWEEP_TERMS; k++)
-        out.area += 0.5 * term[k] * term[k];
-    out.area *= 0.5 * FULL_TURN;
+    out.area = sweep_terms_area(term);
     for (int i = 0; i < ANGLES; i++) {
-        double angle = FULL_TURN * i / ANGLES, slope = 0;
+        double angle = 2 * PI * i / ANGLES, slope = 0;
         radius[i] = term[0];
         for (int k = 1; k <= SWEEP_HARMONICS; k++) {
             double c = same_cos(k * angle), d = same_sin(k * angle);
             radius[i] += term[2 * k - 1] * c + term[2 * k] * d;
             slope += k * (term[2 * k] * c - term[2 * k - 1] * d);
         }
-        out.perimeter += FULL_TURN / ANGLES * same_hypot(radius[i], slope);
+        out.perimeter += 2 * PI / ANGLES * same_hypot(radius[i], slope);
     }
     out.least = HUGE_VAL;
     for (int i = 0; i < ANGLES; i++) {
@@ -46,6 +44,6 @@ SweepSection sweep_section_at(const SweepField *field, int branch, double t)
         if (at >= before && at >= after)
             out.largest = fmax(out.largest, extreme(before, at, after));
     }
-    out.circularity = 2 * FULL_TURN * out.area / (out.perimeter * out.perimeter);
+    out.circularity = 4 * PI * out.area / (out.perimeter * out.perimeter);
     return out;
 }

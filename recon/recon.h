@@ -25,7 +25,6 @@
 #include "recon/fit/reach_report.h"
 
 // edits of swept models
-#include "recon/edit/contour_terms.h"
 #include "recon/edit/edit_list.h"
 #include "recon/edit/sweep_edit.h"
 #include "recon/edit/edit_file.h"

@@ -16,27 +16,10 @@ static void fill_factors(double theta, double factor[SWEEP_TERMS])
         factor[2 * k - 1] = same_cos(k * theta), factor[2 * k] = same_sin(k * theta);
 }
 
-double terms_radius(const double term[SWEEP_TERMS], double theta)
-{
-    double factor[SWEEP_TERMS], sum = 0;
-    fill_factors(theta, factor);
-    for (int k = 0; k < SWEEP_TERMS; k++)
-        sum += term[k] * factor[k];
-    return sum;
-}
-
-double sweep_terms_area(const double term[SWEEP_TERMS])
-{
-    double sum = term[0] * term[0];
-    for (int k = 1; k < SWEEP_TERMS; k++)
-        sum += 0.5 * term[k] * term[k];
-    return PI * sum;
-}
-
 bool terms_are_open(const double term[SWEEP_TERMS])
 {
     for (int i = 0; i < ANGLES; i++)
-        if (!(terms_radius(term, 2 * PI * i / ANGLES) > 0.05 * term[0]))
+        if (!(sweep_terms_radius(term, 2 * PI * i / ANGLES) > 0.05 * term[0]))
             return false;
     return term[0] > 0;
 }
@@ -140,7 +123,7 @@ const char *contour_terms(int count, const Vec3 *point, double term[SWEEP_TERMS]
         wrong = "the contour has a notch or a spike too sharp for 8 harmonics, or comes too close to the branch's curve; expected a smoother one";
     *misfit = 0;
     for (int i = 0; !wrong && i < count; i++)
-        *misfit = fmax(*misfit, fabs(terms_radius(term, theta[i]) - rho[i]));
+        *misfit = fmax(*misfit, fabs(sweep_terms_radius(term, theta[i]) - rho[i]));
     free(p);
     free(memory);
     return wrong;
@@ -151,12 +134,9 @@ const char *contour_terms(int count, const Vec3 *point, double term[SWEEP_TERMS]
 // Terms of the ellipse with the area and moments of the section. False: there is none around the curve.
 static bool ellipse_terms(const double term[SWEEP_TERMS], double ellipse[SWEEP_TERMS])
 {
-    double area = 0, cx = 0, cy = 0, xx = 0, xy = 0, yy = 0, factor[ANGLES][SWEEP_TERMS];
+    double area = 0, cx = 0, cy = 0, xx = 0, xy = 0, yy = 0, radius[ANGLES];
     for (int i = 0; i < ANGLES; i++) {
-        fill_factors(2 * PI * i / ANGLES, factor[i]);
-        double r = 0, c = factor[i][1], s = factor[i][2];
-        for (int k = 0; k < SWEEP_TERMS; k++)
-            r += term[k] * factor[i][k];
+        double theta = 2 * PI * i / ANGLES, r = sweep_terms_radius(term, theta), c = same_cos(theta), s = same_sin(theta);
         double r2 = r * r, r3 = r2 * r / 3, r4 = r2 * r2 / 4;
         area += r2 / 2, cx += r3 * c, cy += r3 * s, xx += r4 * c * c, xy += r4 * c * s, yy += r4 * s * s;
     }
@@ -170,13 +150,12 @@ static bool ellipse_terms(const double term[SWEEP_TERMS], double ellipse[SWEEP_T
     double q = PI / area * sqrt(det), a = q * yy / det, b = -q * xy / det, d = q * xx / det, centre = a * cx * cx + 2 * b * cx * cy + d * cy * cy;
     if (!(centre < 0.8))
         return false;
-    memset(ellipse, 0, SWEEP_TERMS * sizeof *ellipse);
     for (int i = 0; i < ANGLES; i++) {
-        double c = factor[i][1], s = factor[i][2], two = a * c * c + 2 * b * c * s + d * s * s, one = c * (a * cx + b * cy) + s * (b * cx + d * cy);
-        double r = (one + sqrt(one * one + two * (1 - centre))) / two;
-        for (int k = 0; k < SWEEP_TERMS; k++)
-            ellipse[k] += r * factor[i][k] * (k > 0 ? 2.0 : 1.0) / ANGLES;
+        double theta = 2 * PI * i / ANGLES, c = same_cos(theta), s = same_sin(theta), two = a * c * c + 2 * b * c * s + d * s * s,
+               one = c * (a * cx + b * cy) + s * (b * cx + d * cy);
+        radius[i] = (one + sqrt(one * one + two * (1 - centre))) / two;
     }
+    sweep_terms_of_radii(ANGLES, radius, ellipse);
     return true;
 }
 

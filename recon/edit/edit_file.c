@@ -1,8 +1,6 @@
 // See edit_file.h.
 #include "recon/edit/edit_file.h"
 
-#include "recon/edit/contour_terms.h"
-
 bool edit_file_load(const char *path, EditFile *file, Faults *faults)
 {
     *file = (EditFile){0};

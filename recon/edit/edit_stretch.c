@@ -1,7 +1,6 @@
 // See edit_stretch.h.
 #include "recon/edit/edit_stretch.h"
 
-#include "recon/edit/contour_terms.h"
 #include "recon/edit/edit_rows.h"
 
 #include <stdlib.h>
@@ -26,10 +25,7 @@ static void add_row_station(StretchList *list, const SweepModel *m, int branch, 
     SectionPoint contour[ROW_POINTS];
     double term[SWEEP_TERMS];
     edit_rows_section(&rows, t, term);
-    for (int i = 0; i < ROW_POINTS; i++) {
-        double angle = 2 * PI * i / ROW_POINTS, r = terms_radius(term, angle);
-        contour[i] = (SectionPoint){r * same_cos(angle), r * same_sin(angle)};
-    }
+    sweep_terms_contour(term, ROW_POINTS, contour);
     stretch_list_add(list, t, ROW_POINTS, contour);
 }
 

@@ -115,13 +115,8 @@ static bool outermost_terms(int count, const SectionPoint *contour, double term[
     Section *section = section_create(&options, count, contour);
     bool good = section && section_radii(section, 0, 0, RAYS, radius) >= 0;
     section_free(section);
-    for (int k = 0; good && k < SWEEP_TERMS; k++) {
-        term[k] = 0;
-        for (int i = 0; i < RAYS; i++) {
-            double angle = 2 * PI * i / RAYS * ((k + 1) / 2);
-            term[k] += radius[i] * (k % 2 ? same_cos(angle) : k > 0 ? same_sin(angle) : 0.5) * 2 / RAYS;
-        }
-    }
+    if (good)
+        sweep_terms_of_radii(RAYS, radius, term);
     return good;
 }
 
@@ -147,13 +142,12 @@ static SweepModel *edit_section(const Work *w)
     free(flat);
     edit_rows_station(&rows, e->t, &within);
     bool is_raster = wrong && contour && outermost_terms(e->count, contour, term);
-    SweepModel *m = NULL;
-    if (wrong && !is_raster) {
+    if (!contour || (wrong && !is_raster)) {
         edit_rows_free(&rows);
-        refuse(w, "%s", wrong);
-    } else {
-        m = contour ? set_section(w, &rows, e->t, term) : refuse(w, "%s", no_memory);
+        free(contour);
+        return refuse(w, "%s", wrong && !is_raster ? wrong : no_memory);
     }
+    SweepModel *m = set_section(w, &rows, e->t, term);
     if (m && (is_raster || edit_stretch_at(m, e->branch, e->t, e->t) >= 0))
         m = set_stretch(w, m, within, contour);
     free(contour);
@@ -548,7 +542,7 @@ void sweep_edit_contour(const SweepModel *m, int branch, double t, int count, Ve
     double term[SWEEP_TERMS];
     sweep_edit_terms(m, branch, t, term);
     for (int i = 0; i < count; i++) {
-        double theta = 2 * PI * i / count, r = terms_radius(term, theta);
+        double theta = 2 * PI * i / count, r = sweep_terms_radius(term, theta);
         point[i] = vec3(r * same_cos(theta), r * same_sin(theta), 0);
     }
 }

@@ -108,24 +108,13 @@ static bool add_contour(Stations *s, int station, int count, const SectionPoint 
     return true;
 }
 
-static double row_radius(const double *term, double theta)
-{
-    double sum = term[0];
-    for (int k = 1; k <= SWEEP_HARMONICS; k++)
-        sum += term[2 * k - 1] * same_cos(k * theta) + term[2 * k] * same_sin(k * theta);
-    return sum;
-}
-
 static bool contour_of_rows(Stations *s, int branch, int station)
 {
     double term[T];
     SectionPoint point[CONTOUR];
     for (int k = 0; k < T; k++)
         term[k] = sweep_draft_term(s->draft, branch, k, s->station[station].t);
-    for (int i = 0; i < CONTOUR; i++) {
-        double theta = 2 * PI * i / CONTOUR, r = row_radius(term, theta);
-        point[i] = (SectionPoint){r * same_cos(theta), r * same_sin(theta)};
-    }
+    sweep_terms_contour(term, CONTOUR, point);
     return add_contour(s, station, CONTOUR, point);
 }
 
@@ -189,7 +178,7 @@ static bool contour_of_station(Stations *s, int branch, int station)
         s->polar[(size_t)station * T + (size_t)k] = term[k] - sweep_draft_term(s->draft, branch, k, t);
     SectionPoint point[PRINTED_CONTOUR];
     for (int i = 0; i < PRINTED_CONTOUR; i++) {
-        double theta = 2 * PI * i / PRINTED_CONTOUR, rho = fmax(row_radius(term, theta), 0.1 * r);
+        double theta = 2 * PI * i / PRINTED_CONTOUR, rho = fmax(sweep_terms_radius(term, theta), 0.1 * r);
         point[i] = (SectionPoint){rho * same_cos(theta), rho * same_sin(theta)};
     }
     return add_contour(s, station, PRINTED_CONTOUR, point);
@@ -211,16 +200,9 @@ static bool compile(Stations *s, int branch, int station, const Section *section
     double radius[RAYS], *change = s->polar + (size_t)station * T, most = 0;
     if (section_radii(section, 0, 0, RAYS, radius) != 0)
         return false;
-    for (int k = 0; k < T; k++) {
-        double sum = 0;
-        for (int i = 0; i < RAYS; i++) {
-            double theta = 2 * PI * i / RAYS * ((k + 1) / 2);
-            sum += radius[i] * (k % 2 ? same_cos(theta) : k > 0 ? same_sin(theta) : 1);
-        }
-        change[k] = sum * (k > 0 ? 2.0 : 1.0) / RAYS;
-    }
+    sweep_terms_of_radii(RAYS, radius, change);
     for (int i = 0; i < RAYS; i++)
-        most = fmax(most, fabs(row_radius(change, 2 * PI * i / RAYS) - radius[i]));
+        most = fmax(most, fabs(sweep_terms_radius(change, 2 * PI * i / RAYS) - radius[i]));
     for (int k = 0; k < T; k++)
         change[k] -= sweep_draft_term(s->draft, branch, k, s->station[station].t);
     return most <= AGREE * station_radius(s, station);

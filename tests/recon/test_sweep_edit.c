@@ -93,7 +93,7 @@ static void a_contour_becomes_its_fourier_terms(void **state)
     // points of a curve that has only these terms, in either direction
     for (int way = 0; way < 2; way++) {
         for (int i = 0; i < 40; i++) {
-            double theta = (way ? -1 : 1) * (2 * PI * i / 40 + 0.05 * same_sin(i)), r = terms_radius(given, theta);
+            double theta = (way ? -1 : 1) * (2 * PI * i / 40 + 0.05 * same_sin(i)), r = sweep_terms_radius(given, theta);
             point[i] = vec3(r * same_cos(theta), r * same_sin(theta), 0);
         }
         assert_null(contour_terms(40, point, term, &misfit));
