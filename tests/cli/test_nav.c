@@ -148,6 +148,19 @@ static int has_moved(char **argument)
     return motion.inserted > strtod(argument[1], NULL) && motion.twisted > strtod(argument[2], NULL) ? 0 : 1;
 }
 
+// Called as `test_nav --thread RECORDING FITTED LEAST MOST`: exit code 0 once the thread (tool 1) has been exchanged FITTED times and is LEAST to MOST mm in.
+static int thread_is(char **argument)
+{
+    RecordedRun *recorded = recorded_run_load_series(argument[0], &faults);
+    if (!recorded)
+        return 1;
+    int64_t last = recorded->step_count - 1;
+    double in = last < 0 ? NAN : recorded->tool[1].inserted[last];
+    bool is = in >= strtod(argument[2], NULL) && in <= strtod(argument[3], NULL) && recorded_run_fitted(recorded, 1, last) == atoi(argument[1]);
+    recorded_run_free(recorded);
+    return is ? 0 : 1;
+}
+
 // Waits until the window shows a picture, then holds keys as a user does; Esc and Enter end the session. Keys are read once per picture, which can take seconds
 // under a sanitizer on a loaded machine: keys that move the tool are held until it has moved.
 static const char hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
@@ -255,17 +268,19 @@ static void two_tools_are_moved_by_keys(void **state)
 // While the thread is inserted, an exchange is refused. It is pulled back, its tip is shaped on the tray, and it is pushed in again.
 static const char exchanging_hands[] =
     "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "until_thread() { until $TEST_NAV --thread \"$(ls trays/*.h5 2>/dev/null | head -1)\" $* || ! xdotool search --name Seldinger: >/dev/null 2>&1; "
+    "do sleep 0.3; done; }; "
     "xdotool key 2; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.3; xdotool key Return; sleep 0.5; xdotool key x; sleep 0.3; "
-    "xdotool keydown shift; xdotool keydown Down; sleep 4; xdotool keyup Down; xdotool keyup shift; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep "
-    "0.2; xdotool key Right; sleep 0.3; "
-    "xdotool key Return; sleep 3; xdotool keydown shift; xdotool keydown Up; sleep 4; xdotool keyup Up; xdotool keyup shift; sleep 0.3; "
+    "xdotool keydown shift; xdotool keydown Down; until_thread 0 -1000 -76; xdotool keyup Down; xdotool keyup shift; sleep 0.2; "
+    "xdotool key x; sleep 0.7; xdotool key s; sleep 0.2; xdotool key Right; sleep 0.3; xdotool key Return; until_thread 1 -1000 0; "
+    "xdotool keydown shift; xdotool keydown Up; until_thread 1 2.5 1000; xdotool keyup Up; xdotool keyup shift; sleep 0.3; "
     "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
 static void a_tip_is_shaped_and_put_in_from_the_tray(void **state)
 {
     (void)state;
     need_display();
-    WINDOW_RUNS("rm -rf trays; (%s) & exec %s nav coaxial.yaml --sessions trays --duration-s 60 --size 800x600 >out.txt 2>&1", exchanging_hands,
+    WINDOW_RUNS("rm -rf trays; (%s) & exec %s nav coaxial.yaml --sessions trays --duration-s 120 --size 800x600 >out.txt 2>&1", exchanging_hands,
                 SELDINGER_PROGRAM);
     RUNS(0, "test $(ls trays/*.h5 | wc -l) = 1 && test $(ls trays/*.json | wc -l) = 1 && mv trays/*.h5 tray.h5");
     RecordedRun *recorded = load(in_folder("tray.h5"));
@@ -336,7 +351,7 @@ static void a_missing_display_is_reported(void **state)
 int main(int argc, char **argv)
 {
     if (argc > 1)
-        return argc == 5 && !strcmp(argv[1], "--moved") ? has_moved(argv + 2) : 2;
+        return argc == 5 && !strcmp(argv[1], "--moved") ? has_moved(argv + 2) : argc == 6 && !strcmp(argv[1], "--thread") ? thread_is(argv + 2) : 2;
     char self[500];
     ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
     if (length <= 0)
