@@ -211,24 +211,26 @@ static MeshPatch *define_patches(const SweepMeshParts *parts, int *count)
     return patch;
 }
 
-// A patch that cannot be joined to its rings is left out: the rings run through, and what should be blended there stays apart.
-static void drop_failures(SweepMeshParts *parts)
+// Moves the failed cuts of patches `more` gaps outwards, where t may be clearer. Returns false if there are none.
+static bool move_failed_cuts(SweepMeshParts *parts, int more)
 {
-    int kept = 0;
-    parts->failures = 0;
+    bool any = false;
     for (int p = 0; p < parts->patch_count; p++) {
-        MeshPatch *patch = &parts->patch[p];
-        if (patch->failures == 0) {
-            parts->patch[kept++] = *patch;
-            continue;
+        const MeshPatch *patch = &parts->patch[p];
+        for (int r = 0; patch->is_failed && r < patch->run_count; r++) {
+            const MeshRun *run = &patch->run[r];
+            MeshRings *rings = &parts->rings[run->branch];
+            bool low = run->cut_from >= 0 && patch->cut[run->cut_from].is_failed, high = run->cut_to >= 0 && patch->cut[run->cut_to].is_failed;
+            for (int j = 1; j <= more; j++) {
+                if (low)
+                    mark_gap(rings, run->from - j);
+                if (high)
+                    mark_gap(rings, run->to + j);
+            }
+            any |= low || high;
         }
-        parts->failures += patch->failures;
-        for (int r = 0; r < patch->run_count; r++)
-            for (int j = patch->run[r].from; j <= patch->run[r].to; j++)
-                parts->rings[patch->run[r].branch].in_patch[j] = false;
-        mesh_patch_free(patch);
     }
-    parts->patch_count = kept;
+    return any;
 }
 
 // --- Assembly ---
@@ -465,6 +467,9 @@ static void free_parts(SweepMeshParts *parts)
         mesh_rings_free(&parts->rings[i]);
     for (int i = 0; i < parts->patch_count; i++)
         mesh_patch_free(&parts->patch[i]);
+    for (int i = 0; i < parts->failed_count; i++)
+        mesh_patch_free(&parts->failed[i]);
+    free(parts->failed);
     free(parts->rings);
     free(parts->patch);
     free(parts->first_segment);
@@ -601,13 +606,13 @@ static bool same_patch(const MeshPatch *a, const MeshPatch *b)
     return same;
 }
 
-// Whether a patch is the same in both fields: its definition, and what can be seen from it.
+// Whether a patch is the same in both fields: its definition, and what can be seen from it. `c` NULL: the fields are the same.
 static bool is_kept(const SweepField *field, const Changes *c, const MeshPatch *old, const MeshPatch *now)
 {
     static const double BEYOND = 1;          // [radii] beyond the cuts, more than a cell
-    if (!same_patch(old, now) || (now->sac_count > 0 && c->sacs))
+    if (!(old->vertices > 0 || old->is_failed) || !same_patch(old, now) || (c && now->sac_count > 0 && c->sacs))
         return false;
-    for (int i = 0; i < now->run_count; i++) {
+    for (int i = 0; c && i < now->run_count; i++) {
         const MeshRun *run = &now->run[i];
         double length = field->curve[run->branch]->length, from = fmax(0, run->t_from), to = fmin(length, run->t_to);
         from -= BEYOND * sweep_field_largest(field, run->branch, from), to += BEYOND * sweep_field_largest(field, run->branch, to);
@@ -617,22 +622,97 @@ static bool is_kept(const SweepField *field, const Changes *c, const MeshPatch *
     return true;
 }
 
-// Takes what an old patch holds. The rings of its cuts may have other indices now.
-static void take_patch(MeshPatch *now, MeshPatch *old)
+typedef struct PatchList {
+    int count;
+    MeshPatch *patch;
+} PatchList;
+
+// Moves a patch to a list.
+static void keep_patch(PatchList *list, MeshPatch *patch)
 {
-    for (int i = 0; i < now->cut_count; i++)
-        old->cut[i].branch = now->cut[i].branch, old->cut[i].ring = now->cut[i].ring;
-    for (int i = 0; i < now->run_count; i++)
-        old->run[i] = now->run[i];
-    MeshPatch empty = *now;
-    *now = *old;
-    *old = empty;
+    list->patch = HEAP_GROWN(list->patch, (size_t)list->count + 1, sizeof *list->patch);
+    list->patch[list->count++] = *patch;
+    *patch = (MeshPatch){0};
+}
+
+static void free_patches(PatchList *list)
+{
+    for (int i = 0; i < list->count; i++)
+        mesh_patch_free(&list->patch[i]);
+    free(list->patch);
+    *list = (PatchList){0};
+}
+
+// Takes the content of `now` from a list if it is there. The rings of its cuts may have other indices now.
+static bool take_patch(const SweepField *field, const Changes *c, const PatchList *list, MeshPatch *now)
+{
+    for (int k = 0; k < list->count; k++) {
+        MeshPatch *old = &list->patch[k];
+        if (!is_kept(field, c, old, now))
+            continue;
+        for (int i = 0; i < now->cut_count; i++)
+            old->cut[i].branch = now->cut[i].branch, old->cut[i].ring = now->cut[i].ring;
+        for (int i = 0; i < now->run_count; i++)
+            old->run[i] = now->run[i];
+        MeshPatch empty = *now;
+        *now = *old;
+        *old = empty;
+        return true;
+    }
+    return false;
 }
 
 // --- Creation ---
 
+// The patches; a failed one is tried again with its cuts farther outwards. What can be is taken from `before`.
+static void fill_patches(SweepMesh *mesh, SweepMeshParts *parts, const Changes *changes, const PatchList *before)
+{
+    static const int MORE[] = {3, 9, 27, 1 << 20, 1 << 20};      // gaps, at last to the end of the branch
+    enum { TRIES = sizeof MORE / sizeof *MORE };
+    const SweepField *field = parts->feet.field;
+    PatchList tried = {0};
+    MeshPatch *patch;
+    int count;
+    mark_gaps(parts);
+    for (int try = 0;; try++) {
+        patch = parts->patch = define_patches(parts, &parts->patch_count);
+        count = parts->patch_count;
+        for (int p = 0; p < count; p++)
+            if (!take_patch(field, NULL, &tried, &patch[p]) && !(changes && take_patch(field, changes, before, &patch[p]))) {
+                mesh_patch_fill(parts, &patch[p], try == TRIES);
+                mesh->remade_patches++;
+            }
+        if (try == TRIES || !move_failed_cuts(parts, MORE[try]))
+            break;
+        for (int p = 0; p < count; p++)
+            keep_patch(&tried, &patch[p]);
+        free(patch);
+    }
+    // where even the last try failed the rings run through, and what should be blended stays apart
+    parts->patch_count = parts->failures = 0;
+    for (int p = 0; p < count; p++) {
+        if (!patch[p].is_failed) {
+            MeshPatch good = patch[p];
+            parts->patch[parts->patch_count++] = good;
+            continue;
+        }
+        for (int r = 0; r < patch[p].run_count; r++)
+            for (int j = patch[p].run[r].from; j <= patch[p].run[r].to; j++)
+                parts->rings[patch[p].run[r].branch].in_patch[j] = false;
+        keep_patch(&tried, &patch[p]);
+        parts->failures++;
+    }
+    // the next update need not try again what failed now
+    PatchList failed = {0};
+    for (int i = 0; i < tried.count; i++)
+        if (tried.patch[i].is_failed)
+            keep_patch(&failed, &tried.patch[i]);
+    free_patches(&tried);
+    parts->failed = failed.patch, parts->failed_count = failed.count;
+}
+
 // Rings, patches and strips, with patches taken from `before` where nothing changed.
-static bool fill_mesh(SweepMesh *mesh, SweepMeshParts *parts, const Changes *changes, int before_count, MeshPatch *before)
+static bool fill_mesh(SweepMesh *mesh, SweepMeshParts *parts, const Changes *changes, const PatchList *before)
 {
     const SweepField *field = parts->feet.field;
     mesh->remade_rings = mesh->remade_patches = 0;
@@ -643,21 +723,7 @@ static bool fill_mesh(SweepMesh *mesh, SweepMeshParts *parts, const Changes *cha
         mesh_rings_fill(parts, i, &parts->rings[i]);
         mesh->remade_rings += parts->rings[i].count;
     }
-    mark_gaps(parts);
-    parts->patch = define_patches(parts, &parts->patch_count);
-    for (int p = 0; p < parts->patch_count; p++) {
-        MeshPatch *now = &parts->patch[p];
-        int found = -1;
-        for (int k = 0; changes && found < 0 && k < before_count; k++)
-            found = before[k].vertices > 0 && is_kept(field, changes, &before[k], now) ? k : -1;
-        if (found >= 0) {
-            take_patch(now, &before[found]);
-        } else {
-            mesh_patch_fill(parts, now);
-            mesh->remade_patches++;
-        }
-    }
-    drop_failures(parts);
+    fill_patches(mesh, parts, changes, before);
     keep_source(parts);
     return assemble(mesh, parts);
 }
@@ -668,7 +734,7 @@ SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *op
     SweepMeshParts *parts = create_parts(field, options ? options : &defaults);
     SweepMesh *mesh = HEAP_ZEROED(1, sizeof *mesh);
     mesh->parts = parts;
-    if (fill_mesh(mesh, parts, NULL, 0, NULL))
+    if (fill_mesh(mesh, parts, NULL, NULL))
         return mesh;
     sweep_mesh_free(mesh);
     return NULL;
@@ -689,15 +755,15 @@ bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field)
     if (field->branch_count != parts->branch_count)
         return false;
     Changes changes = find_changes(parts, field);
-    MeshPatch *before = parts->patch;
-    int before_count = parts->patch_count;
+    PatchList before = {parts->patch_count, parts->patch};
+    for (int i = 0; i < parts->failed_count; i++)
+        keep_patch(&before, &parts->failed[i]);
+    free(parts->failed);
     parts->feet.field = field;
     parts->feet.harmonics = sweep_model_harmonics(field->model);
     free_surface(mesh);
-    bool good = fill_mesh(mesh, parts, &changes, before_count, before);
-    for (int i = 0; i < before_count; i++)
-        mesh_patch_free(&before[i]);
-    free(before);
+    bool good = fill_mesh(mesh, parts, &changes, &before);
+    free_patches(&before);
     free(changes.segment);
     free(changes.branch);
     return good;

@@ -50,7 +50,8 @@ typedef struct MeshRun {
 // The cut edge of a patch at a ring.
 typedef struct MeshCut {
     int branch, ring;
-    int count;               // 0: failed
+    int count;
+    bool is_failed;          // has no loop of vertices, or a loop that belongs to others too
     int *vertex;             // (count) of the patch, by increasing angle
     double *angle;           // (count) [rad], increasing by 2 pi in one turn
 } MeshCut;
@@ -65,7 +66,7 @@ typedef struct MeshPatch {
     int *branch, *sac_node;  // (vertices) sac_node: of vertices on sacs
     double *t;
     int (*triangle)[3];
-    int failures;
+    bool is_failed;          // could not be joined to its rings: empty
 } MeshPatch;
 
 typedef struct SweepMeshParts {
@@ -75,6 +76,8 @@ typedef struct SweepMeshParts {
     MeshRings *rings;        // (branches)
     int patch_count, failures;
     MeshPatch *patch;
+    int failed_count;        // tries that failed, also of patches that were then widened
+    MeshPatch *failed;
     // what the mesh was made from
     int segment_count;
     int *first_segment;
@@ -114,8 +117,9 @@ bool mesh_carries_rings(const SweepField *field, int segment);
 void mesh_rings_fill(const SweepMeshParts *parts, int branch, MeshRings *rings);
 void mesh_rings_free(MeshRings *rings);
 
-// Extracts the patch of the runs and sacs that it holds.
-void mesh_patch_fill(const SweepMeshParts *parts, MeshPatch *patch);
+// Extracts the patch of the runs and sacs that it holds. Where a cut cannot be joined to its ring, it is marked as failed, and so is the patch, which stays empty;
+// `last`: not before another lattice was tried.
+void mesh_patch_fill(const SweepMeshParts *parts, MeshPatch *patch, bool last);
 void mesh_patch_free(MeshPatch *patch);
 
 #endif

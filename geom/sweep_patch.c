@@ -458,21 +458,73 @@ static void cut_triangle(Cutter *c, const int *v)
     add_triangle(c, corner[shift + 2], corner[(shift + 3) % 4], corner[shift]);
 }
 
+// The connected parts of the surface inside the patch and beyond its cuts: parent[v], and the vertices of each part at its root.
+static void connect_parts(const TriangleMesh *mesh, const double *value, int *parent, int *size)
+{
+    for (int v = 0; v < mesh->vertex_count; v++)
+        parent[v] = v, size[v] = 0;
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++) {
+            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
+            if ((value[a] > 0) == (value[b] > 0))
+                disjoint_join(parent, a, b);
+        }
+    for (int v = 0; v < mesh->vertex_count; v++)
+        size[disjoint_root(parent, v)]++;
+}
+
+// In a bend, and where another branch is blended, t may jump from vertex to vertex near a cut. Parts of the patch that are too small to reach around a ring are
+// left out; of the parts beyond a cut the largest stays, and the others become parts of the patch. So do small parts on branches that have no run in the patch.
+static void remove_islands(const Patch *p, double *value, const int *cut)
+{
+    const TriangleMesh *mesh = p->march.mesh;
+    int n = mesh->vertex_count, cuts = p->out->cut_count, least = p->parts->options.edge_mm > 0 ? 6 : p->parts->options.around / 2;
+    int *parent = HEAP_ZEROED((size_t)n + 1, sizeof *parent), *size = HEAP_ZEROED((size_t)n + 1, sizeof *size);
+    int *largest = HEAP_ZEROED((size_t)cuts + 1, sizeof *largest);
+    bool *stays = HEAP_ZEROED((size_t)n + 1, sizeof *stays);
+    connect_parts(mesh, value, parent, size);
+    for (int v = 0; v < n; v++)
+        if (value[v] > 0 && size[disjoint_root(parent, v)] < least)
+            value[v] = -p->cell;
+    connect_parts(mesh, value, parent, size);
+    for (int i = 0; i < cuts; i++)
+        largest[i] = n;          // size[n] = 0
+    for (int v = 0; v < n; v++)
+        if (!(value[v] > 0) && cut[v] >= 0 && size[disjoint_root(parent, v)] > size[largest[cut[v]]])
+            largest[cut[v]] = disjoint_root(parent, v);
+    for (int i = 0; i < cuts; i++)
+        stays[largest[i]] = true;
+    for (int v = 0; v < n; v++) {
+        int root = disjoint_root(parent, v);
+        if (!(value[v] > 0) && !stays[root] && (cut[v] >= 0 || size[root] < least * least))
+            value[v] = p->cell;
+    }
+    free(stays);
+    free(parent);
+    free(size);
+    free(largest);
+}
+
 static void cut_patch(Cutter *c, double snap)
 {
     Patch *p = c->p;
     const TriangleMesh *mesh = p->march.mesh;
+    double *value = HEAP_ZEROED((size_t)mesh->vertex_count + 1, sizeof *value);
+    int *cut = HEAP_ZEROED((size_t)mesh->vertex_count + 1, sizeof *cut);
+    for (int v = 0; v < mesh->vertex_count; v++)
+        value[v] = inside(p, &p->place[v], &cut[v]);
+    remove_islands(p, value, cut);
     for (int v = 0; v < mesh->vertex_count; v++) {
-        int cut;
         SweepPlace place = p->place[v];
-        double value = inside(p, &place, &cut);
         Vec3 at = mesh->vertex[v];
-        if (cut >= 0 && fabs(value) < snap * p->cell) {
-            at = onto_cut(p, &c->plane[cut], c->is_blended[cut], at, &place);
-            value = 0;
+        if (cut[v] >= 0 && fabs(value[v]) < snap * p->cell) {
+            at = onto_cut(p, &c->plane[cut[v]], c->is_blended[cut[v]], at, &place);
+            value[v] = 0;
         }
-        add_vertex(c, at, place, value, value > 0 ? -1 : cut);
+        add_vertex(c, at, place, value[v], value[v] > 0 ? -1 : cut[v]);
     }
+    free(value);
+    free(cut);
     for (int t = 0; t < mesh->triangle_count; t++)
         cut_triangle(c, mesh->triangle[t]);
 }
@@ -518,6 +570,12 @@ static int compare_edges(const void *a, const void *b)
     return x[0] != y[0] ? (x[0] > y[0] ? 1 : -1) : (x[1] > y[1]) - (x[1] < y[1]);
 }
 
+static void fail_cut(const Cutter *c, int cut)
+{
+    if (cut >= 0)
+        c->p->out->cut[cut].is_failed = true;
+}
+
 // next[v]: the vertex that follows v on the rim, against the direction of the triangles there; -1. Returns false if the rim touches itself.
 static bool rim_of(const Cutter *c, int *next)
 {
@@ -538,7 +596,10 @@ static bool rim_of(const Cutter *c, int *next)
             continue;
         }
         int from = edge[i][2] ? edge[i][1] : edge[i][0], to = edge[i][2] ? edge[i][0] : edge[i][1];
-        good = good && next[from] < 0;
+        if (next[from] >= 0) {
+            fail_cut(c, c->cut[from]);
+            good = false;
+        }
         next[from] = to;
     }
     free(edge);
@@ -581,6 +642,7 @@ static bool read_loop(const Cutter *c, int start, const int *next, MeshCut *cut,
     return fabs(fabs(total) - turn) < 0.1 && next[cut->vertex[total < 0 ? 0 : count - 1]] == cut->vertex[total < 0 ? count - 1 : 0];
 }
 
+// Reads the loops of all cuts. Returns whether each cut has one; else the cuts that do not are marked as failed.
 static bool read_loops(Cutter *c)
 {
     MeshPatch *out = c->p->out;
@@ -590,12 +652,23 @@ static bool read_loops(Cutter *c)
         if (next[v] < 0 || seen[v])
             continue;
         int cut = c->cut[v];
-        good = cut >= 0 && out->cut[cut].count == 0 && read_loop(c, v, next, &out->cut[cut], &c->plane[cut], seen);
-        for (int i = 0; good && i < out->cut[cut].count; i++)
-            good = c->cut[out->cut[cut].vertex[i]] == cut;
+        if (cut < 0 || out->cut[cut].count > 0 || !read_loop(c, v, next, &out->cut[cut], &c->plane[cut], seen)) {
+            fail_cut(c, cut);
+            good = false;
+            break;
+        }
+        for (int i = 0; i < out->cut[cut].count; i++) {
+            int other = c->cut[out->cut[cut].vertex[i]];
+            if (other != cut) {
+                fail_cut(c, cut), fail_cut(c, other);
+                good = false;
+            }
+        }
     }
     for (int i = 0; good && i < out->cut_count; i++)
-        good = out->cut[i].count > 0;
+        out->cut[i].is_failed = out->cut[i].count == 0;
+    for (int i = 0; i < out->cut_count; i++)
+        good = good && !out->cut[i].is_failed;
     free(next);
     free(seen);
     return good;
@@ -761,17 +834,31 @@ static bool try_patch(const SweepMeshParts *parts, MeshPatch *out, double cell, 
     return good;
 }
 
-void mesh_patch_fill(const SweepMeshParts *parts, MeshPatch *patch)
+static bool any_cut_failed(const MeshPatch *patch)
+{
+    for (int i = 0; i < patch->cut_count; i++)
+        if (patch->cut[i].is_failed)
+            return true;
+    return false;
+}
+
+void mesh_patch_fill(const SweepMeshParts *parts, MeshPatch *patch, bool last)
 {
     // lattices relative to the edges, and how close to a cut [cells] vertices are moved onto it
     static const struct {
         double cell, snap;
-    } attempt[] = {{1, 0.3}, {0.93, 0.15}, {0.71, 0}};
+    } attempt[] = {{1, 0.3}, {0.83, 0}};
     enum { ATTEMPTS = sizeof attempt / sizeof *attempt };
-    for (int i = 0; i < ATTEMPTS; i++)
+    for (int i = 0; i < ATTEMPTS; i++) {
+        for (int k = 0; k < patch->cut_count; k++)
+            patch->cut[k].is_failed = false;
         if (try_patch(parts, patch, attempt[i].cell, attempt[i].snap, i == ATTEMPTS - 1))
             return;
-    patch->failures++;
+        // moving a cut helps more than another lattice
+        if (!last && any_cut_failed(patch))
+            break;
+    }
+    patch->is_failed = true;
 }
 
 void mesh_patch_free(MeshPatch *patch)
