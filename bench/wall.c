@@ -218,7 +218,7 @@ static bool open_models(WallBench *bench, Faults *faults)
 static void row_jumps(WallBench *bench, const WallModel *m)
 {
     ModelMeasure measure;
-    if (!model_measure(m->model, NULL, bench->common.threads, &measure))
+    if (!model_measure(&(ModelField){.tree = m->model}, NULL, bench->common.threads, &measure))
         return;
     double raw_p99 = 0, raw = 0, gap = 0, cold = 0, normal = 0, unit_most = 0;
     int joins = 0;
@@ -323,7 +323,7 @@ static bool rows_of_model(WallBench *bench, const WallModel *m, Faults *faults)
     bench->table.on = m->name;
     if (bench->wanted[JUNCTIONS] || bench->wanted[FLOOD]) {
         ReachOptions options = reach_default_options();
-        reach = reach_create(m->model, &options);
+        reach = reach_create(&(ModelField){.tree = m->model}, &options);
         if (!reach)
             faults_add(faults, m->path, 0, 0, "not enough memory to flood the model");
         good = reach != NULL;
@@ -373,7 +373,7 @@ static bool row_truth(WallBench *bench, bool noisy, Faults *faults)
                                   noisy ? (const char *const[]){"phantom", "--noise-mm", "0.05", NULL} : (const char *const[]){"phantom", NULL}, path, faults);
     Shape *shape = model ? shape_create("phantom", 0, NULL, "bench wall", faults) : NULL;
     ModelMeasure measure;
-    bool good = shape && model_measure(model, shape, bench->common.threads, &measure);
+    bool good = shape && model_measure(&(ModelField){.tree = model}, shape, bench->common.threads, &measure);
     if (good) {
         const WallRow *tube = &measure.wall[PLACE_TUBE], *fork = &measure.wall[PLACE_BIFURCATION], *sac = &measure.wall[PLACE_SAC];
         char note[64];
@@ -392,7 +392,7 @@ static bool row_truth(WallBench *bench, bool noisy, Faults *faults)
 static void judge_synth(WallBench *bench, const VesselTree *model, const Shape *truth, double slack)
 {
     ReachOptions options = reach_default_options();
-    Reach *reach = reach_create(model, &options);
+    Reach *reach = reach_create(&(ModelField){.tree = model}, &options);
     if (!reach)
         return;
     TruthFigures f = wall_judge_junctions(model, reach, truth, slack);
@@ -488,7 +488,7 @@ static bool row_spread(WallBench *bench, const WallModel *m, Faults *faults)
             model = good ? tree_file_load(path, NULL, faults) : NULL;
         }
         ReachOptions options = reach_default_options();
-        Reach *reach = model ? reach_create(model, &options) : NULL;
+        Reach *reach = model ? reach_create(&(ModelField){.tree = model}, &options) : NULL;
         good = reach != NULL;
         if (good) {
             blobs[seed] = (double)model->blob_count;

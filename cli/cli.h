@@ -35,6 +35,12 @@ int cli_refuse_verb(const char *program, const char *kind, const char *name, con
     {                                                                                                                                                          \
         "quiet", NULL, OPTION_FLAG, OPTION_AT(structure, member), text                                                                                         \
     }
+// Which model of the file (recon/model_file.h).
+#define CLI_MODEL(structure, member, text)                                                                                                                     \
+    {                                                                                                                                                          \
+        "model", "KIND", OPTION_CHOICE, OPTION_AT(structure, member), text ": lim (blobs) or a swept one: sweep, raster, rbf, pas",                            \
+            .choices = model_names, .otherwise = "the first of these that the file has"                                                                        \
+    }
 #define CLI_OPTIONS(rows, structure) .option = rows, .option_count = sizeof rows / sizeof *rows, .size = sizeof(structure)
 #define CLI_BAD_INPUT_EXITS "0 done; 2 wrong usage or bad input"
 

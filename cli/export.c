@@ -15,8 +15,7 @@ static const char *const whats[] = {"surface", "centreline", "centerline", NULL}
 static const Option rows[] = {
     {"what", "surface|centreline", OPTION_CHOICE, AT(what), "what a .vtp holds", .choices = whats,
      .otherwise = "the surface of a model, the centreline of a tree"},
-    {"model", "KIND", OPTION_CHOICE, AT(model), "the model whose surface is written: lim (blobs) or a swept one: sweep, raster, rbf, pas",
-     .choices = export_models, .otherwise = "the first of these that FILE has"},
+    CLI_MODEL(ExportOptions, model, "the model whose surface is written"),
     {"cell-mm", "X", OPTION_NUMBER, AT(surface.cell_mm), "cell size of the surface, or edges of a swept model's [mm]", .least = 0.001, .most = 1000,
      .otherwise = "about ten to twenty cells around the thinnest branch; swept: 24 edges around each section"},
     {"tags", NULL, OPTION_FLAG, AT(surface.tags),

@@ -4,21 +4,11 @@
 
 #include <string.h>
 
-const char *const export_models[] = {"lim", "sweep", "raster", "rbf", "pas", NULL}, *const export_frames[] = {"LPS", "RAS", NULL};
+const char *const export_frames[] = {"LPS", "RAS", NULL};
 
-// The model to write: 0 blobs, 1 + kind a swept one; -1: the file lacks it.
-static int model_of(const ExportOptions *options, const VesselTree *tree, const SweepModels *swept)
-{
-    for (int i = 0; i <= SECTION_KINDS; i++)
-        if ((options->model < 0 || options->model == i) && (i == 0 ? vessel_tree_is_model(tree) : swept->of[i - 1] != NULL))
-            return i;
-    return -1;
-}
-
-static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, const SweepModel *sweep, Faults *faults)
+static bool export_surface(const ExportOptions *options, const char *extension, const ModelFile *file, Faults *faults)
 {
     ModelSurfaceOptions wanted = options->surface;
-    wanted.sweep = sweep;
     SurfaceFigures surface;
     OutputText text;
     void (*print)(FILE *, const SurfaceFigures *) = !strcmp(extension, ".stl")   ? surface_print_stl
@@ -28,7 +18,7 @@ static bool export_surface(const ExportOptions *options, const char *extension, 
     wanted.with_error = print == surface_print_ply || print == surface_print_vtp;
     wanted.figures = options->quiet || cli_is_standard_output(options->out) ? NULL : stdout;
     wanted.warnings = stderr;
-    bool good = model_surface(tree, options->in, &wanted, &surface, faults);
+    bool good = model_surface(&file->field, options->in, &wanted, &surface, faults);
     if (good && output_text_open(&text)) {
         print(text.stream, &surface);
         good = output_text_write(&text, options->out, faults);
@@ -40,31 +30,25 @@ static bool export_surface(const ExportOptions *options, const char *extension, 
     return good;
 }
 
-static bool export_mask(const ExportOptions *options, const VesselTree *tree, const SweepModel *sweep, Faults *faults)
+static bool export_mask(const ExportOptions *options, const ModelFile *file, Faults *faults)
 {
-    ModelMaskOptions mask = {.sweep = sweep, .spacing_mm = options->spacing, .frame = export_frames[options->frame]};
-    return model_mask_write(options->mask, tree, options->in, &mask, faults);
+    ModelMaskOptions mask = {.sweep = file->sweep, .spacing_mm = options->spacing, .frame = export_frames[options->frame]};
+    return model_mask_write(options->mask, file->tree, options->in, &mask, faults);
 }
 
 bool export_tree(const ExportOptions *options, const char *extension, Faults *faults)
 {
-    VesselTree *tree = tree_file_load(options->in, NULL, faults);
-    if (!tree)
+    ModelFile file;
+    if (!model_file_load(options->in, options->model, &file, faults))
         return false;
-    SweepModels swept = {0};
-    if (!sweep_models_load(options->in, tree, &swept, faults)) {
-        vessel_tree_free(tree);
-        return false;
-    }
-    int chosen = model_of(options, tree, &swept);
-    bool model = chosen >= 0, good = false;
+    bool model = file.kind >= 0, good = false;
     bool line_only = !strcmp(extension, ".swc") || !strcmp(extension, ".json");
     bool surface_only = !strcmp(extension, ".stl") || !strcmp(extension, ".ply") || !strcmp(extension, ".obj");
     bool surface = options->what >= 0 ? options->what == WHAT_SURFACE : surface_only || (model && !line_only);
     if (options->mask && !model)
         faults_add(faults, options->in, 0, 0, "has no model to make a mask of; `seldinger fit` makes one");
     else if (options->mask)
-        good = export_mask(options, tree, chosen > 0 ? swept.of[chosen - 1] : NULL, faults);
+        good = export_mask(options, &file, faults);
     if (!options->out || faults->count > 0)
         ;    // the mask alone
     else if (!line_only && !surface_only && strcmp(extension, ".vtp"))
@@ -72,18 +56,14 @@ bool export_tree(const ExportOptions *options, const char *extension, Faults *fa
     else if (surface ? line_only : surface_only)
         faults_add(faults, options->out, 0, 0, "'%s' cannot hold a %s; valid: %s", extension, surface ? "surface" : "centreline",
                    surface ? ".stl .ply .obj .vtp" : ".vtp .mrk.json .swc");
-    else if (surface && !model && options->model >= 0)
-        faults_add(faults, options->in, 0, 0, "has no model of the kind '%s'; `seldinger fit --model %s` makes one", export_models[options->model],
-                   export_models[options->model]);
     else if (options->surface.tags && (!surface || !strcmp(extension, ".stl") || !strcmp(extension, ".obj")))
         faults_add(faults, options->out, 0, 0, "'%s' cannot hold --tags, which are data of a surface's vertices; valid: .ply .vtp",
                    surface ? extension : "a centreline");
     else if (surface && !model)
         faults_add(faults, options->in, 0, 0, "is a tree without a model, so it has no surface; `seldinger fit` makes one, or export the centreline");
     else
-        good = surface ? export_surface(options, extension, tree, chosen > 0 ? swept.of[chosen - 1] : NULL, faults)
-                       : centreline_write_file(options->out, extension, tree, export_frames[options->frame], faults);
-    sweep_models_free(&swept);
-    vessel_tree_free(tree);
+        good = surface ? export_surface(options, extension, &file, faults)
+                       : centreline_write_file(options->out, extension, file.tree, export_frames[options->frame], faults);
+    model_file_free(&file);
     return good;
 }

@@ -18,13 +18,13 @@ static const char *take_preset(void *structure, const Option *option, const char
 
 #define AT(member) OPTION_AT(FitCommand, member)
 static const char *const presets[] = {"default", "local", "paper", NULL};
-static const char *const models[] = {"lim", "sweep", "raster", "rbf", "pas", NULL};
 static const Option options[] = {
     {"output", "F.h5", OPTION_FILE, AT(output), "the model", .letter = 'o'},
     {"model", "KIND", OPTION_CHOICE, AT(fit.model),
      "lim: blobs; sweep: curves with polar cross-sections along them, blended at forks; raster, rbf, pas: the same with sections of Kretschmer et al. 2013, "
-     "Hong et al. 2018 and 2012. The file keeps the models of other kinds that TREE.h5 holds",
-     .choices = models},
+     "Hong et al. 2018 and 2012. The file keeps the models of other kinds that TREE.h5 holds. "
+     "Without -o: the model that is measured, by default the first of these that the file has",
+     .choices = model_names, .given = offsetof(FitCommand, has_model)},
     {"preset", "NAME", OPTION_CHOICE, AT(fit.preset),
      "default: the recommended form of each model; local (lim): a model for each node, neighbours blended; paper: the published values and method (sweep: as "
      "raster). Must come before the other options",
@@ -54,7 +54,7 @@ static const Option options[] = {
     CLI_THREADS(FitCommand, fit.local.threads),
     {"measure", NULL, OPTION_FLAG, AT(measure),
      "also measures how far the walls of neighbouring nodes differ where a tool passes from one to the next, walls that no point supports, and narrow links; "
-     "without -o the given model is measured and not fitted again"},
+     "without -o the model of the given file is measured and not fitted again"},
     {"tool-radius-mm", "X", OPTION_NUMBER, AT(junctions.tool_radius), "radius of the tool whose reach from the model's inlet is reported at the end",
      .least = 0.01, .most = 100},
     {"json", "F.json", OPTION_FILE, AT(json), "figures as JSON; - is standard output"},
@@ -76,9 +76,6 @@ static const char *check(void *structure)
     bool is_swept = fit_model_is_swept(command->fit.model), is_local = command->fit.preset != FIT_DEFAULT && !is_swept;
     return !command->output && !command->measure          ? "missing -o MODEL.h5"
            : is_swept && command->fit.preset == FIT_LOCAL ? "--preset local needs --model lim"
-           : is_swept && command->measure                 ? "--measure needs --model lim"
-           : is_swept && command->picture                 ? "--picture needs --model lim"
-           : is_swept && command->junctions.picture       ? "--junctions needs --model lim"
            : command->has_alpha && !is_local              ? "--alpha needs --preset local or paper"
            : command->has_beta && !is_local               ? "--beta needs --preset local or paper"
            : command->has_max_blobs && !is_local          ? "--max-blobs needs --preset local or paper"

@@ -10,7 +10,7 @@ typedef struct FitCommand {
     const char *tree, *output, *json, *picture;
     TreeFitOptions fit;
     JunctionPages junctions;    // also contains the radius of the tool for the reach report
-    bool has_alpha, has_beta, has_max_blobs, has_max_points, quiet, measure;
+    bool has_model, has_alpha, has_beta, has_max_blobs, has_max_points, quiet, measure;
 } FitCommand;
 extern const OptionTable fit_options;
 

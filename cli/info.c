@@ -15,6 +15,7 @@ typedef struct InfoCommand {
     const char *file, *report, *picture, *sections;
     JunctionPages junctions;    // and the radius of the tool that is led through the model
     char *reach;                 // comes out: where a tool gets to, as text
+    int model;                   // index in model_names; -1: the first that the file has
     bool json, quiet;
 } InfoCommand;
 
@@ -29,6 +30,7 @@ static const Option options[] = {
      "of a model: a section through each junction, the narrowest first; further pages are F-2.png and so on"},
     {"sections", "F.csv", OPTION_FILE, AT(sections),
      "of a swept model (fit --model sweep): its sections, a row each: branch, way along it, centre, normal, area, radii, perimeter, circularity"},
+    CLI_MODEL(InfoCommand, model, "of several models in the file, the one that is described"),
     {"volume", "V", OPTION_FILE, AT(junctions.volume), "the angiogram behind these"},
     {"before", "M.h5", OPTION_FILE, AT(junctions.before), "another model of the same vessels: the ten narrowest junctions in that, beside what they are now"},
     {"tool-radius-mm", "X", OPTION_NUMBER, AT(junctions.tool_radius), "of the tool that is led from a model's inlet through the tree", .least = 0.01,
@@ -36,7 +38,10 @@ static const Option options[] = {
     CLI_QUIET(InfoCommand, quiet, "no figures as text: the report or picture alone"),
 };
 
-static void set_defaults(void *structure) { *(InfoCommand *)structure = (InfoCommand){.junctions = {.tool_radius = reach_default_options().tool_radius}}; }
+static void set_defaults(void *structure)
+{
+    *(InfoCommand *)structure = (InfoCommand){.model = -1, .junctions = {.tool_radius = reach_default_options().tool_radius}};
+}
 
 static const OptionTable table = {
     .program = "seldinger info",
@@ -53,35 +58,34 @@ static const OptionTable table = {
     .too_many = "one file is needed, not also ",
 };
 
-static bool add_reach(cJSON *object, const VesselTree *tree, InfoCommand *command, Faults *faults)
+static bool add_reach(cJSON *object, const ModelField *model, InfoCommand *command, Faults *faults)
 {
     size_t length;
     FILE *out = open_memstream(&command->reach, &length);
     if (!out)
         heap_is_empty(BUFSIZ, __FILE__);
-    bool good = reach_report(tree, command->file, command->junctions.tool_radius, out, object, faults);
+    bool good = reach_report(model, command->file, command->junctions.tool_radius, out, object, faults);
     if (fclose(out) != 0)
         heap_is_empty(length, __FILE__);
     return good;
 }
 
-static bool draw(const InfoCommand *command, const VesselTree *tree, const TreeFileInfo *info, Faults *faults)
+static bool draw(const InfoCommand *command, const ModelFile *file, Faults *faults)
 {
-    double voxel = tree_file_number(info, "voxel_mm", 0.2);
-    return !command->picture || picture_model_error(command->picture, command->file, tree, voxel > 0 ? voxel : 0.2, faults);
+    double voxel = tree_file_number(&file->info, "voxel_mm", 0.2);
+    return !command->picture || picture_model_error(command->picture, command->file, &file->field, voxel > 0 ? voxel : 0.2, faults);
 }
 
 static bool describe_tree_file(cJSON *object, InfoCommand *command, Faults *faults)
 {
-    TreeFileInfo info = {0};
-    VesselTree *tree = tree_file_load(command->file, &info, faults);
-    if (tree)
-        describe_tree(object, tree, &info);
-    bool good = tree && section_table_of_file(command->sections, command->file, tree, faults) && add_reach(object, tree, command, faults);
-    good = good && (!command->report || tree_page_write(command->report, command->file, tree, &info, faults));
-    good = good && junction_pages_draw(&command->junctions, command->file, tree, faults) && draw(command, tree, &info, faults);
-    tree_file_info_free(&info);
-    vessel_tree_free(tree);
+    ModelFile file;
+    if (!model_file_load(command->file, command->model, &file, faults))
+        return false;
+    describe_tree(object, &file);
+    bool good = section_table_of_file(command->sections, command->file, &file, faults) && add_reach(object, &file.field, command, faults);
+    good = good && (!command->report || tree_page_write(command->report, command->file, &file.field, &file.info, faults));
+    good = good && junction_pages_draw(&command->junctions, command->file, &file.field, faults) && draw(command, &file, faults);
+    model_file_free(&file);
     return good;
 }
 
@@ -109,11 +113,7 @@ static void plan_files(const InfoCommand *command, FileKind kind, Faults *faults
 {
     const JunctionPages *junctions = &command->junctions;
     if ((command->report || command->sections || command->picture || junctions->picture) && kind != FILE_TREE && kind != FILE_MISSING)
-        faults_add(faults, command->file, 0, 0, "is no tree or model; %s is made of those",
-                   command->report     ? "--report"
-                   : command->sections ? "--sections"
-                   : command->picture  ? "--picture"
-                                       : "--junctions");
+        faults_add(faults, command->file, 0, 0, "is no tree or model; --report, --sections, --picture and --junctions are made of those");
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--report", command->report);
     output_plan_write(&plan, "--sections", command->sections);

@@ -23,14 +23,14 @@ static int by_before(const void *a, const void *b)
 // Chooses the junctions that are narrowest in the other model. That model may have other nodes, so the joining lines of this model are used. Returns their
 // number, or -1 if out
 // of memory.
-static int choose_compared(const VesselTree *model, const Reach *reach, const VesselTree *before, double tool_radius, ReachJunction chosen[COMPARED])
+static int choose_compared(const ModelField *model, const Reach *reach, const ModelField *before, double tool_radius, ReachJunction chosen[COMPARED])
 {
     Compared *list = malloc(((size_t)reach->junction_count + 1) * sizeof *list);
     int count = 0;
     for (int k = 0; k < reach->junction_count && list; k++) {
         Vec3 place;
         const ReachJunction *j = &reach->junction[k];
-        list[k] = (Compared){reach_on_line(model, j, before, fmax(model->radius[j->node], 2 * tool_radius), &place), k};
+        list[k] = (Compared){reach_on_line(model->tree, j, before, fmax(model->tree->radius[j->node], 2 * tool_radius), &place), k};
     }
     if (list && reach->junction_count > 0)
         qsort(list, (size_t)reach->junction_count, sizeof *list, by_before);
@@ -41,7 +41,7 @@ static int choose_compared(const VesselTree *model, const Reach *reach, const Ve
     return good ? count : -1;
 }
 
-static bool draw(const JunctionPages *wanted, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume, Faults *faults)
+static bool draw(const JunctionPages *wanted, const char *title, const ModelField *model, const ModelField *before, const Volume *volume, Faults *faults)
 {
     ReachOptions flood = reach_default_options();
     flood.tool_radius = wanted->tool_radius;
@@ -55,7 +55,7 @@ static bool draw(const JunctionPages *wanted, const char *title, const VesselTre
     options.width = 1920, options.height = 1360;
     if (reach) {
         PictureJunctions what = {
-            .tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = wanted->tool_radius, .before = before};
+            .model = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = wanted->tool_radius, .before = before};
         if (before) {
             int count = choose_compared(model, reach, before, wanted->tool_radius, chosen);
             what.junction_count = count > 0 ? count : 0;
@@ -75,23 +75,19 @@ static bool draw(const JunctionPages *wanted, const char *title, const VesselTre
     return drawn;
 }
 
-bool junction_pages_draw(const JunctionPages *wanted, const char *title, const VesselTree *model, Faults *faults)
+bool junction_pages_draw(const JunctionPages *wanted, const char *title, const ModelField *model, Faults *faults)
 {
     if (!wanted->picture)
         return true;
-    if (!vessel_tree_is_model(model)) {
+    if (!model_field_exists(model)) {
         faults_add(faults, wanted->picture, 0, 0, "no picture: the tree has no fitted model to draw");
         return false;
     }
-    VesselTree *before = wanted->before ? tree_file_load(wanted->before, NULL, faults) : NULL;
+    ModelFile before = {.kind = -1};
+    bool good = !wanted->before || model_file_load_model(wanted->before, -1, &before, faults);
     Volume *volume = wanted->volume ? volume_load(wanted->volume, faults) : NULL;
-    bool good = (!wanted->before || before) && (!wanted->volume || volume);
-    if (before && !vessel_tree_is_model(before)) {
-        faults_add(faults, wanted->before, 0, 0, "is a tree without a model; make one with `seldinger fit`");
-        good = false;
-    }
-    good = good && draw(wanted, title, model, before, volume, faults);
+    good = good && (!wanted->volume || volume) && draw(wanted, title, model, wanted->before ? &before.field : NULL, volume, faults);
     volume_free(volume);
-    vessel_tree_free(before);
+    model_file_free(&before);
     return good;
 }

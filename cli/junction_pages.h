@@ -13,6 +13,6 @@ typedef struct JunctionPages {
 } JunctionPages;
 
 // Draws the pages. Returns false with a fault if an input cannot be read or a picture cannot be drawn.
-bool junction_pages_draw(const JunctionPages *wanted, const char *title, const VesselTree *model, Faults *faults);
+bool junction_pages_draw(const JunctionPages *wanted, const char *title, const ModelField *model, Faults *faults);
 
 #endif

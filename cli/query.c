@@ -12,8 +12,8 @@
 #include <string.h>
 
 typedef struct QueryOptions {
-    const char *model, *points, *output;
-    int threads;
+    const char *file, *points, *output;
+    int model, threads;      // model: index in model_names; -1: the first that the file has
     bool quiet;
 } QueryOptions;
 
@@ -21,9 +21,12 @@ static const Option options[] = {
     {"points", "F.csv", OPTION_FILE, OPTION_AT(QueryOptions, points),
      "CSV with columns x_mm,y_mm,z_mm in any order (others are ignored), one point per line; # begins a comment; at most 1 GB"},
     {"output", "F.csv", OPTION_FILE, OPTION_AT(QueryOptions, output), "x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output", .letter = 'o'},
+    CLI_MODEL(QueryOptions, model, "the model that is evaluated"),
     CLI_THREADS(QueryOptions, threads),
     CLI_QUIET(QueryOptions, quiet, "no summary"),
 };
+
+static void set_defaults(void *structure) { *(QueryOptions *)structure = (QueryOptions){.model = -1}; }
 
 static const char *check(void *structure)
 {
@@ -58,7 +61,7 @@ __attribute__((format(printf, 2, 3))) static void print_to(Text *text, const cha
 }
 
 typedef struct Answers {
-    const VesselTree *tree;
+    const ModelField *model;
     const PointTable *table;
     int *node;               // (table->count)
     double *f;
@@ -70,18 +73,17 @@ enum { CHUNK = 256 };        // points per job
 static void answer_chunk(void *context, long chunk)
 {
     const Answers *a = context;
-    const VesselTree *tree = a->tree;
     for (int i = (int)chunk * CHUNK; i < a->table->count && i < ((int)chunk + 1) * CHUNK; i++) {
-        int node = a->node[i] = power_nearest(tree, a->table->point[i]);
-        Blobby model = blobby_of(tree, node);
-        a->f[i] = blobby_gradient(&model, a->table->point[i], &a->gradient[i]);
+        int node = power_nearest(a->model->tree, a->table->point[i]);
+        a->f[i] = model_field_at(a->model, node, a->table->point[i], &a->gradient[i]);
+        a->node[i] = model_field_file_node(a->model, node);
     }
 }
 
-static bool answer(const VesselTree *tree, const PointTable *table, int threads, const char *output, Faults *faults)
+static bool answer(const ModelField *model, const PointTable *table, int threads, const char *output, Faults *faults)
 {
     size_t count = (size_t)table->count + 1;
-    Answers a = {tree, table, malloc(count * sizeof *a.node), malloc(count * sizeof *a.f), malloc(count * sizeof *a.gradient)};
+    Answers a = {model, table, malloc(count * sizeof *a.node), malloc(count * sizeof *a.f), malloc(count * sizeof *a.gradient)};
     Text text = {.failed = !a.node || !a.f || !a.gradient};
     if (!text.failed) {
         parallel_for(threads, (table->count + CHUNK - 1) / CHUNK, answer_chunk, &a, NULL);
@@ -109,16 +111,15 @@ static int query(void *structure, Faults *faults)
     PointTable table = {0};
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "-o", query->output);
-    output_plan_read(&plan, "the model", query->model);
+    output_plan_read(&plan, "the model", query->file);
     output_plan_read(&plan, "--points", query->points);
-    VesselTree *tree = tree_file_load(query->model, NULL, faults);
-    if (tree && !vessel_tree_is_model(tree))
-        faults_add(faults, query->model, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+    ModelFile file;
+    model_file_load_model(query->file, query->model, &file, faults);
     point_table_read(query->points, &table, faults);
-    bool good = faults->count == 0 && answer(tree, &table, query->threads, query->output, faults);
+    bool good = faults->count == 0 && answer(&file.field, &table, query->threads, query->output, faults);
     if (good && !query->quiet && strcmp(query->output, "-"))
         printf("%d points\n", table.count);
-    vessel_tree_free(tree);
+    model_file_free(&file);
     free(table.point);
     return EXIT_DONE;
 }
@@ -128,12 +129,13 @@ static const OptionTable table = {
     .does = "field, gradient and distance of a model at points",
     .usage = "MODEL.h5 --points F.csv -o F.csv",
     .intro = "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed Taubin "
-             "distance f / |grad f| (> 0 inside).",
+             "distance f / |grad f| (> 0 inside). Of a swept model f is the blended field in mm, and the node is the tree's that is nearest along the branch.",
     .exits = CLI_BAD_INPUT_EXITS,
     CLI_OPTIONS(options, QueryOptions),
+    .set_defaults = set_defaults,
     .check = check,
     .takes_argument = true,
-    .argument = offsetof(QueryOptions, model),
+    .argument = offsetof(QueryOptions, file),
     .missing = "missing the model",
     .too_many = "one model at a time, not also ",
 };

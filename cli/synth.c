@@ -10,11 +10,9 @@
 
 static bool measure(const SynthCommand *command, const Shape *shape, Faults *faults)
 {
-    VesselTree *model = tree_file_load(command->measure, NULL, faults);
+    ModelFile file;
     ShapeMeasure figures;
-    if (model && !vessel_tree_is_model(model))
-        faults_add(faults, command->measure, 0, 0, "is a tree without a model; make one with `seldinger fit`");
-    bool good = faults->count == 0 && shape_measure(shape, model, &figures);
+    bool good = model_file_load_model(command->measure, command->model, &file, faults) && shape_measure(shape, &file.field, &figures);
     if (!good && faults->count == 0)
         faults_add(faults, command->measure, 0, 0, "out of memory");
     cJSON *root = cJSON_CreateObject();
@@ -25,7 +23,7 @@ static bool measure(const SynthCommand *command, const Shape *shape, Faults *fau
     if (good && !command->quiet && !cli_is_standard_output(command->json))
         shape_measure_print(stdout, &figures);
     cJSON_Delete(root);
-    vessel_tree_free(model);
+    model_file_free(&file);
     return good;
 }
 

@@ -46,6 +46,7 @@ static const char *take_voxel(void *structure, const Option *option, const char 
 static const Option options[] = {
     {"output", "F", OPTION_FILE, AT(output), "what to write, by its extension", .letter = 'o'},
     {"measure", "MODEL.h5", OPTION_FILE, AT(measure), "instead: how far a model fitted to this shape is from the truth"},
+    CLI_MODEL(SynthCommand, model, "the model that is measured"),
     {"json", "F.json", OPTION_FILE, AT(json), "figures of --measure as JSON; - is standard output"},
     CLI_QUIET(SynthCommand, quiet, "no summary"),
     {"points", "N", OPTION_NUMBER, AT(option), "samples of a vessel node", .otherwise = "108", .take = take_shape_option, .group = "shape"},
@@ -81,8 +82,7 @@ static const Option options[] = {
     {"contrast-grey", "X", OPTION_NUMBER, AT(files.volume.contrast_grey),
      "grey values: whole numbers from 0 to 255, vessels so many levels brighter than the background", .least = 1, .most = 255, .otherwise = "not"},
     {"background-grey", "X", OPTION_NUMBER, AT(background_grey), "grey value of the background; needs --contrast-grey", .most = 255, .otherwise = "60"},
-    {"noise-grey", "X", OPTION_NUMBER, AT(noise_grey), "standard deviation of the noise in grey values instead of --noise; needs --contrast-grey", .most = 255,
-     .otherwise = ""},
+    {"noise-grey", "X", OPTION_NUMBER, AT(noise_grey), "the noise in grey values instead of --noise; needs --contrast-grey", .most = 255, .otherwise = ""},
     {"band-grey", "X", OPTION_NUMBER, AT(band_grey), "a slab across the trunk is brighter by so many grey values; needs --contrast-grey", .least = -255,
      .most = 255, .otherwise = "0: none"},
     {"band-mm", "X", OPTION_NUMBER, AT(files.volume.band_mm), "thickness of this slab, placed by the seed", .least = 0.01, .most = 1000, .unit = "mm"},
@@ -92,7 +92,7 @@ static const Option options[] = {
 static void set_defaults(void *structure)
 {
     *(SynthCommand *)structure =
-        (SynthCommand){.files = {.cell_mm = 0.25, .volume = volume_default_options()}, .gap_voxels = -1, .background_grey = -1, .noise_grey = -1};
+        (SynthCommand){.files = {.cell_mm = 0.25, .volume = volume_default_options()}, .model = -1, .gap_voxels = -1, .background_grey = -1, .noise_grey = -1};
 }
 
 // What was given in grey values, in contrasts. False where it needs a contrast in grey values.
@@ -121,8 +121,8 @@ static const char *check(void *structure)
         return "give either -o F or --measure MODEL.h5";
     if (!take_grey_values(command))
         return "--background-grey, --noise-grey and --band-grey need --contrast-grey X";
-    if (command->json && !command->measure)
-        return "--json goes with --measure MODEL.h5";
+    if ((command->json || command->model >= 0) && !command->measure)
+        return "--json and --model go with --measure MODEL.h5";
     if (command->gap_voxels >= 0) {
         char gap[64];
         snprintf(gap, sizeof gap, "%.17g", command->gap_voxels * fmin(voxel[0], fmin(voxel[1], voxel[2])));

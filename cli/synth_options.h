@@ -11,6 +11,7 @@ typedef struct SynthCommand {
     const char *output, *measure, *json;
     char option[SHAPE_OPTIONS][2][64];
     PhantomFiles files;              // their options are those above
+    int model;                       // that is measured: index in model_names; -1: the first that the file has
     double gap_voxels;               // < 0: not given
     double background_grey, noise_grey, band_grey;   // the first two -1: not given
     bool quiet;

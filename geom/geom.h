@@ -27,10 +27,14 @@
 #include "geom/sweep_vessel.h"
 #include "geom/tube_mesh.h"
 
+// the wall of any model, as seen from a node
+#include "geom/model_field.h"
+
 // surfaces as triangles
 #include "geom/isosurface.h"
 #include "geom/tree_surface.h"
 #include "geom/sweep_mesh.h"
+#include "geom/model_mesh.h"
 #include "geom/mesh_closure.h"
 #include "geom/mesh_decimate.h"
 #include "geom/surface_parts.h"

@@ -70,7 +70,7 @@ static bool line_is_open(const VesselTree *tree, Vec3 x, int node, Vec3 to, doub
     double pieces = ceil(vec3_distance(x, to) / step);
     int count = pieces > 400 ? 400 : pieces < 1 ? 1 : (int)pieces;
     for (int k = 0; k <= count; k++)
-        if (!(reach_field(tree, vec3_mix(x, to, (double)k / count), &node) > 0))
+        if (!(reach_blob_field(tree, vec3_mix(x, to, (double)k / count), &node) > 0))
             return false;
     return true;
 }
@@ -115,7 +115,7 @@ static bool flood_from(Search *s, Vec3 x, int node, bool *failed)
         int beside[3] = {at[0], at[1], at[2]}, of = node;
         if (c >= 0)
             beside[c / 2] += c & 1 ? 1 : -1;
-        if (reach_field(s->tree, lattice_point(s, beside), &of) > 0 && line_is_open(s->tree, x, node, lattice_point(s, beside), 0.5 * s->cell))
+        if (reach_blob_field(s->tree, lattice_point(s, beside), &of) > 0 && line_is_open(s->tree, x, node, lattice_point(s, beside), 0.5 * s->cell))
             add_point(s, beside, of, &held, failed);
     }
     for (int i = 0; i < s->count && !held && !*failed; i++) {
@@ -124,7 +124,7 @@ static bool flood_from(Search *s, Vec3 x, int node, bool *failed)
         for (int c = 0; c < 6 && !held && !*failed; c++) {
             int beside[3] = {p.at[0], p.at[1], p.at[2]}, of = p.node;
             beside[c / 2] += c & 1 ? 1 : -1;
-            if (reach_field(s->tree, lattice_point(s, beside), &of) > 0)
+            if (reach_blob_field(s->tree, lattice_point(s, beside), &of) > 0)
                 add_point(s, beside, of, &held, failed);
         }
     }
@@ -159,7 +159,7 @@ static bool serves_other_lumen(const Search *s, int blob, int node)
                     continue;
                 Vec3 x = vec3_add(c, vec3(i * step, j * step, k * step));
                 int of = node;
-                if (reach_field(s->tree, x, &of) > 0 && !is_point_of_ghost(s, x))
+                if (reach_blob_field(s->tree, x, &of) > 0 && !is_point_of_ghost(s, x))
                     return true;
             }
     return false;
@@ -204,7 +204,7 @@ static bool mark_drops(Search *s, Vec3 x, int node)
 static bool climb(const VesselTree *tree, Vec3 *x, int *node, double step)
 {
     for (int i = 0; i < STEPS_UP; i++) {
-        if (reach_field(tree, *x, node) > 0)
+        if (reach_blob_field(tree, *x, node) > 0)
             return true;
         Blobby model = blobby_of(tree, *node);
         Vec3 g;

@@ -7,7 +7,6 @@
 #include "geom/reach.h"
 
 #include "base/base.h"
-#include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/vessel_branches.h"
 
@@ -17,9 +16,10 @@ enum { DIRECTIONS = 32, RING = 8, PLACES = 1 + 2 * RING, FINE = 10, COARSE = 4, 
 static const double BETWEEN = 1.075;         // 1 / cosine of the largest angle between any direction and the closest of the 32
 
 typedef struct Flood {
-    const VesselTree *tree;
+    const ModelField *model;
+    const VesselTree *tree;  // its nodes
     const ReachOptions *options;
-    bool open_root;
+    bool closes_root;
     Vec3 direction[DIRECTIONS];
     uint32_t *mask;          // (N) places around node i that the flood REACH_ASIDE reached, on the disc that ends its link; bit 0: the line
 } Flood;
@@ -49,23 +49,22 @@ static void fill_directions(Vec3 direction[DIRECTIONS])
 
 // --- The field ---
 
-double reach_field(const VesselTree *tree, Vec3 x, int *node)
+double reach_field(const ModelField *model, Vec3 x, int *node)
 {
-    *node = power_walk(tree, x, *node, 4);
-    Blobby model = blobby_of(tree, *node);
-    return blobby_field(&model, x);
+    *node = power_walk(model->tree, x, *node, 4);
+    return model_field_at(model, *node, x, NULL);
 }
 
-// The same, with the root's section extended upstream of an open root's plane.
+// The same, with the section of an open root at which the field closes extended upstream of its plane.
 static double field_at(const Flood *f, Vec3 x, int *node)
 {
-    if (f->open_root) {
+    if (f->closes_root) {
         Vec3 away = vec3_sub(x, f->tree->center[0]);
         double z = vec3_dot(away, f->tree->direction[0]), r = f->tree->radius[0];
         if (z < 0 && vec3_norm2(away) < 16 * r * r)
             x = vec3_add_scaled(x, -z, f->tree->direction[0]);
     }
-    return reach_field(f->tree, x, node);
+    return reach_field(f->model, x, node);
 }
 
 // Distance along the ray from x in direction d at which the field's sign first changes; `most` if that is further.
@@ -104,8 +103,7 @@ static double clearance_at(const Flood *f, Vec3 x, int node, double most)
         Vec3 wall = vec3_add_scaled(x, least, best), g;
         int at = node;
         field_at(f, wall, &at);
-        Blobby model = blobby_of(f->tree, at);
-        blobby_gradient(&model, wall, &g);
+        model_field_at(f->model, at, wall, &g);
         Vec3 d = vec3_unit_or(inside ? vec3_negate(g) : g, best);
         double t = first_change(f, x, node, d, inside, 0.15 * fmin(least, f->tree->radius[node]), least);
         if (!(t < least * (1 - 1e-6)))
@@ -115,24 +113,24 @@ static double clearance_at(const Flood *f, Vec3 x, int node, double most)
     return inside ? least : -least;
 }
 
-double reach_clearance(const VesselTree *tree, Vec3 x, int node, double most)
+double reach_clearance(const ModelField *model, Vec3 x, int node, double most)
 {
-    Flood f = {.tree = tree, .open_root = vessel_tree_root_is_open(tree)};
+    Flood f = {.model = model, .tree = model->tree, .closes_root = model_field_closes_root(model)};
     fill_directions(f.direction);
     return clearance_at(&f, x, node, most);
 }
 
-double reach_on_line(const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double most, Vec3 *place)
+double reach_on_line(const VesselTree *of, const ReachJunction *junction, const ModelField *in, double most, Vec3 *place)
 {
     enum { SAMPLES = 40 };
-    Flood f = {.tree = in, .open_root = vessel_tree_root_is_open(in)};
+    Flood f = {.model = in, .tree = in->tree, .closes_root = model_field_closes_root(in)};
     double least = most;
     fill_directions(f.direction);
     *place = of->center[junction->node];
     for (int at = junction->last; at != junction->parent && at >= 0; at = of->parent[at])
         for (int i = 0; i <= SAMPLES && of->parent[at] >= 0; i++) {
             Vec3 x = vec3_mix(of->center[at], of->center[of->parent[at]], (double)i / SAMPLES);
-            double c = clearance_at(&f, x, power_nearest(in, x), most);
+            double c = clearance_at(&f, x, power_nearest(in->tree, x), most);
             if (c < least)
                 least = c, *place = x;
         }
@@ -510,13 +508,14 @@ static bool list_stops(const Flood *f, Reach *reach)
     return good;
 }
 
-Reach *reach_create(const VesselTree *tree, const ReachOptions *options)
+Reach *reach_create(const ModelField *model, const ReachOptions *options)
 {
-    if (!tree || !vessel_tree_is_model(tree) || !(options->tool_radius > 0) || !isfinite(options->tool_radius) || !(options->aside >= 0) || options->aside > 1)
+    const VesselTree *tree = model->tree;
+    if (!model_field_exists(model) || !(options->tool_radius > 0) || !isfinite(options->tool_radius) || !(options->aside >= 0) || options->aside > 1)
         return NULL;
     size_t n = (size_t)tree->node_count;
     Reach *reach = calloc(1, sizeof *reach);
-    Flood f = {.tree = tree, .options = options, .open_root = vessel_tree_root_is_open(tree), .mask = calloc(n, sizeof *f.mask)};
+    Flood f = {.model = model, .tree = tree, .options = options, .closes_root = model_field_closes_root(model), .mask = calloc(n, sizeof *f.mask)};
     bool good = reach && f.mask && (reach->share = calloc(n, sizeof *reach->share));
     if (good) {
         reach->options = *options;

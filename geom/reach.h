@@ -1,4 +1,4 @@
-// Computes which part of a fitted tree a tool can reach from its inlet, from the field alone: along the centreline's links, starting at the root.
+// Computes which part of a model (model_field.h) a tool can reach from its inlet, from the field alone: along the centreline's links, starting at the root.
 //
 // Three floods. Point: the field is above 0 all along the link's line. Tool: a ball of the tool's radius is free all along the line. Aside: the ball may leave
 // the line by up to `aside` times the lesser radius of the link's two nodes. The field at each place is that of the node to which a tool point there walks
@@ -9,7 +9,7 @@
 #ifndef SELDINGER_GEOM_REACH_H
 #define SELDINGER_GEOM_REACH_H
 
-#include "geom/vessel_tree.h"
+#include "geom/model_field.h"
 
 typedef enum { REACH_POINT, REACH_TOOL, REACH_ASIDE, REACH_MODES } ReachMode;
 
@@ -53,17 +53,21 @@ typedef struct Reach {
     int sac_nodes, sac_nodes_reached;        // nodes of aneurysms; of these, those that a point reaches
 } Reach;
 
-// Returns NULL if the tree has no model, if an option is out of range, or if out of memory. Takes about 0.1 ms of one core per node.
-Reach *reach_create(const VesselTree *tree, const ReachOptions *options);
+// Nodes are those of model->tree. Returns NULL if there is no model, if an option is out of range, or if out of memory. Takes about 0.1 ms of one core per node.
+Reach *reach_create(const ModelField *model, const ReachOptions *options);
 void reach_free(Reach *reach);
 
 // The field at x for a tool point that comes from `node`, > 0 in the lumen; sets `node` to the node whose field it is.
-double reach_field(const VesselTree *tree, Vec3 x, int *node);
+double reach_field(const ModelField *model, Vec3 x, int *node);
+static inline double reach_blob_field(const VesselTree *tree, Vec3 x, int *node)
+{
+    ModelField blobs = model_field_of_blobs(tree);
+    return reach_field(&blobs, x, node);
+}
 // [mm] distance from x to the wall, > 0 inside, as met by a tool from `node`; limited to -most … most.
-double reach_clearance(const VesselTree *tree, Vec3 x, int node, double most);
-// The least clearance [mm] in model `in` along a junction's joining line in the tree `of`, another model of the same vessels; at most `most`; its location in
-// *place.
-double reach_on_line(const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double most, Vec3 *place);
+double reach_clearance(const ModelField *model, Vec3 x, int node, double most);
+// The least clearance [mm] in model `in` along a junction's joining line in the nodes `of` of another model of the same vessels; at most `most`; its location in *place.
+double reach_on_line(const VesselTree *of, const ReachJunction *junction, const ModelField *in, double most, Vec3 *place);
 static inline bool reach_link_is_apart(const VesselTree *tree, int node)
 {
     int parent = tree->parent[node];

@@ -53,7 +53,7 @@ static bool sees(const VesselTree *tree, int node, Vec3 x)
     double far = vec3_distance(c, x), pieces = ceil(far / (0.1 * tree->radius[node]));
     int count = pieces > 100 ? 100 : (int)pieces, at = node;
     for (int k = 0; k <= count; k++)
-        if (!(reach_field(tree, vec3_mix(c, x, 0.98 * k / fmax(count, 1)), &at) > 0))
+        if (!(reach_blob_field(tree, vec3_mix(c, x, 0.98 * k / fmax(count, 1)), &at) > 0))
             return false;
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
         if (tree->near[k] == at)

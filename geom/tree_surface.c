@@ -453,9 +453,9 @@ static int64_t nearest_point(const VesselTree *tree, const int *around, int coun
     return nearest;
 }
 
-bool surface_point_error_from(const TriangleMesh *mesh, const VesselTree *tree, double (*of_wall)(const void *wall, int vertex, Vec3 point), const void *wall,
-                              double *error, double *distance)
+bool surface_point_error(const TriangleMesh *mesh, const ModelField *model, double *error, double *distance)
 {
+    const VesselTree *tree = model->tree;
     int around[NODES_MAX], count = 0, of = -1;
     if (tree->point_count < 1)
         return false;
@@ -469,25 +469,7 @@ bool surface_point_error_from(const TriangleMesh *mesh, const VesselTree *tree, 
         if (distance)
             distance[v] = nearest < 0 ? NAN : vec3_distance(x, tree->point[nearest]);
         if (error)
-            error[v] = nearest < 0 ? NAN : of_wall(wall, v, tree->point[nearest]);
+            error[v] = nearest < 0 ? NAN : model_field_project(model, of, tree->point[nearest], x).distance;
     }
     return true;
-}
-
-typedef struct BlobWall {
-    const TriangleMesh *mesh;
-    const VesselTree *tree;
-} BlobWall;
-
-static double of_blobs(const void *wall, int vertex, Vec3 point)
-{
-    const BlobWall *w = wall;
-    Blobby model = blobby_of(w->tree, w->mesh->node[vertex]);
-    return blobby_project(&model, point, w->mesh->vertex[vertex]).distance;
-}
-
-bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, double *error, double *distance)
-{
-    BlobWall wall = {mesh, tree};
-    return surface_point_error_from(mesh, tree, of_blobs, &wall, error, distance);
 }

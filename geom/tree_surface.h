@@ -4,6 +4,7 @@
 #define SELDINGER_GEOM_TREE_SURFACE_H
 
 #include "geom/isosurface.h"
+#include "geom/model_field.h"
 
 typedef struct SurfaceCensus {
     int vertices, triangles; // vertices that no triangle uses are not counted
@@ -31,12 +32,10 @@ int surface_drop_specks(TriangleMesh *mesh, double least_volume);
 bool surface_open_inlet(TriangleMesh *mesh, const VesselTree *tree);
 
 // For each vertex, finds the nearest data point among those of the vertex's node and of nodes up to two links away (further if these have none):
-//   error[v]     [mm] signed distance of that data point to the local model of the vertex's node, > 0 inside: there the model is too wide
+//   error[v]     [mm] signed distance of that data point to the wall as the vertex's node sees it, > 0 inside: there the model is too wide
 //   distance[v]  [mm] from the vertex to it: large where there are no data, as on the caps of open ends
-// Either array may be NULL. Both are NaN where none of the 64 surrounding nodes has points. Returns false if the tree has no points.
-bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, double *error, double *distance);
-// The same for a wall of any kind: `of_wall` returns the signed distance of a data point, > 0 inside, from the wall near a vertex.
-bool surface_point_error_from(const TriangleMesh *mesh, const VesselTree *tree, double (*of_wall)(const void *wall, int vertex, Vec3 point), const void *wall,
-                              double *error, double *distance);
+// Either array may be NULL. Both are NaN where none of the 64 surrounding nodes has points. Nodes are those of
+// model->tree. Returns false if it has no points.
+bool surface_point_error(const TriangleMesh *mesh, const ModelField *model, double *error, double *distance);
 
 #endif

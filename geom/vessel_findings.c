@@ -85,23 +85,23 @@ static int find_runs(const Profile *p, const VesselBranches *branches, int index
 }
 
 // The radius of the circle with the area of the model's section perpendicular to `axis` at `at`; 0 if `at` is outside, HUGE_VAL if the section is not closed.
-static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double longest)
+static double section_radius(const ModelField *model, int node, Vec3 at, Vec3 axis, double longest)
 {
     enum { RAYS = 36 };
     Vec3 e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
     double sum = 0;
-    if (!(blobby_field(model, at) > 0))
+    if (!(model_field_at(model, node, at, NULL) > 0))
         return 0;
     for (int i = 0; i < RAYS; i++) {
         double angle = 2 * PI * i / RAYS, step = longest / 64, low = 0, high = step;
         Vec3 ray = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
-        while (high < longest && blobby_field(model, vec3_add_scaled(at, high, ray)) > 0)
+        while (high < longest && model_field_at(model, node, vec3_add_scaled(at, high, ray), NULL) > 0)
             low = high, high += step;
         if (!(high < longest))
             return HUGE_VAL;
         for (int k = 0; k < 30; k++) {
             double middle = 0.5 * (low + high);
-            *(blobby_field(model, vec3_add_scaled(at, middle, ray)) > 0 ? &low : &high) = middle;
+            *(model_field_at(model, node, vec3_add_scaled(at, middle, ray), NULL) > 0 ? &low : &high) = middle;
         }
         sum += low * low / RAYS;
     }
@@ -109,18 +109,18 @@ static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double lon
 }
 
 // Sections perpendicular to the line from the vessel's axis to the sac's middle, starting at the vessel's wall.
-static double neck_width(const VesselTree *tree, int sac, int vessel)
+static double neck_width(const ModelField *model, int sac, int vessel)
 {
+    const VesselTree *tree = model->tree;
     enum { SECTIONS = 40 };
-    Blobby model = blobby_of(tree, sac);
     Vec3 to = vec3_sub(tree->center[sac], tree->center[vessel]);
     double distance = vec3_norm(to), start = 0.7 * tree->radius[vessel], least = HUGE_VAL;
-    if (model.count < 1 || !(distance > start))
+    if ((!model->swept && blobby_of(tree, sac).count < 1) || !(distance > start))
         return NAN;
     Vec3 axis = vec3_scale(to, 1 / distance);
     for (int i = 0; i <= SECTIONS; i++) {
         double s = start + (distance - start) * i / SECTIONS,
-               r = section_radius(&model, vec3_add_scaled(tree->center[vessel], s, axis), axis, 3 * tree->radius[sac]);
+               r = section_radius(model, sac, vec3_add_scaled(tree->center[vessel], s, axis), axis, 3 * tree->radius[sac]);
         least = r > 0 ? fmin(least, r) : least;
     }
     return least < HUGE_VAL ? 2 * least : NAN;
@@ -147,8 +147,9 @@ static double extent_of(const VesselTree *tree, const int *top, int sac)
 }
 
 // One finding for each connected group of aneurysm nodes, at its largest node.
-static int find_sacs(const VesselTree *tree, const VesselBranches *branches, int *top, Finding *found)
+static int find_sacs(const ModelField *model, const VesselBranches *branches, int *top, Finding *found)
 {
+    const VesselTree *tree = model->tree;
     int count = 0;
     for (int i = 0; i < tree->node_count; i++) {   // top[i]: the first node of i's group
         int p = tree->parent[i];
@@ -175,14 +176,15 @@ static int find_sacs(const VesselTree *tree, const VesselBranches *branches, int
     for (int k = 0; k < count; k++) {
         int first = found[k].node, vessel = tree->parent[first];
         found[k].extent = extent_of(tree, top, first);
-        if (vessel_tree_is_model(tree) && vessel >= 0)
-            found[k].neck = neck_width(tree, first, vessel);
+        if (model_field_exists(model) && vessel >= 0)
+            found[k].neck = neck_width(model, first, vessel);
     }
     return count;
 }
 
-Finding *vessel_findings(const VesselTree *tree, const VesselBranches *branches, const FindingOptions *options, int *count)
+Finding *vessel_findings(const ModelField *model, const VesselBranches *branches, const FindingOptions *options, int *count)
 {
+    const VesselTree *tree = model->tree;
     size_t n = (size_t)tree->node_count;
     double *numbers = malloc(5 * n * sizeof *numbers);
     Profile p = {.radius = numbers};
@@ -198,7 +200,7 @@ Finding *vessel_findings(const VesselTree *tree, const VesselBranches *branches,
         *count += find_runs(&p, branches, b, FINDING_DILATATION, options->wide, found + *count);
     }
     if (good)
-        *count += find_sacs(tree, branches, top, found + *count);
+        *count += find_sacs(model, branches, top, found + *count);
     free(numbers);
     free(top);
     if (!good) {

@@ -8,6 +8,7 @@
 #ifndef SELDINGER_GEOM_VESSEL_FINDINGS_H
 #define SELDINGER_GEOM_VESSEL_FINDINGS_H
 
+#include "geom/model_field.h"
 #include "geom/vessel_branches.h"
 
 typedef enum { FINDING_STENOSIS, FINDING_DILATATION, FINDING_ANEURYSM } FindingKind;
@@ -31,8 +32,8 @@ typedef struct FindingOptions {
 } FindingOptions;
 FindingOptions finding_default_options(void);
 
-// Returns the findings ordered by branch and arc length, sacs last, and their number in *count; the caller frees the array. Returns NULL, with *count 0, if out
+// `branches` and nodes are those of model->tree, which need have no wall. Returns the findings ordered by branch and arc length, sacs last, and their number in *count; the caller frees the array. Returns NULL, with *count 0, if out
 // of memory.
-Finding *vessel_findings(const VesselTree *tree, const VesselBranches *branches, const FindingOptions *options, int *count);
+Finding *vessel_findings(const ModelField *model, const VesselBranches *branches, const FindingOptions *options, int *count);
 
 #endif

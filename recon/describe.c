@@ -36,9 +36,24 @@ static void add_box(cJSON *object, const Vec3 *point, int count)
     add_vector(object, "high_mm", high);
 }
 
-void describe_tree(cJSON *object, const VesselTree *tree, const TreeFileInfo *info)
+static void add_models(cJSON *object, const ModelFile *file)
 {
-    bool model = vessel_tree_is_model(tree);
+    cJSON *list = cJSON_AddArrayToObject(object, "models");
+    for (int i = 0; i < MODELS; i++)
+        if (i == 0 ? vessel_tree_is_model(file->tree) : file->swept.of[i - 1] != NULL)
+            cJSON_AddItemToArray(list, cJSON_CreateString(model_names[i]));
+    if (file->sweep) {
+        cJSON_AddStringToObject(object, "model", model_names[file->kind]);
+        cJSON_AddNumberToObject(object, "model_branches", file->sweep->branch_count);
+        cJSON_AddNumberToObject(object, "model_sections", file->sweep->break_count);
+    }
+}
+
+void describe_tree(cJSON *object, const ModelFile *file)
+{
+    const VesselTree *tree = file->tree;
+    const TreeFileInfo *info = &file->info;
+    bool model = file->kind >= 0;
     int *children = HEAP_ZEROED((size_t)tree->node_count, sizeof *children), branches = 1, ends = 0, aneurysm = 0;
     for (int i = 1; i < tree->node_count; i++)
         if (children[tree->parent[i]]++ > 0)
@@ -58,12 +73,15 @@ void describe_tree(cJSON *object, const VesselTree *tree, const TreeFileInfo *in
     add_spread(object, "radius_mm", tree->radius, tree->node_count);
     add_box(object, tree->center, tree->node_count);
     add_vector(object, "root_mm", tree->center[0]);
-    if (model) {
+    if (model)
+        add_models(object, file);
+    if (file->kind == 0) {
         cJSON_AddNumberToObject(object, "blobs", (double)tree->blob_count);
         cJSON_AddNumberToObject(object, "blobs_per_node", (double)tree->blob_count / tree->node_count);
         cJSON_AddNumberToObject(object, "iso_level", tree->iso_level);
-        add_spread(object, "error_mm", tree->error, tree->node_count);
     }
+    if (model)
+        add_spread(object, "error_mm", file->field.tree->error, file->field.tree->node_count);
     if (info->source)
         cJSON_AddStringToObject(object, "source", info->source);
     if (info->created_by)

@@ -51,6 +51,7 @@
 #include "recon/describe.h"
 #include "recon/hdf5_reader.h"
 #include "recon/hdf5_silence.h"
+#include "recon/model_file.h"
 #include "recon/sweep_file.h"
 #include "recon/tree_file.h"
 

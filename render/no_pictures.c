@@ -17,8 +17,8 @@ PICTURE(picture_of_run, const PictureScene *scene, const PictureTool *tool)
 PICTURE(picture_of_moments, const PictureScene *scene, int tool_count, const PictureTool *tool)
 PICTURE(picture_of_tree, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low, float high, const VesselTree *tree, int mark_count,
         const PictureMark *mark)
-PICTURE(picture_of_fit, const VesselTree *tree, const TriangleMesh *mesh, const double *distance)
-PICTURE(picture_of_error, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm)
+PICTURE(picture_of_fit, const ModelField *model, const TriangleMesh *mesh, const double *distance)
+PICTURE(picture_of_error, const ModelField *model, const TriangleMesh *mesh, const double *error, double voxel_mm)
 PICTURE(picture_of_junctions, const PictureJunctions *what, int *pages)
 PICTURE(picture_of_series, int count, const double *time_s, int panel_count, const PicturePanel *panel, int event_count, const PictureEvent *event)
 

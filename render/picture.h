@@ -89,25 +89,24 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
 
 // --- a fit ---
 // Draws the fitted surface, coloured by the signed distance of the data (blue: outside the model, red: inside), a histogram, and slices through the
-// worst local models with blobs, contour and points. `tree` must be a model; `distance` (tree->point_count) [mm]: signed distance of each point to the model of
-// its
-// own node, > 0 inside; NULL: Taubin's distance is computed here. `mesh` may be NULL (only points).
-bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance, char *message,
+// worst nodes with blobs, if there are any, contour and points. `distance` (points of model->tree) [mm]: signed distance of each point to the wall that its node
+// sees, > 0 inside; NULL: Taubin's distance is computed here. `mesh` (geom/model_mesh.h) may be NULL (only points).
+bool picture_of_fit(const char *path, const PictureOptions *options, const ModelField *model, const TriangleMesh *mesh, const double *distance, char *message,
                     size_t capacity);
 
 // Draws the surface of the model with each vertex coloured by `error` (mesh->vertex_count) [mm] (geom/tree_surface.h: signed distance of the nearest data
 // point,
-// > 0 inside; NaN grey), and a histogram of the d_a of the local models (tree->error) in voxels with the class limits of the paper's Table 4: half, one, two.
-bool picture_of_error(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm,
+// > 0 inside; NaN grey), and a histogram of the d_a of the nodes (model->tree->error) in voxels with the class limits of the paper's Table 4: half, one, two.
+bool picture_of_error(const char *path, const PictureOptions *options, const ModelField *model, const TriangleMesh *mesh, const double *error, double voxel_mm,
                       char *message, size_t capacity);
 
 // --- junctions ---
 typedef struct PictureJunctions {
-    const VesselTree *tree;          // a model
+    const ModelField *model;
     int junction_count;
     const ReachJunction *junction;   // junctions of that model (geom/reach.h), in the order in which they are drawn
     double tool_radius;              // [mm] a smaller clearance is framed orange
-    const VesselTree *before;        // another model of the same vessels: each junction of both models side by side, in the same plane; NULL: none
+    const ModelField *before;        // another model of the same vessels: each junction of both models side by side, in the same plane; NULL: none
     int size[3];                     // the voxel grid behind them, as in picture_of_tree; value NULL: none
     Vec3 origin, axis[3];
     const float *value;

@@ -87,14 +87,14 @@ static void picture_page_class_chart(PicturePage *page, double x, double y, doub
         picture_page_text_anchored(page, left, y + height + 4 * s, 0.5, TEXT_SMALL, PAGE_INK, text);
     }
     char text[96];
-    snprintf(text, sizeof text, "d_a [voxels of %g mm], %d local models, tallest bar %d", voxel, count, most);
+    snprintf(text, sizeof text, "d_a [voxels of %g mm], %d nodes, tallest bar %d", voxel, count, most);
     picture_page_text(page, x, y + height + 24 * s, TEXT_SMALL, PAGE_MUTED, "%s", text);
 }
 
-bool picture_of_error(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm,
+bool picture_of_error(const char *path, const PictureOptions *options, const ModelField *model, const TriangleMesh *mesh, const double *error, double voxel_mm,
                       char *message, size_t capacity)
 {
-    if (!tree || !vessel_tree_is_model(tree) || !mesh || mesh->vertex_count < 1 || !error)
+    if (!model_field_exists(model) || !mesh || mesh->vertex_count < 1 || !error)
         return message_fail(message, capacity, "the model has no surface to draw");
     if (!(voxel_mm > 0) || !isfinite(voxel_mm))
         return message_fail(message, capacity, "the voxel size is %g mm; expected above 0", voxel_mm);
@@ -111,8 +111,8 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
         picture_page_title(&page, gap, 18 * s, page.width - 2 * gap, options->title ? options->title : "distance of the surface to the data");
         picture_page_color_bar(&page, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale,
                                "data to surface [mm]: blue outside the model, red inside");
-        picture_page_text(&page, left, top + 90 * s, TEXT_NORMAL, PAGE_INK, "local models by distance to their data (Table 4)");
-        picture_page_class_chart(&page, left, top + 120 * s, column, 240 * s, tree->node_count, tree->error, voxel_mm);
+        picture_page_text(&page, left, top + 90 * s, TEXT_NORMAL, PAGE_INK, "nodes by distance to their data (Table 4)");
+        picture_page_class_chart(&page, left, top + 120 * s, column, 240 * s, model->tree->node_count, model->tree->error, voxel_mm);
         drawn = picture_page_save(&page, path);
     }
     picture_page_close(&page);

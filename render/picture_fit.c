@@ -14,7 +14,8 @@ enum { SLICE_CELLS = 140, WORST_MOST = 12, BINS = 60 };
 typedef struct FitDrawing {
     PicturePage *page;
     const PictureOptions *options;
-    const VesselTree *tree;
+    const ModelField *model;
+    const VesselTree *tree;    // its nodes
     const TriangleMesh *mesh;
     double *distance;          // (P) [mm] > 0 inside; NaN if the node has no model
     double *sorted;            // |distance|, ascending, finite values only
@@ -34,22 +35,12 @@ static bool find_distances(FitDrawing *drawing, const double *distance)
     drawing->field = malloc((SLICE_CELLS + 1) * (SLICE_CELLS + 1) * sizeof *drawing->field);
     if (!drawing->distance || !drawing->sorted || !drawing->field)
         return false;
-    for (int i = 0; i < tree->node_count; i++) {
-        Blobby model = blobby_of(tree, i);
+    for (int i = 0; i < tree->node_count; i++)
         for (int64_t k = tree->point_offset[i]; k < tree->point_offset[i + 1]; k++) {
-            Vec3 gradient;
-            double d = NAN;
-            if (distance)
-                d = distance[k];
-            else if (model.count > 0) {
-                double f = blobby_gradient(&model, tree->point[k], &gradient);
-                d = f / vec3_norm(gradient);
-            }
-            drawing->distance[k] = d;
+            double d = drawing->distance[k] = distance ? distance[k] : model_field_distance(drawing->model, i, tree->point[k]);
             if (isfinite(d))
                 drawing->sorted[drawing->finite_count++] = fabs(d);
         }
-    }
     sort_doubles(drawing->sorted, (size_t)drawing->finite_count);
     return true;
 }
@@ -66,7 +57,7 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
     double s = page->scale;
     if (drawing->mesh && drawing->mesh->vertex_count > 0 && tree->point_count > 0) {
         double *error = malloc((size_t)drawing->mesh->vertex_count * sizeof *error);
-        bool drawn = error && surface_point_error(drawing->mesh, tree, error, NULL) &&
+        bool drawn = error && surface_point_error(drawing->mesh, drawing->model, error, NULL) &&
                      picture_page_error_surface(page, drawing->options, drawing->mesh, error, drawing->full_scale, x, y, width, height);
         free(error);
         return drawn || message_fail(page->message, page->capacity, "out of memory for a picture");
@@ -141,14 +132,14 @@ typedef struct Slice {
 
 static void draw_contour(FitDrawing *drawing, const Slice *slice, int node, Color color, double thickness)
 {
-    Blobby model = blobby_of(drawing->tree, node);
-    if (model.count < 1)
+    if (!drawing->model->swept && blobby_of(drawing->tree, node).count < 1)
         return;
     const int n = SLICE_CELLS + 1;
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
             double u = slice->half * (2.0 * i / SLICE_CELLS - 1), v = slice->half * (1 - 2.0 * j / SLICE_CELLS);
-            drawing->field[j * n + i] = (float)blobby_field(&model, vec3_add_scaled(vec3_add_scaled(slice->center, u, slice->along), v, slice->across));
+            Vec3 x = vec3_add_scaled(vec3_add_scaled(slice->center, u, slice->along), v, slice->across);
+            drawing->field[j * n + i] = (float)model_field_at(drawing->model, node, x, NULL);
         }
     double cell = slice->side / SLICE_CELLS;
     for (int j = 0; j < SLICE_CELLS; j++)
@@ -194,7 +185,8 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     slice.across = aside;
     slice.normal = vec3_cross(slice.along, aside);
-    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%d: r %.2f, error %.2f mm", node, r, tree->error ? tree->error[node] : NAN);
+    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%d: r %.2f, error %.2f mm", model_field_file_node(drawing->model, node), r,
+                      tree->error ? tree->error[node] : NAN);
     overlay_fill(page->overlay, slice.x, slice.y, slice.side, slice.side, PAGE_PANEL);
     overlay_push_clip(page->overlay, slice.x, slice.y, slice.side, slice.side);
     double px, py, off, scale = slice.side / (2 * slice.half);
@@ -219,20 +211,22 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     overlay_pop_clip(page->overlay);
     overlay_rectangle(page->overlay, slice.x, slice.y, slice.side, slice.side, PAGE_FAINT, s);
-    char blobs[32];
-    snprintf(blobs, sizeof blobs, "%d blobs", blobby_of(tree, node).count);
+    char blobs[32] = "";
+    if (!drawing->model->swept)
+        snprintf(blobs, sizeof blobs, "%d blobs", blobby_of(tree, node).count);
     picture_page_label(page, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, PAGE_MUTED, blobs);
     picture_page_scale_bar(page, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, PAGE_INK);
 }
 
 // Chooses the largest errors first, and none next to one already chosen.
-static int choose_worst(const VesselTree *tree, int most, int chosen[WORST_MOST])
+static int choose_worst(const ModelField *model, int most, int chosen[WORST_MOST])
 {
+    const VesselTree *tree = model->tree;
     int count = 0;
     while (tree->error && count < most && count < WORST_MOST) {
         int best = -1;
         for (int i = 0; i < tree->node_count; i++) {
-            bool near_other = blobby_of(tree, i).count < 1 || !isfinite(tree->error[i]);
+            bool near_other = (!model->swept && blobby_of(tree, i).count < 1) || !isfinite(tree->error[i]);
             for (int k = 0; k < count; k++)
                 near_other = near_other || vec3_distance(tree->center[i], tree->center[chosen[k]]) < 1.5 * tree->radius[chosen[k]];
             if (!near_other && (best < 0 || tree->error[i] > tree->error[best]))
@@ -249,7 +243,7 @@ static bool draw_fit(FitDrawing *drawing)
 {
     PicturePage *page = drawing->page;
     const VesselTree *tree = drawing->tree;
-    int chosen[WORST_MOST], worst = choose_worst(tree, drawing->options->worst_count, chosen);
+    int chosen[WORST_MOST], worst = choose_worst(drawing->model, drawing->options->worst_count, chosen);
     double s = page->scale, gap = 20 * s, top = 62 * s, column = (worst > 0 ? 0.42 : 0.28) * page->width, left = page->width - gap - column;
     if (!draw_surface(drawing, gap, top, (int)(left - 2 * gap), (int)(page->height - top - gap)))
         return false;
@@ -264,8 +258,12 @@ static bool draw_fit(FitDrawing *drawing)
     y += 66 * s;
     picture_page_text(page, left, y, TEXT_NORMAL, PAGE_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
                       (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99), percentile(drawing, 1));
-    picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, PAGE_INK, "%d nodes, %lld blobs, %.1f per node", tree->node_count, (long long)tree->blob_count,
-                      (double)tree->blob_count / tree->node_count);
+    if (drawing->model->swept)
+        picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, PAGE_INK, "%d branches, %d sections", drawing->model->swept->branch_count,
+                          drawing->model->swept->break_count);
+    else
+        picture_page_text(page, left, y + 23 * s, TEXT_NORMAL, PAGE_INK, "%d nodes, %lld blobs, %.1f per node", tree->node_count, (long long)tree->blob_count,
+                          (double)tree->blob_count / tree->node_count);
     y += 56 * s;
     if (worst < 1)
         return true;
@@ -287,15 +285,15 @@ static bool draw_fit(FitDrawing *drawing)
     return true;
 }
 
-bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance, char *message,
+bool picture_of_fit(const char *path, const PictureOptions *options, const ModelField *model, const TriangleMesh *mesh, const double *distance, char *message,
                     size_t capacity)
 {
-    if (!tree || tree->node_count < 1 || !vessel_tree_is_model(tree))
+    if (!model_field_exists(model) || model->tree->node_count < 1)
         return message_fail(message, capacity, "the tree has no fitted model to draw");
     PicturePage page;
     if (!picture_page_open(&page, options, options->height, message, capacity))
         return false;
-    FitDrawing drawing = {.page = &page, .options = options, .tree = tree, .mesh = mesh};
+    FitDrawing drawing = {.page = &page, .options = options, .model = model, .tree = model->tree, .mesh = mesh};
     bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "out of memory for a picture");
     if (drawn) {
         double wide = percentile(&drawing, 0.98);

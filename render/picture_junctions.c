@@ -16,7 +16,8 @@ static const Color CAPPED = {200, 30, 30, 255}, NARROW = {225, 140, 20, 255}, OP
                    DATA = {214, 120, 0, 255}, LUMEN = {70, 160, 230, 60};
 
 typedef struct JunctionCell {
-    const VesselTree *tree;
+    const ModelField *model;
+    const VesselTree *tree;  // its nodes
     int near_count, near[NEAR_MOST];         // nodes whose balls may lie in the picture
     Vec3 center, along, across, normal;
     double half;             // [mm] half of the side
@@ -46,9 +47,10 @@ static void find_plane(const VesselTree *tree, const ReachJunction *junction, Ju
     cell->center = vec3_add_scaled(from, 0.55 * length, cell->along);
 }
 
-static void find_near(const VesselTree *tree, JunctionCell *cell)
+static void find_near(const ModelField *model, JunctionCell *cell)
 {
-    cell->tree = tree;
+    const VesselTree *tree = model->tree;
+    cell->model = model, cell->tree = tree;
     cell->near_count = 0;
     for (int i = 0; i < tree->node_count && cell->near_count < NEAR_MOST; i++)
         if (vec3_distance(tree->center[i], cell->center) < 1.5 * cell->half + 1.5 * tree->radius[i])
@@ -72,7 +74,7 @@ static double field_in_plane(const JunctionCell *cell, double u, double v)
 {
     Vec3 x = vec3_add_scaled(vec3_add_scaled(cell->center, u, cell->along), v, cell->across);
     int node = nearest_node(cell, x);
-    return node < 0 ? -1 : reach_field(cell->tree, x, &node);
+    return node < 0 ? -1 : reach_field(cell->model, x, &node);
 }
 
 static void place(const JunctionCell *cell, Vec3 point, double *x, double *y, double *off)
@@ -189,17 +191,17 @@ static void draw_tree(JunctionDrawing *drawing, const JunctionCell *cell)
     }
 }
 
-static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double clearance, Vec3 where,
+static void draw_cell(JunctionDrawing *drawing, const ModelField *of, const ReachJunction *junction, const ModelField *in, double clearance, Vec3 where,
                       const char *label, double x, double y, double side)
 {
     PicturePage *page = drawing->page;
     double s = page->scale, head = 20 * s, tool = drawing->what->tool_radius, px, py, off;
     JunctionCell cell = {.x = x, .y = y + head, .side = side - head};
     Color color = clearance < 0 ? CAPPED : clearance < tool ? NARROW : OPEN;
-    find_plane(of, junction, &cell);
+    find_plane(of->tree, junction, &cell);
     find_near(in, &cell);
-    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%s%d: %s%.2f mm%s", label, junction->node, clearance < 0 ? "capped, " : "", clearance,
-                      junction->apart ? ", apart" : "");
+    picture_page_text(page, x, y, TEXT_SMALL, PAGE_INK, "%s%d: %s%.2f mm%s", label, model_field_file_node(of, junction->node), clearance < 0 ? "capped, " : "",
+                      clearance, junction->apart ? ", apart" : "");
     overlay_fill(page->overlay, cell.x, cell.y, cell.side, cell.side, PAGE_PANEL);
     overlay_push_clip(page->overlay, cell.x, cell.y, cell.side, cell.side);
     draw_image(drawing, &cell);
@@ -280,11 +282,12 @@ static bool draw_page(JunctionDrawing *drawing, const PictureOptions *options, i
         double x = gap + (slot % COLUMNS) * (width + gap), y = top + (slot / COLUMNS) * (height + gap);
         if (what->before) {
             Vec3 where;
-            double most = fmax(what->tree->radius[j->node], 2 * what->tool_radius), before = reach_on_line(what->tree, j, what->before, most, &where);
-            draw_cell(drawing, what->tree, j, what->before, before, where, "before, ", x, y, side);
+            double most = fmax(what->model->tree->radius[j->node], 2 * what->tool_radius),
+                   before = reach_on_line(what->model->tree, j, what->before, most, &where);
+            draw_cell(drawing, what->model, j, what->before, before, where, "before, ", x, y, side);
             x += width + gap;
         }
-        draw_cell(drawing, what->tree, j, what->tree, j->clearance, j->place, what->before ? "after, " : "node ", x, y, side);
+        draw_cell(drawing, what->model, j, what->model, j->clearance, j->place, what->before ? "after, " : "node ", x, y, side);
     }
     return true;
 }

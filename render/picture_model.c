@@ -5,10 +5,10 @@
 
 #include <stdlib.h>
 
-bool picture_model_fit(const char *path, const VesselTree *model, Faults *faults)
+bool picture_model_fit(const char *path, const ModelField *model, Faults *faults)
 {
     char message[256] = "";
-    TriangleMesh *mesh = isosurface_of_tree(model, isosurface_cell_for(model));
+    TriangleMesh *mesh = triangle_mesh_of_model(model, 0);
     PictureOptions options = picture_default_options();
     bool drawn = picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message);
     if (!drawn)
@@ -17,10 +17,10 @@ bool picture_model_fit(const char *path, const VesselTree *model, Faults *faults
     return drawn;
 }
 
-bool picture_model_error(const char *path, const char *title, const VesselTree *model, double voxel_mm, Faults *faults)
+bool picture_model_error(const char *path, const char *title, const ModelField *model, double voxel_mm, Faults *faults)
 {
     char message[512] = "the tree has no fitted model to draw";
-    TriangleMesh *mesh = vessel_tree_is_model(model) ? isosurface_of_tree(model, isosurface_cell_for(model)) : NULL;
+    TriangleMesh *mesh = model_field_exists(model) ? triangle_mesh_of_model(model, 0) : NULL;
     double *error = mesh ? malloc(((size_t)mesh->vertex_count + 1) * sizeof *error) : NULL;
     PictureOptions options = picture_default_options();
     options.title = title;

@@ -202,12 +202,11 @@ void tree_page_error_figure(const Report *report)
     for (int k = 0; k < BINS; k++)
         most = bin[k] > most ? bin[k] : most;
     Chart c = {.left = 48, .top = 26, .width = 560, .height = 180, .x_high = end, .y_high = 1.08 * most};
-    fprintf(
-        out,
-        "<svg class=\"histogram\" role=\"img\" aria-labelledby=\"fit-t fit-d\" viewBox=\"0 0 624 250\" width=\"624\" height=\"250\">"
-        "<title id=\"fit-t\">Local models by their distance to the data</title><desc id=\"fit-d\">Histogram of d_a in voxels over %d local models: C1 %d, C2 "
-        "%d, C3 %d, C4 %d.</desc>\n",
-        tree->node_count, class_count[0], class_count[1], class_count[2], class_count[3]);
+    fprintf(out,
+            "<svg class=\"histogram\" role=\"img\" aria-labelledby=\"fit-t fit-d\" viewBox=\"0 0 624 250\" width=\"624\" height=\"250\">"
+            "<title id=\"fit-t\">Nodes by their distance to the data</title><desc id=\"fit-d\">Histogram of d_a in voxels over %d nodes: C1 %d, C2 "
+            "%d, C3 %d, C4 %d.</desc>\n",
+            tree->node_count, class_count[0], class_count[1], class_count[2], class_count[3]);
     draw_axes(out, &c, 6, 5, "d_a [voxels]");
     for (int k = 0; k < BINS; k++) {
         double x = end * k / BINS;

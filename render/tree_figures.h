@@ -10,7 +10,8 @@
 typedef struct Report {
     FILE *out;
     const char *name;
-    const VesselTree *tree;
+    const ModelField *model;
+    const VesselTree *tree;  // its nodes
     const TreeFileInfo *info;
     const VesselBranches *branches;
     const Finding *finding;

@@ -37,7 +37,9 @@ static void print_summary(const Report *report)
             report->branches->count, length, report->branches->count > 0 ? least : 0, largest, tree->node_count, (long long)tree->point_count);
     fprintf(out, "<dt>Candidates</dt><dd>%d narrow, %d wide, %d aneurysm%s</dd>\n", by_kind[FINDING_STENOSIS], by_kind[FINDING_DILATATION],
             by_kind[FINDING_ANEURYSM], by_kind[FINDING_ANEURYSM] == 1 ? "" : "s");
-    if (vessel_tree_is_model(tree))
+    if (report->model->swept)
+        fprintf(out, "<dt>Model</dt><dd>swept: %d branches, %d sections</dd>\n", report->model->swept->branch_count, report->model->swept->break_count);
+    else if (vessel_tree_is_model(tree))
         fprintf(out, "<dt>Model</dt><dd>%lld blobs, %.1f per node</dd>\n", (long long)tree->blob_count, (double)tree->blob_count / tree->node_count);
     fprintf(out, "<dt>Units</dt><dd>lengths in millimetres, in the coordinate system of the volume or surface from which it was made</dd>\n</dl></section>\n");
 }
@@ -162,13 +164,13 @@ static void print_worst(const Report *report)
         worst[at] = i;
     }
     fprintf(out,
-            "<div class=\"scroll\"><table><caption>Local models furthest from their data</caption><thead><tr><th scope=\"col\">Node</th><th "
+            "<div class=\"scroll\"><table><caption>Nodes furthest from their data</caption><thead><tr><th scope=\"col\">Node</th><th "
             "scope=\"col\">Branch</th><th scope=\"col\">x, y, z [mm]</th><th scope=\"col\">Radius [mm]</th><th scope=\"col\">Blobs</th><th scope=\"col\">d_a "
             "[mm]</th><th scope=\"col\">d_a [voxels]</th></tr></thead><tbody>\n");
     for (int k = 0; k < count; k++) {
         int i = worst[k], of = report->branches->of_node[i];
         Vec3 c = tree->center[i];
-        fprintf(out, "<tr><th scope=\"row\">%d</th><td>", i);
+        fprintf(out, "<tr><th scope=\"row\">%d</th><td>", model_field_file_node(report->model, i));
         if (of >= 0)
             fprintf(out, "%d", of + 1);
         else
@@ -183,14 +185,14 @@ static void print_fit(const Report *report)
 {
     FILE *out = report->out;
     fprintf(out, "<section id=\"fit\"><h2>Quality of the fit</h2>\n");
-    if (!vessel_tree_is_model(report->tree)) {
+    if (!model_field_exists(report->model)) {
         fprintf(out, "<p>This tree has no fitted model yet.</p></section>\n");
         return;
     }
     fprintf(out, "<figure id=\"figure-fit\">\n");
     tree_page_error_figure(report);
     fprintf(out,
-            "<figcaption>d_a of a local model is the distance to it that 90 %% of its data points keep. Classes of Kerrien et al. 2017, Table 4: C1 under "
+            "<figcaption>d_a of a node is the distance to the wall that 90 %% of its data points keep. Classes of Kerrien et al. 2017, Table 4: C1 under "
             "half a voxel, C2 under one, C3 under two, C4 beyond; voxel %g mm%s.</figcaption></figure>\n",
             report->voxel, report->voxel_is_known ? "" : " (assumed: the file does not say)");
     print_worst(report);
@@ -200,7 +202,7 @@ static void print_fit(const Report *report)
 static void print_page(const Report *report)
 {
     FILE *out = report->out;
-    bool model = vessel_tree_is_model(report->tree);
+    bool model = model_field_exists(report->model);
     fprintf(out, "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
                  "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\"/>\n"
                  "<title>Vessel report: ");
@@ -221,19 +223,19 @@ static void print_page(const Report *report)
     fprintf(out, "</pre></details>\n<p>Written by seldinger " SELDINGER_VERSION ".</p></section></footer></body></html>\n");
 }
 
-bool tree_page_write(const char *path, const char *name, const VesselTree *tree, const TreeFileInfo *info, Faults *faults)
+bool tree_page_write(const char *path, const char *name, const ModelField *model, const TreeFileInfo *info, Faults *faults)
 {
     char *bytes = NULL;
     size_t length = 0;
     int count = 0;
     FindingOptions options = finding_default_options();
-    VesselBranches *branches = vessel_branches_create(tree);
-    Finding *finding = branches ? vessel_findings(tree, branches, &options, &count) : NULL;
+    VesselBranches *branches = vessel_branches_create(model->tree);
+    Finding *finding = branches ? vessel_findings(model, branches, &options, &count) : NULL;
     FILE *out = finding ? open_memstream(&bytes, &length) : NULL;
     bool good = out != NULL;
     if (good) {
         double stated = tree_file_number(info, "voxel_mm", 0);
-        Report report = {out, name, tree, info, branches, finding, count, stated > 0 ? stated : 0.2, stated > 0};
+        Report report = {out, name, model, model->tree, info, branches, finding, count, stated > 0 ? stated : 0.2, stated > 0};
         print_page(&report);
         good = !ferror(out);
         good = fclose(out) == 0 && good;

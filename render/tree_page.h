@@ -7,7 +7,7 @@
 #include "geom/geom.h"
 #include "recon/recon.h"
 
-// `name`: the file that the tree was loaded from. Returns false with faults if the file cannot be written or if out of memory.
-bool tree_page_write(const char *path, const char *name, const VesselTree *tree, const TreeFileInfo *info, Faults *faults);
+// `model`: may be a tree without a wall. `name`: the file that it was loaded from. Returns false with faults if the file cannot be written or if out of memory.
+bool tree_page_write(const char *path, const char *name, const ModelField *model, const TreeFileInfo *info, Faults *faults);
 
 #endif

@@ -31,7 +31,8 @@ typedef struct NodeFigures {
     bool failed;
 } NodeFigures;
 typedef struct Job {
-    const VesselTree *tree;
+    const ModelField *model;
+    const VesselTree *tree;  // its nodes
     const Shape *truth;
     const Vessel *vessel;
     const uint8_t *place;    // (N)
@@ -98,12 +99,14 @@ static int place_of(const Job *job, int a, int b)
 
 // --- One node ---
 
-static Vec3 bisect(const Blobby *model, Vec3 c, Vec3 d, double low, double high)
+static bool is_inside(const ModelField *model, int node, Vec3 x) { return model_field_at(model, node, x, NULL) > 0; }
+
+static Vec3 bisect(const ModelField *model, int node, Vec3 c, Vec3 d, double low, double high)
 {
-    bool in = blobby_field(model, vec3_add_scaled(c, low, d)) > 0;
+    bool in = is_inside(model, node, vec3_add_scaled(c, low, d));
     for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
-        if ((blobby_field(model, vec3_add_scaled(c, middle, d)) > 0) == in)
+        if (is_inside(model, node, vec3_add_scaled(c, middle, d)) == in)
             low = middle;
         else
             high = middle;
@@ -134,7 +137,7 @@ static VesselHit query_with(const Job *job, VesselMemory *memory, Vec3 x)
 
 static VesselHit query_from(const Job *job, int node, Vec3 x)
 {
-    VesselMemory memory = {.node = node};
+    VesselMemory memory = {.node = model_field_file_node(job->model, node)};
     return query_with(job, &memory, x);
 }
 
@@ -142,9 +145,8 @@ static VesselHit query_from(const Job *job, int node, Vec3 x)
 static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, NodeFigures *f)
 {
     const double aside = 1e-4;   // [mm] larger than the rounding of the cells' planes
-    Blobby a = blobby_of(job->tree, node), b = blobby_of(job->tree, other);
-    SurfacePoint p = blobby_project(&a, x, x), q = blobby_project(&b, x, x);
-    VesselMemory memory = {.node = node};
+    SurfacePoint p = model_field_project(job->model, node, x, x), q = model_field_project(job->model, other, x, x);
+    VesselMemory memory = {.node = model_field_file_node(job->model, node)};
     VesselHit before = query_with(job, &memory, vec3_add_scaled(x, -aside, across)), behind = query_with(job, &memory, vec3_add_scaled(x, aside, across));
     VesselHit fresh = query_from(job, other, vec3_add_scaled(x, aside, across));
     unsigned unfit = VESSEL_OPEN_END | VESSEL_BEYOND;
@@ -170,10 +172,10 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
 }
 
 // Moves x in the plane with normal `across` to the model's wall. Returns false if it is still further than `far` away after some steps.
-static bool slide_to_wall(const Blobby *model, Vec3 across, double far, Vec3 *x)
+static bool slide_to_wall(const ModelField *model, int node, Vec3 across, double far, Vec3 *x)
 {
     for (int i = 0; i < 6; i++) {
-        SurfacePoint s = blobby_project(model, *x, *x);
+        SurfacePoint s = model_field_project(model, node, *x, *x);
         if (fabs(s.distance) < far)
             return true;
         Vec3 tangent = vec3_add_scaled(s.normal, -vec3_dot(s.normal, across), across);
@@ -188,7 +190,6 @@ static bool slide_to_wall(const Blobby *model, Vec3 across, double far, Vec3 *x)
 static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
 {
     const VesselTree *tree = job->tree;
-    Blobby model = blobby_of(tree, node);
     double own = power_distance(p, tree->center[node], tree->radius[node]);
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
         int other = tree->near[k];
@@ -198,8 +199,8 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
             continue;
         double beyond = (power_distance(p, tree->center[other], tree->radius[other]) - own) / (2 * apart);
         Vec3 across = vec3_scale(e, 1 / apart), x = vec3_add_scaled(p, beyond, across);
-        if (beyond < 0.1 * tree->radius[node] && slide_to_wall(&model, across, 0.01 * tree->radius[node], &x) && lim_is_in_cell(tree, node, other, x) &&
-            lim_is_in_cell(tree, other, node, x))
+        if (beyond < 0.1 * tree->radius[node] && slide_to_wall(job->model, node, across, 0.01 * tree->radius[node], &x) &&
+            lim_is_in_cell(tree, node, other, x) && lim_is_in_cell(tree, other, node, x))
             add_join(job, node, other, x, across, f);
     }
     if (job->truth) {
@@ -213,22 +214,21 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
 static void cast_rays_of(const Job *job, int node, NodeFigures *f)
 {
     const VesselTree *tree = job->tree;
-    Blobby model = blobby_of(tree, node);
     Vec3 c = tree->center[node];
     double radius = tree->radius[node], step = 0.05 * radius;
     int rays = ray_count(tree, node);
     for (int k = 0; k < rays; k++) {
         double z = 1 - (2 * k + 1.0) / rays, ring = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
         Vec3 d = {ring * same_cos(angle), ring * same_sin(angle), z};
-        bool in = blobby_field(&model, c) > 0, first = true;
+        bool in = is_inside(job->model, node, c), first = true;
         for (int i = 1; i * step < 3 * radius; i++) {
             Vec3 x = vec3_add_scaled(c, i * step, d);
             if (!lim_is_in_cell(tree, node, -1, x))
                 break;   // cells are convex
-            bool now = blobby_field(&model, x) > 0;
+            bool now = is_inside(job->model, node, x);
             if (now == in)
                 continue;
-            Vec3 p = bisect(&model, c, d, (i - 1) * step, i * step);
+            Vec3 p = bisect(job->model, node, c, d, (i - 1) * step, i * step);
             if (first && in)
                 look_at_wall(job, node, p, f);
             double far = job->place[node] == PLACE_END && first ? 0 : distance_to_data(tree, node, p);
@@ -254,7 +254,7 @@ static void measure_node(void *context, long index)
         f->failed = true;
         return;
     }
-    if (blobby_of(tree, node).count > 0)
+    if (job->model->swept || blobby_of(tree, node).count > 0)
         cast_rays_of(job, node, f);
     for (int k = 0; k < LINK_SAMPLES && parent >= 0; k++) {
         double t = (k + 0.5) / LINK_SAMPLES, radius = tree->radius[node] + t * (tree->radius[parent] - tree->radius[node]);
@@ -316,6 +316,19 @@ static WallRow wall_row(const Job *job, int place, double *value)
     return row;
 }
 
+// Nodes are then those of the file.
+static void name_nodes(const ModelField *model, ModelMeasure *out)
+{
+    for (int place = 0; place < PLACES; place++) {
+        JumpRow *row[JUMPS] = {&out->raw[place], &out->met[place], &out->cold[place]};
+        for (int k = 0; k < JUMPS; k++)
+            row[k]->worst_node = model_field_file_node(model, row[k]->worst_node), row[k]->worst_other = model_field_file_node(model, row[k]->worst_other);
+        out->wall[place].worst_node = model_field_file_node(model, out->wall[place].worst_node);
+    }
+    out->bare_worst = model_field_file_node(model, out->bare_worst), out->ghost_worst = model_field_file_node(model, out->ghost_worst);
+    out->narrowest_node = model_field_file_node(model, out->narrowest_node);
+}
+
 static bool add_up(const Job *job, ModelMeasure *out)
 {
     size_t capacity = 1;
@@ -345,26 +358,27 @@ static bool add_up(const Job *job, ModelMeasure *out)
             out->least_clearance = f->clearance, out->narrowest_node = i;
     }
     free(value);
+    name_nodes(job->model, out);
     return true;
 }
 
-bool model_measure(const VesselTree *model, const Shape *truth, int threads, ModelMeasure *out)
+bool model_measure(const ModelField *model, const Shape *truth, int threads, ModelMeasure *out)
 {
-    Job job = {.tree = model, .truth = truth};
-    if (!vessel_tree_is_model(model))
+    Job job = {.model = model, .tree = model->tree, .truth = truth};
+    if (!model_field_exists(model))
         return false;
-    Vessel *vessel = model_vessel_create(model);
-    uint8_t *place = find_places(model);
+    Vessel *vessel = model_field_vessel(model);
+    uint8_t *place = find_places(model->tree);
     job.vessel = vessel;
     job.place = place;
-    job.node = calloc((size_t)model->node_count, sizeof *job.node);
+    job.node = calloc((size_t)model->tree->node_count, sizeof *job.node);
     bool good = vessel && place && job.node;
     if (good) {
-        parallel_for(threads, model->node_count, measure_node, &job, NULL);
-        for (int i = 0; i < model->node_count; i++)
+        parallel_for(threads, model->tree->node_count, measure_node, &job, NULL);
+        for (int i = 0; i < model->tree->node_count; i++)
             good = good && !job.node[i].failed;
         good = good && add_up(&job, out);
-        for (int i = 0; i < model->node_count; i++) {
+        for (int i = 0; i < model->tree->node_count; i++) {
             free(job.node[i].join);
             free(job.node[i].wall);
         }

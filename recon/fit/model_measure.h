@@ -1,4 +1,4 @@
-// Measures how well the local models of a tree agree with each other where a tool passes from one to the next and, if known, with the truth.
+// Measures how well the walls that the nodes of a model (geom/model_field.h) see agree with each other where a tool passes from one to the next and, if known, with the truth.
 //
 // Places: a link of the tree is a tube, unless a sac, a bifurcation or an end is near it along the tree. A join is a point on the wall at the border of
 // two nodes' power cells and in no third cell. Raw: jumps between the fields of the two nodes (the paper's switch). As met: jumps between vessel queries
@@ -36,7 +36,7 @@ typedef struct ModelMeasure {
     int narrowest_node;
 } ModelMeasure;
 
-// Measures a model. Returns false if out of memory or if the tree has no model. `truth` may be NULL. The result does not depend on `threads` (0: all cores).
-bool model_measure(const VesselTree *model, const Shape *truth, int threads, ModelMeasure *out);
+// Measures a model. Returns false if out of memory or if there is no model. Nodes are those of the file. `truth` may be NULL. The result does not depend on `threads` (0: all cores).
+bool model_measure(const ModelField *model, const Shape *truth, int threads, ModelMeasure *out);
 
 #endif

@@ -8,19 +8,19 @@ enum { STOPS_SHOWN = 12, GHOSTS_SHOWN = 6 };
 
 static double percent(const Reach *reach, double length) { return reach->length > 0 ? 100 * length / reach->length : 0; }
 
-static void print_stop(FILE *out, const VesselTree *tree, const Reach *reach, const ReachStop *stop)
+static void print_stop(FILE *out, const ModelField *model, const Reach *reach, const ReachStop *stop)
 {
     Vec3 p = stop->place;
-    fprintf(out, "  node %-6d ", stop->node);
+    fprintf(out, "  node %-6d ", model_field_file_node(model, stop->node));
     if (stop->capped)
         fprintf(out, "capped, %.2f mm to the lumen", -stop->clearance);
     else
-        fprintf(out, "narrow, %.2f mm free on the centreline", fmin(stop->clearance, tree->radius[stop->node]));
+        fprintf(out, "narrow, %.2f mm free on the centreline", fmin(stop->clearance, model->tree->radius[stop->node]));
     fprintf(out, "%s, at %.2f, %.2f, %.2f; %.1f mm of centreline behind it (%.1f %%)\n", stop->apart ? ", a link longer than the sum of its radii" : "", p.x,
             p.y, p.z, stop->lost, percent(reach, stop->lost));
 }
 
-static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
+static void reach_print(FILE *out, const ModelField *model, const Reach *reach)
 {
     double tool = reach->options.tool_radius;
     fprintf(out,
@@ -40,20 +40,20 @@ static void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
     if (reach->stop_count > 0)
         fprintf(out, "blocked        %d places, sorted by the centreline behind them:\n", reach->stop_count);
     for (int k = 0; k < reach->stop_count && k < STOPS_SHOWN; k++)
-        print_stop(out, tree, reach, &reach->stop[k]);
+        print_stop(out, model, reach, &reach->stop[k]);
     if (reach->stop_count > STOPS_SHOWN)
         fprintf(out, "  and %d more (--json lists all)\n", reach->stop_count - STOPS_SHOWN);
 }
 
 static void add_place(cJSON *object, Vec3 p) { cJSON_AddItemToObject(object, "place_mm", cJSON_CreateDoubleArray((double[]){p.x, p.y, p.z}, 3)); }
 
-static void add_stops(cJSON *object, const Reach *reach)
+static void add_stops(cJSON *object, const ModelField *model, const Reach *reach)
 {
     cJSON *list = cJSON_AddArrayToObject(object, "shut");
     for (int k = 0; k < reach->stop_count; k++) {
         const ReachStop *stop = &reach->stop[k];
         cJSON *item = cJSON_CreateObject();
-        cJSON_AddNumberToObject(item, "node", stop->node);
+        cJSON_AddNumberToObject(item, "node", model_field_file_node(model, stop->node));
         cJSON_AddStringToObject(item, "why", stop->capped ? "capped" : "narrow");
         cJSON_AddBoolToObject(item, "apart", stop->apart);
         cJSON_AddNumberToObject(item, "clearance_mm", stop->clearance);
@@ -63,14 +63,14 @@ static void add_stops(cJSON *object, const Reach *reach)
     }
 }
 
-static void add_junctions(cJSON *object, const Reach *reach)
+static void add_junctions(cJSON *object, const ModelField *model, const Reach *reach)
 {
     cJSON *list = cJSON_AddArrayToObject(object, "junctions");
     for (int k = 0; k < reach->junction_count; k++) {
         const ReachJunction *j = &reach->junction[k];
         cJSON *item = cJSON_CreateObject();
-        cJSON_AddNumberToObject(item, "parent", j->parent);
-        cJSON_AddNumberToObject(item, "node", j->node);
+        cJSON_AddNumberToObject(item, "parent", model_field_file_node(model, j->parent));
+        cJSON_AddNumberToObject(item, "node", model_field_file_node(model, j->node));
         cJSON_AddBoolToObject(item, "capped", j->clearance < 0);
         cJSON_AddBoolToObject(item, "apart", j->apart);
         cJSON_AddNumberToObject(item, "clearance_mm", j->clearance);
@@ -80,8 +80,9 @@ static void add_junctions(cJSON *object, const Reach *reach)
 }
 
 // Adds each branch with the length that is reached; the link to its first node counts as part of the branch.
-static void add_branches(cJSON *object, const VesselTree *tree, const Reach *reach)
+static void add_branches(cJSON *object, const ModelField *model, const Reach *reach)
 {
+    const VesselTree *tree = model->tree;
     VesselBranches *branches = vessel_branches_create(tree);
     if (!branches)
         heap_is_empty((size_t)tree->node_count * sizeof *branches->node, __FILE__);
@@ -99,7 +100,7 @@ static void add_branches(cJSON *object, const VesselTree *tree, const Reach *rea
                 reached[mode] += reach->share[node][mode] * link;
         }
         cJSON *item = cJSON_CreateObject();
-        cJSON_AddNumberToObject(item, "node", branches->node[branch->first]);
+        cJSON_AddNumberToObject(item, "node", model_field_file_node(model, branches->node[branch->first]));
         cJSON_AddNumberToObject(item, "nodes", branch->count);
         cJSON_AddNumberToObject(item, "length_mm", length);
         cJSON_AddNumberToObject(item, "point_mm", reached[REACH_POINT]);
@@ -110,7 +111,7 @@ static void add_branches(cJSON *object, const VesselTree *tree, const Reach *rea
     vessel_branches_free(branches);
 }
 
-static void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach)
+static void reach_add_json(cJSON *object, const ModelField *model, const Reach *reach)
 {
     cJSON *at = cJSON_AddObjectToObject(object, "reach");
     cJSON_AddNumberToObject(at, "tool_radius_mm", reach->options.tool_radius);
@@ -129,9 +130,9 @@ static void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *r
     cJSON_AddNumberToObject(at, "behind_apart_mm", reach->apart_length);
     cJSON_AddNumberToObject(at, "aneurysm_nodes", reach->sac_nodes);
     cJSON_AddNumberToObject(at, "aneurysm_nodes_reached", reach->sac_nodes_reached);
-    add_stops(at, reach);
-    add_junctions(at, reach);
-    add_branches(at, tree, reach);
+    add_stops(at, model, reach);
+    add_junctions(at, model, reach);
+    add_branches(at, model, reach);
 }
 
 static void print_ghosts(FILE *out, const GhostLumens *ghosts)
@@ -174,29 +175,27 @@ static void add_ghosts(cJSON *object, const GhostLumens *ghosts)
     }
 }
 
-bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults)
+bool reach_report(const ModelField *model, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults)
 {
-    if (!vessel_tree_is_model(tree))
+    if (!model_field_exists(model))
         return true;
     ReachOptions options = reach_default_options();
     options.tool_radius = tool_radius;
-    Reach *reach = reach_create(tree, &options);
-    GhostLumens *ghosts = ghost_lumens_find(tree);
-    if (!reach || !ghosts) {
-        reach_free(reach);
-        ghost_lumens_free(ghosts);
+    Reach *reach = reach_create(model, &options);
+    // sections along curves leave no lumen beside the tree
+    GhostLumens *ghosts = model->swept ? NULL : ghost_lumens_find(model->tree);
+    bool good = reach && (ghosts || model->swept);
+    if (!good)
         faults_add(faults, file, 0, 0, "not enough memory to flood the model from its inlet");
-        return false;
-    }
-    if (out) {
-        reach_print(out, tree, reach);
+    if (good && out)
+        reach_print(out, model, reach);
+    if (good && json)
+        reach_add_json(json, model, reach);
+    if (good && ghosts && out)
         print_ghosts(out, ghosts);
-    }
-    if (json) {
-        reach_add_json(json, tree, reach);
+    if (good && ghosts && json)
         add_ghosts(cJSON_GetObjectItem(json, "reach"), ghosts);
-    }
     ghost_lumens_free(ghosts);
     reach_free(reach);
-    return true;
+    return good;
 }

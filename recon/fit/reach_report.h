@@ -7,8 +7,8 @@
 #include <cJSON.h>
 #include <stdio.h>
 
-// Reports the reach of a tool of radius `tool_radius` [mm]. For a tree without a model nothing is printed or added, and it returns true. Returns false with a
+// Reports the reach of a tool of radius `tool_radius` [mm], with the nodes' numbers in the file. Without a model nothing is printed or added, and it returns true. Returns false with a
 // fault if out of memory. `json` and `out` may be NULL.
-bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults);
+bool reach_report(const ModelField *model, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults);
 
 #endif

@@ -1,5 +1,5 @@
 // True surface points are found by rays from the nodes' centres to the true surface, the model's surface points by rays to the local
-// model's surface, both while the ray stays in the node's power cell. 200 rays per node, Fibonacci directions.
+// model's surface as seen from the node, both while the ray stays in the node's power cell. 200 rays per node, Fibonacci directions.
 #include "recon/phantom/phantom_measure.h"
 
 #include "base/base.h"
@@ -30,9 +30,9 @@ static MeasureRow row_of(List *list)
     return row;
 }
 
-// Finds the first change of sign of the model's field (NULL: the shape's field) from the node's centre along d. Returns false if it is not in the node's
+// Finds the first change of sign of the model's field (NULL: the shape's field), as its node sees it, from the node's centre along d. Returns false if it is not in the node's
 // cell. Cells are convex, so only the end of the ray must be checked.
-static bool first_crossing(const Shape *shape, const Blobby *model, const VesselTree *tree, int node, Vec3 d, Vec3 *hit)
+static bool first_crossing(const Shape *shape, const ModelField *model, const VesselTree *tree, int node, Vec3 d, Vec3 *hit)
 {
     Vec3 c = tree->center[node];
     double step = 0.04 * tree->radius[node], low = 0, high = 0, longest = 8 * tree->radius[node];
@@ -47,7 +47,7 @@ static bool first_crossing(const Shape *shape, const Blobby *model, const Vessel
         Vec3 x = vec3_add_scaled(c, i * step, d);
         if (i * step > longest || (i % 8 == 0 && power_nearest(tree, x) != node))
             return false;
-        if (blobby_field(model, x) < 0)
+        if (model_field_at(model, node, x, NULL) < 0)
             high = i * step;
         else
             low = i * step;
@@ -57,7 +57,7 @@ static bool first_crossing(const Shape *shape, const Blobby *model, const Vessel
     for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
         Vec3 x = vec3_add_scaled(c, middle, d);
-        if (blobby_field(model, x) < 0)
+        if (model_field_at(model, node, x, NULL) < 0)
             high = middle;
         else
             low = middle;
@@ -66,8 +66,9 @@ static bool first_crossing(const Shape *shape, const Blobby *model, const Vessel
     return power_nearest(tree, *hit) == node;
 }
 
-static void add_jumps(const VesselTree *tree, int node, Vec3 p, double distance, List *jump)
+static void add_jumps(const ModelField *model, int node, Vec3 p, double distance, List *jump)
 {
+    const VesselTree *tree = model->tree;
     double own = power_distance(p, tree->center[node], tree->radius[node]);
     for (int k = tree->neighbour_offset[node]; k < tree->neighbour_offset[node + 1]; k++) {
         int other = tree->neighbour[k];
@@ -75,26 +76,25 @@ static void add_jumps(const VesselTree *tree, int node, Vec3 p, double distance,
         double beyond = (power_distance(p, tree->center[other], tree->radius[other]) - own) / (2 * apart);
         if (beyond > 0.1 * tree->radius[node])
             continue;
-        Blobby model = blobby_of(tree, other);
-        jump->value[jump->count++] = fabs(blobby_project(&model, p, p).distance - distance);
+        jump->value[jump->count++] = fabs(model_field_project(model, other, p, p).distance - distance);
     }
 }
 
-bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out)
+bool shape_measure(const Shape *shape, const ModelField *model, ShapeMeasure *out)
 {
+    const VesselTree *tree = model->tree;
     size_t room = (size_t)tree->node_count * RAYS;
     size_t links = 2 * (size_t)tree->node_count * RAYS;
     List to_model = {calloc(room, sizeof(double)), 0}, to_truth = {calloc(room, sizeof(double)), 0}, jump = {calloc(links + 1, sizeof(double)), 0};
     *out = (ShapeMeasure){.least_clearance = HUGE_VAL};
     double worst = -1;
-    bool good = to_model.value && to_truth.value && jump.value && vessel_tree_is_model(tree);
+    bool good = to_model.value && to_truth.value && jump.value && model_field_exists(model);
     for (int node = 0; good && node < tree->node_count; node++) {
-        Blobby model = blobby_of(tree, node);
         Vec3 c = tree->center[node], hit;
         double truth = shape_field(shape, c, NULL);
         // on the axis the projection may find no closest point; the sign is then that of the field
-        double clearance = blobby_project(&model, c, c).distance;
-        bool inside = blobby_field(&model, c) > 0;
+        double clearance = model_field_project(model, node, c, c).distance;
+        bool inside = model_field_at(model, node, c, NULL) > 0;
         if (inside == (clearance > 0))
             out->least_clearance = fmin(out->least_clearance, clearance / truth);
         else if (!inside)
@@ -103,14 +103,14 @@ bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out
             double z = 1 - (2 * k + 1.0) / RAYS, ring = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5)), far = 0;
             Vec3 d = {ring * same_cos(angle), ring * same_sin(angle), z};
             if (first_crossing(shape, NULL, tree, node, d, &hit) && !shape_beyond_open_end(shape, hit)) {
-                double signed_distance = blobby_project(&model, hit, hit).distance;
+                double signed_distance = model_field_project(model, node, hit, hit).distance;
                 out->bias += signed_distance;
                 far = fabs(signed_distance);
                 to_model.value[to_model.count++] = far;
                 if ((size_t)jump.count + (size_t)(tree->neighbour_offset[node + 1] - tree->neighbour_offset[node]) <= links)
-                    add_jumps(tree, node, hit, signed_distance, &jump);
+                    add_jumps(model, node, hit, signed_distance, &jump);
             }
-            if (first_crossing(shape, &model, tree, node, d, &hit) && !shape_beyond_open_end(shape, hit)) {
+            if (first_crossing(shape, model, tree, node, d, &hit) && !shape_beyond_open_end(shape, hit)) {
                 double distance = fabs(shape_distance(shape, hit, NULL));
                 to_truth.value[to_truth.count++] = distance;
                 far = fmax(far, distance);
@@ -125,6 +125,7 @@ bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out
         out->to_model = row_of(&to_model);
         out->to_truth = row_of(&to_truth);
         out->jump = row_of(&jump);
+        out->worst_node = model_field_file_node(model, out->worst_node);
     }
     free(to_model.value);
     free(to_truth.value);

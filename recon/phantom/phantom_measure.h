@@ -18,7 +18,7 @@ typedef struct ShapeMeasure {
     int worst_node;
 } ShapeMeasure;
 
-// Returns false if out of memory or if the model has no blobs.
-bool shape_measure(const Shape *shape, const VesselTree *model, ShapeMeasure *out);
+// Returns false if out of memory or if there is no model. The node is one of the file.
+bool shape_measure(const Shape *shape, const ModelField *model, ShapeMeasure *out);
 
 #endif

@@ -52,11 +52,11 @@ static void print_dropped(FILE *out, const char *file, const SurfaceParts *parts
 }
 
 // Removes bubbles in the lumen and, unless keep_floating, parts that are not connected to the inlet. Returns false if out of memory.
-static bool drop_parts(const ModelSurfaceOptions *options, const char *name, double cell, const VesselTree *tree, TriangleMesh *mesh, int *bubbles)
+static bool drop_parts(const ModelSurfaceOptions *options, const char *name, double cell, const ModelField *model, TriangleMesh *mesh, int *bubbles)
 {
     ReachOptions flood = reach_default_options();
-    Reach *reach = reach_create(tree, &flood);
-    SurfaceParts *parts = reach ? surface_parts_create(mesh, tree, reach) : NULL;
+    Reach *reach = reach_create(model, &flood);
+    SurfaceParts *parts = reach ? surface_parts_create(mesh, model->tree, reach) : NULL;
     bool kinds[PART_KINDS] = {[PART_INLET] = true, [PART_SHUT] = options->keep_floating, [PART_GHOST] = options->keep_floating};
     // specks of a few cells beside the lumen are artefacts of the grid, not wall
     for (int p = 1; parts && p < parts->count; p++)
@@ -73,37 +73,27 @@ static bool drop_parts(const ModelSurfaceOptions *options, const char *name, dou
     return good;
 }
 
-// --- Swept models ---
-
-typedef struct SweptWall {
-    const SweepField *field;
-    const SweepMesh *mesh;
-} SweptWall;
-
-static double of_swept(const void *wall, int v, Vec3 point)
+static bool add_error(const ModelField *model, const TriangleMesh *mesh, SurfaceFigures *surface)
 {
-    const SweptWall *w = wall;
-    bool on_branch = w->mesh->branch[v] >= 0;
-    // on a sac, the nearest node is found from any
-    SweepPlace place = {.branch = w->mesh->branch[v], .t = w->mesh->along[v], .sac = on_branch ? -1 : w->mesh->sac[v]};
-    SweepBlend blend;
-    sweep_field_blend(w->field, place, point, &blend);
-    return blend.f / vec3_norm(blend.gradient);
+    size_t count = (size_t)mesh->vertex_count + 1;
+    surface->error = HEAP_ZEROED(count, sizeof *surface->error), surface->distance = HEAP_ZEROED(count, sizeof *surface->distance);
+    return surface_point_error(mesh, model, surface->error, surface->distance);
 }
 
+// --- Swept models ---
+
 // Returns whether memory sufficed.
-static bool sweep_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface)
+static bool sweep_surface(const ModelField *model, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface)
 {
     SweepMeshOptions wanted = sweep_mesh_default_options();
     wanted.edge_mm = options->cell_mm, wanted.flat_ends = options->tags;
-    SweepField *field = sweep_field_create(options->sweep);
-    SweepMesh *mesh = field ? sweep_mesh_create(field, &wanted) : NULL;
+    SweepMesh *mesh = sweep_mesh_create(model->field, &wanted);
     bool good = mesh != NULL;
-    if (good && options->with_error && tree->point_count > 0) {
-        size_t count = (size_t)mesh->surface->vertex_count + 1;
-        SweptWall wall = {field, mesh};
-        surface->error = HEAP_ZEROED(count, sizeof *surface->error), surface->distance = HEAP_ZEROED(count, sizeof *surface->distance);
-        good = surface_point_error_from(mesh->surface, tree, of_swept, &wall, surface->error, surface->distance);
+    if (good && options->with_error && model->tree->point_count > 0) {
+        model_mesh_take_nodes(model, mesh);
+        good = add_error(model, mesh->surface, surface);
+        for (int v = 0; v < mesh->surface->vertex_count; v++)
+            mesh->surface->node[v] = model_field_file_node(model, mesh->surface->node[v]);
     }
     if (good && options->open_inlet) {
         TriangleMesh *all = mesh->surface;
@@ -129,7 +119,6 @@ static bool sweep_surface(const VesselTree *tree, const char *name, const ModelS
         }
     }
     sweep_mesh_free(mesh);
-    sweep_field_free(field);
     return good;
 }
 
@@ -154,35 +143,33 @@ static bool tag_blobs(const VesselTree *tree, SurfaceFigures *surface)
     return true;
 }
 
-static bool blob_surface(const VesselTree *tree, const char *name, double cell, const ModelSurfaceOptions *options, SurfaceFigures *surface, int *bubbles,
+static bool blob_surface(const ModelField *model, const char *name, double cell, const ModelSurfaceOptions *options, SurfaceFigures *surface, int *bubbles,
                          Faults *faults)
 {
+    const VesselTree *tree = model->tree;
     TriangleMesh *mesh = surface->mesh = isosurface_of_tree(tree, cell);
     if (!mesh || mesh->triangle_count < 1) {
         faults_add(faults, name, 0, 0, "cannot make a surface: %s",
                    mesh ? "the model is empty at this --cell-mm" : "not enough memory; try a larger --cell-mm");
         return false;
     }
-    bool good = drop_parts(options, name, cell, tree, mesh, bubbles);
+    bool good = drop_parts(options, name, cell, model, mesh, bubbles);
     if (options->open_inlet && !surface_open_inlet(mesh, tree)) {
         faults_add(faults, name, 0, 0, "has no inlet to open: the tree continues upstream of its root, or the root's points close it; omit --open-inlet");
         return false;
     }
-    if (good && options->with_error && tree->point_count > 0) {
-        surface->error = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->error);
-        surface->distance = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->distance);
-        good = surface->error && surface->distance && surface_point_error(mesh, tree, surface->error, surface->distance);
-    }
+    if (good && options->with_error && tree->point_count > 0)
+        good = add_error(model, mesh, surface);
     return good && (!options->tags || tag_blobs(tree, surface));
 }
 
-bool model_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults)
+bool model_surface(const ModelField *model, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults)
 {
     *surface = (SurfaceFigures){0};
-    double cell = options->cell_mm > 0 || options->sweep ? options->cell_mm : isosurface_cell_for(tree);
+    double cell = options->cell_mm > 0 || model->swept ? options->cell_mm : isosurface_cell_for(model->tree);
     int bubbles = 0, before = faults->count;
     SurfaceCensus census;
-    bool good = options->sweep ? sweep_surface(tree, name, options, surface) : blob_surface(tree, name, cell, options, surface, &bubbles, faults);
+    bool good = model->swept ? sweep_surface(model, name, options, surface) : blob_surface(model, name, cell, options, surface, &bubbles, faults);
     good = good && surface_census(surface->mesh, &census);
     if (!good && faults->count == before)
         faults_add(faults, name, 0, 0, "cannot make a surface: not enough memory; try a larger --cell-mm");

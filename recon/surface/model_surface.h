@@ -6,7 +6,6 @@
 #include "recon/surface/surface_write.h"
 
 typedef struct ModelSurfaceOptions {
-    const SweepModel *sweep; // the swept model to mesh (geom/sweep_mesh.h); NULL: the tree's blobs
     double cell_mm;          // [mm] grid spacing, or the edges of a swept model; 0: chosen for the thinnest branch, or by the local radius
     bool tags;               // branch, way along it and boundary of each vertex; the ends of a swept model are flat
     bool open_inlet;         // cut the surface open at the root's plane
@@ -16,7 +15,7 @@ typedef struct ModelSurfaceOptions {
 } ModelSurfaceOptions;
 
 // Creates the surface. Returns false with faults, prefixed by `name`; the caller must call model_surface_free() in this case too.
-bool model_surface(const VesselTree *tree, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults);
+bool model_surface(const ModelField *model, const char *name, const ModelSurfaceOptions *options, SurfaceFigures *surface, Faults *faults);
 void model_surface_free(SurfaceFigures *surface);
 
 #endif

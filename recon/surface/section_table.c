@@ -1,7 +1,5 @@
 #include "recon/surface/section_table.h"
 
-#include "recon/sweep_file.h"
-
 bool section_table_write(const char *path, const SweepModel *model, Faults *faults)
 {
     OutputText text;
@@ -23,12 +21,12 @@ bool section_table_write(const char *path, const SweepModel *model, Faults *faul
     return output_text_write(&text, path, faults);
 }
 
-bool section_table_of_file(const char *path, const char *file, const VesselTree *tree, Faults *faults)
+bool section_table_of_file(const char *path, const char *name, const ModelFile *file, Faults *faults)
 {
-    if (!path)
-        return true;
-    SweepModel *model = sweep_file_load(file, SECTION_POLAR, tree, faults);
-    bool good = model && section_table_write(path, model, faults);
-    sweep_model_free(model);
-    return good;
+    const SweepModel *model = file->sweep;
+    for (int i = 0; i < SECTION_KINDS && !model; i++)
+        model = file->swept.of[i];
+    if (path && !model)
+        faults_add(faults, name, 0, 0, "has no swept model, whose sections --sections writes; `seldinger fit --model sweep` makes one");
+    return !path || (model && section_table_write(path, model, faults));
 }

@@ -3,11 +3,11 @@
 #define SELDINGER_RECON_SURFACE_SECTION_TABLE_H
 
 #include "base/base.h"
-#include "geom/geom.h"
+#include "recon/model_file.h"
 
 // One row for each break of the sections' B-splines: branch, t_mm, centre, normal, area_mm2, radii, perimeter_mm, circularity (geom/sweep_section.h).
 bool section_table_write(const char *path, const SweepModel *model, Faults *faults);
-// The table of the polar model of a file whose tree is `tree`. True if `path` is NULL.
-bool section_table_of_file(const char *path, const char *file, const VesselTree *tree, Faults *faults);
+// The table of the chosen model of a file, or of its first swept one. True if `path` is NULL.
+bool section_table_of_file(const char *path, const char *name, const ModelFile *file, Faults *faults);
 
 #endif

@@ -26,7 +26,7 @@ static Reach *reach_with(const VesselTree *tree, double radius)
 {
     ReachOptions options = reach_default_options();
     options.tool_radius = radius;
-    Reach *reach = reach_create(tree, &options);
+    Reach *reach = reach_create(&(ModelField){.tree = tree}, &options);
     assert_non_null(reach);
     return reach;
 }
@@ -60,10 +60,10 @@ static void a_straight_tube_is_reached_to_its_end(void **state)
     assert_int_equal(reach->stop[0].node, 0);
     reach_free(reach);
     // clearance: on the axis the radius, beside it less, outside negative. The row of blobs has ripples of some thousandths
-    assert_near(reach_clearance(tree, vec3(10.1, 0, 0), 20, 3), 1, 0.01);
-    assert_near(reach_clearance(tree, vec3(10.1, 0.3, -0.4), 20, 3), 0.5, 0.01);
-    assert_near(reach_clearance(tree, vec3(10.1, 0.9, 0.9), 20, 3), 1 - 0.9 * sqrt(2), 0.01);
-    assert_near(reach_clearance(tree, vec3(10.1, 0, 0), 20, 0.2), 0.2, 0);
+    assert_near(reach_clearance(&(ModelField){.tree = tree}, vec3(10.1, 0, 0), 20, 3), 1, 0.01);
+    assert_near(reach_clearance(&(ModelField){.tree = tree}, vec3(10.1, 0.3, -0.4), 20, 3), 0.5, 0.01);
+    assert_near(reach_clearance(&(ModelField){.tree = tree}, vec3(10.1, 0.9, 0.9), 20, 3), 1 - 0.9 * sqrt(2), 0.01);
+    assert_near(reach_clearance(&(ModelField){.tree = tree}, vec3(10.1, 0, 0), 20, 0.2), 0.2, 0);
     vessel_tree_free(tree);
 }
 
@@ -96,8 +96,8 @@ static void a_tool_gets_by_beside_the_line(void **state)
         field_tree_extend_root(t);
         field_tree_blob(t, 20, vec3(10, 0.55 * cos(angle), 0.55 * sin(angle)), 0.75, -3);
         VesselTree *tree = field_tree_make(t, NULL);
-        double on_line = reach_clearance(tree, vec3(10, 0, 0), 20, 2);
-        double beside = reach_clearance(tree, vec3(10, -0.4 * cos(angle), -0.4 * sin(angle)), 20, 2);
+        double on_line = reach_clearance(&(ModelField){.tree = tree}, vec3(10, 0, 0), 20, 2);
+        double beside = reach_clearance(&(ModelField){.tree = tree}, vec3(10, -0.4 * cos(angle), -0.4 * sin(angle)), 20, 2);
         assert_true(on_line > 0 && on_line < 0.25 && beside > 0.4);
         Reach *reach = reach_with(tree, 0.3);
         assert_near(part(reach, REACH_POINT), 1, 0);
@@ -126,8 +126,8 @@ static void a_thin_diaphragm_shuts(void **state)
                 field_tree_blob(t, 10, vec3(10.03, 0.11 * j, 0.11 * k), 0.16, -2.5);
     VesselTree *tree = field_tree_make(t, NULL);
     int node = 10;
-    assert_true(reach_field(tree, vec3(9.95, 0, 0), &node) > 0 && reach_field(tree, vec3(10.11, 0, 0), &node) > 0);
-    assert_true(reach_field(tree, vec3(10.03, 0, 0), &node) < 0);
+    assert_true(reach_blob_field(tree, vec3(9.95, 0, 0), &node) > 0 && reach_blob_field(tree, vec3(10.11, 0, 0), &node) > 0);
+    assert_true(reach_blob_field(tree, vec3(10.03, 0, 0), &node) < 0);
     Reach *reach = reach_with(tree, 0.18);
     assert_near(reach->reached[REACH_POINT], 10, 0.25);
     assert_near(reach->reached[REACH_ASIDE], 9.8, 0.6);
@@ -214,8 +214,8 @@ static void a_kissing_vessel_opens_nothing(void **state)
     int in_a = fork + 1 + 39, in_b = b - 20;                 // (30, 0, 0) and about (30, 1.9, 0): 0.1 mm of both lumens overlap
     assert_near(tree->center[in_a].x, 30, 0.3);
     assert_near(tree->center[in_b].x, 30, 0.5);
-    assert_near(reach_clearance(tree, tree->center[in_a], in_a, 3), 1, 0.01);
-    assert_near(reach_clearance(tree, tree->center[in_b], in_b, 3), 1, 0.01);
+    assert_near(reach_clearance(&(ModelField){.tree = tree}, tree->center[in_a], in_a, 3), 1, 0.01);
+    assert_near(reach_clearance(&(ModelField){.tree = tree}, tree->center[in_b], in_b, 3), 1, 0.01);
     Reach *reach = reach_with(tree, 0.18);
     assert_near(reach->share[in_a][REACH_ASIDE], 1, 0);
     assert_near(reach->share[in_b][REACH_POINT], 0, 0);
@@ -258,16 +258,16 @@ static void options_are_checked(void **state)
     field_tree_branch(t, -1, vec3(0, 0, 0), vec3(4, 0, 0), 1, 1e9, 0);
     VesselTree *tree = field_tree_make(t, NULL), *bare = vessel_tree_create(3, 0, 0);
     ReachOptions options = reach_default_options();
-    assert_null(reach_create(NULL, &options));
-    assert_null(reach_create(bare, &options));
+    assert_null(reach_create(&(ModelField){0}, &options));
+    assert_null(reach_create(&(ModelField){.tree = bare}, &options));
     const double bad[] = {0, -1, NAN, HUGE_VAL};
     for (int k = 0; k < 4; k++) {
         options.tool_radius = bad[k];
-        assert_null(reach_create(tree, &options));
+        assert_null(reach_create(&(ModelField){.tree = tree}, &options));
     }
     options = reach_default_options();
     options.aside = 1.5;
-    assert_null(reach_create(tree, &options));
+    assert_null(reach_create(&(ModelField){.tree = tree}, &options));
     vessel_tree_free(tree);
     vessel_tree_free(bare);
 }

@@ -49,7 +49,7 @@ static void vertices_are_on_the_wall(const TriangleMesh *mesh, const VesselTree 
 static SurfaceParts *parts_of(const TriangleMesh *mesh, const VesselTree *tree)
 {
     ReachOptions options = reach_default_options();
-    Reach *reach = reach_create(tree, &options);
+    Reach *reach = reach_create(&(ModelField){.tree = tree}, &options);
     SurfaceParts *parts = surface_parts_create(mesh, tree, reach);
     assert_non_null(parts);
     reach_free(reach);

@@ -275,7 +275,7 @@ static void vertices_know_their_data(void **state)
     vessel_tree_link(t);
     TriangleMesh *m = isosurface_of_tree(t, 0.2);
     double *error = malloc((size_t)m->vertex_count * sizeof *error), *distance = malloc((size_t)m->vertex_count * sizeof *distance);
-    assert_true(surface_point_error(m, t, error, distance));
+    assert_true(surface_point_error(m, &(ModelField){.tree = t}, error, distance));
     for (int v = 0; v < m->vertex_count; v++) {
         Vec3 d = vec3_sub(m->vertex[v], t->center[0]);
         assert_true(distance[v] >= 0.03 - 1e-9 && distance[v] < 0.3);
@@ -286,7 +286,7 @@ static void vertices_know_their_data(void **state)
     free(distance);
     triangle_mesh_free(m);
     t->point_count = 0;
-    assert_false(surface_point_error(NULL, t, NULL, NULL));
+    assert_false(surface_point_error(NULL, &(ModelField){.tree = t}, NULL, NULL));
     vessel_tree_free(t);
 }
 

@@ -64,7 +64,7 @@ static void a_y_has_two_branches(void **state)
         assert_int_equal(seen[i], i != 20);
     FindingOptions options = finding_default_options();
     int count;
-    Finding *f = vessel_findings(t, b, &options, &count);
+    Finding *f = vessel_findings(&(ModelField){.tree = t}, b, &options, &count);
     assert_int_equal(count, 1);
     assert_true(f[0].kind == FINDING_ANEURYSM && f[0].node == 20 && f[0].branch == 0);
     assert_near(f[0].along, 4, 1e-12);
@@ -80,7 +80,7 @@ static Finding *findings_of(double (*radius)(double), int *count)
     VesselTree *t = chain(121, 0.5, radius);
     VesselBranches *b = vessel_branches_create(t);
     FindingOptions options = finding_default_options();
-    Finding *f = vessel_findings(t, b, &options, count);
+    Finding *f = vessel_findings(&(ModelField){.tree = t}, b, &options, count);
     assert_non_null(f);
     vessel_branches_free(b);
     vessel_tree_free(t);
@@ -162,7 +162,7 @@ static void a_sac_has_the_neck_of_its_section(void **state)
     VesselBranches *b = vessel_branches_create(t);
     FindingOptions options = finding_default_options();
     int count;
-    Finding *f = vessel_findings(t, b, &options, &count);
+    Finding *f = vessel_findings(&(ModelField){.tree = t}, b, &options, &count);
     assert_int_equal(count, 1);
     assert_near(f->extent, 2 * sac, 1e-12);
     assert_near(f->neck, 2 * sqrt(sac * sac - (far - 0.7 * r) * (far - 0.7 * r)), 1e-6);   // a sphere's section

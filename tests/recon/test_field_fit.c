@@ -28,7 +28,7 @@ static VesselTree *shared_fit(const Shape *shape, double voxel, int threads)
 static ModelMeasure measure(const char *name, const VesselTree *model, const Shape *shape)
 {
     ModelMeasure m;
-    assert_true(model_measure(model, shape, 0, &m));
+    assert_true(model_measure(&(ModelField){.tree = model}, shape, 0, &m));
     print_message("%-20s %6lld blobs", name, (long long)model->blob_count);
     for (int place = 0; place < PLACES; place++)
         if (m.wall[place].count > 0)

@@ -32,7 +32,7 @@ static void neighbours_agree(void **state)
         options.max_points = 300;   // to limit the time under the sanitizers
         VesselTree *model = fit_of(shape, options);
         ModelMeasure m;
-        assert_true(model_measure(model, shape, 0, &m));
+        assert_true(model_measure(&(ModelField){.tree = model}, shape, 0, &m));
         for (int place = 0; place < PLACES; place++) {
             if (m.raw[place].count == 0)
                 continue;
@@ -59,7 +59,7 @@ static void few_blobs_are_not_too_wide(void **state)
     options.voxel_mm = 0.2;
     VesselTree *model = fit_of(shape, options);
     ModelMeasure m;
-    assert_true(model_measure(model, shape, 0, &m));
+    assert_true(model_measure(&(ModelField){.tree = model}, shape, 0, &m));
     print_message("helix: %.1f blobs a node, wall bias %+.4f rms %.4f mm\n", (double)model->blob_count / model->node_count, m.wall[PLACE_TUBE].bias,
                   m.wall[PLACE_TUBE].rms);
     assert_true(model->blob_count < 4 * model->node_count);
@@ -136,7 +136,7 @@ static void without_a_voxel_the_fit_has_no_scale(void **state)
         options.voxel_mm = 0;
         VesselTree *model = fit_of(shape, options);
         ShapeMeasure m;
-        assert_true(shape_measure(shape, model, &m));
+        assert_true(shape_measure(shape, &(ModelField){.tree = model}, &m));
         blobs[k] = (double)model->blob_count / model->node_count;
         far[k] = m.to_truth.p99 / (k ? 20 : 1);
         vessel_tree_free(model);

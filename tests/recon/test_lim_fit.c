@@ -78,7 +78,7 @@ static void shapes_are_fitted_within_the_target(void **state)
         options.voxel_mm = shape_voxel_mm(shape);
         VesselTree *model = fit_of(shape, options);
         ShapeMeasure m;
-        assert_true(shape_measure(shape, model, &m));
+        assert_true(shape_measure(shape, &(ModelField){.tree = model}, &m));
         print_message("%-12s %4.1f blobs a node, true distance mean %.4f p99 %.4f max %.4f, jump p99 %.4f max %.4f mm\n", names[s],
                       (double)model->blob_count / model->node_count, m.to_truth.mean, m.to_truth.p99, m.to_truth.most, m.jump.p99, m.jump.most);
         assert_true(m.to_truth.mean < 0.015 && m.to_truth.p99 < 0.06 && m.to_truth.most < 0.12);
@@ -101,7 +101,7 @@ static void distance_follows_the_target(void **state)
         options.target_mm = 0.2 / pow(3, k);
         VesselTree *model = fit_of(shape, options);
         ShapeMeasure m;
-        assert_true(shape_measure(shape, model, &m));
+        assert_true(shape_measure(shape, &(ModelField){.tree = model}, &m));
         mean[k] = m.to_truth.mean;
         vessel_tree_free(model);
     }
@@ -120,7 +120,7 @@ static void noise_is_averaged(void **state)
         Shape *shape = make(k == 1 ? "bifurcation" : "phantom", 1, (const char(*)[2][64])option);
         VesselTree *model = fit_of(shape, lim_fit_default_options());
         ShapeMeasure m;
-        assert_true(shape_measure(shape, model, &m));
+        assert_true(shape_measure(shape, &(ModelField){.tree = model}, &m));
         print_message("noise %.2f mm: %.1f blobs a node, true distance mean %.4f p99 %.4f max %.4f, bias %+.4f, jump p99 %.4f mm\n", sigma,
                       (double)model->blob_count / model->node_count, m.to_truth.mean, m.to_truth.p99, m.to_truth.most, m.bias, m.jump.p99);
         assert_true(m.to_truth.mean < 0.5 * sigma && m.to_truth.p99 < 2 * sigma && m.to_truth.most < 0.4);

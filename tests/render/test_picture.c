@@ -329,7 +329,7 @@ static void input_that_cannot_be_drawn_is_refused(void **state)
     PictureOptions options = picture_default_options();
     assert_false(picture_of_series(path, &options, 3, time, 1, &panel, 0, NULL, message, sizeof message));
     assert_false(picture_of_series(path, &options, 1, time, 1, &panel, 0, NULL, message, sizeof message));
-    assert_false(picture_of_fit(path, &options, NULL, NULL, NULL, message, sizeof message));
+    assert_false(picture_of_fit(path, &options, &(ModelField){0}, NULL, NULL, message, sizeof message));
     const int size[3] = {0, 2, 2};
     const Vec3 axis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     assert_false(picture_of_tree(path, &options, size, vec3(0, 0, 0), axis, NULL, 0, 0, NULL, 0, NULL, message, sizeof message));
@@ -522,13 +522,13 @@ static void distances_choose_the_colour(void **state)
     options.width = 640;
     options.height = 400;
     char message[256] = "";
-    if (!picture_of_fit(in_folder("f.png"), &options, tree, NULL, NULL, message, sizeof message))
+    if (!picture_of_fit(in_folder("f.png"), &options, &(ModelField){.tree = tree}, NULL, NULL, message, sizeof message))
         fail_msg("%s", message);
     for (int sign = -1; sign <= 1; sign += 2) {
         for (int64_t k = 0; k < tree->point_count; k++)
             distance[k] = 0.1 * sign;
         options.distance_full_scale = 0.12;
-        if (!picture_of_fit(in_folder("f.png"), &options, tree, NULL, distance, message, sizeof message))
+        if (!picture_of_fit(in_folder("f.png"), &options, &(ModelField){.tree = tree}, NULL, distance, message, sizeof message))
             fail_msg("%s", message);
         Image image = load(in_folder("f.png"));
         int red = 0, blue = 0;
@@ -546,7 +546,7 @@ static void distances_choose_the_colour(void **state)
     free(distance);
     vessel_tree_free(tree);
     tree = vessel_tree_create(2, 0, 0);
-    assert_false(picture_of_fit(in_folder("f.png"), &options, tree, NULL, NULL, message, sizeof message));
+    assert_false(picture_of_fit(in_folder("f.png"), &options, &(ModelField){.tree = tree}, NULL, NULL, message, sizeof message));
     assert_non_null(strstr(message, "model"));
     vessel_tree_free(tree);
 }
@@ -572,7 +572,7 @@ static void errors_colour_the_surface(void **state)
             error[v] = k ? 0.1 : -0.1;
         for (int i = 0; i < tree->node_count; i++)
             tree->error[i] = k ? 0.3 : 0.1;   // C3 or C1 of voxels of 0.25 mm
-        if (!picture_of_error(in_folder("e.png"), &options, tree, mesh, error, 0.25, message, sizeof message))
+        if (!picture_of_error(in_folder("e.png"), &options, &(ModelField){.tree = tree}, mesh, error, 0.25, message, sizeof message))
             fail_msg("%s", message);
         Image image = load(in_folder("e.png"));
         int red = 0, blue = 0;
@@ -591,8 +591,8 @@ static void errors_colour_the_surface(void **state)
     assert_true(bars[0][0] > 100 && bars[0][0] > 2 * bars[1][0]);   // the name of the class in its colour is always there
     assert_true(bars[1][1] > 100 && bars[1][1] > 2 * bars[0][1]);
     remove(in_folder("e.png"));
-    assert_false(picture_of_error(in_folder("e.png"), &options, tree, mesh, error, 0, message, sizeof message));
-    assert_false(picture_of_error(in_folder("e.png"), &options, tree, NULL, error, 1, message, sizeof message));
+    assert_false(picture_of_error(in_folder("e.png"), &options, &(ModelField){.tree = tree}, mesh, error, 0, message, sizeof message));
+    assert_false(picture_of_error(in_folder("e.png"), &options, &(ModelField){.tree = tree}, NULL, error, 1, message, sizeof message));
     free(error);
     triangle_mesh_free(mesh);
     vessel_tree_free(tree);
