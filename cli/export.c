@@ -19,7 +19,7 @@ static const Option rows[] = {
     {"cell-mm", "X", OPTION_NUMBER, AT(surface.cell_mm), "cell size of the surface, or edges of a swept model's [mm]", .least = 0.001, .most = 1000,
      .otherwise = "about ten to twenty cells around the thinnest branch; swept: 24 edges around each section"},
     {"tags", NULL, OPTION_FLAG, AT(surface.tags),
-     "also writes for each vertex its branch, the way along it, and the boundary; a swept model ends with flat caps then"},
+     "also writes for each vertex its branch, the way along it, boundary and flow; a swept model ends with flat caps then"},
     {"keep-floating", NULL, OPTION_FLAG, AT(surface.keep_floating),
      "keeps parts of the surface that are not connected to the inlet; by default they are dropped and reported"},
     {"open-inlet", NULL, OPTION_FLAG, AT(surface.open_inlet), "cuts the surface open at the plane of the root; otherwise blobs close it"},
@@ -54,8 +54,10 @@ static const OptionTable table = {
              "                         with --tags, for flow solvers:\n"
              "                         branch    of the tree, 0 the root's; -1: an aneurysm\n"
              "                         along_mm  way along the branch\n"
-             "                         boundary  0 wall, 1 inlet, 2, 3 ... outlets in the order of the branches. A triangle belongs to the flat cap of\n"
-             "                                   an end if its three vertices have the same number above 0. Only swept models have such caps\n"
+             "                         boundary  0 wall, else the number of a flat end: 1, 2 ... inlets, then outlets, from 2 on, both in the order of\n"
+             "                                   the branches. A triangle belongs to an end if its three vertices have the same number above 0.\n"
+             "                                   Only swept models have flat ends\n"
+             "                         flow      0 wall, 1 blood enters here, 2 it leaves: as tagged by `edit`; untagged, it enters at the root\n"
              "                         (.stl and .obj cannot store these)\n"
              "  tree or model, centreline  .vtp (lines with Radius)  .mrk.json (3D Slicer curves)  .swc\n"
              "  recording              .csv (a row per node and frame)  .vtp or .pvd (one .vtp per frame and a .pvd that lists them); with several\n"

@@ -409,6 +409,29 @@ static void put_vertices(Assembly *a)
     }
 }
 
+// The gap of a cap at the start or the end of a branch; -1: there is none.
+static int cap_gap(const MeshRings *r, int end)
+{
+    int gap = end == 0 ? 0 : r->count - 2;
+    return !r->in_patch[gap] && is_cap(r, gap) ? gap : -1;
+}
+
+static void number_caps(Assembly *a)
+{
+    SweepMesh *mesh = a->mesh;
+    const SweepModel *model = a->parts->feet.field->model;
+    mesh->cap = HEAP_ZEROED(2 * (size_t)a->parts->branch_count + 3, sizeof *mesh->cap);
+    mesh->cap[0].branch = mesh->cap[1].branch = -1;
+    mesh->boundaries = 0;
+    for (SweepTag flow = SWEEP_TAG_IN; flow <= SWEEP_TAG_OUT; flow++)
+        for (int i = 0; i < a->parts->branch_count; i++)
+            for (int end = 0; end < 2; end++)
+                if (cap_gap(&a->parts->rings[i], end) >= 0 && sweep_model_tag(model, i, end) == flow) {
+                    mesh->boundaries += flow == SWEEP_TAG_OUT && mesh->boundaries == 0 ? 2 : 1;
+                    mesh->cap[mesh->boundaries] = (SweepCap){i, end, flow};
+                }
+}
+
 // The strips of a branch, and the numbers of its caps.
 static void put_strips(Assembly *a, int branch, Row *low, Row *high)
 {
@@ -421,8 +444,7 @@ static void put_strips(Assembly *a, int branch, Row *low, Row *high)
         zip(a, low, high);
         if (!is_cap(r, j))
             continue;
-        int number = r->ring[j].kind == RING_MIDDLE ? 1 : a->mesh->boundaries < 2 ? 2 : a->mesh->boundaries + 1;
-        a->mesh->boundaries = number;
+        int number = sweep_mesh_cap(a->mesh, branch, j == 0 ? 0 : 1);
         for (int i = 0; i < low->count; i++)
             a->mesh->boundary[low->vertex[i]] = number;
         for (int i = 0; i < high->count; i++)
@@ -443,7 +465,8 @@ static bool assemble(SweepMesh *mesh, const SweepMeshParts *parts)
     Row high = {.vertex = HEAP_ZEROED(256, sizeof(int)), .angle = HEAP_ZEROED(256, sizeof(double))};
     count_vertices(&a);
     put_vertices(&a);
-    mesh->boundaries = 0, mesh->failures = parts->failures, mesh->patches = parts->patch_count;
+    number_caps(&a);
+    mesh->failures = parts->failures, mesh->patches = parts->patch_count;
     for (int i = 0; i < parts->branch_count; i++)
         put_strips(&a, i, &low, &high);
     for (int p = 0; p < parts->patch_count; p++) {
@@ -747,6 +770,7 @@ static void free_surface(SweepMesh *mesh)
     free(mesh->along);
     free(mesh->sac);
     free(mesh->boundary);
+    free(mesh->cap);
 }
 
 bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field)
@@ -767,6 +791,14 @@ bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field)
     free(changes.segment);
     free(changes.branch);
     return good;
+}
+
+int sweep_mesh_cap(const SweepMesh *mesh, int branch, int end)
+{
+    int number = mesh->boundaries;
+    while (number > 0 && (mesh->cap[number].branch != branch || mesh->cap[number].end != end))
+        number--;
+    return number;
 }
 
 void sweep_mesh_free(SweepMesh *mesh)

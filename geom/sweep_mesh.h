@@ -13,14 +13,20 @@
 #include "geom/sweep_field.h"
 #include "geom/sweep_mesh_options.h"
 
+typedef struct SweepCap {    // a flat end
+    int branch, end;         // end 0: the branch's start
+    SweepTag flow;           // what crosses it (sweep_model_tag)
+} SweepCap;
+
 typedef struct SweepMesh {
     TriangleMesh *surface;   // `node` is the nearest knot's knot_node (or sac_node)
     int *branch;             // (V) branch of the vertex; -1: on a sac
     double *along;           // (V) [mm] t on the branch; on a sac 0
     int *sac;                // (V) on a sac: the node of model->sac; else -1
-    int *boundary;           // (V) 0: wall; 1: on the flat cap of the open start; 2, 3 …: on the flat end of a branch, in the order of the branches. A triangle
-                             // belongs to a cap if its three vertices have the same number > 0
+    int *boundary;           // (V) 0: wall; else the number of the cap on which it lies: 1, 2 … where blood enters, and from 2 on where it leaves, each in the order
+                             // of the branches. A triangle belongs to a cap if its three vertices have the same number > 0
     int boundaries;          // highest number used
+    SweepCap *cap;           // (boundaries + 1) by number; branch -1: no cap has the number
     int rings, patches;
     int failures;            // patches that could not be joined to their rings; expected 0. There the rings run through, so the mesh has several closed parts or crosses itself
     int remade_rings, remade_patches;        // by the last update
@@ -34,6 +40,8 @@ SweepMesh *sweep_mesh_create(const SweepField *field, const SweepMeshOptions *op
 // the rings of branches from which none can be seen. The result is the same to the bit as a fresh mesh. Returns false, with the mesh unchanged, if the model has
 // another number of branches. `field` need not outlive the call.
 bool sweep_mesh_update(SweepMesh *mesh, const SweepField *field);
+// The number of the cap at an end of a branch; 0: there is none.
+int sweep_mesh_cap(const SweepMesh *mesh, int branch, int end);
 void sweep_mesh_free(SweepMesh *mesh);
 // The surface alone. `options` may be NULL. Returns NULL as above, or if out of memory.
 TriangleMesh *triangle_mesh_of_sweep(const SweepModel *model, const SweepMeshOptions *options);

@@ -97,10 +97,11 @@ static bool sweep_surface(const ModelField *model, const char *name, const Model
     }
     if (good && options->open_inlet) {
         TriangleMesh *all = mesh->surface;
+        int inlet = sweep_mesh_cap(mesh, 0, 0);
         bool *keep = HEAP_ZEROED((size_t)all->triangle_count + 1, sizeof *keep);
         for (int t = 0; t < all->triangle_count; t++)
             for (int k = 0; k < 3; k++)
-                keep[t] |= mesh->boundary[all->triangle[t][k]] != 1;
+                keep[t] |= inlet == 0 || mesh->boundary[all->triangle[t][k]] != inlet;
         int kept = 0;
         for (int t = 0; t < all->triangle_count; t++)
             if (keep[t])
@@ -115,6 +116,9 @@ static bool sweep_surface(const ModelField *model, const char *name, const Model
         surface->mesh = mesh->surface, mesh->surface = NULL;
         if (options->tags) {
             surface->branch = mesh->branch, surface->along = mesh->along, surface->boundary = mesh->boundary;
+            surface->flow = HEAP_ZEROED((size_t)surface->mesh->vertex_count + 1, sizeof *surface->flow);
+            for (int v = 0; v < surface->mesh->vertex_count; v++)
+                surface->flow[v] = mesh->boundary[v] > 0 ? (int)mesh->cap[mesh->boundary[v]].flow : 0;
             mesh->branch = mesh->boundary = NULL, mesh->along = NULL;
         }
     }
@@ -135,6 +139,7 @@ static bool tag_blobs(const VesselTree *tree, SurfaceFigures *surface)
             along[branches->node[i]] = branches->along[i];
     size_t count = (size_t)surface->mesh->vertex_count + 1;
     surface->branch = HEAP_ZEROED(count, sizeof *surface->branch), surface->boundary = HEAP_ZEROED(count, sizeof *surface->boundary);
+    surface->flow = HEAP_ZEROED(count, sizeof *surface->flow);
     surface->along = HEAP_ZEROED(count, sizeof *surface->along);
     for (int v = 0; v < surface->mesh->vertex_count; v++)
         surface->branch[v] = branches->of_node[surface->mesh->node[v]], surface->along[v] = along[surface->mesh->node[v]];
@@ -185,5 +190,6 @@ void model_surface_free(SurfaceFigures *surface)
     free(surface->distance);
     free(surface->branch);
     free(surface->boundary);
+    free(surface->flow);
     free(surface->along);
 }

@@ -47,14 +47,14 @@ void surface_print_ply(FILE *out, const SurfaceFigures *surface)
             "property float nx\nproperty float ny\nproperty float nz\nproperty int node\n%s%selement face %d\nproperty list uchar int vertex_indices\n"
             "end_header\n",
             mesh->vertex_count, surface->error ? "property float error_mm\nproperty float data_mm\n" : "",
-            surface->branch ? "property int branch\nproperty float along_mm\nproperty int boundary\n" : "", mesh->triangle_count);
+            surface->branch ? "property int branch\nproperty float along_mm\nproperty int boundary\nproperty int flow\n" : "", mesh->triangle_count);
     for (int i = 0; i < mesh->vertex_count; i++) {
         fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g %d", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
                 mesh->normal[i].z, mesh->node[i]);
         if (surface->error)
             fprintf(out, " %.6g %.6g", surface->error[i], surface->distance[i]);
         if (surface->branch)
-            fprintf(out, " %d %.9g %d", surface->branch[i], surface->along[i], surface->boundary[i]);
+            fprintf(out, " %d %.9g %d %d", surface->branch[i], surface->along[i], surface->boundary[i], surface->flow[i]);
         fputc('\n', out);
     }
     for (int i = 0; i < mesh->triangle_count; i++)
@@ -101,6 +101,7 @@ void surface_print_vtp(FILE *out, const SurfaceFigures *surface)
         print_tags(out, "branch", surface->branch, mesh->vertex_count);
         vtp_numbers(out, "along_mm", surface->along, mesh->vertex_count);
         print_tags(out, "boundary", surface->boundary, mesh->vertex_count);
+        print_tags(out, "flow", surface->flow, mesh->vertex_count);
     }
     fprintf(out, "</PointData>\n");
     vtp_points(out, mesh->vertex, mesh->vertex_count);

@@ -9,7 +9,8 @@
 typedef struct SurfaceFigures {
     TriangleMesh *mesh;
     double *error, *distance;   // (V) [mm], both NULL if the tree has no points
-    int *branch, *boundary;     // (V) tags, NULL if not wanted: branch (-1: a sac); 0 wall, 1 flat cap at the inlet, 2, 3 … at the outlets
+    int *branch, *boundary;     // (V) tags, NULL if not wanted: branch (-1: a sac); 0 wall, else the number of the flat cap (geom/sweep_mesh.h)
+    int *flow;                  // (V) SweepTag of that cap; 0: wall
     double *along;              // (V) [mm] way along the branch
 } SurfaceFigures;
 

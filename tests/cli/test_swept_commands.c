@@ -158,6 +158,68 @@ static void an_edit_that_cuts_shows(void **state)
     cJSON_Delete(measure);
 }
 
+// Numbers and flows of the caps at the start of branch 0 and at the ends of both branches, in `export --tags`; 0: no cap.
+static void read_caps(const char *arguments, int boundary[3], int flow[3])
+{
+    char command[300];
+    snprintf(command, sizeof command, "export %s --tags --quiet -o tags.ply", arguments);
+    assert_int_equal(run_in("", command), 0);
+    char *text = text_of(in_folder("tags.ply")), *at = strstr(text, "end_header\n") + 11;
+    int vertices = 0, known = 0;
+    assert_int_equal(sscanf(strstr(text, "element vertex"), "element vertex %d", &vertices), 1);
+    assert_non_null(strstr(text, "property int branch\nproperty float along_mm\nproperty int boundary\nproperty int flow\n"));
+    memset(boundary, 0, 3 * sizeof *boundary), memset(flow, 0, 3 * sizeof *flow);
+    for (int v = 0; v < vertices; v++) {
+        double number[13];
+        for (int i = 0; i < 13; i++)
+            number[i] = strtod(at, &at);
+        int end = number[9] == 1 ? 2 : number[10] == 0 ? 0 : 1, b = (int)number[11], f = (int)number[12];
+        assert_true((b == 0) == (f == 0));
+        if (b == 0)
+            continue;
+        assert_true(boundary[end] == 0 || (boundary[end] == b && flow[end] == f));   // an end is one cap
+        known += boundary[end] == 0;
+        boundary[end] = b, flow[end] = f;
+    }
+    assert_true(known == 3 || strstr(arguments, "--open-inlet"));
+    free(text);
+}
+
+static void tags_of_edits_are_exported(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *edits;
+        int boundary[3], flow[3];        // start of the root's branch, its end, end of the other
+    } cases[] = {
+        {"[]", {1, 2, 3}, {1, 2, 2}},
+        {"\n- {edit: tag, branch: 1, end: end, as: flip}\n", {1, 3, 2}, {1, 2, 1}},
+        {"\n- {edit: tag, branch: 0, end: start, as: out}\n- {edit: tag, branch: 0, end: end, as: in}\n", {2, 1, 3}, {2, 1, 2}},
+        {"\n- {edit: tag, branch: 0, end: start, as: flip}\n", {2, 3, 4}, {2, 2, 2}},
+        {"\n- {edit: tag, branch: 1, end: end, as: flip}\n- {edit: tag, branch: 1, end: end, as: flip}\n", {1, 2, 3}, {1, 2, 2}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[300];
+        int boundary[3], flow[3];
+        snprintf(text, sizeof text, "edits: %s", cases[i].edits);
+        put("tags.yaml", text);
+        assert_int_equal(run_in("", "edit swept.h5 --do tags.yaml -o tags.h5 --quiet"), 0);
+        read_caps("tags.h5", boundary, flow);
+        assert_memory_equal(boundary, cases[i].boundary, sizeof boundary);
+        assert_memory_equal(flow, cases[i].flow, sizeof flow);
+        // the root's plane is cut open whatever its tag
+        read_caps("tags.h5 --open-inlet", boundary, flow);
+        assert_int_equal(boundary[1], cases[i].boundary[1]);
+        char *ply = text_of(in_folder("tags.ply"));
+        int vertices, faces, rim = 0;
+        assert_int_equal(sscanf(strstr(ply, "element vertex"), "element vertex %d", &vertices), 1);
+        assert_int_equal(sscanf(strstr(ply, "element face"), "element face %d", &faces), 1);
+        rim = 2 * (vertices - 1) - faces;    // of a closed surface V - 2 = F/2; open with n edges at the rim: F = 2 V - 2 - n
+        assert_int_equal(rim, 24 + 2);       // of the 24 triangles of the cap; its middle is a vertex without a triangle
+        free(ply);
+    }
+}
+
 #ifdef SELDINGER_RENDER
 static void pictures_are_drawn(void **state)
 {
@@ -183,6 +245,7 @@ int main(void)
         cmocka_unit_test(fit_measures_what_it_fitted),
         cmocka_unit_test(info_lists_the_forks),
         cmocka_unit_test(an_edit_that_cuts_shows),
+        cmocka_unit_test(tags_of_edits_are_exported),
 #ifdef SELDINGER_RENDER
         cmocka_unit_test(pictures_are_drawn),
 #endif
