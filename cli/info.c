@@ -29,7 +29,7 @@ static const Option options[] = {
     {"junctions", "F.png", OPTION_FILE, AT(junctions.picture),
      "of a model: a section through each junction, the narrowest first; further pages are F-2.png and so on"},
     {"sections", "F.csv", OPTION_FILE, AT(sections),
-     "of a swept model (fit --model sweep): its sections, a row each: branch, way along it, centre, normal, area, radii, perimeter, circularity"},
+     "of a swept model (fit --model sweep): its sections, a row each: branch, way along it, centre, normal, area, radii, perimeter, circularity, diameters"},
     CLI_MODEL(InfoCommand, model, "of several models in the file, the one that is described"),
     {"volume", "V", OPTION_FILE, AT(junctions.volume), "the angiogram behind these"},
     {"before", "M.h5", OPTION_FILE, AT(junctions.before), "another model of the same vessels: the ten narrowest junctions in that, beside what they are now"},

@@ -18,6 +18,7 @@
 #include "geom/stretch_list.h"
 #include "geom/sweep_terms.h"
 #include "geom/sweep_field.h"
+#include "geom/sweep_contour.h"
 #include "geom/sweep_section.h"
 
 // vessels: the wall as the solver queries it

@@ -8,14 +8,17 @@ typedef struct SweepSection {
     int branch;
     double t;                // [mm]
     Vec3 centre, normal;     // S, and the unit tangent
+    SectionKind kind;        // SECTION_POLAR outside stretches
     double area;             // [mm2]
-    double mean, least, largest;     // radii about the centre [mm]; mean over the angle
+    double mean;             // [mm] mean over the angle of the ray's length within the lumen, from the centre: of a star-shaped section the mean radius
+    double least, largest;   // [mm] distance of the contour from the centre
+    double least_diameter, largest_diameter;     // [mm] distance of two parallel tangents
     double perimeter;        // [mm]
     double circularity;      // 4 pi area / perimeter^2: 1 for a circle
 } SweepSection;
 
-// The branch's own section at t in 0 … length, without blends, from the polar rows: where sections of another kind are used, the nearest polar one.
-//   area = (1/2) integral of R^2 = pi (c_0^2 + sum |c_k|^2 / 2),   perimeter = integral of sqrt(R^2 + R'^2), by the trapezoidal rule at 512 angles.
-SweepSection sweep_section_at(const SweepField *field, int branch, double t);
+// The branch's own section at t in 0 … length, without blends, as the model has it (sweep_contour.h). Returns false if out of memory, or if the section has no
+// closed contour, which published sections may lack.
+bool sweep_section_at(const SweepField *field, int branch, double t, SweepSection *out);
 
 #endif

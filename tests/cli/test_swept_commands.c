@@ -220,6 +220,53 @@ static void tags_of_edits_are_exported(void **state)
     }
 }
 
+// Contours that rays from the curve meet three times become rasters: the table shows their figures, not those of the rows under them. Around the middle one the
+// stations beside it have the same contour.
+static void sections_are_those_of_the_raster(void **state)
+{
+    (void)state;
+    enum { POINTS = 48 };
+    char text[4000] = "", edits[16000] = "edits:\n";
+    static const double places[] = {1, 1.9, 2.7, 3.2, 3.6};
+    // half a ring of radii 0.4 and 1.4 with round ends, about a point of its lumen
+    for (int i = 0; i < POINTS; i++) {
+        double way = 2.8 * PI * i / POINTS, angle = way / 1.4 - PI / 2, r = 1.4, up = 0;
+        if (way >= 2.3 * PI)
+            angle = (way - 2.3 * PI) / 0.5 + PI / 2, r = 0.5, up = -0.9;
+        else if (way >= 1.9 * PI)
+            angle = PI / 2 - (way - 1.9 * PI) / 0.4, r = 0.4;
+        else if (way >= 1.4 * PI)
+            angle = (way - 1.4 * PI) / 0.5 + PI / 2, r = 0.5, up = 0.9;
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%s[%.5f, %.5f]", i > 0 ? ", " : "", r * cos(angle) - 0.65, up + r * sin(angle));
+    }
+    for (int i = 0; i < 5; i++)
+        snprintf(edits + strlen(edits), sizeof edits - strlen(edits), "- {edit: section, branch: 0, t_mm: %g, contour_nb_mm: [%s]}\n", places[i], text);
+    put("raster.yaml", edits);
+    assert_int_equal(run_in("", "edit swept.h5 --do raster.yaml -o raster.h5 --quiet"), 0);
+    assert_int_equal(run_in("", "info raster.h5 --sections sections.csv --quiet"), 0);
+    char *table = text_of(in_folder("sections.csv")), kind[20] = "";
+    int rasters = 0, polar = 0, found = 0;
+    for (char *row = strchr(table, '\n') + 1; *row; row = strchr(row, '\n') + 1) {
+        int branch;
+        double t, x[6], area, mean, least, largest, around, round, thin, wide;
+        assert_int_equal(sscanf(row, "%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%19[a-z]", &branch, &t, x, x + 1, x + 2, x + 3, x + 4,
+                                x + 5, &area, &mean, &least, &largest, &around, &round, &thin, &wide, kind),
+                         17);
+        rasters += !strcmp(kind, "raster"), polar += !strcmp(kind, "polar");
+        if (branch != 0 || fabs(t - places[2]) > 0.1)
+            continue;
+        found++;
+        assert_string_equal(kind, "raster");
+        assert_true(fabs(area - 1.15 * PI) < 0.05 && fabs(around - 2.8 * PI) < 0.1);
+        assert_true(fabs(round - 4 * PI * area / (around * around)) < 1e-6);
+        assert_true(fabs(wide - 2.8) < 0.03 && fabs(thin - 1.9) < 0.03);
+        assert_true(fabs(least - 0.25) < 0.03 && fabs(largest - 1.61) < 0.03);
+    }
+    assert_int_equal(found, 1);
+    assert_true(rasters >= 5 && polar > 20);
+    free(table);
+}
+
 #ifdef SELDINGER_RENDER
 static void pictures_are_drawn(void **state)
 {
@@ -246,6 +293,7 @@ int main(void)
         cmocka_unit_test(info_lists_the_forks),
         cmocka_unit_test(an_edit_that_cuts_shows),
         cmocka_unit_test(tags_of_edits_are_exported),
+        cmocka_unit_test(sections_are_those_of_the_raster),
 #ifdef SELDINGER_RENDER
         cmocka_unit_test(pictures_are_drawn),
 #endif

@@ -283,9 +283,97 @@ static void bad_stretches_are_refused(void **state)
     sweep_model_free(m);
 }
 
+// Mean over the angle of the length of a ray from the origin inside a polygon.
+static double mean_of_rays(int count, const SectionPoint *polygon)
+{
+    enum { RAYS = 3600 };
+    double sum = 0;
+    for (int k = 0; k < RAYS; k++) {
+        double c = cos(2 * PI * (k + 0.5) / RAYS), s = sin(2 * PI * (k + 0.5) / RAYS);
+        for (int i = 0; i < count; i++) {
+            const SectionPoint *p = &polygon[i], *q = &polygon[(i + 1) % count];
+            double before = c * p->b - s * p->n, after = c * q->b - s * q->n;
+            if ((before > 0) == (after > 0))
+                continue;
+            double share = before / (before - after), far = c * (p->n + share * (q->n - p->n)) + s * (p->b + share * (q->b - p->b));
+            sum += far > 0 ? (after > before ? far : -far) : 0;
+        }
+    }
+    return sum / RAYS;
+}
+
+// Half a ring of radii 0.4 and 1.4 with round ends: its figures are known. The contour is a polygon of 64 points, which cuts 0.0024 off its curves.
+static void figures_are_those_of_the_contour(void **state)
+{
+    (void)state;
+    static const SectionKind kinds[] = {SECTION_RASTER, SECTION_RBF, SECTION_PAS};
+    for (int k = 0; k < 3; k++)
+        for (int bent = 0; bent < 2; bent++) {
+            Made m = make((Wanted){kinds[k], SECTION_MENDED, SECTION_PSP, false, bent, true, 0.1, 0.9, 0.1});
+            double length = sweep_model_length(m.model, 0);
+            SectionPoint polygon[POINTS];
+            SweepSection s;
+            kidney(polygon);
+            assert_true(sweep_section_at(m.field, 0, 0.5 * length, &s));
+            assert_int_equal(s.kind, kinds[k]);
+            assert_near(s.area, 1.15 * PI, 0.03);
+            assert_near(s.perimeter, 2.8 * PI, 0.06);
+            assert_near(s.circularity, 4 * 1.15 / (2.8 * 2.8), 0.01);
+            assert_near(s.least_diameter, 1.9, 0.02);
+            assert_near(s.largest_diameter, 2.8, 0.02);
+            assert_near(s.least, 0.25, 0.02);
+            assert_near(s.largest, 0.5 + sqrt(0.65 * 0.65 + 0.9 * 0.9), 0.02);
+            assert_near(s.mean, mean_of_rays(POINTS, polygon), 0.02);
+            // outside the stretch the rows are circles of radius 1
+            assert_true(sweep_section_at(m.field, 0, 0.05 * length, &s));
+            assert_int_equal(s.kind, SECTION_POLAR);
+            assert_near(s.area, PI, 1e-8);
+            assert_near(s.perimeter, 2 * PI, 1e-8);
+            assert_near(s.mean, 1, 1e-8);
+            assert_near(s.least_diameter, 2, 1e-8);
+            discard(&m);
+        }
+}
+
+// Every point of a contour is on the branch's wall, its way is along the wall, and it goes once around; in the fade, too.
+static void contours_lie_on_the_wall(void **state)
+{
+    (void)state;
+    for (int form = SECTION_MENDED; form <= SECTION_AS_PRINTED; form++)
+        for (int kidneys = 0; kidneys < 2; kidneys++) {
+            Made m = make(
+                (Wanted){SECTION_RASTER, (SectionForm)form, form == SECTION_MENDED ? SECTION_PSP : SECTION_CATMULL_ROM, false, true, kidneys, 0.1, 0.9, 0.2});
+            double length = sweep_model_length(m.model, 0);
+            for (double part = 0; part <= 1; part += 0.0625) {
+                SweepContour c;
+                double t = part * length;
+                assert_true(sweep_contour_create(m.field, 0, t, &c));
+                SweepPlane plane = sweep_plane(m.field, 0, t);
+                assert_true(polygon_area(c.count, c.point) > 2);
+                double turned = 0;
+                for (int i = 0; i < c.count; i++) {
+                    Vec3 x = vec3_add_scaled(vec3_add_scaled(plane.s, c.point[i].n, plane.p), c.point[i].b, plane.q), g;
+                    Vec3 way = vec3_add_scaled(vec3_scale(plane.p, c.way[i].n), c.way[i].b, plane.q);
+                    const SectionPoint *next = &c.way[(i + 1) % c.count];
+                    assert_near(vec3_dot(vec3_sub(x, plane.s), plane.normal), 0, 1e-12);
+                    assert_near(value(&m, x, t, &g, NULL), 0, 1e-6);
+                    assert_near(vec3_dot(g, way), 0, 1e-6);
+                    turned += atan2(c.way[i].n * next->b - c.way[i].b * next->n, c.way[i].n * next->n + c.way[i].b * next->b);
+                }
+                assert_near(turned, 2 * PI, 1e-9);
+                sweep_contour_free(&c);
+            }
+            discard(&m);
+        }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(derivatives_are_exact), cmocka_unit_test(rows_are_repeated), cmocka_unit_test(contact_with_a_kidney),
-                                       cmocka_unit_test(bad_stretches_are_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(derivatives_are_exact),
+                                       cmocka_unit_test(rows_are_repeated),
+                                       cmocka_unit_test(contact_with_a_kidney),
+                                       cmocka_unit_test(bad_stretches_are_refused),
+                                       cmocka_unit_test(figures_are_those_of_the_contour),
+                                       cmocka_unit_test(contours_lie_on_the_wall)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -397,7 +397,10 @@ static void figures_of_an_ellipse_are_exact(void **state)
         SweepModel *model = sweep_model_of(&shape, 1);
         SweepField *field = sweep_field_create(model);
         for (double t = 0; t <= 8; t += 4) {
-            SweepSection s = sweep_section_at(field, 0, t);
+            SweepSection s;
+            assert_true(sweep_section_at(field, 0, t, &s));
+            assert_int_equal(s.kind, SECTION_POLAR);
+            assert_true(fabs(s.least_diameter - 2 * b) < 2 * missing && fabs(s.largest_diameter - 2 * a) < 2 * missing);
             assert_true(vec3_distance(s.centre, vec3(1 + t, 2, 3)) < 1e-12 && vec3_distance(s.normal, vec3(1, 0, 0)) < 1e-12);
             assert_true(fabs(s.area - PI * a * b) < 2 * PI * missing);
             assert_true(fabs(s.perimeter - perimeter) < 2 * PI * missing);
