@@ -9,7 +9,7 @@
 
 #include <stdlib.h>
 
-enum { AROUND = 400, MOST = 16 * AROUND };
+enum { LONGER = 16 };        // at most so many times `around` points
 
 SweepPlane sweep_plane(const SweepField *field, int branch, double t)
 {
@@ -29,14 +29,14 @@ const SweepStretch *sweep_stretch_at(const SweepModel *model, int branch, double
 
 // --- Polar ---
 
-static void fill_polar(const SweepSegment *s, double t, SweepContour *out)
+static void fill_polar(const SweepSegment *s, double t, int around, SweepContour *out)
 {
     double x = t - s->origin, term[SWEEP_TERMS];
     for (int k = 0; k < SWEEP_TERMS; k++)
         term[k] = s->section[k][0] + x * (s->section[k][1] + x * (s->section[k][2] + x * s->section[k][3]));
-    out->count = AROUND;
-    for (int i = 0; i < AROUND; i++) {
-        double angle = 2 * PI * i / AROUND, cosine = same_cos(angle), sine = same_sin(angle), radius = sweep_terms_radius(term, angle), slope = 0;
+    out->count = around;
+    for (int i = 0; i < around; i++) {
+        double angle = 2 * PI * i / around, cosine = same_cos(angle), sine = same_sin(angle), radius = sweep_terms_radius(term, angle), slope = 0;
         for (int k = 1; k <= SWEEP_HARMONICS; k++)
             slope += k * (term[2 * k] * same_cos(k * angle) - term[2 * k - 1] * same_sin(k * angle));
         double n = slope * cosine - radius * sine, b = slope * sine + radius * cosine, speed = same_hypot(n, b);
@@ -97,13 +97,13 @@ static bool start_at(const Tracer *c, const SweepStretch *stretch, double radius
     return false;
 }
 
-static bool follow(const Tracer *c, const SweepStretch *stretch, double radius, SweepContour *out)
+static bool follow(const Tracer *c, const SweepStretch *stretch, double radius, int around, SweepContour *out)
 {
-    const double step = 2 * PI * radius / AROUND, turn = 0.766, sharp = -0.17, SHORT = 0.1;     // cosines of 40 and 100 degrees
+    const double step = 2 * PI * radius / around, turn = 0.766, sharp = -0.17, SHORT = 0.1;     // cosines of 40 and 100 degrees
     SectionPoint at, way, next, ahead;
     if (!start_at(c, stretch, radius, &at, &way))
         return false;
-    for (out->count = 0; out->count < MOST;) {
+    for (out->count = 0; out->count < LONGER * around;) {
         out->point[out->count] = at, out->way[out->count++] = way;
         bool taken = false;
         for (double length = step; !taken && length > 1e-3 * step; length *= 0.5) {
@@ -125,27 +125,64 @@ static bool follow(const Tracer *c, const SweepStretch *stretch, double radius, 
     return false;
 }
 
-bool sweep_contour_create(const SweepField *field, int branch, double t, SweepContour *out)
+bool sweep_contour_create(const SweepField *field, int branch, double t, int around, SweepContour *out)
 {
     double length = field->curve[branch]->length;
-    SEL_ASSERT(t >= 0 && t <= length, "the section lies on the branch");
+    SEL_ASSERT(t >= 0 && t <= length && around >= 16, "the section lies on the branch, and has points around it");
     // the section at the end belongs to the segment before it
     const SweepSegment *s = &field->segment[t < length ? sweep_field_segment(field, branch, t) : field->first_segment[branch + 1] - 3];
     const SweepStretch *stretch = sweep_stretch_at(field->model, branch, t);
-    int room = stretch ? MOST : AROUND;
+    int room = stretch ? LONGER * around : around;
     *out = (SweepContour){.kind = stretch ? stretch->section.kind : SECTION_POLAR,
                           .point = calloc((size_t)room, sizeof *out->point),
                           .way = calloc((size_t)room, sizeof *out->way)};
     bool good = out->point && out->way;
     if (good && stretch) {
         Tracer tracer = {field, s, branch, t, sweep_plane(field, branch, t)};
-        good = follow(&tracer, stretch, sweep_field_mean(field, branch, t), out);
+        good = follow(&tracer, stretch, sweep_field_mean(field, branch, t), around, out);
     } else if (good) {
-        fill_polar(s, t, out);
+        fill_polar(s, t, around, out);
     }
     if (!good)
         sweep_contour_free(out);
     return good;
+}
+
+static double span(const SweepContour *c, int i)
+{
+    const SectionPoint *p = &c->point[i % c->count], *q = &c->point[(i + 1) % c->count];
+    return same_hypot(q->n - p->n, q->b - p->b);
+}
+
+void sweep_contour_sample(const SweepContour *c, int count, SectionPoint *point, SectionPoint *way)
+{
+    if (c->kind == SECTION_POLAR && c->count % count == 0) {
+        for (int i = 0; i < count; i++) {
+            point[i] = c->point[i * (c->count / count)];
+            if (way)
+                way[i] = c->way[i * (c->count / count)];
+        }
+        return;
+    }
+    // the first point lies in the direction n, the outermost one if there are several
+    int first = 0;
+    double perimeter = 0, least = HUGE_VAL, before = 0;
+    for (int i = 0; i < c->count; i++) {
+        double n = c->point[i].n, b = c->point[i].b, aside = fabs(b) - 0.01 * n;
+        if (n > 0 && aside < least)
+            least = aside, first = i;
+        perimeter += span(c, i);
+    }
+    for (int i = 0, at = first; i < count; i++) {
+        double wanted = perimeter * i / count, here = span(c, at);
+        while (before + here < wanted)
+            before += here, here = span(c, ++at);
+        const SectionPoint *p = &c->point[at % c->count], *q = &c->point[(at + 1) % c->count];
+        double part = here > 0 ? (wanted - before) / here : 0;
+        point[i] = (SectionPoint){p->n + part * (q->n - p->n), p->b + part * (q->b - p->b)};
+        if (way)
+            way[i] = c->way[at % c->count];
+    }
 }
 
 void sweep_contour_free(SweepContour *contour)

@@ -21,9 +21,13 @@ SweepPlane sweep_plane(const SweepField *field, int branch, double t);
 
 // The stretch that shapes the section at t; NULL: the rows alone do.
 const SweepStretch *sweep_stretch_at(const SweepModel *model, int branch, double t);
-// `t` in 0 … length. About 400 points; more where the contour is longer than the rows' circle. Returns false if out of memory, or if no closed contour is found
+enum { SWEEP_CONTOUR = 384 };
+// `t` in 0 … length. `around` points (SWEEP_CONTOUR for figures); more where the contour of a stretch is longer than the rows' circle. Returns false if out of memory, or if no closed contour is found
 // (published sections may have none); nothing is owned then.
-bool sweep_contour_create(const SweepField *field, int branch, double t, SweepContour *out);
+bool sweep_contour_create(const SweepField *field, int branch, double t, int around, SweepContour *out);
+// `count` points of a contour that has points, and their tangents unless `way` is NULL: of a polar one at equal angles if count divides `around`, of others at equal
+// distances along the contour; the first in the direction n.
+void sweep_contour_sample(const SweepContour *contour, int count, SectionPoint *point, SectionPoint *way);
 void sweep_contour_free(SweepContour *contour);
 
 #endif

@@ -5,8 +5,6 @@
 //   mean = 1/(2 pi) integral of rho d(angle): each part of a ray counts by the sense in which the contour crosses it, so that parts outside the lumen cancel.
 #include "geom/sweep_section.h"
 
-#include "geom/sweep_contour.h"
-
 enum { WAYS = 180 };         // directions of diameters
 
 // The extreme value of a parabola through three neighbouring values at equal distances.
@@ -80,19 +78,27 @@ static void find_diameters(const SweepContour *c, SweepSection *out)
     }
 }
 
+bool sweep_section_of(const SweepContour *contour, SweepSection *out)
+{
+    *out = (SweepSection){.kind = contour->kind};
+    if (contour->count == 0)
+        return false;
+    for (int i = 0; i < contour->count; i++)
+        add_span(contour, i, out);
+    find_radii(contour, out);
+    find_diameters(contour, out);
+    out->circularity = 4 * PI * out->area / (out->perimeter * out->perimeter);
+    return true;
+}
+
 bool sweep_section_at(const SweepField *field, int branch, double t, SweepSection *out)
 {
     SweepContour contour;
     SweepPlane plane = sweep_plane(field, branch, t);
-    *out = (SweepSection){.branch = branch, .t = t, .centre = plane.s, .normal = plane.normal};
-    if (!sweep_contour_create(field, branch, t, &contour))
-        return false;
-    out->kind = contour.kind;
-    for (int i = 0; i < contour.count; i++)
-        add_span(&contour, i, out);
-    find_radii(&contour, out);
-    find_diameters(&contour, out);
-    out->circularity = 4 * PI * out->area / (out->perimeter * out->perimeter);
+    bool good = sweep_contour_create(field, branch, t, SWEEP_CONTOUR, &contour) && sweep_section_of(&contour, out);
+    if (!good)
+        *out = (SweepSection){0};
+    out->branch = branch, out->t = t, out->centre = plane.s, out->normal = plane.normal;
     sweep_contour_free(&contour);
-    return true;
+    return good;
 }

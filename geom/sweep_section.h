@@ -2,7 +2,7 @@
 #ifndef SELDINGER_GEOM_SWEEP_SECTION_H
 #define SELDINGER_GEOM_SWEEP_SECTION_H
 
-#include "geom/sweep_field.h"
+#include "geom/sweep_contour.h"
 
 typedef struct SweepSection {
     int branch;
@@ -20,5 +20,7 @@ typedef struct SweepSection {
 // The branch's own section at t in 0 … length, without blends, as the model has it (sweep_contour.h). Returns false if out of memory, or if the section has no
 // closed contour, which published sections may lack.
 bool sweep_section_at(const SweepField *field, int branch, double t, SweepSection *out);
+// The same of a contour alone: all but branch, t, centre and normal. Returns false if it has no points.
+bool sweep_section_of(const SweepContour *contour, SweepSection *out);
 
 #endif

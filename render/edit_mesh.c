@@ -1,5 +1,5 @@
 // See edit_mesh.h. A vertex lies on the ray from the curve at angle theta: first on the branch's own wall, R(theta, t); then Newton along the ray for the blended
-// field F, which is larger, outwards by at most the blend's width.
+// field F, which is larger, outwards by at most the blend's width. Within a stretch it lies on the section's contour and moves across that.
 #include "render/edit_mesh.h"
 
 #include <stdlib.h>
@@ -37,8 +37,8 @@ static void place_rings(const SweepField *field, EditMesh *m)
     }
 }
 
-// Moves x along a direction onto F = 0, outwards by at most `most`. Leaves it where it is if the wall is not there.
-static Vec3 onto_wall(const SweepField *field, SweepPlace place, Vec3 x, Vec3 way, double most, Vec3 *normal)
+// Moves x along a direction onto F = 0, outwards by at most `most`, inwards by at most -`least`. Leaves it where it is if the wall is not there.
+static Vec3 onto_wall(const SweepField *field, SweepPlace place, Vec3 x, Vec3 way, double least, double most, Vec3 *normal)
 {
     SweepBlend b;
     double moved = 0;
@@ -47,7 +47,7 @@ static Vec3 onto_wall(const SweepField *field, SweepPlace place, Vec3 x, Vec3 wa
         double slope = -vec3_dot(b.gradient, way);
         if (!(slope > 0.1) || !isfinite(b.f))
             break;
-        moved = fmax(0, moved + b.f / slope);
+        moved = fmax(least, moved + b.f / slope);
         if (fabs(b.f) < 1e-4 || moved > most)
             break;
     }
@@ -55,8 +55,33 @@ static Vec3 onto_wall(const SweepField *field, SweepPlace place, Vec3 x, Vec3 wa
     return moved <= most ? vec3_add_scaled(x, moved, way) : x;
 }
 
+// Within a stretch: points at equal distances along the contour. False outside of stretches, or if the section has no closed contour.
+static bool make_shaped_ring(const SweepField *field, EditMesh *m, const EditRing *r)
+{
+    SweepContour contour;
+    if (r->polar > 0 || !sweep_stretch_at(field->model, r->branch, r->t) || !sweep_contour_create(field, r->branch, r->t, 4 * AROUND, &contour))
+        return false;
+    SectionPoint point[AROUND], along[AROUND];
+    SweepPlane plane = sweep_plane(field, r->branch, r->t);
+    const SweepPlace place = {.branch = r->branch, .t = r->t, .sac = -1};
+    double most = 0.5 * sweep_field_mean(field, r->branch, r->t);
+    sweep_contour_sample(&contour, AROUND, point, along);
+    sweep_contour_free(&contour);
+    for (int i = 0; i < AROUND; i++) {
+        int vertex = r->first + i;
+        Vec3 x = vec3_add_scaled(vec3_add_scaled(plane.s, point[i].n, plane.p), point[i].b, plane.q);
+        Vec3 way = vec3_unit(vec3_add_scaled(vec3_scale(plane.p, along[i].b), -along[i].n, plane.q));
+        m->surface->vertex[vertex] = onto_wall(field, place, x, way, -0.05 * most, most, &m->surface->normal[vertex]);
+        m->surface->node[vertex] = 0;
+        m->branch[vertex] = r->branch, m->along[vertex] = r->t;
+    }
+    return true;
+}
+
 static void make_ring(const SweepField *field, EditMesh *m, const EditRing *r)
 {
+    if (make_shaped_ring(field, m, r))
+        return;
     bool far = r->t > 0.5 * field->curve[r->branch]->length;
     double term[SWEEP_TERMS], out = r->polar > 0 ? same_sin(r->polar) : 0, flat = r->polar > 0 ? same_cos(r->polar) : 1;
     SweepJet j = sweep_curve_at(field->curve[r->branch], r->t);
@@ -70,7 +95,7 @@ static void make_ring(const SweepField *field, EditMesh *m, const EditRing *r)
         Vec3 way = vec3_add_scaled(vec3_scale(across, flat), out, ahead), x = vec3_add_scaled(j.s, radius, way);
         int vertex = r->first + i;
         const SweepPlace place = {.branch = r->branch, .t = r->t, .sac = -1};
-        m->surface->vertex[vertex] = onto_wall(field, place, x, way, 0.5 * radius, &m->surface->normal[vertex]);
+        m->surface->vertex[vertex] = onto_wall(field, place, x, way, 0, 0.5 * radius, &m->surface->normal[vertex]);
         m->surface->node[vertex] = 0;
         m->branch[vertex] = r->branch, m->along[vertex] = r->t;
     }

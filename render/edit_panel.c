@@ -49,13 +49,15 @@ static void heading(Gui *gui, const char *text)
 static void show_place(Gui *gui, const EditState *s)
 {
     const SweepModel *m = sweep_editor_model(s->editor);
-    double term[SWEEP_TERMS];
     char title[80];
-    sweep_edit_terms(m, s->branch, s->t, term);
     snprintf(title, sizeof title, "Branch %d at %.2f mm", s->branch, s->t);
     gui_text(gui, GUI_LARGE, gui_colors.text, title);
     row(gui, edit_state_at_station(s) ? "a section of the model" : "between two sections", "%d branches", m->branch_count);
-    row(gui, "mean radius, area", "%.3f mm, %.2f mm²", term[0], sweep_terms_area(term));
+    SweepSection section;
+    if (sweep_section_of(&s->outline, &section))
+        row(gui, "mean radius, area", "%.3f mm, %.2f mm²", section.mean, section.area);
+    if (s->outline.kind != SECTION_POLAR)
+        row(gui, "stored as", "%s", section_kind_name[s->outline.kind]);
     row(gui, "surface follows in", "%.1f ms, at most %.1f", s->update_ms, s->worst_ms);
 }
 

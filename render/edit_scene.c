@@ -86,15 +86,18 @@ static void add_ends(EditScene *scene, const EditState *s)
 static void add_section(EditScene *scene, const EditState *s, double pixel)
 {
     enum { POINTS = EDIT_CONTOUR + 1 };
-    Vec3 point[POINTS], fine[EDIT_CONTOUR];
-    double radius[POINTS];
+    Vec3 point[POINTS];
+    SectionPoint fine[EDIT_CONTOUR], way[EDIT_CONTOUR];
+    double radius[POINTS], outside = 0.03 * sweep_field_mean(sweep_editor_field(s->editor), s->branch, s->t);
     Color color[POINTS];
-    sweep_edit_contour(sweep_editor_model(s->editor), s->branch, s->t, EDIT_CONTOUR, fine);
-    for (int i = 0; i < POINTS; i++) {
-        point[i] = edit_state_in_space(s, vec3_scale(fine[i % EDIT_CONTOUR], 1.03));
+    if (s->outline.count > 0)
+        sweep_contour_sample(&s->outline, EDIT_CONTOUR, fine, way);
+    for (int i = 0; i < POINTS && s->outline.count > 0; i++) {
+        int k = i % EDIT_CONTOUR;
+        point[i] = edit_state_in_space(s, vec3(fine[k].n + outside * way[k].b, fine[k].b - outside * way[k].n, 0));
         radius[i] = 2 * pixel, color[i] = section_color;
     }
-    primitives_tube(&scene->primitives, POINTS, point, radius, color);
+    primitives_tube(&scene->primitives, s->outline.count > 0 ? POINTS : 0, point, radius, color);
     for (int i = 0; s->draws_branch && i < s->drawn_count; i++) {
         primitives_sphere(&scene->primitives, s->drawn[i], fmax(4 * pixel, 0.5 * (double)s->drawn_radius), drawn_color);
         double thin[2] = {2 * pixel, 2 * pixel};

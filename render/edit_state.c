@@ -38,6 +38,12 @@ static void follow(EditState *s, Vec3 low, Vec3 high)
     s->mesh_is_new = true;
 }
 
+static void take_outline(EditState *s)
+{
+    sweep_contour_free(&s->outline);
+    sweep_contour_create(sweep_editor_field(s->editor), s->branch, fmin(s->t, curve(s, s->branch)->length), SWEEP_CONTOUR, &s->outline);
+}
+
 // The same, and undoes the changes of what was looked at before.
 static void follow_change(EditState *s, const EditChange *change)
 {
@@ -48,6 +54,8 @@ static void follow_change(EditState *s, const EditChange *change)
     }
     if (change || s->looks)
         follow(s, low, high);
+    if (s->branch < model(s)->branch_count)
+        take_outline(s);
 }
 
 static void measure(EditState *s, double since)
@@ -72,13 +80,27 @@ void edit_state_end(EditState *s)
 {
     edit_mesh_free(s->mesh);
     s->mesh = NULL;
+    sweep_contour_free(&s->outline);
 }
 
 // --- the place ---
 
+static void take_points(EditState *s)
+{
+    SectionPoint point[EDIT_CONTOUR];
+    if (s->outline.count == 0) {
+        sweep_edit_contour(model(s), s->branch, s->t, EDIT_CONTOUR, s->contour);
+        return;
+    }
+    sweep_contour_sample(&s->outline, EDIT_CONTOUR, point, NULL);
+    for (int i = 0; i < EDIT_CONTOUR; i++)
+        s->contour[i] = vec3(point[i].n, point[i].b, 0);
+}
+
 static void take_contour(EditState *s)
 {
-    sweep_edit_contour(model(s), s->branch, s->t, EDIT_CONTOUR, s->contour);
+    take_outline(s);
+    take_points(s);
     s->is_moved = false;
     s->stroke_count = 0;
     s->blend = (float)sweep_model_blend(model(s), s->branch);
@@ -251,7 +273,7 @@ void edit_state_smooth(EditState *s, bool is_kept)
     if (s->looks)
         edit_state_say(s, false, "A keeps the smoothed wall, Esc drops it");
     if (!is_kept)
-        sweep_edit_contour(model(s), s->branch, s->t, EDIT_CONTOUR, s->contour);
+        take_points(s);
 }
 
 void edit_state_blend(EditState *s, bool is_kept)

@@ -16,7 +16,8 @@ typedef struct EditState {
     double t;                // … [mm]
     Vec3 wall;               // the point of the wall that was clicked, or that lies at the place
     bool snaps;              // moving along t stops at stations
-    Vec3 contour[EDIT_CONTOUR];      // of the section there (n, b, 0)
+    SweepContour outline;    // the section there as the model has it; count 0: it has no closed contour
+    Vec3 contour[EDIT_CONTOUR];      // points of it (n, b, 0), or as they were moved
     int handle;              // the point of the contour that is moved, 0 to EDIT_HANDLES - 1
     bool is_moved;           // the contour differs from the model's
     bool looks;              // the surface shows an edit that is not kept yet

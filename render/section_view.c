@@ -179,9 +179,13 @@ void section_view_draw_contour(const SectionView *v, Gui *gui, const EditState *
     enum { FINE = 192 };
     float k = gui_scale(gui);
     Vec3 fine[FINE];
+    SectionPoint point[FINE];
     draw_grid(v, gui, at);
-    sweep_edit_contour(sweep_editor_model(s->editor), s->branch, s->t, FINE, fine);
-    draw_closed(v, gui, at, FINE, fine, gui_colors.accent, 2 * k, false);
+    if (s->outline.count > 0)
+        sweep_contour_sample(&s->outline, FINE, point, NULL);
+    for (int i = 0; i < FINE && s->outline.count > 0; i++)
+        fine[i] = vec3(point[i].n, point[i].b, 0);
+    draw_closed(v, gui, at, s->outline.count > 0 ? FINE : 0, fine, gui_colors.accent, 2 * k, false);
     if (s->stroke_count > 1)
         draw_closed(v, gui, at, s->stroke_count, s->stroke, gui_colors.warning, 2 * k, true);
     for (int i = 0; i < EDIT_HANDLES; i++) {

@@ -347,7 +347,7 @@ static void contours_lie_on_the_wall(void **state)
             for (double part = 0; part <= 1; part += 0.0625) {
                 SweepContour c;
                 double t = part * length;
-                assert_true(sweep_contour_create(m.field, 0, t, &c));
+                assert_true(sweep_contour_create(m.field, 0, t, SWEEP_CONTOUR, &c));
                 SweepPlane plane = sweep_plane(m.field, 0, t);
                 assert_true(polygon_area(c.count, c.point) > 2);
                 double turned = 0;
