@@ -81,6 +81,8 @@ void sweep_figures_print(FILE *out, const SweepModel *model, SectionKind kind, c
             section_kind_name[kind], model->branch_count, model->row_count, (long long)f->numbers, f->seconds, (long long)f->points, f->mean, f->p99, f->most,
             f->noise, (long long)f->left_out, (long long)f->folded, (long long)f->not_star_shaped, f->shaped,
             section_kind_name[kind == SECTION_POLAR ? SECTION_RASTER : kind]);
+    if (f->mended > 0)
+        fprintf(out, "%d sections depart from the published method: the points beside them give no contour around the centreline\n", f->mended);
 }
 
 void sweep_figures_add(cJSON *root, const SweepModel *model, SectionKind kind, const SweepFitFigures *f)
@@ -97,4 +99,5 @@ void sweep_figures_add(cJSON *root, const SweepModel *model, SectionKind kind, c
     cJSON_AddNumberToObject(root, "folded", (double)f->folded);
     cJSON_AddNumberToObject(root, "not_star_shaped", (double)f->not_star_shaped);
     cJSON_AddNumberToObject(root, "shaped_sections", f->shaped);
+    cJSON_AddNumberToObject(root, "mended_sections", f->mended);
 }

@@ -85,7 +85,7 @@ static bool take_figures(const SweepDraft *d, const SweepSystem *system, const S
         figures->most = value[figures->points - 1];
     }
     figures->noise = system->noise;
-    figures->not_star_shaped = stretches->second_sheets, figures->shaped = stretches->stations;
+    figures->not_star_shaped = stretches->second_sheets, figures->shaped = stretches->stations, figures->mended = stretches->mended;
     for (int64_t p = 0; p < d->vessel_point_count; p++) {
         SweepJet jet = sweep_curve_at(d->curve[d->owner[p]], d->t[p]);
         double speed2 = vec3_norm2(jet.s1);
@@ -136,7 +136,8 @@ SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, Sw
                    (long long)tree->point_count, tree->kind[0] == NODE_VESSEL ? "a vessel" : "an aneurysm");
         return NULL;
     }
-    if (sweep_draft_create(&draft, tree, options) && fit(&draft, &system, &stretches, faults) && take_figures(&draft, &system, &stretches, &found)) {
+    if (sweep_draft_create(&draft, tree, options) && fit(&draft, &system, &stretches, faults) && take_figures(&draft, &system, &stretches, &found) &&
+        sweep_model_validate(draft.model, "fit", faults)) {
         model = draft.model;
         draft.model = NULL;
     } else if (faults->count == before) {

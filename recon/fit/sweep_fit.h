@@ -26,11 +26,13 @@ typedef struct SweepFitFigures {
     int64_t not_star_shaped; // points of sections that a ray from the middle meets more than once
     int64_t numbers;         // stored: knots, breaks, coefficients that are not held at 0 or the numbers of sections of another kind, blobs
     int shaped;              // stations whose sections are not polar
+    int mended;              // as printed: stations whose points give no contour around the curve (sweep_stretches.h)
     double noise;            // [mm] standard deviation of the points, as the fit found it
     double seconds;
 } SweepFitFigures;
 
-// `tree`: linked, with points. `figures` may be NULL. Returns NULL with faults (options out of range, too few points, no vessel nodes, out of memory).
+// `tree`: linked, with points. `figures` may be NULL. The model is valid. Returns NULL with faults (options out of range, too few points, no vessel nodes, points
+// that give no valid model, out of memory).
 SweepModel *sweep_fit(const VesselTree *tree, const SweepFitOptions *options, SweepFitFigures *figures, Faults *faults);
 
 #endif

@@ -36,7 +36,7 @@ typedef struct Stations {
     SectionPoint *contour;
     int contour_count, contour_room;
     bool *is_shaped;         // (stations)
-    double *polar;           // (stations, T) change of the terms
+    double *polar;           // (stations, T) change of the rows' terms; as printed, the terms
     SweepStretchFigures *figures;
     Faults *faults;
 } Stations;
@@ -118,32 +118,33 @@ static bool contour_of_rows(Stations *s, int branch, int station)
     return add_contour(s, station, CONTOUR, point);
 }
 
-// The shortest closed polygon through the points beside the station; one through the rows if the points give none. `apart`: [radii].
-static bool contour_of_points(Stations *s, int branch, int station, double apart)
+// The shortest closed polygon through the points beside a station. Returns the number of its points, 0: none around the curve, -1: out of memory.
+static int tour_of_points(const Stations *s, int station, double apart_mm, SectionPoint tour[CONTOUR_TOUR_MOST])
 {
     int64_t count = s->first[station + 1] - s->first[station];
-    SectionPoint *point = malloc(((size_t)count + 1) * sizeof *point), tour[CONTOUR_TOUR_MOST];
+    SectionPoint *point = malloc(((size_t)count + 1) * sizeof *point);
     if (!point)
-        return false;
+        return -1;
     for (int64_t i = 0; i < count; i++)
         point[i] = s->loose[s->first[station] + i].at;
-    int kept = contour_tour((int)count, point, apart * station_radius(s, station), tour);
+    int kept = contour_tour((int)count, point, apart_mm, tour);
     free(point);
-    return kept >= 8 && polygon_contains(kept, tour, 0, 0) ? add_contour(s, station, kept, tour) : contour_of_rows(s, branch, station);
+    return kept >= 8 && polygon_contains(kept, tour, 0, 0) ? kept : 0;
 }
 
 // A contour as the papers have it: of this station alone, without regard to forks. Points within 0.8 of the distance to the next stations, robust least squares of
-// rho = sum_k a_k cos k theta + b_k sin k theta, k <= 5, with a ridge k^4 (shared/rivals.md, section 1); a child's first part repeats the tree's radius. The rows are
-// moved there, too.
-static bool contour_of_station(Stations *s, int branch, int station)
+// rho = sum_k a_k cos k theta + b_k sin k theta, k <= 5, with a ridge k^4 (shared/rivals.md, section 1); a child's first part repeats the tree's radius, and so
+// does a station with hardly any points. No ray is shorter than LEAST of that radius: the contour surrounds the curve. The station's terms are those of the contour.
+static bool contour_of_station(Stations *s, int branch, int station, bool *is_mended)
 {
     enum { HARMONICS = 5, TERMS = 2 * HARMONICS + 1, ROUNDS = 4 };
-    static const double REACH = 0.8, RIDGE = 1e-4, KNEE = 0.1, SKIP = 0.7;
+    static const double REACH = 0.8, RIDGE = 1e-4, KNEE = 0.1, SKIP = 0.7, LEAST = 0.1;
     const SweepBranch *b = &s->draft->model->branch[branch];
     int first = station > b->first_break ? station - 1 : station, last = station + 1 < b->first_break + b->break_count ? station + 1 : station;
     double t = s->station[station].t, reach = REACH * (s->station[last].t - s->station[first].t) / (last - first), term[T] = {0}, matrix[TERMS * TERMS],
            c[TERMS] = {0};
     double hidden = b->parent >= 0 ? SKIP * sweep_draft_radius(s->draft, b->parent, b->parent_t) : -HUGE_VAL, r = sweep_draft_radius(s->draft, branch, t);
+    *is_mended = false;
     c[0] = r;
     for (int round = 0; round < ROUNDS && t >= hidden; round++) {
         double next[TERMS] = {0}, basis[TERMS], sum = 0;
@@ -168,19 +169,23 @@ static bool contour_of_station(Stations *s, int branch, int station)
         }
         for (int k = 1; k < TERMS; k++)
             matrix[k * TERMS] += RIDGE * sum * same_square(same_square((k + 1) / 2));
-        if (!(sum > 1) || !band_factor(matrix, TERMS, TERMS - 1))
+        if (!(sum > 1) || !band_factor(matrix, TERMS, TERMS - 1)) {
+            *is_mended = round == 0;
             break;
+        }
         band_solve(matrix, TERMS, TERMS - 1, next);
         memcpy(c, next, sizeof c);
     }
     memcpy(term, c, sizeof c);
-    for (int k = 0; k < T; k++)
-        s->polar[(size_t)station * T + (size_t)k] = term[k] - sweep_draft_term(s->draft, branch, k, t);
     SectionPoint point[PRINTED_CONTOUR];
+    double radius[PRINTED_CONTOUR];
     for (int i = 0; i < PRINTED_CONTOUR; i++) {
-        double theta = 2 * PI * i / PRINTED_CONTOUR, rho = fmax(sweep_terms_radius(term, theta), 0.1 * r);
-        point[i] = (SectionPoint){rho * same_cos(theta), rho * same_sin(theta)};
+        double theta = 2 * PI * i / PRINTED_CONTOUR, rho = sweep_terms_radius(term, theta);
+        *is_mended |= rho < LEAST * r;
+        radius[i] = fmax(rho, LEAST * r);
+        point[i] = (SectionPoint){radius[i] * same_cos(theta), radius[i] * same_sin(theta)};
     }
+    sweep_terms_of_radii(PRINTED_CONTOUR, radius, s->polar + (size_t)station * T);
     return add_contour(s, station, PRINTED_CONTOUR, point);
 }
 
@@ -236,8 +241,9 @@ static Section *make_section(Stations *s, int branch, int station, bool missed)
     Section *section = NULL;
     if (missed) {
         double of_section, of_rows;
-        int kept = s->contour_count;
-        if (!contour_of_points(s, branch, station, fmax(TOUR_APART, TOUR_NOISE * s->system->noise / station_radius(s, station))))
+        SectionPoint tour[CONTOUR_TOUR_MOST];
+        int kept = s->contour_count, points = tour_of_points(s, station, fmax(TOUR_APART * station_radius(s, station), TOUR_NOISE * s->system->noise), tour);
+        if (points < 0 || !(points > 0 ? add_contour(s, station, points, tour) : contour_of_rows(s, branch, station)))
             return NULL;
         section = section_create(&options, at->point_count, s->contour + at->first_point);
         if (section)
@@ -298,6 +304,27 @@ static void move_rows(Stations *s, int branch, int term, double *x, double *uppe
         x[q + 1] -= upper[q + 1] * x[q + 2];
     for (int k = 0; k < m + 2; k++)
         s->draft->model->row[(size_t)(b->first_row + k) * T + (size_t)term] += x[k];
+}
+
+static int within(int k, int last) { return k < 0 ? 0 : k > last ? last : k; }
+
+// Lays the rows of a branch between the stations' terms, by Schoenberg's operator: each row has the terms of its place, the mean of its three knots, on the line
+// between the stations beside it. Exact for tapers, and never beyond the stations: the spline through them swings below 0 at a child's start, whose rows no point
+// has seen.
+static void lay_rows(const Stations *s, int branch)
+{
+    const SweepBranch *b = &s->draft->model->branch[branch];
+    const double *at = s->draft->model->break_t + b->first_break;
+    int last = b->break_count - 1;
+    for (int k = 0, q = 0; k < b->break_count + 2; k++) {
+        double place = (at[within(k - 2, last)] + at[within(k - 1, last)] + at[within(k, last)]) / 3;
+        while (q + 1 < last && at[q + 1] < place)
+            q++;
+        double share = (place - at[q]) / (at[q + 1] - at[q]);
+        const double *before = s->polar + (size_t)(b->first_break + q) * T;
+        for (int j = 0; j < T; j++)
+            s->draft->model->row[(size_t)(b->first_row + k) * T + (size_t)j] = before[j] + share * (before[T + j] - before[j]);
+    }
 }
 
 // --- Stretches ---
@@ -390,6 +417,17 @@ static bool fit_mended(Stations *s)
     return good;
 }
 
+// Replaces a station's contour by one through the raw points beside it, unless they give no section around the curve. Returns false if out of memory.
+static bool take_raw_points(Stations *s, int station, bool *is_mended)
+{
+    SectionPoint tour[CONTOUR_TOUR_MOST];
+    int points = tour_of_points(s, station, 1e-9 * station_radius(s, station), tour);
+    Section *section = points > 0 ? section_create(&s->draft->options->section, points, tour) : NULL;
+    *is_mended = !section;
+    section_free(section);
+    return points >= 0 && (!section || add_contour(s, station, points, tour));
+}
+
 static bool fit_printed(Stations *s)
 {
     SweepModel *m = s->draft->model;
@@ -397,10 +435,14 @@ static bool fit_printed(Stations *s)
     bool good = stretch != NULL, raw = s->draft->options->section.kind == SECTION_RBF;
     for (int i = 0; good && i < m->branch_count; i++) {
         stretch[i] = whole_branch(s, i);
-        for (int q = m->branch[i].first_break; good && q < m->branch[i].first_break + m->branch[i].break_count; q++)
-            good = contour_of_station(s, i, q) && (!raw || contour_of_points(s, i, q, 1e-9));
+        for (int q = m->branch[i].first_break; good && q < m->branch[i].first_break + m->branch[i].break_count; q++) {
+            bool is_mended;
+            good = contour_of_station(s, i, q, &is_mended) && (!raw || take_raw_points(s, q, &is_mended));
+            s->figures->mended += good && is_mended;
+        }
+        if (good)
+            lay_rows(s, i);
     }
-    good = good && move_all_rows(s);
     good = good && set_stretches(s, m->branch_count, stretch);
     for (int i = 0; good && i < m->station_count; i++)
         s->figures->numbers += section_numbers(m->section[i]);

@@ -3,8 +3,9 @@
 // Mended kinds: each break is a station. Its contour is sampled from the rows; where they miss points (the lumen is not star-shaped), it is the shortest
 // closed polygon through the points beside the station. A section of the kind is made from it. Where the section's curve agrees with a polar one to 0.01 radii
 // the rows are moved to it; where it does not, the model gets a stretch there (sweep_model.h), for polar sections of the kind raster.
-// As printed: one stretch for each whole branch, contours of each station alone. raster: weights of Catmull and Rom with tension 0.7. rbf: through the raw points beside the station; PSP weights.
-// pas: sections in the straight frames of their stations.
+// As printed: one stretch for each whole branch, contours of each station alone, rows laid between the stations. raster: weights of Catmull and Rom with tension
+// 0.7. rbf: through the raw points beside the station; PSP weights. pas: sections in the straight frames of their stations. Where the points beside a station give
+// no contour around the curve, it is mended (rbf: as the other kinds have it; these: no ray shorter than a tenth of the tree's radius) and counted.
 #ifndef SELDINGER_RECON_FIT_SWEEP_STRETCHS_H
 #define SELDINGER_RECON_FIT_SWEEP_STRETCHS_H
 
@@ -12,6 +13,7 @@
 
 typedef struct SweepStretchFigures {
     int64_t second_sheets;   // points of sections that a ray from the middle meets more than once
+    int mended;              // as printed: stations whose points give no contour around the curve
     int stations;            // with sections of another kind than polar
     int64_t numbers;         // that the sections store, if all are of the kind; 0 for polar ones
 } SweepStretchFigures;

@@ -271,6 +271,57 @@ static void stretches_and_several_models_live_in_one_file(void **state)
     vessel_tree_free(tube);
 }
 
+// A place's blend must be the same number in both models.
+static void assert_same_field(const VesselTree *of, SweepModel *a, SweepModel *b)
+{
+    SweepField *field = sweep_field_create(a), *other = sweep_field_create(b);
+    assert_true(field && other);
+    for (int64_t p = 0; p < of->point_count; p += 11) {
+        SweepPlace place = swept_place(a, of, of->point[p]);
+        SweepBlend there, back;
+        sweep_field_blend(field, place, of->point[p], &there);
+        sweep_field_blend(other, place, of->point[p], &back);
+        assert_true(there.f == back.f && vec3_distance(there.gradient, back.gradient) == 0);
+    }
+    sweep_field_free(field);
+    sweep_field_free(other);
+}
+
+// What a fit has made is loaded, for each kind, mended and as printed. The phantom's children begin inside their parents, where no point is, and it has a sac; few
+// noisy points do not surround the curve everywhere.
+static void every_fit_is_loaded(void **state)
+{
+    (void)state;
+    static const char few[2][2][64] = {{"points", "24"}, {"sac_points", "300"}}, noisy[2][2][64] = {{"points", "8"}, {"noise_mm", "0.3"}};
+    int departed = 0;
+    for (int noise = is_slow; noise < 2; noise++) {
+        Shape *shape = make(noise ? "y" : "phantom", 2, noise ? noisy : few);
+        VesselTree *sampled = shape_sample(shape, &faults);
+        for (int kind = 0; kind < SECTION_KINDS; kind++)
+            for (int printed = 0; printed < (kind == SECTION_POLAR ? 1 : 2); printed++) {
+                SweepFitOptions options = printed ? sweep_fit_paper_options((SectionKind)kind) : sweep_fit_default_options();
+                SweepFitFigures figures;
+                if (!printed)
+                    options.section = section_default_options((SectionKind)kind, SECTION_MENDED);
+                SweepModel *there = swept(sampled, options, &figures);
+                assert_true(save(sampled, there, (SectionKind)kind, in_folder("fit.h5")));
+                SweepModel *back = sweep_file_load(in_folder("fit.h5"), (SectionKind)kind, sampled, &faults);
+                print_message("%s, %s %s: %d of %d sections depart from the method, mean %.4f, most %.4f mm%s%s\n", noise ? "y" : "phantom",
+                              section_kind_name[kind], printed ? "as printed" : "mended", figures.mended, there->station_count, figures.mean, figures.most,
+                              back ? "" : "; ", back ? "" : faults.text[0]);
+                assert_non_null(back);
+                assert_same_field(sampled, there, back);
+                assert_true(printed || figures.mended == 0);
+                departed += figures.mended;
+                sweep_model_free(there);
+                sweep_model_free(back);
+            }
+        vessel_tree_free(sampled);
+        shape_free(shape);
+    }
+    assert_true(departed > 0);
+}
+
 static void every_part_of_a_file_is_refused(void **state)
 {
     (void)state;
@@ -288,9 +339,13 @@ static void every_part_of_a_file_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(save_load_is_equality),           cmocka_unit_test(a_file_without_the_model_says_how_to_make_it),
-        cmocka_unit_test(missing_datasets_are_named),      cmocka_unit_test(lies_are_found),
-        cmocka_unit_test(every_part_of_a_file_is_refused), cmocka_unit_test(stretches_and_several_models_live_in_one_file),
+        cmocka_unit_test(save_load_is_equality),
+        cmocka_unit_test(a_file_without_the_model_says_how_to_make_it),
+        cmocka_unit_test(missing_datasets_are_named),
+        cmocka_unit_test(lies_are_found),
+        cmocka_unit_test(every_part_of_a_file_is_refused),
+        cmocka_unit_test(stretches_and_several_models_live_in_one_file),
+        cmocka_unit_test(every_fit_is_loaded),
     };
     return cmocka_run_group_tests(tests, make_all, remove_all);
 }
