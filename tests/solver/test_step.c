@@ -475,6 +475,58 @@ static void sheath_guides(void **state)
     stepper_destroy(s);
 }
 
+// A solution that is finite but absurd ends the step as one without a solution does, and the state remains. One that is only large is followed as far as the step
+// may go: the linear solution of a tool that is let go can be large, and its step ends well.
+static void absurd_motions_are_refused(void **state)
+{
+    (void)state;
+    for (int magnitude = 10; magnitude <= 190; magnitude += 60) {
+        Bench b;
+        bench_start(&b, 50, 10, 1);
+        bench_load(&b, 50, vec3(0, 0, pow(10, magnitude)), vec3(0, 0, 0), 0);
+        Stepper *s = bench_make(&b);
+        const WireState *w = stepper_state(s);
+        Vec3 position[11];
+        Quat orientation[11];
+        memcpy(position, w->position, sizeof position);
+        memcpy(orientation, w->orientation, sizeof orientation);
+        unsigned flags = step_once(s, 0, 0)->flags;
+        print_message("a load of 1e%d N: flags %u, tip moves %.3g mm\n", magnitude, flags, vec3_distance(tip_of(s), position[10]));
+        assert_true(((flags & STEP_DIVERGED) != 0) == (magnitude > 100));
+        if (magnitude > 100) {
+            assert_memory_equal(position, w->position, sizeof position);
+            assert_memory_equal(orientation, w->orientation, sizeof orientation);
+        }
+        for (int i = 0; i <= 10; i++) {
+            Quat q = w->orientation[i];
+            assert_true(vec3_is_finite(w->position[i]) && fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-12);
+        }
+        stepper_destroy(s);
+    }
+}
+
+// Nodes in the sheath turn about its axis by what the solution says, however far: the series that turns free nodes holds up to 2.5 rad.
+static void held_nodes_turn_exactly(void **state)
+{
+    (void)state;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        Bench b;
+        bench_sheath(&b, 50, 25, 10);
+        Stepper *s = bench_make(&b);
+        double twist = 30 * sign;
+        step_once(s, 0, twist);
+        const WireState *w = stepper_state(s);
+        Vec3 e2 = quat_rotate(w->orientation[0], vec3(0, 1, 0));
+        print_message("a twist of %g rad in one step: node 0 is off by %.1e\n", twist, vec3_distance(e2, vec3(0, cos(twist), sin(twist))));
+        assert_true(vec3_distance(e2, vec3(0, cos(twist), sin(twist))) < 1e-12);
+        for (int i = 0; i < w->node_count; i++) {
+            Quat q = w->orientation[i];
+            assert_true(fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-12);
+        }
+        stepper_destroy(s);
+    }
+}
+
 // A transverse dead force at the tip of a wire that leaves the sheath: the push at the hand is -M^2/(2 EI) at every length, and smooth as nodes pass the mouth.
 static void push_back_of_a_bent_wire(void **state)
 {
@@ -541,6 +593,8 @@ int main(void)
         cmocka_unit_test(rotated_and_mirrored_problems),
         cmocka_unit_test(restored_runs_repeat),
         cmocka_unit_test(sheath_guides),
+        cmocka_unit_test(absurd_motions_are_refused),
+        cmocka_unit_test(held_nodes_turn_exactly),
         cmocka_unit_test(push_back_of_a_bent_wire),
         cmocka_unit_test(rest_curvature_is_straightened),
     };
