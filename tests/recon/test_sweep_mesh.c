@@ -7,6 +7,7 @@
 #include <cmocka.h>
 
 #include "geom/sweep_mesh.h"
+#include "geom/sweep_mesh_parts.h"
 #include "geom/tree_surface.h"
 #include "recon/recon.h"
 #include "tests/geom/sweep_models.h"
@@ -320,6 +321,62 @@ static void an_update_gives_the_fresh_mesh(void **state)
     sweep_model_free(model);
 }
 
+// A trunk with a child far before a bend that is tighter than the trunk is wide, and one at the bend's end, on its inner side: there t jumps, and cuts of the patch
+// fail until they have moved outwards.
+static SweepModel *fork_in_a_bend(void)
+{
+    static const double BEND = 0.9, TURN = 2.3, BEFORE = 14, AFTER = 8;
+    SweepShape s[3];
+    double arc = BEND * TURN, length = BEFORE + arc + AFTER;
+    Vec3 along = vec3(cos(TURN), sin(TURN), 0), aside = vec3(-along.y, along.x, 0);
+    s[0] = (SweepShape){.pitch = 1, .parent = -1, .radius = 1, .open_start = true, .knots = 73};
+    for (int i = 0; i < s[0].knots; i++) {
+        double t = length * i / (s[0].knots - 1), turn = fmax(0, fmin(TURN, (t - BEFORE) / BEND)), over = fmax(0, t - BEFORE - arc);
+        s[0].knot[i] = vec3_add_scaled(vec3(fmin(t, BEFORE) + BEND * sin(turn), BEND * (1 - cos(turn)), 0), over, along);
+    }
+    s[1] = (SweepShape){.pitch = 1, .parent = 0, .parent_t = 4, .radius = 0.6};
+    sweep_shape_line(&s[1], vec3(4, 0, 0), vec3(7, -5, 0), 8);
+    Vec3 fork = vec3(BEFORE + BEND * sin(TURN), BEND * (1 - cos(TURN)), 0);
+    s[2] = (SweepShape){.pitch = 1, .parent = 0, .parent_t = BEFORE + arc, .radius = 0.4};
+    sweep_shape_line(&s[2], fork, vec3_add_scaled(vec3_add_scaled(fork, 3, aside), 1.5, along), 8);
+    return sweep_model_of(s, 3);
+}
+
+// Tries that failed are remembered: an update does not repeat them where nothing changed, and makes them anew where something did.
+static void failed_tries_are_remembered(void **state)
+{
+    (void)state;
+    SweepModel *model = fork_in_a_bend();
+    SweepField *field = sweep_field_create(model);
+    SweepMesh *mesh = sweep_mesh_create(field, NULL);
+    int tries = mesh->remade_patches, failed = mesh->parts->failed_count;
+    print_message("bend: %d patches, %d tries, %d of them failed\n", mesh->patches, tries, failed);
+    assert_closed(mesh);
+    assert_true(mesh->patches == 2 && failed > 0 && tries == mesh->patches + failed);
+    assert_true(sweep_mesh_update(mesh, field));
+    assert_int_equal(mesh->remade_patches, 0);
+    sweep_field_free(field);
+    // a row of the far child, then one of the child in the bend, then none
+    const int row[] = {model->branch[1].first_row + 2, model->branch[2].first_row + 2, 0};
+    const double by[] = {1.1, 1.1, 1};
+    for (int i = 0; i < 3; i++) {
+        model->row[row[i] * SWEEP_TERMS] *= by[i];
+        field = sweep_field_create(model);
+        SweepMesh *fresh = sweep_mesh_create(field, NULL);
+        assert_true(sweep_mesh_update(mesh, field));
+        print_message("row %d: %d of %d tries made anew; %d failed, fresh %d\n", row[i], mesh->remade_patches, fresh->remade_patches, mesh->parts->failed_count,
+                      fresh->parts->failed_count);
+        assert_true(same_mesh(mesh, fresh));
+        assert_true(mesh->failures == fresh->failures && mesh->parts->failed_count == fresh->parts->failed_count && fresh->parts->failed_count > 0);
+        // each try belongs to one of the two forks
+        assert_int_equal(mesh->remade_patches, i == 0 ? 1 : i == 1 ? fresh->remade_patches - 1 : 0);
+        sweep_mesh_free(fresh);
+        sweep_field_free(field);
+    }
+    sweep_mesh_free(mesh);
+    sweep_model_free(model);
+}
+
 // --- Tags ---
 
 static void ends_are_numbered(void **state)
@@ -495,9 +552,16 @@ int main(int count, char **argument)
 {
     all = count > 1 && !strcmp(argument[1], "--all");
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distance_and_volume_are_of_second_order), cmocka_unit_test(forks_are_closed),      cmocka_unit_test(moved_models_have_the_same_volume),
-        cmocka_unit_test(an_update_gives_the_fresh_mesh),          cmocka_unit_test(ends_are_numbered),     cmocka_unit_test(a_sac_is_part_of_the_mesh),
-        cmocka_unit_test(figures_of_an_ellipse_are_exact),         cmocka_unit_test(a_mask_has_the_volume), cmocka_unit_test(larger_models_are_closed),
+        cmocka_unit_test(distance_and_volume_are_of_second_order),
+        cmocka_unit_test(forks_are_closed),
+        cmocka_unit_test(moved_models_have_the_same_volume),
+        cmocka_unit_test(an_update_gives_the_fresh_mesh),
+        cmocka_unit_test(ends_are_numbered),
+        cmocka_unit_test(a_sac_is_part_of_the_mesh),
+        cmocka_unit_test(failed_tries_are_remembered),
+        cmocka_unit_test(figures_of_an_ellipse_are_exact),
+        cmocka_unit_test(a_mask_has_the_volume),
+        cmocka_unit_test(larger_models_are_closed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
