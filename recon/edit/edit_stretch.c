@@ -8,12 +8,18 @@
 enum { ROW_POINTS = 32 };
 static const double SAME = 1e-6;             // [mm] stations closer together are one
 
-static bool overlaps(const SweepStretch *s, int branch, double from, double to) { return s->branch == branch && s->from < to && s->to > from; }
+// At an end of the branch, a stretch has all that lies beyond.
+static bool overlaps(const SweepModel *m, const SweepStretch *s, int branch, double from, double to)
+{
+    const SweepBranch *b = &m->branch[branch];
+    double end = m->break_t[b->first_break + b->break_count - 1];
+    return s->branch == branch && (s->from <= 0 || s->from < to) && (s->to >= end || s->to > from);
+}
 
 int edit_stretch_at(const SweepModel *m, int branch, double from, double to)
 {
     for (int i = 0; i < m->stretch_count; i++)
-        if (overlaps(&m->stretch[i], branch, from, to))
+        if (overlaps(m, &m->stretch[i], branch, from, to))
             return i;
     return -1;
 }
@@ -73,7 +79,7 @@ bool edit_stretch_set(SweepModel *m, int branch, double t, double within, int co
                       .tension = 0.5,
                       .width = 0.5};
     for (int i = 0; old && i < m->stretch_count; i++)
-        if (overlaps(&m->stretch[i], branch, s.from, s.to))
+        if (overlaps(m, &m->stretch[i], branch, s.from, s.to))
             old[olds++] = i;
     if (olds > 0)
         s.from = fmin(s.from, m->stretch[old[0]].from), s.to = fmax(s.to, m->stretch[old[olds - 1]].to), s.section = m->stretch[old[0]].section;
@@ -82,7 +88,7 @@ bool edit_stretch_set(SweepModel *m, int branch, double t, double within, int co
         const SweepStretch *o = &m->stretch[i];
         if (!is_in && (o->branch > branch || (o->branch == branch && o->to > s.from)))
             add_merged(&list, m, &s, old, olds, t, within, count, contour), is_in = true;
-        if (!overlaps(o, branch, s.from, s.to))
+        if (!overlaps(m, o, branch, s.from, s.to))
             stretch_list_copy(&list, o, m->station, m->contour);
     }
     if (!is_in)
@@ -99,7 +105,7 @@ bool edit_stretch_delete(SweepModel *m, int branch, double t, double within, con
     for (int i = 0; i < m->stretch_count; i++) {
         const SweepStretch *s = &m->stretch[i];
         const SweepStation *at = m->station + s->first_station;
-        if (!overlaps(s, branch, t - within, t + within)) {
+        if (!overlaps(m, s, branch, t - within, t + within)) {
             stretch_list_copy(&list, s, m->station, m->contour);
             continue;
         }

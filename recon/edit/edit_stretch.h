@@ -5,7 +5,7 @@
 
 #include "geom/geom.h"
 
-// Index of a stretch of the branch that overlaps from … to; -1: none.
+// Index of a stretch of the branch that overlaps from … to, or has from = to within it; one that reaches to an end of the branch has the end, too. -1: none.
 int edit_stretch_at(const SweepModel *model, int branch, double from, double to);
 // Gives the contour at the station t to a stretch that reaches to the stations beside it; those that it overlaps become one with it. A station nearer to t than
 // `within` is replaced. Returns false with a fault.

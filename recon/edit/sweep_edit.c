@@ -97,7 +97,9 @@ static SweepModel *set_stretch(const Work *w, SweepModel *m, double within, cons
 {
     const SweepEdit *e = w->edit;
     if (edit_stretch_set(m, e->branch, e->t, within, e->count, contour, w->name, w->faults)) {
-        const SweepStretch *s = &m->stretch[edit_stretch_at(m, e->branch, e->t, e->t)];
+        int at = edit_stretch_at(m, e->branch, e->t, e->t);
+        SEL_ASSERT(at >= 0, "a stretch reaches beyond the station that it is given, or to the branch's end");
+        const SweepStretch *s = &m->stretch[at];
         w->change->from = fmin(w->change->from, s->from), w->change->to = fmax(w->change->to, s->to);
         w->change->misfit = 0;
         return m;
