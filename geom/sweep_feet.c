@@ -125,7 +125,8 @@ static void apply_stretches(const SweepFeet *feet, SweepBlock *b, int k, unsigne
     }
 }
 
-static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes)
+// `bends`: with the Hessian and the ring.
+static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes, bool bends)
 {
     SweepPartLanes *p = &b->part[k];
     SweepLane own;
@@ -137,9 +138,12 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
         if (p->absent[i] == 0 && p->segment[i]->harmonics > harmonics)
             harmonics = (int)p->segment[i]->harmonics;
     }
-    if (any)
+    if (any && bends)
         harmonics = b->harmonics = harmonics > b->harmonics ? harmonics : b->harmonics;
-    feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, harmonics, any ? &b->ring : NULL, own);
+    if (bends)
+        feet->kernels->evaluate(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, harmonics, any ? &b->ring : NULL, own);
+    else
+        feet->kernels->evaluate_slope(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, harmonics);
     if (feet->field->model->stretch_count > 0)
         apply_stretches(feet, b, k, lanes);
     for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -151,14 +155,48 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
     }
 }
 
+// A part with a share was blended in: what is left of the shares of those before it.
+static void keep_shares(SweepBlock *b, int part, const double *share)
+{
+    for (int k = 0; k < part; k++)
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            b->share[k][i] *= 1 - share[i];
+}
+
+// The sacs of the lanes without Hessians, in lanes for each node that they see.
+static void slope_sacs(const SweepFeet *feet, SweepBlock *b, unsigned sacs, SweepPartLanes *p)
+{
+    const VesselTree *tree = feet->field->model->sac;
+    const FootSample *at = &b->foot.at;
+    for (unsigned left = sacs; left != 0; left &= left - 1) {
+        int i = __builtin_ctz(left);
+        b->sac[i] = power_walk(tree, vec3(at->x[i], at->y[i], at->z[i]), b->sac[i], 1 << 20);
+    }
+    for (unsigned left = sacs; left != 0;) {
+        int node = b->sac[__builtin_ctz(left)];
+        const SweepSac *sac = &feet->field->sac[node];
+        Blobby blobs = blobby_of(tree, node);
+        SweepLane f, gx, gy, gz;
+        feet->kernels->blobs_slope(&blobs, at->x, at->y, at->z, f, gx, gy, gz);
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            if (!(left >> i & 1) || b->sac[i] != node)
+                continue;
+            left &= ~(1u << i);
+            p->absent[i] = 0, p->delta[i] = sac->delta;
+            p->f[i] = sac->scale * f[i];
+            p->gx[i] = sac->scale * gx[i], p->gy[i] = sac->scale * gy[i], p->gz[i] = sac->scale * gz[i];
+        }
+    }
+}
+
 // Blends the sacs of the lanes in.
-static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, unsigned sacs, SweepPartLanes *sac)
+static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, unsigned sacs, SweepPartLanes *sac, bool bends)
 {
     SweepPartLanes p = {.f = {0}};
     SweepLane share;
     for (int i = 0; i < FOOT_BLOCK; i++) {
         p.absent[i] = 1, p.f[i] = -1e300;
-        if (!(sacs >> i & 1))
+        if (!(sacs >> i & 1) || !bends)
             continue;
         SweepPart part;
         sweep_field_sac(feet->field, b->sac[i], vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), &part);
@@ -170,7 +208,14 @@ static void blend_sacs(const SweepFeet *feet, SweepBlock *b, unsigned lanes, uns
         p.hxx[i] = part.hessian.xx, p.hxy[i] = part.hessian.xy, p.hxz[i] = part.hessian.xz;
         p.hyy[i] = part.hessian.yy, p.hyz[i] = part.hessian.yz, p.hzz[i] = part.hessian.zz;
     }
-    feet->kernels->blend(&b->foot.at, &p, share);
+    if (!bends)
+        slope_sacs(feet, b, sacs, &p);
+    if (bends)
+        feet->kernels->blend(&b->foot.at, &p, share);
+    else
+        feet->kernels->blend_slope(&b->foot.at, &p, share);
+    if (!bends)
+        keep_shares(b, SWEEP_PARTS, share), memcpy(b->sac_share, share, sizeof share);
     for (int i = 0; i < FOOT_BLOCK; i++)
         if ((sacs & lanes) >> i & 1 && share[i] > 0.5)
             b->owner[i] = -1;
@@ -228,7 +273,7 @@ static void copy_part(FootSample *s, const SweepPartLanes *p)
 }
 
 // The own parts of all lanes first, whose fields show which other parts matter.
-static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, unsigned lanes, double *most)
+static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, unsigned lanes, double *most, bool bends)
 {
     unsigned own = 0, evaluated = 0;
     for (int i = 0; i < FOOT_BLOCK; i++)
@@ -236,7 +281,7 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
             own |= 1u << b->own[i];
     for (int k = 0; k < parts; k++)
         if (own >> k & 1) {
-            evaluate_part(feet, b, k, lanes);
+            evaluate_part(feet, b, k, lanes, bends);
             evaluated |= 1u << k;
         }
     for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -248,14 +293,14 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
     }
     for (int k = 0; k < parts; k++) {
         if (!(own >> k & 1) && lanes_need(b, k, lanes, most)) {
-            evaluate_part(feet, b, k, lanes);
+            evaluate_part(feet, b, k, lanes, bends);
             evaluated |= 1u << k;
         }
     }
     return evaluated;
 }
 
-void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
+static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool bends)
 {
     int parts = 0;
     unsigned sacs = 0;
@@ -296,32 +341,41 @@ void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes)
         if (parts > 1)
             feet->kernels->width(&b->part[k]);
     }
-    unsigned evaluated = evaluate_parts(feet, b, parts, lanes, most);
+    unsigned evaluated = evaluate_parts(feet, b, parts, lanes, most, bends);
+    if (!bends)
+        memset(b->share, 0, sizeof b->share), memset(b->sac_share, 0, sizeof b->sac_share);
     if (parts == 1 && sacs == 0) {
         copy_part(&b->foot.at, &b->part[0]);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if (lanes >> i & 1)
-                b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true, b->apart[i] = 0;
+                b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true, b->apart[i] = 0, b->share[0][i] = 1;
         return;
     }
     clear_sum(&b->foot.at);
     for (int k = 0; k < parts; k++) {
         if (!(evaluated >> k & 1))
             continue;
-        feet->kernels->blend(&b->foot.at, &b->part[k], share);
+        if (bends)
+            feet->kernels->blend(&b->foot.at, &b->part[k], share);
+        else
+            feet->kernels->blend_slope(&b->foot.at, &b->part[k], b->share[k]), keep_shares(b, k, b->share[k]), memcpy(share, b->share[k], sizeof share);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if ((lanes >> i & 1) && share[i] > 0.5 && b->part[k].absent[i] == 0)
                 b->owner[i] = k;
     }
     if (sacs != 0)
-        blend_sacs(feet, b, lanes, sacs, &sac);
+        blend_sacs(feet, b, lanes, sacs, &sac, bends);
     for (int i = 0; i < FOOT_BLOCK; i++)
         if (lanes >> i & 1) {
             b->keeps_t[i] = true;
             b->pure[i] = b->owner[i] >= 0 && b->foot.at.f[i] == b->part[b->owner[i]].f[i];
-            b->apart[i] = b->pure[i] && b->owner[i] == b->own[i] ? lane_apart(feet, b, i, most[i] - b->foot.at.f[i], sacs != 0 ? &sac : NULL) : 0;
+            b->apart[i] = bends && b->pure[i] && b->owner[i] == b->own[i] ? lane_apart(feet, b, i, most[i] - b->foot.at.f[i], sacs != 0 ? &sac : NULL) : 0;
         }
 }
+
+void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes) { sample(feet, b, lanes, true); }
+
+void sweep_block_slope(const SweepFeet *feet, SweepBlock *b, unsigned lanes) { sample(feet, b, lanes, false); }
 
 // --- Feet ---
 

@@ -37,6 +37,7 @@ typedef struct SweepBlock {
     bool pure[FOOT_BLOCK];               // after a sample: the owner alone, nothing is blended
     bool keeps_t[FOOT_BLOCK];            // the parts' t are near the feet; else they start from the view
     bool alone[FOOT_BLOCK];              // the own branch is evaluated alone, whatever is seen
+    SweepLane share[SWEEP_PARTS], sac_share;     // of the parts, after sweep_block_slope
     double apart[FOOT_BLOCK];            // after a sample of a pure lane: see VesselSweepMemory
     SweepLane own_t;                     // t on the own branch
     SweepLane is_flat;                   // 1: the ring holds (the own segment is no dome)
@@ -55,6 +56,8 @@ enum { FOOT_ALL = (1 << FOOT_BLOCK) - 1 };
 // F, gradient and Hessian at the feet of the lanes in `lanes` (bits). The first sample of a block is one of FOOT_ALL; lanes that are left out later keep their
 // parts and owners.
 void sweep_block_sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes);
+// The same without Hessians and rings, for those who need no feet; F and its gradient have the same bits. Sets the shares.
+void sweep_block_slope(const SweepFeet *feet, SweepBlock *b, unsigned lanes);
 
 typedef struct SweepFoot {
     Vec3 at, normal;

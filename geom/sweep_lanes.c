@@ -22,7 +22,8 @@ const double sweep_ring_sin[SWEEP_RING] = {0, THIN, DIAGONAL, WIDE, 1, WIDE, DIA
 
 #define KERNEL_TABLE(set)                                                                                                                                      \
     {                                                                                                                                                          \
-        seek_##set, evaluate_##set, blend_##set, width_##set, ring_##set, ring_points_##set, near_field_##set, predict_##set, newton_##set, finish_##set       \
+        seek_##set, evaluate_##set, evaluate_slope_##set, blend_##set, blend_slope_##set, blobs_slope_##set, width_##set, ring_##set, ring_points_##set,       \
+            near_field_##set, predict_##set, newton_##set, finish_##set                                                                                        \
     }
 
 #define KERNEL_TEXT "geom/sweep_kernel.inc"

@@ -54,8 +54,14 @@ typedef struct SweepKernels {
     // f, gradient and Hessian at the points. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
     // stored to it.
     void (*evaluate)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics, SweepRingLanes *ring, const double *own);
+    // The same without the Hessian and without a ring.
+    void (*evaluate_slope)(SweepPartLanes *part, const double *x, const double *y, const double *z, int harmonics);
     // Blends a part into the sum; `share`: the part's share, for each lane.
     void (*blend)(FootSample *sum, SweepPartLanes *part, double *share);
+    // The same without the Hessian.
+    void (*blend_slope)(FootSample *sum, SweepPartLanes *part, double *share);
+    // Compact blobs and their gradient at the same eight points.
+    void (*blobs_slope)(const Blobby *blobs, const double *x, const double *y, const double *z, double *f, double *gx, double *gy, double *gz);
     // Width of the blend at t.
     void (*width)(SweepPartLanes *part);
     // The nearest point of the ring at the foot's t to X.

@@ -163,16 +163,37 @@ static void add_cut(MeshPatch *patch, int branch, int ring, int *index)
     patch->cut[patch->cut_count++] = (MeshCut){.branch = branch, .ring = ring};
 }
 
+// Joins two runs of one patch that follow each other on a branch if the patch, followed beyond its cuts, could reach from one to the other. Returns whether there
+// are such runs.
+static bool join_close_runs(SweepMeshParts *parts, const MeshRun *run, int run_count, int *parent)
+{
+    bool any = false;
+    for (int i = 0; i + 1 < run_count; i++) {
+        const MeshRun *a = &run[i], *b = &run[i + 1];
+        if (a->branch != b->branch || disjoint_root(parent, i) != disjoint_root(parent, i + 1) ||
+            b->t_from - a->t_to > 2 * MESH_BEYOND * mesh_edge(parts, a->branch, 0.5 * (a->t_to + b->t_from)))
+            continue;
+        for (int j = a->to + 1; j < b->from; j++)
+            mark_gap(&parts->rings[a->branch], j);
+        any = true;
+    }
+    return any;
+}
+
 // The patches' definitions: runs, sacs and cuts.
-static MeshPatch *define_patches(const SweepMeshParts *parts, int *count)
+static MeshPatch *define_patches(SweepMeshParts *parts, int *count)
 {
     const VesselTree *sac = parts->feet.field->model->sac;
-    int *first_run = HEAP_ZEROED((size_t)parts->branch_count + 1, sizeof *first_run), sacs = sac ? sac->node_count : 0;
-    MeshRun *run;
-    int runs = find_runs(parts, &run, first_run), *parent = HEAP_ZEROED((size_t)(runs + sacs) + 1, sizeof *parent);
-    for (int i = 0; i < runs + sacs; i++)
-        parent[i] = i;
-    join_marks(parts, run, first_run, runs, parent);
+    int *first_run = HEAP_ZEROED((size_t)parts->branch_count + 1, sizeof *first_run), sacs = sac ? sac->node_count : 0, *parent = NULL, runs;
+    MeshRun *run = NULL;
+    do {
+        free(run);
+        runs = find_runs(parts, &run, first_run);
+        parent = HEAP_GROWN(parent, (size_t)(runs + sacs) + 1, sizeof *parent);
+        for (int i = 0; i < runs + sacs; i++)
+            parent[i] = i;
+        join_marks(parts, run, first_run, runs, parent);
+    } while (join_close_runs(parts, run, runs, parent));
     MeshPatch *patch = HEAP_ZEROED((size_t)runs + 1, sizeof *patch);
     *count = 0;
     for (int root = 0; root < runs; root++) {

@@ -40,6 +40,9 @@ typedef struct MeshMark {
     double from, to;         // t on the branch
 } MeshMark;
 
+// Cells that a patch's wall is followed beyond the patch, see sweep_march.h.
+enum { MESH_BEYOND = 6 };
+
 // Gaps from … to of a branch that belong to a patch. Its cuts are the rings `from` and `to + 1`, unless these are poles or middles.
 typedef struct MeshRun {
     int branch, from, to;

@@ -131,7 +131,7 @@ void mesh_normals(const SweepFeet *feet, int count, const Vec3 *at, SweepPlace *
             mesh_set_place(feet, &b, i, &place[v]);
             b.foot.at.x[i] = at[v].x, b.foot.at.y[i] = at[v].y, b.foot.at.z[i] = at[v].z;
         }
-        sweep_block_sample(feet, &b, FOOT_ALL);
+        sweep_block_slope(feet, &b, FOOT_ALL);
         for (int i = 0; i < FOOT_BLOCK && first + i < count; i++) {
             normal[first + i] = vec3_unit(vec3(-b.foot.at.gx[i], -b.foot.at.gy[i], -b.foot.at.gz[i]));
             place[first + i] = mesh_owner(&b, i);
@@ -176,21 +176,17 @@ static void add_mark(MeshRings *rings, MeshMark mark)
 }
 
 // What a vertex that is not on its branch's own wall blends with.
-static void mark_vertex(const SweepMeshParts *parts, MeshRings *rings, int branch, double t, Vec3 x)
+static void mark_vertex(const SweepMeshParts *parts, MeshRings *rings, int branch, double t, const SweepBlock *b, int lane)
 {
-    const SweepField *field = parts->feet.field;
+    const SweepView *view = b->view[lane];
     double margin = mesh_edge(parts, branch, t);
-    SweepBlend blend;
-    sweep_field_blend(field, (SweepPlace){.branch = branch, .t = t}, x, &blend);
-    for (int i = 0; i < blend.count; i++) {
-        const SweepPart *p = &blend.part[i];
-        if (!(p->share > 0) || p->branch == branch)
-            continue;
-        if (p->branch >= 0)
-            add_mark(rings, (MeshMark){.ring = rings->count - 1, .branch = p->branch, .sac = -1, .from = p->t - margin, .to = p->t + margin});
-        else
-            add_mark(rings, (MeshMark){.ring = rings->count - 1, .branch = -1, .sac = field->sac_group[p->sac]});
+    for (int k = 0; k < view->count; k++) {
+        double there = b->part[k].t[lane];
+        if (b->share[k][lane] > 0 && view->of[k].branch != branch)
+            add_mark(rings, (MeshMark){.ring = rings->count - 1, .branch = view->of[k].branch, .sac = -1, .from = there - margin, .to = there + margin});
     }
+    if (b->sac_share[lane] > 0)
+        add_mark(rings, (MeshMark){.ring = rings->count - 1, .branch = -1, .sac = parts->feet.field->sac_group[b->sac[lane]]});
 }
 
 // Normals of a ring's vertices on the branch's own wall, and whether something else is blended there.
@@ -204,7 +200,6 @@ static void finish_ring(const SweepMeshParts *parts, int branch, MeshRings *ring
         sweep_block_begin(&b);
         FootSample *at = &b.foot.at;
         SweepPartLanes *p = &b.part[0];
-        SweepLane own = {0};
         for (int i = 0; i < FOOT_BLOCK; i++) {
             Vec3 x = rings->at[ring->first + (first + i < ring->count ? first + i : first)];
             at->x[i] = x.x, at->y[i] = x.y, at->z[i] = x.z;
@@ -219,9 +214,9 @@ static void finish_ring(const SweepMeshParts *parts, int branch, MeshRings *ring
                 sweep_block_place(&parts->feet, &b, i, (int)(p->segment[i] - field->segment), -1, there);
         }
         if (alone)
-            parts->feet.kernels->evaluate(p, at->x, at->y, at->z, parts->feet.harmonics, NULL, own);
+            parts->feet.kernels->evaluate_slope(p, at->x, at->y, at->z, parts->feet.harmonics);
         else
-            sweep_block_sample(&parts->feet, &b, FOOT_ALL);
+            sweep_block_slope(&parts->feet, &b, FOOT_ALL);
         for (int i = 0; i < FOOT_BLOCK && first + i < ring->count; i++) {
             int v = ring->first + first + i;
             Vec3 g = alone ? vec3(p->gx[i], p->gy[i], p->gz[i]) : vec3(at->gx[i], at->gy[i], at->gz[i]);
@@ -229,7 +224,7 @@ static void finish_ring(const SweepMeshParts *parts, int branch, MeshRings *ring
             if (alone || (b.pure[i] && b.owner[i] == b.own[i]))
                 continue;
             ring->is_blended = true;
-            mark_vertex(parts, rings, branch, t, rings->at[v]);
+            mark_vertex(parts, rings, branch, t, &b, i);
         }
     }
 }
