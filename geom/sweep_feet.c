@@ -146,6 +146,10 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
         feet->kernels->evaluate_slope(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, harmonics);
     if (feet->field->model->stretch_count > 0)
         apply_stretches(feet, b, k, lanes);
+    // far from the curve t may not settle; then the point is not in the section's plane, where its radius would be too small
+    for (int i = 0; i < FOOT_BLOCK && !bends; i++)
+        if (p->absent[i] == 0 && p->settled[i] == 0)
+            p->f[i] = fmin(p->f[i], p->segment[i]->largest - p->away[i]);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         if (own[i] > 0) {
             b->is_flat[i] = p->segment[i]->rise == 0 && p->segment[i]->is_shaped == 0;
@@ -338,6 +342,9 @@ static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool be
         }
         if (others != 0)
             seek_part(feet, b, &b->part[k], others);
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            if ((lanes >> i & 1) && k == b->own[i])
+                b->part[k].settled[i] = first.settled[i];
         if (parts > 1)
             feet->kernels->width(&b->part[k]);
     }

@@ -1,7 +1,8 @@
 // See sweep_march.h.
 //
-// A lattice point's place is that of the sample of the patch in whose tube it lies deepest; where the part of largest share is on another branch, F is seen
-// from there. Cells are taken in waves: the points that a wave needs are evaluated in lanes, then each cell gives its triangles and asks for the neighbours
+// F depends on the place from which it is seen where vessels overlap that do not see each other, and where a curve bends more tightly than the lumen is wide. At a
+// lattice point it is the largest F as seen from the samples of the patch in whose tubes the point lies, and from the part of largest share there: so the mesh is
+// the surface of all lumens together. Cells are taken in waves: the points that a wave needs are evaluated in lanes, then each cell gives its triangles and asks for the neighbours
 // that the wall enters. Beyond the patch the march goes on for a few cells only: far enough to tell islands, where t jumps, from what lies beyond a cut.
 #include "geom/sweep_march.h"
 
@@ -165,61 +166,92 @@ static int block_of(const Follow *f, const int at[3])
 
 static Vec3 lattice_point(const Follow *f, const int at[3]) { return vec3(at[0] * f->cell, at[1] * f->cell, at[2] * f->cell); }
 
-// The sample in whose tube x lies deepest; -1: there is none near it.
-static int best_sample(const Follow *f, Vec3 x, int block)
+enum { VIEWS = 4 };
+
+// The samples from which F at x is to be seen: those in whose tubes x lies deepest, deeper than in the samples beside them. The first is the deepest of all.
+static int best_samples(const Follow *f, Vec3 x, int block, int *best)
 {
-    double deepest = -HUGE_VAL;
-    int best = -1;
-    for (int link = block >= 0 ? f->march.block[block].first : -1; link >= 0; link = f->march.link[link].next) {
-        const Sample *s = &f->sample[f->march.link[link].ball];
-        double far2 = vec3_norm2(vec3_sub(x, s->center));
-        if (best >= 0 && s->radius > deepest && far2 > same_square(s->radius - deepest))
-            continue;
-        double deep = s->radius - sqrt(far2);
-        if (deep > deepest)
-            deepest = deep, best = f->march.link[link].ball;
+    static const double OUTSIDE = 0.25;      // [radii] how far outside of a sample's tube the wall may still be its own
+    double deep[VIEWS], before = -HUGE_VAL;
+    int count = 0, last = -2;
+    bool rises = false;
+    for (int link = block >= 0 ? f->march.block[block].first : -1;; link = f->march.link[link].next) {
+        int ball = link >= 0 ? f->march.link[link].ball : -1;
+        const Sample *s = ball >= 0 ? &f->sample[ball] : NULL;
+        bool follows = s && ball == last + 1 && s->place.branch >= 0 && s->place.branch == f->sample[last].place.branch;
+        double here = s ? s->radius - vec3_distance(x, s->center) : 0;
+        if (rises && !(follows && here > before)) {
+            // the sample before is deeper than both beside it
+            int at = count;
+            for (; at > 0 && before > deep[at - 1]; at--)
+                if (at < VIEWS)
+                    deep[at] = deep[at - 1], best[at] = best[at - 1];
+            if (at < VIEWS)
+                deep[at] = before, best[at] = last;
+            count += count < VIEWS;
+        }
+        if (!s)
+            break;
+        rises = !follows || here > before;
+        before = here, last = ball;
     }
-    return best;
+    while (count > 1 && deep[count - 1] < -OUTSIDE * f->sample[best[count - 1]].radius)
+        count--;
+    return count;
 }
 
 typedef struct Queue {
     int count;
     int index[FOOT_BLOCK];
+    SweepPlace place[FOOT_BLOCK];
+    int views[FOOT_BLOCK], view[FOOT_BLOCK][VIEWS];      // other samples from which F may have to be seen
 } Queue;
 
-// F at the queued points from their places. Returns the bits of those whose largest part is on another branch than the place.
-static unsigned sample_queue(Follow *f, const Queue *q)
+// Whether a sample's stretch of its branch is among the parts that were seen in a lane.
+static bool is_seen(const Sample *s, const SweepBlock *b, int lane)
+{
+    if (s->place.branch < 0)
+        return b->sac[lane] >= 0;
+    for (int k = 0; k < b->view[lane]->count; k++)
+        if (b->view[lane]->of[k].branch == s->place.branch && fabs(b->part[k].t[lane] - s->place.t) < s->radius)
+            return true;
+    return false;
+}
+
+static void put_place(Queue *q, int index, SweepPlace place)
+{
+    SEL_ASSERT(q->count < FOOT_BLOCK, "a full queue is sampled");
+    q->index[q->count] = index, q->place[q->count] = place;
+    q->views[q->count++] = 0;
+}
+
+// F at the queued points from their places; a point keeps the largest. Where the part of largest share is on another branch than the place, or where a sample
+// that holds the point was not seen, the point is queued `again` (NULL: not).
+static void sample_queue(Follow *f, Queue *q, Queue *again)
 {
     SweepBlock b;
-    unsigned other = 0;
+    if (q->count == 0)
+        return;
     sweep_block_begin(&b);
     for (int i = 0; i < FOOT_BLOCK; i++) {
-        const Point *point = &f->point[q->index[i < q->count ? i : 0]];
-        Vec3 x = lattice_point(f, point->at);
-        mesh_set_place(&f->parts->feet, &b, i, &point->place);
+        int k = i < q->count ? i : 0;
+        Vec3 x = lattice_point(f, f->point[q->index[k]].at);
+        mesh_set_place(&f->parts->feet, &b, i, &q->place[k]);
         b.foot.at.x[i] = x.x, b.foot.at.y[i] = x.y, b.foot.at.z[i] = x.z;
     }
     sweep_block_slope(&f->parts->feet, &b, FOOT_ALL);
     for (int i = 0; i < q->count; i++) {
         Point *point = &f->point[q->index[i]];
         SweepPlace owner = mesh_owner(&b, i);
-        point->value = b.foot.at.f[i];
-        other |= owner.branch != point->place.branch ? 1u << i : 0;
-        point->place = owner;
-    }
-    return other;
-}
-
-static void run_queue(Follow *f, Queue *q, Queue *again)
-{
-    unsigned other = q->count > 0 ? sample_queue(f, q) : 0;
-    for (int i = 0; i < q->count; i++) {
-        if (!(other >> i & 1))
-            continue;
-        again->index[again->count++] = q->index[i];
-        if (again->count == FOOT_BLOCK) {
-            sample_queue(f, again);
-            again->count = 0;
+        if (!(point->value > b.foot.at.f[i]))
+            point->value = b.foot.at.f[i], point->place = owner;
+        for (int k = -1; again && k < q->views[i]; k++) {
+            const Sample *s = k >= 0 ? &f->sample[q->view[i][k]] : NULL;
+            if (s ? is_seen(s, &b, i) : owner.branch == q->place[i].branch)
+                continue;
+            put_place(again, q->index[i], s ? s->place : owner);
+            if (again->count == FOOT_BLOCK)
+                sample_queue(f, again, NULL);
         }
     }
     q->count = 0;
@@ -232,19 +264,19 @@ static void evaluate_points(Follow *f)
     int first = f->evaluated;
     for (; f->evaluated < f->points; f->evaluated++) {
         Point *point = &f->point[f->evaluated];
-        int best = best_sample(f, lattice_point(f, point->at), block_of(f, point->at));
-        point->value = -f->cell;
+        int best[VIEWS], views = best_samples(f, lattice_point(f, point->at), block_of(f, point->at), best);
+        point->value = views > 0 ? -HUGE_VAL : -f->cell;
         point->place = (SweepPlace){.branch = -1, .sac = -1};
-        if (best < 0)
+        if (views == 0)
             continue;
-        point->place = f->sample[best].place;
-        queue.index[queue.count++] = f->evaluated;
+        put_place(&queue, f->evaluated, f->sample[best[0]].place);
+        for (int k = 1; k < views; k++)
+            queue.view[queue.count - 1][queue.views[queue.count - 1]++] = best[k];
         if (queue.count == FOOT_BLOCK)
-            run_queue(f, &queue, &again);
+            sample_queue(f, &queue, &again);
     }
-    run_queue(f, &queue, &again);
-    if (again.count > 0)
-        sample_queue(f, &again);
+    sample_queue(f, &queue, &again);
+    sample_queue(f, &again, NULL);
     for (int i = first; i < f->points; i++) {
         Point *point = &f->point[i];
         int cut;

@@ -6,6 +6,7 @@
 #include "geom/sweep_mesh.h"
 
 #include "base/base.h"
+#include "geom/blobby.h"
 #include "geom/sweep_mesh_parts.h"
 
 #include <stddef.h>
@@ -157,6 +158,21 @@ static void join_marks(const SweepMeshParts *parts, const MeshRun *run, const in
     }
 }
 
+// Joins sacs that see each other's blobs: they have one wall.
+static void join_sacs(const SweepField *field, int run_count, int *parent)
+{
+    const VesselTree *sac = field->model->sac;
+    for (int i = 0; sac && i < sac->node_count; i++) {
+        Blobby blobs = blobby_of(sac, i);
+        for (int k = 0; k < blobs.count; k++) {
+            int owner = 0;
+            while (owner + 1 < sac->node_count && sac->blob_offset[owner + 1] <= blobby_row(&blobs, k))
+                owner++;
+            disjoint_join(parent, run_count + field->sac_group[i], run_count + field->sac_group[owner]);
+        }
+    }
+}
+
 static void add_cut(MeshPatch *patch, int branch, int ring, int *index)
 {
     *index = patch->cut_count;
@@ -193,6 +209,7 @@ static MeshPatch *define_patches(SweepMeshParts *parts, int *count)
         for (int i = 0; i < runs + sacs; i++)
             parent[i] = i;
         join_marks(parts, run, first_run, runs, parent);
+        join_sacs(parts->feet.field, runs, parent);
     } while (join_close_runs(parts, run, runs, parent));
     MeshPatch *patch = HEAP_ZEROED((size_t)runs + 1, sizeof *patch);
     *count = 0;

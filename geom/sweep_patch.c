@@ -103,6 +103,7 @@ typedef struct Cutter {
     Patch *p;
     MeshPlane *plane;        // (cuts)
     bool *is_blended;        // (cuts)
+    bool *is_upper;          // (cuts) the patch lies below it on the branch
     KeyMap of_edge;
     int vertices, capacity;
     Vec3 *at;
@@ -318,9 +319,12 @@ static void rim_of(const Cutter *c, int *next)
     free(edge);
 }
 
-// Reads the loop through `start` into the cut, by increasing angle. Returns false, with the cut unchanged, if it does not run once around the branch.
-static bool read_loop(const Cutter *c, int start, const int *next, MeshCut *cut, const MeshPlane *plane)
+// Reads the loop through `start` into the cut, by increasing angle. Returns false, with the cut unchanged, if it does not run once around the branch, with the
+// patch on its side.
+static bool read_loop(const Cutter *c, int start, const int *next, int index)
 {
+    MeshCut *cut = &c->p->out->cut[index];
+    const MeshPlane *plane = &c->plane[index];
     const double turn = 6.283185307179586476925;
     int count = 1;
     for (int v = next[start]; v != start; v = next[v])
@@ -336,7 +340,7 @@ static bool read_loop(const Cutter *c, int start, const int *next, MeshCut *cut,
         if (i < count)
             vertex[i] = v, angle[i] = i == 0 ? here : angle[0] + total;
     }
-    if (!(fabs(fabs(total) - turn) < 0.1)) {
+    if (!(fabs(total - (c->is_upper[index] ? turn : -turn)) < 0.1)) {
         free(vertex), free(angle);
         return false;
     }
@@ -381,7 +385,7 @@ static bool read_loops(Cutter *c)
             seen[w] = true;
         MeshCut *cut = c->cut[v] >= 0 ? &out->cut[c->cut[v]] : NULL;
         if (cut && (cut->count == 0 || size[disjoint_root(parent, v)] > size[disjoint_root(parent, cut->vertex[0])]))
-            read_loop(c, v, next, cut, &c->plane[c->cut[v]]);
+            read_loop(c, v, next, c->cut[v]);
     }
     memset(seen, 0, room * sizeof *seen);
     for (int i = 0; i < out->cut_count; i++) {
@@ -534,7 +538,13 @@ static bool try_patch(const SweepMeshParts *parts, MeshPatch *out, double cell, 
     if (good) {
         SweepMarch *march = &p.march;
         Vec3 *normal = HEAP_ZEROED((size_t)march->vertices + 1, sizeof *normal);
-        Cutter c = {.p = &p, .plane = HEAP_ZEROED((size_t)out->cut_count + 1, sizeof *c.plane), .is_blended = HEAP_ZEROED((size_t)out->cut_count + 1, 1)};
+        Cutter c = {.p = &p,
+                    .plane = HEAP_ZEROED((size_t)out->cut_count + 1, sizeof *c.plane),
+                    .is_blended = HEAP_ZEROED((size_t)out->cut_count + 1, 1),
+                    .is_upper = HEAP_ZEROED((size_t)out->cut_count + 1, 1)};
+        for (int r = 0; r < out->run_count; r++)
+            if (out->run[r].cut_to >= 0)
+                c.is_upper[out->run[r].cut_to] = true;
         for (int i = 0; i < out->cut_count; i++) {
             const MeshRing *ring = &parts->rings[out->cut[i].branch].ring[out->cut[i].ring];
             c.plane[i] = mesh_plane(&parts->feet, out->cut[i].branch, ring->t);
@@ -560,6 +570,7 @@ static bool try_patch(const SweepMeshParts *parts, MeshPatch *out, double cell, 
         free_cutter(&c);
         free(c.plane);
         free(c.is_blended);
+        free(c.is_upper);
     }
     sweep_march_free(&p.march);
     return good;

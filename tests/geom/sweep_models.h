@@ -80,22 +80,58 @@ static inline SweepModel *sweep_model_of(const SweepShape *shape, int branches)
     return m;
 }
 
-// A round sac beside the first branch of a model: one blob whose surface is a sphere, linked to the branch's knot. The model owns it.
+// One blob whose surface is a sphere, of a node linked to `parent`.
+static inline void sweep_set_sphere(VesselTree *t, int node, int parent, int blob, Vec3 center, double radius)
+{
+    t->center[node] = t->blob_center[blob] = center;
+    t->radius[node] = radius;
+    t->direction[node] = vec3_unit(vec3_sub(center, t->center[parent]));
+    t->parent[node] = parent;
+    t->kind[node] = NODE_ANEURYSM;
+    t->blob_width[blob] = 2 * radius;
+    t->blob_amplitude[blob] = 1 / (0.75 * 0.75 * 0.75);      // u = 3/4 at d = radius
+    t->blob_offset[node + 1] = blob + 1;
+}
+
+static inline void sweep_set_neck(VesselTree *t, int node, int parent, Vec3 center, double radius, Vec3 towards)
+{
+    t->center[node] = center, t->radius[node] = radius, t->direction[node] = vec3_unit(vec3_sub(towards, center));
+    t->parent[node] = parent, t->kind[node] = NODE_VESSEL;
+    t->blob_offset[node + 1] = t->blob_offset[node];
+}
+
+static inline void sweep_own_sac(SweepModel *m, VesselTree *t)
+{
+    vessel_tree_link(t);
+    if (m->sac)
+        vessel_tree_free(m->sac);
+    free(m->sac_node);
+    m->sac = t;
+    m->sac_node = (int32_t *)calloc((size_t)t->node_count, sizeof *m->sac_node);
+    for (int i = 0; i < t->node_count; i++)
+        m->sac_node[i] = m->knot_count + i;
+}
+
+// A round sac beside the first branch of a model, linked to the branch's knot. The model owns it.
 static inline void sweep_add_sac(SweepModel *m, int knot, Vec3 center, double radius)
 {
     VesselTree *t = vessel_tree_create_shared(2, 0, 1);
-    t->center[0] = m->knot[knot], t->center[1] = t->blob_center[0] = center;
-    t->radius[0] = m->branch[0].radius, t->radius[1] = radius;
-    t->direction[0] = t->direction[1] = vec3_unit(vec3_sub(center, m->knot[knot]));
-    t->parent[0] = -1, t->parent[1] = 0;
-    t->kind[0] = NODE_VESSEL, t->kind[1] = NODE_ANEURYSM;
-    t->blob_width[0] = 2 * radius;
-    t->blob_amplitude[0] = 1 / (0.75 * 0.75 * 0.75);     // u = 3/4 at d = radius
-    t->blob_offset[1] = 0, t->blob_offset[2] = 1;
-    vessel_tree_link(t);
-    m->sac = t;
-    m->sac_node = (int32_t *)calloc(2, sizeof *m->sac_node);
-    m->sac_node[0] = m->knot_node[knot], m->sac_node[1] = m->knot_count + 1;
+    sweep_set_neck(t, 0, -1, m->knot[knot], m->branch[0].radius, center);
+    sweep_set_sphere(t, 1, 0, 0, center, radius);
+    sweep_own_sac(m, t);
+    m->sac_node[0] = m->knot_node[knot];
+}
+
+// A second round sac, beside the model's sac and linked to it by a vessel's node between them: a group of its own.
+static inline void sweep_add_lobe(SweepModel *m, Vec3 center, double radius)
+{
+    const VesselTree *old = m->sac;
+    VesselTree *t = vessel_tree_create_shared(4, 0, 2);
+    sweep_set_neck(t, 0, -1, old->center[0], old->radius[0], old->center[1]);
+    sweep_set_sphere(t, 1, 0, 0, old->center[1], old->radius[1]);
+    sweep_set_neck(t, 2, 1, vec3_mix(old->center[1], center, 0.5), 0.2 * radius, center);
+    sweep_set_sphere(t, 3, 2, 1, center, radius);
+    sweep_own_sac(m, t);
 }
 
 #endif

@@ -440,6 +440,53 @@ static void a_sac_is_part_of_the_mesh(void **state)
     sweep_model_free(model);
 }
 
+// A lobe on a sac, with nodes of its own: the sac sees the lobe's blob, the vessel does not.
+static void a_lobe_of_a_sac_is_closed(void **state)
+{
+    (void)state;
+    SweepShape s;
+    straight(&s);
+    SweepModel *model = sweep_model_of(&s, 1);
+    sweep_add_sac(model, 4, vec3(5, 3.6, 3), 1.5);
+    sweep_add_lobe(model, vec3(5, 5.8, 3), 1.2);
+    SweepMesh *mesh = mesh_of(model, NULL);
+    assert_closed(mesh);
+    assert_int_equal(vertices_off_wall(model, mesh), 0);
+    double top = 0;
+    for (int v = 0; v < mesh->surface->vertex_count; v++)
+        top = fmax(top, mesh->surface->vertex[v].y);
+    assert_true(top > 6.9 && top < 7.5);
+    sweep_mesh_free(mesh);
+    sweep_model_free(model);
+}
+
+// A child that turns back at its fork more tightly than its lumen is wide: t jumps across the inner side of the bend, within the patch and at its cut.
+static void a_hairpin_is_closed(void **state)
+{
+    (void)state;
+    enum { KNOTS = 60 };
+    static const double bend = 0.3, turn = 1.7;
+    for (int moved = 0; moved < 3; moved++) {
+        SweepShape s[2] = {{.pitch = 1, .parent = -1, .radius = 1, .open_start = true},
+                           {.pitch = 0.5, .parent = 0, .parent_t = 6, .radius = 0.5, .knots = KNOTS}};
+        sweep_shape_line(&s[0], vec3(0, 0, 0), vec3(14, 0, 0), 15);
+        for (int k = 0; k < KNOTS; k++) {
+            double way = 6.0 * k / (KNOTS - 1), a = fmax(0, fmin(turn, (way - 1.5) / bend)), rest = fmax(0, way - 1.5 - bend * turn);
+            s[1].knot[k] = vec3(6 + bend * (1 - cos(a)) + rest * sin(a), fmin(way, 1.5) + bend * sin(a) + rest * cos(a), 0.4 * fmax(0, way - 1.5));
+        }
+        for (int i = 0; i < 2 && moved; i++)
+            for (int k = 0; k < s[i].knots; k++)
+                s[i].knot[k] = moved == 1 ? mirrored(s[i].knot[k]) : rotated(s[i].knot[k]);
+        SweepModel *model = sweep_model_of(s, 2);
+        SweepMesh *mesh = mesh_of(model, NULL);
+        SurfaceCensus c = census_of(mesh);
+        print_message("hairpin: %d patches, %d failures, Euler characteristic %d, open %d\n", mesh->patches, mesh->failures, (int)c.euler, (int)c.open_edges);
+        assert_closed(mesh);
+        sweep_mesh_free(mesh);
+        sweep_model_free(model);
+    }
+}
+
 // --- Sections and masks ---
 
 static double semi_axis[2];
@@ -577,6 +624,8 @@ int main(int count, char **argument)
         cmocka_unit_test(ends_are_numbered),
         cmocka_unit_test(a_sac_is_part_of_the_mesh),
         cmocka_unit_test(failed_tries_are_remembered),
+        cmocka_unit_test(a_lobe_of_a_sac_is_closed),
+        cmocka_unit_test(a_hairpin_is_closed),
         cmocka_unit_test(figures_of_an_ellipse_are_exact),
         cmocka_unit_test(a_mask_has_the_volume),
         cmocka_unit_test(larger_models_are_closed),
