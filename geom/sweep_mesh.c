@@ -6,7 +6,6 @@
 #include "geom/sweep_mesh.h"
 
 #include "base/base.h"
-#include "geom/blobby.h"
 #include "geom/sweep_mesh_parts.h"
 
 #include <stddef.h>
@@ -158,19 +157,15 @@ static void join_marks(const SweepMeshParts *parts, const MeshRun *run, const in
     }
 }
 
-// Joins sacs that see each other's blobs: they have one wall.
+// Joins sacs whose nodes' balls overlap: they have one wall.
 static void join_sacs(const SweepField *field, int run_count, int *parent)
 {
     const VesselTree *sac = field->model->sac;
-    for (int i = 0; sac && i < sac->node_count; i++) {
-        Blobby blobs = blobby_of(sac, i);
-        for (int k = 0; k < blobs.count; k++) {
-            int owner = 0;
-            while (owner + 1 < sac->node_count && sac->blob_offset[owner + 1] <= blobby_row(&blobs, k))
-                owner++;
-            disjoint_join(parent, run_count + field->sac_group[i], run_count + field->sac_group[owner]);
-        }
-    }
+    for (int i = 0; sac && i < sac->node_count; i++)
+        for (int k = 0; k < i; k++)
+            if (sac->kind[i] == NODE_ANEURYSM && sac->kind[k] == NODE_ANEURYSM &&
+                vec3_distance(sac->center[i], sac->center[k]) < sac->radius[i] + sac->radius[k])
+                disjoint_join(parent, run_count + field->sac_group[i], run_count + field->sac_group[k]);
 }
 
 static void add_cut(MeshPatch *patch, int branch, int ring, int *index)
