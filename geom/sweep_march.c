@@ -43,7 +43,8 @@ typedef struct Follow {
     const MeshPatch *patch;
     double cell;
     int samples, sample_capacity;
-    Sample *sample;
+    Sample *sample;          // those from sacs_from on are sacs
+    int sacs_from;
     KeyMap point_of, cell_of;
     int points, point_capacity, evaluated;
     Point *point;
@@ -89,7 +90,6 @@ static void add_sample(Follow *f, Sample sample)
         f->sample_capacity = f->sample_capacity > 0 ? 2 * f->sample_capacity : 64;
         f->sample = HEAP_GROWN(f->sample, (size_t)f->sample_capacity, sizeof *f->sample);
     }
-    f->good = f->good && march_add_ball(&f->march, f->samples, sample.center, sample.reach);
     f->sample[f->samples++] = sample;
 }
 
@@ -111,12 +111,15 @@ static void add_place(Follow *f, int branch, double t)
     // beyond an end the section runs on with its slope
     if (t >= length)
         largest = fmax(largest, fmax(sweep_field_largest(field, branch, 2 * length + largest), sweep_field_largest(field, branch, length * (1 - 1e-12))));
-    add_sample(f, (Sample){.place = {.branch = branch, .t = t, .sac = -1},
-                           .center = sweep_curve_at(field->curve[branch], t).s,
-                           .radius = largest,
-                           .reach = 1.1 * largest + widest_blend(field, branch, t) + 2 * f->cell});
+    Sample sample = {.place = {.branch = branch, .t = t, .sac = -1},
+                     .center = sweep_curve_at(field->curve[branch], t).s,
+                     .radius = largest,
+                     .reach = 1.1 * largest + widest_blend(field, branch, t) + 2 * f->cell};
+    f->good = f->good && march_add_ball(&f->march, f->samples, sample.center, sample.reach);
+    add_sample(f, sample);
 }
 
+// Sacs are few and wide: their samples belong to no blocks.
 static void add_sacs(Follow *f)
 {
     const SweepField *field = field_of(f);
@@ -150,6 +153,7 @@ static void add_samples(Follow *f)
         }
         add_place(f, run->branch, to);
     }
+    f->sacs_from = f->samples;
     add_sacs(f);
 }
 
@@ -168,6 +172,18 @@ static Vec3 lattice_point(const Follow *f, const int at[3]) { return vec3(at[0] 
 
 enum { VIEWS = 4 };
 
+// Keeps the deepest samples in order.
+static void add_best(int *best, double *deep, int *count, int sample, double here)
+{
+    int at = *count;
+    for (; at > 0 && here > deep[at - 1]; at--)
+        if (at < VIEWS)
+            deep[at] = deep[at - 1], best[at] = best[at - 1];
+    if (at < VIEWS)
+        deep[at] = here, best[at] = sample;
+    *count += *count < VIEWS;
+}
+
 // The samples from which F at x is to be seen: those in whose tubes x lies deepest, deeper than in the samples beside them. The first is the deepest of all.
 static int best_samples(const Follow *f, Vec3 x, int block, int *best)
 {
@@ -180,21 +196,23 @@ static int best_samples(const Follow *f, Vec3 x, int block, int *best)
         const Sample *s = ball >= 0 ? &f->sample[ball] : NULL;
         bool follows = s && ball == last + 1 && s->place.branch >= 0 && s->place.branch == f->sample[last].place.branch;
         double here = s ? s->radius - vec3_distance(x, s->center) : 0;
-        if (rises && !(follows && here > before)) {
-            // the sample before is deeper than both beside it
-            int at = count;
-            for (; at > 0 && before > deep[at - 1]; at--)
-                if (at < VIEWS)
-                    deep[at] = deep[at - 1], best[at] = best[at - 1];
-            if (at < VIEWS)
-                deep[at] = before, best[at] = last;
-            count += count < VIEWS;
-        }
+        // the sample before is deeper than both beside it
+        if (rises && !(follows && here > before))
+            add_best(best, deep, &count, last, before);
         if (!s)
             break;
         rises = !follows || here > before;
         before = here, last = ball;
     }
+    int sac = -1;
+    for (int i = f->sacs_from; i < f->samples; i++) {
+        const Sample *s = &f->sample[i];
+        double away = vec3_distance(x, s->center), here = s->radius - away;
+        if (away < s->reach && (sac < 0 || here > before))
+            sac = i, before = here;
+    }
+    if (sac >= 0)
+        add_best(best, deep, &count, sac, before);
     while (count > 1 && deep[count - 1] < -OUTSIDE * f->sample[best[count - 1]].radius)
         count--;
     return count;

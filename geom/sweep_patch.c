@@ -47,7 +47,8 @@ static double cell_of(const Patch *p)
 // Newton along the gradient for the vertices with `moves`, and their normals; `rounds` 0: normals alone.
 static void project(Patch *p, int count, Vec3 *at, Vec3 *normal, SweepPlace *place, const bool *moves, int rounds)
 {
-    static const double CLOSE = 1e-11, LONGEST = 0.5;       // [cells]
+    // [cells]; the error after a step is of the order of its square
+    static const double CLOSE = 1e-7, LONGEST = 0.5;
     int which[FOOT_BLOCK], next = 0;
     while (next < count) {
         int lanes = 0;
