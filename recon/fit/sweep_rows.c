@@ -423,6 +423,8 @@ typedef struct Stepper {
     double **stiffness, **factor;    // (branches) V and its factor
     double *x, *residual, *way, *image, *preconditioned;     // (rows, T)
     bool *failed;            // (branches)
+    int64_t blended_count;
+    int64_t *blended;        // points that several branches see
 } Stepper;
 
 static double *part_of(const Stepper *t, double *vector, int branch) { return vector + (size_t)branch_of(t->system, branch)->first_row * T; }
@@ -474,10 +476,9 @@ static void add_coupling(const Stepper *t, double *x, double *out)
 {
     const SweepSystem *s = t->system;
     double precision = 1 / (s->noise * s->noise), term[SWEEP_CANDIDATES + 1][T], sum[SWEEP_CANDIDATES + 1];
-    for (int64_t p = 0; p < s->draft->point_count; p++) {
+    for (int64_t k = 0; k < t->blended_count; k++) {
+        int64_t p = t->blended[k];
         int count = (int)(s->first[p + 1] - s->first[p]);
-        if (count < 2 || s->trust[p] < 1e-6)
-            continue;
         const SweepSight *sight = &s->sight[s->first[p]];
         double total = 0;
         for (int i = 0; i < count; i++) {
@@ -507,11 +508,30 @@ static double dot(const double *a, const double *b, size_t n)
     return sum;
 }
 
+static void find_blended(Stepper *t)
+{
+    const SweepSystem *s = t->system;
+    for (int64_t p = 0; p < s->draft->point_count; p++)
+        if (s->first[p + 1] - s->first[p] > 1 && !(s->trust[p] < 1e-6))
+            t->blended[t->blended_count++] = p;
+}
+
+static void solve_branch(void *context, long branch)
+{
+    Stepper *t = context;
+    band_solve(t->factor[branch], rows_of(t->system, (int)branch) * T, WIDTH, part_of(t, t->preconditioned, (int)branch));
+}
+
 static void precondition(Stepper *t, size_t n)
 {
     memcpy(t->preconditioned, t->residual, n * sizeof *t->preconditioned);
-    for (int i = 0; i < t->system->draft->count; i++)
-        band_solve(t->factor[i], rows_of(t->system, i) * T, WIDTH, part_of(t, t->preconditioned, i));
+    parallel_for(t->system->draft->options->threads, t->system->draft->count, solve_branch, t, NULL);
+}
+
+static void multiply_branch(void *context, long branch)
+{
+    Stepper *t = context;
+    band_multiply(t->stiffness[branch], rows_of(t->system, (int)branch) * T, WIDTH, part_of(t, t->way, (int)branch), part_of(t, t->image, (int)branch));
 }
 
 // Conjugate gradients; without coupling the preconditioner is the solution.
@@ -525,8 +545,7 @@ static void solve(Stepper *t, size_t n, bool coupled)
     memcpy(t->way, t->preconditioned, n * sizeof *t->way);
     double now = dot(t->residual, t->preconditioned, n), start = now;
     for (int k = 0; k < GRADIENTS && now > CLOSE * CLOSE * start && now > 0; k++) {
-        for (int i = 0; i < t->system->draft->count; i++)
-            band_multiply(t->stiffness[i], rows_of(t->system, i) * T, WIDTH, part_of(t, t->way, i), part_of(t, t->image, i));
+        parallel_for(t->system->draft->options->threads, t->system->draft->count, multiply_branch, t, NULL);
         add_coupling(t, t->way, t->image);
         double step = now / dot(t->way, t->image, n);
         for (size_t i = 0; i < n; i++) {
@@ -570,8 +589,11 @@ bool sweep_system_step(SweepSystem *s, bool coupled)
                  .stiffness = calloc(branches, sizeof *t.stiffness),
                  .factor = calloc(branches, sizeof *t.factor),
                  .failed = calloc(branches, sizeof *t.failed)};
-    bool good = memory && t.stiffness && t.factor && t.failed;
+    t.blended = coupled ? malloc(((size_t)s->draft->point_count + 1) * sizeof *t.blended) : NULL;
+    bool good = memory && t.stiffness && t.factor && t.failed && (t.blended || !coupled);
     if (good) {
+        if (coupled)
+            find_blended(&t);
         t.x = memory, t.residual = memory + n, t.way = memory + 2 * n, t.image = memory + 3 * n, t.preconditioned = memory + 4 * n;
         parallel_for(s->draft->options->threads, s->draft->count, prepare_branch, &t, NULL);
         for (int i = 0; i < s->draft->count; i++)
@@ -594,6 +616,7 @@ bool sweep_system_step(SweepSystem *s, bool coupled)
             free(t.factor[i]);
     }
     free(memory);
+    free(t.blended);
     free(t.stiffness);
     free(t.factor);
     free(t.failed);
