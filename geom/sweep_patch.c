@@ -183,6 +183,9 @@ static void cut_triangle(Cutter *c, const int *v)
     add_triangle(c, corner[shift + 2], corner[(shift + 3) % 4], corner[shift]);
 }
 
+// Vertices that a part needs to reach around a ring.
+static int least_turn(const Patch *p) { return p->parts->options.edge_mm > 0 ? 6 : p->parts->options.around / 2; }
+
 // The connected parts of the surface inside the patch and beyond its cuts: parent[v], and the vertices of each part at its root.
 static void connect_parts(const SweepMarch *march, const double *value, int *parent, int *size)
 {
@@ -221,7 +224,7 @@ static void name_parts(const Patch *p, const double *value, const int *parent, c
 static void remove_islands(const Patch *p, double *value, int *cut)
 {
     const SweepMarch *march = &p->march;
-    int n = march->vertices, cuts = p->out->cut_count, least = p->parts->options.edge_mm > 0 ? 6 : p->parts->options.around / 2;
+    int n = march->vertices, cuts = p->out->cut_count, least = least_turn(p);
     size_t room = (size_t)n + 1;
     int *parent = HEAP_ZEROED(room, sizeof *parent), *size = HEAP_ZEROED(room, sizeof *size), *name = HEAP_ZEROED(room, sizeof *name);
     int *largest = HEAP_ZEROED((size_t)cuts + 1, sizeof *largest);
@@ -369,8 +372,9 @@ static void connect_surface(const Cutter *c, int *parent, int *size)
         size[disjoint_root(parent, c->triangle[t][0])]++;
 }
 
-// Reads the loops of all cuts; of several around a branch, that on the largest part of the surface. Parts that have none of these loops are left out; without
-// cuts, all but the part with most triangles. Returns whether each cut has a loop, and no other loop is left; else the cuts that are concerned are marked.
+// Reads the loops of all cuts; of several around a branch, that on the largest part of the surface. Small parts that have none of these loops are left out, and
+// so are parts without any; without cuts, all but the part with most triangles. Returns whether each cut has a loop, and no other loop is left; else the cuts
+// that are concerned are marked.
 static bool read_loops(Cutter *c)
 {
     MeshPatch *out = c->p->out;
@@ -394,12 +398,12 @@ static bool read_loops(Cutter *c)
         for (int k = 0; k < out->cut[i].count; k++)
             seen[out->cut[i].vertex[k]] = true, stays[disjoint_root(parent, out->cut[i].vertex[k])] = true;
     }
-    int most = 0, kept = 0;
+    int most = 0, kept = 0, least = least_turn(c->p), large = least * least;
     for (int v = 0; v < c->vertices; v++)
         most = size[v] > size[most] ? v : most;
     stays[most] |= out->cut_count == 0;
     for (int v = 0; v < c->vertices; v++)
-        if (next[v] >= 0 && !seen[v] && stays[disjoint_root(parent, v)]) {
+        if (next[v] >= 0 && !seen[v] && (stays[disjoint_root(parent, v)] || size[disjoint_root(parent, v)] > large)) {
             fail_cut(c, c->cut[v]);
             good = false;
         }

@@ -350,8 +350,8 @@ static SweepModel *fork_past_the_inlet(void)
     sweep_shape_line(&s[0], vec3(0, 0, 0), vec3(30, 0, 0), 31);
     s[1] = (SweepShape){.pitch = 1, .parent = 0, .parent_t = 22, .radius = 0.6};
     sweep_shape_line(&s[1], vec3(22, 0, 0), vec3(26, -5, 0), 8);
-    s[2] = (SweepShape){.pitch = 1, .parent = 0, .parent_t = 2, .radius = 0.4};
-    sweep_shape_line(&s[2], vec3(2, 0, 0), vec3(-3, 0.9, 0), 8);
+    s[2] = (SweepShape){.pitch = 1, .parent = 0, .parent_t = 2, .radius = 0.6};
+    sweep_shape_line(&s[2], vec3(2, 0, 0), vec3(0.5, 1.2, 0), 8);
     return sweep_model_of(s, 3);
 }
 
