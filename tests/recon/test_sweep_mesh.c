@@ -395,6 +395,46 @@ static void failed_tries_are_remembered(void **state)
     }
 }
 
+// --- Lanes ---
+
+// F and its gradient without Hessians against those with them, and the sum of the shares, at points around a fork and a sac.
+static void slopes_have_the_bits_of_samples(void **state)
+{
+    (void)state;
+    SweepModel *model = two_forks();
+    sweep_add_sac(model, 12, vec3(12, 1.6, 0), 1.5);
+    SweepField *field = sweep_field_create(model);
+    int blended = 0;
+    for (int isa = 1; isa <= 3; isa++) {
+        SweepFeet feet = {.field = field, .kernels = sweep_kernels(isa), .harmonics = sweep_model_harmonics(model)};
+        for (int n = 0; n < 400; n++) {
+            SweepBlock slope, sample;
+            sweep_block_begin(&slope), sweep_block_begin(&sample);
+            for (int i = 0; i < FOOT_BLOCK; i++) {
+                double a = 0.7 * n + 2.4 * i, t = 4 + 0.03 * n, rho = 0.7 + 0.1 * (i % 6);
+                SweepPlace place = {.branch = 0, .t = t, .sac = -1};
+                mesh_set_place(&feet, &slope, i, &place), mesh_set_place(&feet, &sample, i, &place);
+                slope.foot.at.x[i] = sample.foot.at.x[i] = t, slope.foot.at.y[i] = sample.foot.at.y[i] = rho * cos(a);
+                slope.foot.at.z[i] = sample.foot.at.z[i] = rho * sin(a);
+            }
+            sweep_block_slope(&feet, &slope, FOOT_ALL), sweep_block_sample(&feet, &sample, FOOT_ALL);
+            const FootSample *x = &slope.foot.at, *y = &sample.foot.at;
+            for (int i = 0; i < FOOT_BLOCK; i++) {
+                double shares = slope.sac_share[i];
+                for (int k = 0; k < slope.view[i]->count; k++)
+                    shares += slope.share[k][i];
+                assert_true(fabs(shares - 1) < 1e-14);
+                assert_true(x->f[i] == y->f[i] && x->gx[i] == y->gx[i] && x->gy[i] == y->gy[i] && x->gz[i] == y->gz[i]);
+                assert_true(slope.owner[i] == sample.owner[i] && slope.pure[i] == sample.pure[i]);
+                blended += !slope.pure[i];
+            }
+        }
+    }
+    assert_true(blended > 100);
+    sweep_field_free(field);
+    sweep_model_free(model);
+}
+
 // --- Tags ---
 
 static void ends_are_numbered(void **state)
@@ -621,6 +661,7 @@ int main(int count, char **argument)
         cmocka_unit_test(forks_are_closed),
         cmocka_unit_test(moved_models_have_the_same_volume),
         cmocka_unit_test(an_update_gives_the_fresh_mesh),
+        cmocka_unit_test(slopes_have_the_bits_of_samples),
         cmocka_unit_test(ends_are_numbered),
         cmocka_unit_test(a_sac_is_part_of_the_mesh),
         cmocka_unit_test(failed_tries_are_remembered),
