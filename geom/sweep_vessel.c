@@ -10,7 +10,6 @@
 #include "geom/sweep_feet.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 // The nodes of the knots before and after a segment, and t between them.
 typedef struct SegmentNodes {
@@ -101,6 +100,7 @@ static void answer(const SweepVessel *v, Vec3 x, const SweepFoot *foot, VesselMe
     m->foot = foot->at, m->place = x, m->normal = foot->normal, m->hessian = foot->hessian;
     m->clearance = foot->sure && foot->gap > 0 ? 0.999 * foot->gap : 0;
     m->clear_place = x;
+    m->miss = m->step = vec3(0, 0, 0);
     m->sweep.segment = foot->segment, m->sweep.sac = foot->sac, m->sweep.own_t = foot->t, m->sweep.is_known = 0, m->sweep.apart = 0;
     set_flags(v, x, foot, hit);
 }
@@ -305,6 +305,19 @@ static bool answer_cheaply(const SweepVessel *v, Vec3 x, double reach, VesselMem
 
 // --- Feet that are followed ---
 
+// A foot that one step does not reach: where Newton continues.
+typedef struct Follow {
+    bool alone;              // the own branch is evaluated alone
+    Vec3 straight, first;    // the predicted foot, and that with the correction by the last prediction's miss
+    Vec3 at;
+    int segment, sac;        // the place, as in VesselSweepMemory
+    double own_t, t[VESSEL_SEEN];
+} Follow;
+
+static Vec3 lane_at(const FootBatch *f, int i) { return vec3(f->at.x[i], f->at.y[i], f->at.z[i]); }
+
+static void set_lane_at(FootBatch *f, int i, Vec3 at) { f->at.x[i] = at.x, f->at.y[i] = at.y, f->at.z[i] = at.z; }
+
 static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const VesselMemory *m, bool alone)
 {
     FootBatch *f = &b->foot;
@@ -312,7 +325,7 @@ static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const 
     b->alone[i] = alone;
     sweep_block_place(&v->feet, b, i, m->sweep.segment, m->sweep.sac, m->sweep.own_t);
     sweep_block_set_point(&v->feet, b, i, x);
-    f->at.x[i] = m->foot.x, f->at.y[i] = m->foot.y, f->at.z[i] = m->foot.z;
+    set_lane_at(f, i, m->foot);
     f->at.gx[i] = m->place.x, f->at.gy[i] = m->place.y, f->at.gz[i] = m->place.z;
     f->nx[i] = m->normal.x, f->ny[i] = m->normal.y, f->nz[i] = m->normal.z;
     f->axx[i] = m->hessian.xx, f->axy[i] = m->hessian.xy, f->axz[i] = m->hessian.xz;
@@ -321,6 +334,36 @@ static void load_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const 
     b->keeps_t[i] = m->sweep.is_known != 0 && !alone;
     for (int k = 0; b->keeps_t[i] && k < b->view[i]->count; k++)
         b->part[k].t[i] = m->sweep.t[k];
+}
+
+// Corrects a predicted foot by the miss of the last prediction, scaled to a motion along the same line.
+static Vec3 correct_start(const VesselMemory *m, Vec3 x, Vec3 straight)
+{
+    Vec3 motion = vec3_sub(x, m->place);
+    double step2 = vec3_norm2(m->step), motion2 = vec3_norm2(motion), both = vec3_dot(m->step, motion);
+    bool same = both * both > 0.8 * (step2 * motion2) && motion2 < 4 * step2;
+    return same ? vec3_add_scaled(straight, motion2 / step2, m->miss) : straight;
+}
+
+static void pause_lane(const SweepBlock *b, int i, Vec3 straight, Vec3 first, Follow *w)
+{
+    *w = (Follow){.alone = b->alone[i], .straight = straight, .first = first, .at = lane_at(&b->foot, i)};
+    w->segment = b->segment[i], w->sac = b->sac[i], w->own_t = b->own_t[i];
+    for (int k = 0; k < b->view[i]->count; k++)
+        w->t[k] = b->part[k].t[i];
+}
+
+static void resume_lane(const SweepVessel *v, SweepBlock *b, int i, Vec3 x, const Follow *w)
+{
+    FootBatch *f = &b->foot;
+    b->alone[i] = w->alone;
+    sweep_block_place(&v->feet, b, i, w->segment, w->sac, w->own_t);
+    sweep_block_set_point(&v->feet, b, i, x);
+    set_lane_at(f, i, w->at);
+    f->longest[i] = 0.5 * f->radius[i], f->allowed[i] = REST, f->state[i] = FOOT_PENDING;
+    b->keeps_t[i] = true;
+    for (int k = 0; k < b->view[i]->count; k++)
+        b->part[k].t[i] = w->t[k];
 }
 
 static void store_lane(const SweepVessel *v, const SweepBlock *b, int i, Vec3 x, VesselMemory *m, VesselHit *hit)
@@ -350,8 +393,10 @@ typedef struct Batch {
     VesselMemory *memory;
     VesselHit *hit;
     Queue alone, among;      // feet that are followed: those that see one branch, or near which no other matters; and the rest
-    Queue sought;            // feet that are not reached by one or two steps: careful steps from where they were
+    Queue again;             // feet that one step does not reach
+    Queue sought;            // feet that are not reached by several steps: careful steps from where they were
     Queue beside;            // feet whose rivals are followed, too
+    Follow follow[FOOT_BATCH];
     int checks;              // feet that may not be the nearest
     Check check[FOOT_BATCH];
 } Batch;
@@ -376,41 +421,55 @@ static bool is_single(const SweepVessel *v, const VesselMemory *m)
     return m->sweep.segment >= 0 && v->field->view[m->sweep.segment].count == 1 && v->field->view[m->sweep.segment].sac < 0;
 }
 
-static void follow_block(const SweepVessel *v, Batch *batch, const int *which, int count, bool alone)
+// One step of up to eight points; the few that it does not bring to their feet fill other blocks, which take up to two more (`again`).
+static void follow_block(const SweepVessel *v, Batch *batch, const int *which, int count, bool alone, bool again)
 {
-    enum { ROUNDS = 3, USUAL = 2 };
+    enum { ROUNDS_AGAIN = 2 };
     static const double NEARER = 1e-6;       // [mm]
     SEL_ASSERT(count > 0 && count <= FOOT_BLOCK, "a block has a point, and no more than lanes");
     SweepBlock b;
     FootBatch *f = &b.foot;
-    unsigned all = (1u << count) - 1, done = 0;
+    Vec3 straight[FOOT_BLOCK], first[FOOT_BLOCK];
+    unsigned all = (1u << count) - 1, done = 0, usual = 0;
     sweep_block_begin(&b);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         int p = which[i < count ? i : 0];
-        load_lane(v, &b, i, batch->point[p], &batch->memory[p], alone);
+        if (again)
+            resume_lane(v, &b, i, batch->point[p], &batch->follow[p]);
+        else
+            load_lane(v, &b, i, batch->point[p], &batch->memory[p], alone);
     }
-    v->feet.kernels->predict(f, REST);
-    Vec3 first[FOOT_BLOCK];
-    for (int i = 0; i < FOOT_BLOCK; i++)
-        first[i] = vec3(f->at.x[i], f->at.y[i], f->at.z[i]);
-    unsigned usual = 0;
-    for (int round = 0; round < ROUNDS && (done & all) != all; round++) {
+    if (!again)
+        v->feet.kernels->predict(f, REST);
+    for (int i = 0; i < FOOT_BLOCK; i++) {
+        int p = which[i < count ? i : 0];
+        straight[i] = again ? batch->follow[p].straight : lane_at(f, i);
+        first[i] = again ? batch->follow[p].first : correct_start(&batch->memory[p], batch->point[p], straight[i]);
+        if (!again)
+            set_lane_at(f, i, first[i]);
+    }
+    for (int round = 0; round < (again ? ROUNDS_AGAIN : 1) && (done & all) != all; round++) {
         sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
         done = v->feet.kernels->newton(f, false);
-        usual = round < USUAL ? done : usual;
+        usual = round == 0 ? done : usual;
     }
     v->feet.kernels->finish(f);
     v->feet.kernels->ring(&b.ring, f, b.ring_x, b.ring_y, b.ring_z, b.harmonics);
     for (int i = 0; i < count; i++) {
         int p = which[i];
         VesselMemory *m = &batch->memory[p];
-        Vec3 last = vec3(f->at.x[i], f->at.y[i], f->at.z[i]);
+        Vec3 last = lane_at(f, i), motion = vec3_sub(batch->point[p], m->place);
         if (b.alone[i] && !is_single(v, m) && !(vec3_distance(first[i], m->foot) + vec3_distance(first[i], last) < m->sweep.apart)) {
-            put(&batch->among, p);
+            put(again ? &batch->sought : &batch->among, p);
             continue;
         }
         if (!(done >> i & 1)) {
-            put(&batch->sought, p);
+            if (!again && f->state[i] == FOOT_PENDING) {
+                pause_lane(&b, i, straight[i], first[i], &batch->follow[p]);
+                put(&batch->again, p);
+            } else {
+                put(&batch->sought, p);
+            }
             continue;
         }
         double size = fabs(f->gap[i]) - NEARER, travel = m->trust;
@@ -422,6 +481,7 @@ static void follow_block(const SweepVessel *v, Batch *batch, const int *which, i
             continue;
         }
         store_lane(v, &b, i, batch->point[p], m, &batch->hit[p]);
+        m->miss = vec3_sub(last, straight[i]), m->step = motion;
         if (m->has_rival)
             put(&batch->beside, p);
     }
@@ -480,8 +540,9 @@ static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, 
     }
 }
 
-static void follow_alone(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, true); }
-static void follow_among(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, false); }
+static void follow_alone(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, true, false); }
+static void follow_among(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, false, false); }
+static void follow_again(const SweepVessel *v, Batch *batch, const int *which, int count) { follow_block(v, batch, which, count, false, true); }
 
 static void in_blocks(const SweepVessel *v, Batch *batch, const Queue *queue, void (*treat)(const SweepVessel *v, Batch *batch, const int *which, int count))
 {
@@ -494,7 +555,7 @@ static void query_batch(const SweepVessel *v, int count, const Vec3 *point, doub
     SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
     Batch batch;
     batch.point = point, batch.memory = memory, batch.hit = hit;
-    batch.alone.count = batch.among.count = batch.sought.count = batch.beside.count = batch.checks = 0;
+    batch.alone.count = batch.among.count = batch.again.count = batch.sought.count = batch.beside.count = batch.checks = 0;
     for (int i = 0; i < count; i++) {
         VesselMemory *m = &memory[i];
         if (answer_cheaply(v, point[i], reach, m, &hit[i]))
@@ -509,6 +570,7 @@ static void query_batch(const SweepVessel *v, int count, const Vec3 *point, doub
     }
     in_blocks(v, &batch, &batch.alone, follow_alone);
     in_blocks(v, &batch, &batch.among, follow_among);
+    in_blocks(v, &batch, &batch.again, follow_again);
     in_blocks(v, &batch, &batch.sought, seek_block);
     in_blocks(v, &batch, &batch.beside, follow_rivals);
     run_checks(v, point, batch.check, batch.checks);
