@@ -550,6 +550,14 @@ static void in_blocks(const SweepVessel *v, Batch *batch, const Queue *queue, vo
         treat(v, batch, queue->point + i, queue->count - i < FOOT_BLOCK ? queue->count - i : FOOT_BLOCK);
 }
 
+// Neighbours on a branch see the same branches: in one block, these are evaluated together.
+static void put_in_order(const VesselMemory *memory, Queue *queue, int point)
+{
+    put(queue, point);
+    for (int i = queue->count - 1; i > 0 && memory[queue->point[i - 1]].sweep.segment > memory[point].sweep.segment; i--)
+        queue->point[i] = queue->point[i - 1], queue->point[i - 1] = point;
+}
+
 static void query_batch(const SweepVessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
     SEL_ASSERT(count <= FOOT_BATCH, "queries come in batches");
@@ -566,7 +574,7 @@ static void query_batch(const SweepVessel *v, int count, const Vec3 *point, doub
         else if (is_single(v, m) || m->sweep.apart > vec3_distance(point[i], m->place))
             put(&batch.alone, i);
         else
-            put(&batch.among, i);
+            put_in_order(memory, &batch.among, i);
     }
     in_blocks(v, &batch, &batch.alone, follow_alone);
     in_blocks(v, &batch, &batch.among, follow_among);
