@@ -635,6 +635,11 @@ static void drop_inner(const SweepFeet *feet, Rings *rings, double limit2, const
     for (int i = 0; i < RINGS; i++) {
         SweepRing *r = &rings->of[i];
         double f[SWEEP_RING];
+        bool any = false;
+        for (int k = 0; k < SWEEP_RING; k++)
+            any |= r->far2[k] < limit2;
+        if (!any)
+            continue;
         if (other)
             feet->kernels->near_field(other, feet->harmonics, SWEEP_RING, r->x, r->y, r->z, f);
         for (int k = 0; k < SWEEP_RING; k++) {

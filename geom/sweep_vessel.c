@@ -39,6 +39,7 @@ static const double BESIDE = 0.25;           // relative to the radius: a rival 
 static const double LOOK_BESIDE = 0.25;      // relative to the radius: with a rival, a third foot may be this near
 static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;    // relative to the radius: travel between two searches …
 static const double TRUST_AMONG = 0.25;      // … and at most this where several branches are seen
+static const double LOOK_AMONG = 0.56;       // … for which LOOK need not be more
 
 // --- Nodes and places ---
 
@@ -168,6 +169,7 @@ static void keep_starts(double most, const SweepStart *start, int count, Check *
 static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
 {
     const SweepFoot *foot = &check->foot;
+    bool single = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
     double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac), limit = fabs(foot->gap) + LOOK * radius;
     SweepStart start[SWEEP_FEET];
     SweepPlace place = place_of_foot(v, foot);
@@ -176,7 +178,6 @@ static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
     // are as near to each other as to x
     search.own = foot->gap > 0 ? 0.33 * radius : fmin(0.33 * radius, -0.6 * foot->gap);
     search.zone = foot->gap > 0 ? 0.9 * radius : fmin(0.9 * radius, -1.2 * foot->gap);
-    bool single = foot->segment >= 0 && v->field->view[foot->segment].count == 1 && v->field->view[foot->segment].sac < 0;
     check->radius = radius, check->rival = check->beyond = limit, check->count = 0, check->sound = 0;
     search.alone = single || (foot->pure && foot->gap > 0 && !check->nearer);
     if (search.alone) {
@@ -184,7 +185,8 @@ static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
         keep_starts(fabs(foot->gap), start, count, check);
     }
     if (!single && (!search.alone || check->count > 0)) {
-        check->rival = check->beyond = limit;
+        limit = fabs(foot->gap) + LOOK_AMONG * radius;
+        check->rival = check->beyond = search.limit = search.beyond = limit;
         search.alone = false;
         int count = sweep_starts(&v->feet, x, place, foot->segment, &search, start);
         keep_starts(fabs(foot->gap) + BESIDE * radius, start, count, check);
