@@ -466,17 +466,20 @@ static void start_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, con
 }
 
 // On a ridge that is narrower than a step, Newton leaps from one flank to the other: a lane whose step turns back takes shorter ones.
-static unsigned run_block(const SweepFeet *feet, SweepBlock *b, unsigned all, int rounds)
+// A lane that comes close to its `known` foot (NULL: none) will end there: it is taken out of `all`.
+static unsigned run_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, const Vec3 *known, unsigned *all, int rounds)
 {
+    static const double CLOSE = 0.02, NEAR = 0.1;    // relative to the radius, and to the distance of x from the known foot
+
     static const double BACK = -0.25;        // of the last step's square: the next one leads back
     FootBatch *f = &b->foot;
     unsigned done = 0;
     Vec3 last[FOOT_BLOCK] = {{0, 0, 0}};
-    for (int round = 0; round < rounds && (done & all) != all; round++) {
+    for (int round = 0; round < rounds && (done & *all) != *all; round++) {
         Vec3 from[FOOT_BLOCK];
         for (int i = 0; i < FOOT_BLOCK; i++)
             from[i] = lane_foot(f, i);
-        sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : all & ~done);
+        sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : *all & ~done);
         done = feet->kernels->newton(f, true);
         for (int i = 0; i < FOOT_BLOCK; i++) {
             Vec3 step = vec3_sub(lane_foot(f, i), from[i]);
@@ -484,8 +487,11 @@ static unsigned run_block(const SweepFeet *feet, SweepBlock *b, unsigned all, in
                 f->longest[i] = fmin(f->longest[i], 0.5 * vec3_norm(step));
             last[i] = step;
         }
+        for (int i = 0; known && i < FOOT_BLOCK; i++)
+            if (*all >> i & 1 && vec3_distance(lane_foot(f, i), known[i]) < fmin(CLOSE * f->radius[i], NEAR * vec3_distance(x[i], known[i])))
+                *all &= ~(1u << i);
     }
-    return done & all;
+    return done & *all;
 }
 
 static bool is_number(const SweepFoot *foot) { return vec3_is_finite(foot->at) && vec3_is_finite(foot->normal) && isfinite(foot->gap); }
@@ -501,12 +507,12 @@ static bool is_one_of_many(const SweepBlock *b, int i, Vec3 x, SweepFoot *foot)
     return slope > 0.1 && gap > 0.3 * radius && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius;
 }
 
-unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, int rounds, SweepFoot *foot)
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, const Vec3 *known, int count, int rounds, SweepFoot *foot)
 {
     SEL_ASSERT(count > 0 && count <= SWEEP_FEET && rounds > 0, "points fit into a block");
     SweepBlock b;
     start_block(feet, &b, x, start, count);
-    unsigned all = (1u << count) - 1, done = run_block(feet, &b, all, rounds), sound = 0;
+    unsigned all = (1u << count) - 1, done = run_block(feet, &b, x, known, &all, rounds), sound = 0;
     if (done != all)
         sweep_block_sample(feet, &b, all & ~done);
     feet->kernels->finish(&b.foot);
@@ -515,7 +521,7 @@ unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *st
     // On the way from a distant start, t of another branch may have been caught at a place where that branch comes near again: F as seen from the foot decides.
     unsigned several = 0;
     for (int i = 0; i < count; i++)
-        if (b.view[i]->count > 1 && is_number(&foot[i])) {
+        if (all >> i & 1 && b.view[i]->count > 1 && is_number(&foot[i])) {
             sweep_block_place(feet, &b, i, foot[i].segment, foot[i].sac, foot[i].t);
             several |= 1u << i;
         }
@@ -523,7 +529,7 @@ unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *st
         sweep_block_sample(feet, &b, several);
     for (int i = 0; i < count; i++) {
         foot[i].doubtful = several >> i & 1 && fabs(b.foot.at.f[i]) > OFF_WALL * b.foot.radius[i];
-        if (is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
+        if (all >> i & 1 && is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
             sound |= 1u << i;
     }
     return sound;
@@ -536,7 +542,7 @@ int sweep_settle(const SweepFeet *feet, Vec3 x, const SweepStart *start, int cou
     int found = 0;
     for (int i = 0; i < SWEEP_FEET; i++)
         same[i] = x;
-    unsigned sound = sweep_follow(feet, same, start, count, SWEEP_ROUNDS, one);
+    unsigned sound = sweep_follow(feet, same, start, NULL, count, SWEEP_ROUNDS, one);
     for (int i = 0; i < count; i++)
         if (sound >> i & 1)
             add_foot(foot, &found, &one[i]);

@@ -102,9 +102,10 @@ typedef struct SweepSearch {
 } SweepSearch;
 // Starts for x on all walls that are seen from a place (`segment`: its segment), the nearest first.
 int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, const SweepSearch *search, SweepStart *start);
-// Careful Newton steps of up to eight points, each from its own start; at most `rounds`. Returns the bits of those that reach a foot.
+// Careful Newton steps of up to eight points, each from its own start; at most `rounds`. Returns the bits of those that reach a foot other than their
+// `known` ones (NULL: none is known).
 enum { SWEEP_ROUNDS = 24 };
-unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, int count, int rounds, SweepFoot *foot);
+unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *start, const Vec3 *known, int count, int rounds, SweepFoot *foot);
 // The place as seen from x: the branch or sac in which x lies deepest, from a place near it; F at x and its gradient.
 SweepPlace sweep_descend(const SweepFeet *feet, Vec3 x, SweepPlace place, double *f, Vec3 *gradient);
 // A foot on the line from the curve through x, by bisection. Always finds a wall point; `sure` is false.

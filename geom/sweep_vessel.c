@@ -196,20 +196,20 @@ static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
 // Finds feet from the starts of several checks, eight at a time.
 static void run_checks(const SweepVessel *v, const Vec3 *point, Check *check, int count)
 {
-    Vec3 x[SWEEP_FEET];
+    Vec3 x[SWEEP_FEET], known[SWEEP_FEET];
     SweepStart start[SWEEP_FEET];
     SweepFoot found[SWEEP_FEET];
     int which[SWEEP_FEET], index[SWEEP_FEET], filled = 0;
     for (int i = 0; i < count; i++)
         for (int k = 0; k < check[i].count; k++) {
-            x[filled] = point[check[i].point], start[filled] = check[i].start[k];
+            x[filled] = point[check[i].point], known[filled] = check[i].foot.at, start[filled] = check[i].start[k];
             which[filled] = i, index[filled++] = k;
             bool last = true;
             for (int j = i + (k + 1 == check[i].count); j < count && last; j++)
                 last = check[j].count == 0;
             if (filled < SWEEP_FEET && !last)
                 continue;
-            unsigned sound = sweep_follow(&v->feet, x, start, filled, CHECK_ROUNDS, found);
+            unsigned sound = sweep_follow(&v->feet, x, start, known, filled, CHECK_ROUNDS, found);
             for (int j = 0; j < filled; j++)
                 if (sound >> j & 1) {
                     check[which[j]].found[index[j]] = found[j];
@@ -500,7 +500,7 @@ static void seek_block(const SweepVessel *v, Batch *batch, const int *which, int
         x[i] = batch->point[which[i]];
         start[i] = (SweepStart){.at = m->foot, .far = vec3_distance(x[i], m->foot), .segment = m->sweep.segment, .sac = m->sweep.sac, .t = m->sweep.own_t};
     }
-    unsigned sound = sweep_follow(&v->feet, x, start, count, SWEEP_ROUNDS, found);
+    unsigned sound = sweep_follow(&v->feet, x, start, NULL, count, SWEEP_ROUNDS, found);
     for (int i = 0; i < count; i++) {
         if (sound >> i & 1)
             put_check(v, batch, which[i], &found[i], false);
@@ -523,7 +523,7 @@ static void follow_rivals(const SweepVessel *v, Batch *batch, const int *which, 
         start[i] = (SweepStart){
             .at = m->rival, .far = vec3_distance(x[i], m->rival), .segment = m->sweep.rival_segment, .sac = m->sweep.rival_sac, .t = m->sweep.rival_t};
     }
-    unsigned done = sweep_follow(&v->feet, x, start, count, ROUNDS, rival);
+    unsigned done = sweep_follow(&v->feet, x, start, NULL, count, ROUNDS, rival);
     for (int i = 0; i < count; i++) {
         VesselMemory *m = &batch->memory[which[i]];
         VesselHit *h = &batch->hit[which[i]];
