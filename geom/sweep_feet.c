@@ -585,37 +585,10 @@ typedef struct Seen {
     SweepNear near[SWEEP_CANDIDATES];
 } Seen;
 
-// Rings around a branch at several t: points of its wall and their distances from x.
-enum { RINGS = 5, RING_POINTS = RINGS * SWEEP_RING };
-typedef struct Rings {
-    SweepRing of[RINGS];
-    int segment[RINGS];
-    double t[RINGS], radius;     // radius: c_0 of the middle ring
-} Rings;
+enum { RINGS = 5 };          // around a branch at several t; the last one is repeated
 
 static Vec3 curve_part(const Vec3 c[4], double x) { return vec3_add_scaled(c[0], x, vec3_add_scaled(c[1], x, vec3_add_scaled(c[2], x, c[3]))); }
 static Vec3 curve_slope(const Vec3 c[4], double x) { return vec3_add_scaled(c[1], x, vec3_add_scaled(vec3_scale(c[2], 2), 3 * x, c[3])); }
-
-static void fill_ring(const SweepFeet *feet, Vec3 x, const SweepSegment *near, double t, Rings *rings, int which)
-{
-    int segment = neighbour(feet->field, near, t);
-    const SweepSegment *s = &feet->field->segment[segment];
-    double term[SWEEP_TERMS], at = t - s->origin, up = 0, out = 1, foot = at;
-    for (int k = 0; k <= 2 * feet->harmonics; k++)
-        term[k] = s->section[k][0] + at * (s->section[k][1] + at * (s->section[k][2] + at * s->section[k][3]));
-    if (s->rise != 0) {      // the direction of the ring: at its height over the end's plane, as far as the dome reaches
-        double power = 1;
-        up = fmax(-0.98, fmin(0.98, s->rise * at / fmax(term[0], 1e-9))), out = sqrt(1 - up * up), foot = 0;
-        for (int k = 1; k <= feet->harmonics; k++)
-            power *= out, term[2 * k - 1] *= power, term[2 * k] *= power;
-    }
-    Vec3 n = vec3_scale(curve_part(s->n, foot), out), b = vec3_scale(curve_part(s->b, foot), out), tip = {0, 0, 0};
-    if (up != 0)
-        tip = vec3_scale(vec3_unit(s->s[1]), up);
-    feet->kernels->ring_points(term, feet->harmonics, curve_part(s->s, foot), n, b, tip, x, &rings->of[which]);
-    rings->segment[which] = segment, rings->t[which] = t;
-    rings->radius = which == RINGS / 2 ? term[0] : rings->radius;
-}
 
 static void fill_near(const SweepFeet *feet, int branch, int segment, double t, SweepNear *near)
 {
@@ -636,45 +609,19 @@ static void fill_near(const SweepFeet *feet, int branch, int segment, double t, 
 }
 
 // Removes the points of a branch's rings that lie inside another branch or a sac: they are no wall.
-static void drop_inner(const SweepFeet *feet, Rings *rings, double limit2, const SweepNear *other, int sac)
+static void drop_inner(const SweepFeet *feet, SweepRings *rings, const SweepNear *other, int sac)
 {
-    for (int i = 0; i < RINGS; i++) {
-        SweepRing *r = &rings->of[i];
-        double f[SWEEP_RING];
-        bool any = false;
-        for (int k = 0; k < SWEEP_RING; k++)
-            any |= r->far2[k] < limit2;
-        if (!any)
-            continue;
-        if (other)
-            feet->kernels->near_field(other, feet->harmonics, SWEEP_RING, r->x, r->y, r->z, f);
-        for (int k = 0; k < SWEEP_RING; k++) {
-            SweepPart part = {.f = other ? f[k] : -1};
-            if (!other && r->far2[k] < limit2)
-                sweep_field_sac(feet->field, sac, vec3(r->x[k], r->y[k], r->z[k]), &part);
-            r->far2[k] = part.f > 0 ? HUGE_VAL : r->far2[k];
-        }
-    }
-}
-
-// For each point of the rings, the square of the distance of the nearest of its neighbours and itself.
-static void least_around(const Rings *r, double least[RINGS][SWEEP_RING])
-{
-    double along[RINGS][SWEEP_RING];
-    for (int i = 0; i < RINGS; i++) {
-        double f[SWEEP_RING + 2];
-        memcpy(f + 1, r->of[i].far2, sizeof r->of[i].far2);
-        f[0] = f[SWEEP_RING], f[SWEEP_RING + 1] = f[1];
-        for (int k = 0; k < SWEEP_RING; k++) {
-            double two = f[k] < f[k + 1] ? f[k] : f[k + 1];
-            along[i][k] = two < f[k + 2] ? two : f[k + 2];
-        }
-    }
-    for (int i = 0; i < RINGS; i++) {
-        const double *before = along[i > 0 ? i - 1 : 0], *after = along[i + 1 < RINGS ? i + 1 : i];
-        for (int k = 0; k < SWEEP_RING; k++) {
-            double two = before[k] < along[i][k] ? before[k] : along[i][k];
-            least[i][k] = two < after[k] ? two : after[k];
+    for (int k = 0; k < SWEEP_RING; k++) {
+        double f[SWEEP_RINGS];
+        if (other && rings->near[k] != 0)
+            feet->kernels->near_field(other, feet->harmonics, SWEEP_RINGS, rings->x[k], rings->y[k], rings->z[k], f);
+        for (unsigned left = rings->near[k]; left != 0; left &= left - 1) {
+            int i = __builtin_ctz(left);
+            SweepPart part = {.f = other ? f[i] : -1};
+            if (!other)
+                sweep_field_sac(feet->field, sac, vec3(rings->x[k][i], rings->y[k][i], rings->z[k][i]), &part);
+            if (part.f > 0)
+                rings->far2[k][i] = HUGE_VAL, rings->near[k] &= ~(1u << i);
         }
     }
 }
@@ -692,34 +639,31 @@ static double inner_share(const SweepSegment *s, double t, Vec3 x)
 static void add_rings(const SweepFeet *feet, Vec3 x, const Seen *seen, int which, double reach, const SweepSearch *search, SweepStart *start, int *count)
 {
     static const double ASIDE = 0.5;         // between rings, relative to `reach`
-    Rings rings;
-    double least[RINGS][SWEEP_RING], limit2 = search->limit * search->limit, own2 = search->own * search->own, zone2 = search->zone * search->zone;
+    SweepRings rings;
+    double limit2 = search->limit * search->limit;
     const SweepSegment *near = &feet->field->segment[seen->segment[which]];
     double half_angle = 0.2 * near->largest, half_step = 0.5 * ASIDE * reach, slack2 = half_angle * half_angle + half_step * half_step;
-    double beyond2 = search->beyond * search->beyond, apart = ASIDE * reach / inner_share(near, seen->t[which], x);
-    for (int i = 0; i < RINGS; i++)
-        fill_ring(feet, x, near, seen->t[which] + (i - RINGS / 2) * apart, &rings, i);
+    double apart = ASIDE * reach / inner_share(near, seen->t[which], x);
+    for (int i = 0; i < SWEEP_RINGS; i++) {
+        rings.t[i] = seen->t[which] + ((i < RINGS ? i : RINGS - 1) - RINGS / 2) * apart;
+        rings.segment[i] = feet->field->segment + neighbour(feet->field, near, rings.t[i]);
+    }
+    feet->kernels->rings(&rings, feet->harmonics, x, limit2);
     for (int i = 0; i < seen->count; i++)
         if (i != which)
-            drop_inner(feet, &rings, limit2, &seen->near[i], -1);
+            drop_inner(feet, &rings, &seen->near[i], -1);
     if (seen->sac >= 0)
-        drop_inner(feet, &rings, limit2, NULL, seen->sac);
-    least_around(&rings, least);
-    for (int i = 0; i < RINGS; i++)
-        for (int k = 0; k < SWEEP_RING; k++) {
-            const SweepRing *r = &rings.of[i];
-            if (!(r->far2[k] < limit2) || (r->far2[k] > least[i][k] && r->far2[k] >= beyond2))
-                continue;
-            SweepStart more = {.at = {r->x[k], r->y[k], r->z[k]}, .segment = rings.segment[i], .sac = -1, .t = rings.t[i]};
-            double aside2 = vec3_norm2(vec3_sub(more.at, search->from));
-            if (r->far2[k] < beyond2 && aside2 > zone2)
-                beyond2 = r->far2[k];
-            if (r->far2[k] > least[i][k] || aside2 <= own2)
-                continue;
-            more.far = sqrt(r->far2[k]), more.least = sqrt(fmax(0, r->far2[k] - slack2));
-            add_start(start, count, search->most, &more, 0.2 * rings.radius);
-        }
+        drop_inner(feet, &rings, NULL, seen->sac);
+    double beyond2 = feet->kernels->minima(&rings, search->from, search->own * search->own, search->zone * search->zone, limit2);
     *search->nearest_beyond = fmin(*search->nearest_beyond, sqrt(beyond2));
+    for (int k = 0; k < SWEEP_RING; k++)
+        for (unsigned left = rings.least[k] & ((1u << RINGS) - 1); left != 0; left &= left - 1) {
+            int i = __builtin_ctz(left);
+            double far2 = rings.far2[k][i];
+            SweepStart more = {.at = {rings.x[k][i], rings.y[k][i], rings.z[k][i]}, .sac = -1, .t = rings.t[i], .far = sqrt(far2)};
+            more.segment = (int)(rings.segment[i] - feet->field->segment), more.least = sqrt(fmax(0, far2 - slack2));
+            add_start(start, count, search->most, &more, 0.2 * rings.radius[RINGS / 2]);
+        }
 }
 
 // Points of a sac's wall that lie in no branch.

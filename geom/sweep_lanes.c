@@ -5,11 +5,12 @@
 #include "base/base.h"
 
 #include <stddef.h>
+#include <string.h>
 #if SIMD_HAS_AVX
 #include <immintrin.h>
 #endif
 
-_Static_assert(offsetof(SweepSegment, n) == 8 * 12 && offsetof(SweepSegment, b) == 8 * 24 && offsetof(SweepSegment, origin) == 8 * 36 &&
+_Static_assert(offsetof(SweepSegment, origin) == 8 * 12 && offsetof(SweepSegment, n) == 8 * 16 && offsetof(SweepSegment, b) == 8 * 28 &&
                    offsetof(SweepSegment, section) == 8 * 40 && SWEEP_SEGMENT_ROW == 112,
                "segments are rows of doubles");
 _Static_assert(40 + 8 * (SWEEP_HARMONICS + 1) <= SWEEP_SEGMENT_ROW, "the tiles of all terms lie in the row");
@@ -22,8 +23,8 @@ const double sweep_ring_sin[SWEEP_RING] = {0, THIN, DIAGONAL, WIDE, 1, WIDE, DIA
 
 #define KERNEL_TABLE(set)                                                                                                                                      \
     {                                                                                                                                                          \
-        seek_##set, evaluate_##set, evaluate_slope_##set, blend_##set, blend_slope_##set, blobs_slope_##set, width_##set, ring_##set, ring_points_##set,       \
-            near_field_##set, predict_##set, newton_##set, finish_##set                                                                                        \
+        seek_##set, evaluate_##set, evaluate_slope_##set, blend_##set, blend_slope_##set, blobs_slope_##set, width_##set, ring_##set, rings_##set,             \
+            minima_##set, near_field_##set, predict_##set, newton_##set, finish_##set                                                                          \
     }
 
 #define KERNEL_TEXT "geom/sweep_kernel.inc"

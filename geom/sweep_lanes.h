@@ -34,10 +34,17 @@ typedef struct SweepRingLanes {
     SweepLane near2, at_n, at_b;         // result: the square of X's distance to the nearest point of the ring, and that point's coordinates
 } SweepRingLanes;
 
-// Points of a section's contour at equal angles, the first at N.
-typedef struct SweepRing {
-    double x[SWEEP_RING], y[SWEEP_RING], z[SWEEP_RING], far2[SWEEP_RING];
-} SweepRing;
+// Rings around a branch at several t, each a lane: points of its wall at equal angles, the first at N.
+enum { SWEEP_RINGS = FOOT_BLOCK };
+typedef double SweepRingRows[SWEEP_RING][SWEEP_RINGS];
+typedef struct SweepRings {
+    const SweepSegment *segment[SWEEP_RINGS];    // of each ring, with its t
+    double t[SWEEP_RINGS];
+    double radius[SWEEP_RINGS];          // results: c_0, …
+    SweepRingRows x, y, z, far2;         // … points, and the squares of their distances from a point, …
+    unsigned near[SWEEP_RING];           // … bits of the points that are nearer than a limit, …
+    unsigned least[SWEEP_RING];          // … and of those among them that are not farther than any of their neighbours
+} SweepRings;
 
 // A branch near a place: curve, frame and section to second order in the length w along its tangent there.
 typedef struct SweepNear {
@@ -66,9 +73,11 @@ typedef struct SweepKernels {
     void (*width)(SweepPartLanes *part);
     // The nearest point of the ring at the foot's t to X.
     void (*ring)(SweepRingLanes *ring, const FootBatch *foot, const double *foot_x, const double *foot_y, const double *foot_z, int harmonics);
-    // A ring's points and the squares of their distances from x. `term`: the section's SWEEP_TERMS coefficients; `middle`: S; n, b, up: N, B and the ring's
-    // height per mm of radius.
-    void (*ring_points)(const double *term, int harmonics, Vec3 middle, Vec3 n, Vec3 b, Vec3 up, Vec3 x, SweepRing *ring);
+    // Points of the rings, on domes at the height of their t; those nearer to x than the root of limit2.
+    void (*rings)(SweepRings *rings, int harmonics, Vec3 x, double limit2);
+    // Finds the points that are not farther from x than any of their neighbours, nearer than the root of limit2, and farther from `from` than that of own2.
+    // Returns the least far2 of the points that are farther from `from` than the root of zone2; at most limit2.
+    double (*minima)(SweepRings *rings, Vec3 from, double own2, double zone2, double limit2);
     // f of a branch at `count` points (a multiple of FOOT_BLOCK), approximately.
     void (*near_field)(const SweepNear *near, int harmonics, int count, const double *x, const double *y, const double *z, double *f);
     void (*predict)(FootBatch *foot, double allowed);

@@ -7,8 +7,9 @@
 
 // Polynomials of t - origin on from <= t <= to. A branch has two segments before its start and two beyond its end, the outer ones without end.
 typedef struct SweepSegment {
-    Vec3 s[4], n[4], b[4];               // as in SweepInterval
+    Vec3 s[4];                           // as in SweepInterval; with the next four, all that the search for t reads
     double origin, rise, from, to;       // rise: w = rise (t - origin); 0: w = 0
+    Vec3 n[4], b[4];                     // as in SweepInterval
     double section[SWEEP_TERMS][4];      // the terms' polynomials
     double largest;                      // [mm] upper bound of R on the segment
     double is_shaped;                    // 1: sections of another kind reach into the segment (sweep_stretch.h)

@@ -39,7 +39,6 @@ static const double BESIDE = 0.25;           // relative to the radius: a rival 
 static const double LOOK_BESIDE = 0.25;      // relative to the radius: with a rival, a third foot may be this near
 static const double TRUST_LEAST = 0.02, TRUST_MOST = 0.45;    // relative to the radius: travel between two searches …
 static const double TRUST_AMONG = 0.25;      // … and at most this where several branches are seen
-static const double LOOK_AMONG = 0.56;       // … for which LOOK need not be more
 
 // --- Nodes and places ---
 
@@ -173,7 +172,7 @@ static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
     double radius = sweep_place_radius(&v->feet, foot->segment, foot->sac), limit = fabs(foot->gap) + LOOK * radius;
     SweepStart start[SWEEP_FEET];
     SweepPlace place = place_of_foot(v, foot);
-    SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot->at, .beyond = limit, .nearest_beyond = &check->beyond};
+    SweepSearch search = {.most = SWEEP_FEET, .limit = limit, .from = foot->at, .nearest_beyond = &check->beyond};
     // a start closer to the foot than this leads to it, and a wall closer than `zone` belongs to it; outside, in the groove between two tubes, feet on both sides
     // are as near to each other as to x
     search.own = foot->gap > 0 ? 0.33 * radius : fmin(0.33 * radius, -0.6 * foot->gap);
@@ -185,8 +184,7 @@ static void begin_check(const SweepVessel *v, Vec3 x, Check *check)
         keep_starts(fabs(foot->gap), start, count, check);
     }
     if (!single && (!search.alone || check->count > 0)) {
-        limit = fabs(foot->gap) + LOOK_AMONG * radius;
-        check->rival = check->beyond = search.limit = search.beyond = limit;
+        check->rival = check->beyond = search.limit = limit;
         search.alone = false;
         int count = sweep_starts(&v->feet, x, place, foot->segment, &search, start);
         keep_starts(fabs(foot->gap) + BESIDE * radius, start, count, check);
