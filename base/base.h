@@ -7,6 +7,7 @@
 // faults and assumptions
 #include "base/assert.h"
 #include "base/faults.h"
+#include "base/folders.h"
 #include "base/nearest_name.h"
 
 // memory and order

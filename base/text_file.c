@@ -2,6 +2,7 @@
 
 #include "base/whole_file.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,5 +18,14 @@ char *text_file_beside(const char *base, const char *name)
         memcpy(path, base, folder);
         memcpy(path + folder, name, length + 1);
     }
+    return path;
+}
+
+char *text_file_in(const char *folder, const char *name)
+{
+    size_t length = strlen(folder) + strlen(name) + 2;
+    char *path = malloc(length);
+    if (path)
+        snprintf(path, length, "%s/%s", folder, name);
     return path;
 }

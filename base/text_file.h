@@ -12,5 +12,7 @@ enum { TEXT_FILE_LIMIT = 64 * 1024 * 1024 };
 char *text_file_read(const char *path, size_t *length, Faults *faults);
 // `name` resolved relative to the folder of the file `base`; absolute paths are unchanged. The caller frees it.
 char *text_file_beside(const char *base, const char *name);
+// The file `name` in a folder. The caller frees it. NULL: out of memory.
+char *text_file_in(const char *folder, const char *name);
 
 #endif

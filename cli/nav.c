@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output_plan.h"
+#include "cli/scene_input.h"
 #include "render/render.h"
 #include "sim/sim.h"
 
@@ -56,7 +57,8 @@ static const OptionTable table = {
     .program = "seldinger nav",
     .does = "opens the trainer: steer the tools in a window; sessions are recorded and scored",
     .usage = "SCENE [options]",
-    .intro = "Opens the trainer's window: steer the tools by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its "
+    .intro = "Opens the trainer's window in a scene, a case (`seldinger case`), a tree or a model: steer the tools by keyboard, gamepad, HID or USB device. "
+             "`?` lists the keys. Each session is recorded, and its "
              "score written beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.",
     .exits = "0 done; 2 wrong usage, bad input or no display; 3 the simulation diverged or the recording is incomplete",
     CLI_OPTIONS(rows, NavOptions),
@@ -103,7 +105,7 @@ static int call(void *structure, Faults *faults)
     OpenVessel open = {0};
     int code = EXIT_BAD_INPUT;
     recording_prepare_process();
-    Scene *scene = scene_load(nav->scene, faults);
+    Scene *scene = cli_scene_input(nav->scene, nav->trainer.threads, nav->quiet, faults);
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--figures", nav->figures);
     output_plan_read_scene(&plan, scene);

@@ -16,26 +16,7 @@ enum { CACHE_PATH = 4096 };
 // The folder of the cache, created if it does not exist; false if none is available.
 static bool cache_folder(char folder[CACHE_PATH])
 {
-    const char *own = getenv("SELDINGER_CACHE"), *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
-    int length = -1;
-    if (own && *own)
-        length = snprintf(folder, CACHE_PATH, "%s", own);
-    else if (xdg && *xdg)
-        length = snprintf(folder, CACHE_PATH, "%s/seldinger", xdg);
-    else if (home && *home)
-        length = snprintf(folder, CACHE_PATH, "%s/.cache/seldinger", home);
-    if (length <= 0 || length >= CACHE_PATH - 128)
-        return false;
-    for (char *at = folder + 1; *at; at++) {
-        if (*at != '/')
-            continue;
-        *at = 0;
-        bool made = mkdir(folder, 0777) == 0 || errno == EEXIST;
-        *at = '/';
-        if (!made)
-            return false;
-    }
-    return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
+    return folders_cache(folder, CACHE_PATH - 128) && folders_create(folder) && access(folder, R_OK | W_OK | X_OK) == 0;
 }
 
 // The key covers all inputs of fit_shape(): the shape with its options, the kind of contact, and the program or library itself, whose defaults are the fit's

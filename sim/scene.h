@@ -105,7 +105,7 @@ typedef struct Scene {
 
 // `text` need not be NUL-terminated; `path` is used in messages and to resolve relative paths. NULL with faults.
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
-Scene *scene_load(const char *path, Faults *faults);
+Scene *scene_load(const char *path, Faults *faults);     // of a folder (sim/case_make.h): its scene.yaml
 void scene_free(Scene *scene);
 // A tool's current options: scene->wire for the first; for the others their own, with start, direction, normal, sheath and gravity of scene->wire
 // (which `inlet: root` sets late).

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static const double per_m_s2 = 1e-3;           // mm/ms2
 static const double farthest_mm = 1e5;
@@ -542,8 +543,12 @@ Scene *scene_parse(const char *text, size_t length, const char *path, Faults *fa
 Scene *scene_load(const char *path, Faults *faults)
 {
     size_t length;
-    char *text = text_file_read(path, &length, faults);
-    Scene *scene = text ? scene_parse(text, length, path, faults) : NULL;
+    struct stat status;
+    char *inside = stat(path, &status) == 0 && S_ISDIR(status.st_mode) ? text_file_in(path, "scene.yaml") : NULL;
+    const char *file = inside ? inside : path;
+    char *text = text_file_read(file, &length, faults);
+    Scene *scene = text ? scene_parse(text, length, file, faults) : NULL;
     free(text);
+    free(inside);
     return scene;
 }

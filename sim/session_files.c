@@ -12,25 +12,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// Creates each folder of the path in turn.
-static bool make_folders(char *path)
-{
-    for (char *at = path + 1; *at; at++) {
-        if (*at != '/')
-            continue;
-        *at = 0;
-        bool made = mkdir(path, 0777) == 0 || errno == EEXIST;
-        *at = '/';
-        if (!made)
-            return false;
-    }
-    struct stat status;
-    if (mkdir(path, 0777) == 0 || (errno == EEXIST && stat(path, &status) == 0 && S_ISDIR(status.st_mode)))
-        return true;
-    errno = errno == EEXIST ? ENOTDIR : errno;
-    return false;
-}
-
 bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
 {
     const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
@@ -41,7 +22,7 @@ bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faul
     bool fits = length > 0 && (size_t)length < capacity - 512;
     if (!fits)
         errno = ENAMETOOLONG;
-    if (fits && make_folders(out) && access(out, W_OK | X_OK) == 0)
+    if (fits && folders_create(out) && access(out, W_OK | X_OK) == 0)
         return true;
     faults_add(faults, wanted ? wanted : out, 0, 0, "cannot store sessions: %s; give a writable folder by --sessions FOLDER", strerror(errno));
     return false;
@@ -49,9 +30,13 @@ bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faul
 
 void session_file_name(const char *folder, const char *scene_path, const char *extension, char *out, size_t capacity)
 {
-    const char *name = strrchr(scene_path, '/');
-    name = name ? name + 1 : scene_path;
-    int stem = (int)strcspn(name, ".");
+    const char *end = scene_path + strlen(scene_path), *plain = "/scene.yaml";
+    if (end - scene_path > (ptrdiff_t)strlen(plain) && !strcmp(end - strlen(plain), plain))
+        end -= strlen(plain);
+    const char *name = end;
+    while (name > scene_path && name[-1] != '/')
+        name--;
+    int stem = (int)strcspn(name, "./");
     char when[32];
     time_t now = time(NULL);
     struct tm local;

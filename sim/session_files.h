@@ -7,7 +7,7 @@
 // The folder of sessions: `wanted`, else $XDG_DATA_HOME/seldinger/sessions, else ~/.local/share/seldinger/sessions; created if it does not exist.
 // False with a fault.
 bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faults);
-// FOLDER/SCENE-20261121-221100.EXT: local time; with a number appended if that name is taken.
+// FOLDER/SCENE-20261121-221100.EXT: local time; with a number appended if that name is taken. The scene.yaml of a folder has the folder's name.
 void session_file_name(const char *folder, const char *scene_path, const char *extension, char *out, size_t capacity);
 // The recording's name with another extension.
 void session_file_beside(const char *recording, const char *extension, char *out, size_t capacity);

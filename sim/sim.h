@@ -8,6 +8,7 @@
 #include "sim/scene.h"
 #include "sim/scene_list.h"
 #include "sim/open_vessel.h"
+#include "sim/case_make.h"
 #include "sim/tray_devices.h"
 #include "sim/tube_tree.h"
 

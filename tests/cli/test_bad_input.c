@@ -249,7 +249,7 @@ static void verbs_of_the_trainer(void **state)
         {"nav free.yaml other.yaml", "one scene at a time, not also other.yaml"},
         {"nav nowhere.yaml", "nowhere.yaml: cannot be opened"},
         {"nav open.yaml", "open.yaml:2:1: is not YAML"},
-        {"nav free.h5", "free.h5:1:1: is not YAML"},
+        {"nav free.h5", "free.h5: is a recording; show it: seldinger replay free.h5"},
         {"nav free.yaml --banana", "see `seldinger nav --help`"},
         {"nav free.yaml --at x", "--at: 'x' is not valid"},
         {"nav free.yaml --size 64x64", "--size: '64x64' is not valid"},

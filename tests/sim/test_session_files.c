@@ -80,6 +80,10 @@ static void no_name_is_taken_twice(void **state)
         assert_int_equal(access(name[i], F_OK), -1);
         put(name[i] + strlen(folder) + 1, "");
     }
+    session_file_name(folder, "/cases/arch/scene.yaml", ".h5", name[0], sizeof name[0]);
+    assert_memory_equal(name[0] + strlen(folder), "/arch-20", 8);
+    session_file_name(folder, "scene.yaml", ".h5", name[0], sizeof name[0]);
+    assert_memory_equal(name[0] + strlen(folder), "/scene-20", 9);
     char beside[4096];
     session_file_beside("/a.b/c.d.h5", ".json", beside, sizeof beside);
     assert_string_equal(beside, "/a.b/c.d.json");

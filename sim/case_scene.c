@@ -1,0 +1,151 @@
+#include "sim/case_scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Wires as in scenes/tools: the shaft's length is what remains.
+typedef struct CaseWire {
+    const char *name;
+    double tip;              // [mm] length of the sections after the shaft
+    const char *shaft, *tip_sections, *damping;
+} CaseWire;
+static const CaseWire wires[] = {
+    {"a nitinol wire of 0.014 inch with an angled tip (scenes/tools/wire-014-nitinol.yaml)", 85,
+     "diameter_mm: 0.3556, young_modulus_gpa: 59.88, poisson_ratio: 0.3, density_g_cm3: 6.45",
+     "    - {length_mm: 50, diameter_mm: 0.3556, young_modulus_gpa: 19.11, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
+     "    - {length_mm: 25, diameter_mm: 0.3556, young_modulus_gpa: 2.548, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
+     "    - {length_mm: 10, diameter_mm: 0.3556, young_modulus_gpa: 2.548, poisson_ratio: 0.3, density_g_cm3: 6.45, rest_curvature_1_mm: 0.1}\n",
+     "{mass_1_s: 0.1, stiffness_s: 0.0002}"},
+    {"a wire of 0.035 inch with an angled tip (scenes/exercises/left-carotid.yaml)", 100,
+     "diameter_mm: 0.89, young_modulus_gpa: 9.5, poisson_ratio: 0.3, density_g_cm3: 4",
+     "    - {length_mm: 70, diameter_mm: 0.89, young_modulus_gpa: 3, poisson_ratio: 0.3, density_g_cm3: 4, attenuation_1_mm: 3}\n"
+     "    - {length_mm: 30, diameter_mm: 0.89, young_modulus_gpa: 2, poisson_ratio: 0.3, density_g_cm3: 4, attenuation_1_mm: 3, rest_curvature_1_mm: 0.03}\n",
+     "{mass_1_s: 0.5, stiffness_s: 0.0002}"},
+};
+static const double WIDE_MM = 2.5;      // mean radius of the vessels from which on the thicker wire is taken
+static const double SPARE_MM = 60;      // of wire, beyond the farthest place
+static const double ELEMENT_MM = 1.5;
+enum { ELEMENTS_LEAST = 60, ELEMENTS_MOST = 400 };
+
+static double *paths_from_root(const VesselTree *tree)
+{
+    double *path = calloc((size_t)tree->node_count, sizeof *path);
+    for (int i = 1; path && i < tree->node_count; i++)
+        path[i] = path[tree->parent[i]] + vec3_distance(tree->center[i], tree->center[tree->parent[i]]);
+    return path;
+}
+
+static int nearest_node(const VesselTree *tree, Vec3 x)
+{
+    int best = 0;
+    for (int i = 1; i < tree->node_count; i++)
+        if (vec3_distance(x, tree->center[i]) - tree->radius[i] < vec3_distance(x, tree->center[best]) - tree->radius[best])
+            best = i;
+    return best;
+}
+
+// Mean radius, weighted by length: short twigs have many nodes.
+static double mean_radius(const VesselTree *tree)
+{
+    double sum = 0, length = 0;
+    for (int i = 1; i < tree->node_count; i++) {
+        double step = tree->kind[i] == NODE_VESSEL ? vec3_distance(tree->center[i], tree->center[tree->parent[i]]) : 0;
+        sum += step * tree->radius[i];
+        length += step;
+    }
+    return length > 0 ? sum / length : tree->radius[0];
+}
+
+static void write_wire(FILE *out, const VesselTree *tree, double farthest)
+{
+    const CaseWire *wire = &wires[mean_radius(tree) >= WIDE_MM];
+    double length = fmax(10 * ceil((farthest + SPARE_MM) / 10), wire->tip + 20), elements = ceil(length / ELEMENT_MM);
+    fprintf(out, "wire:   # %s\n  elements: %.0f\n  sections:\n    - {length_mm: %.0f, %s}\n%s  damping: %s\n", wire->name,
+            fmin(fmax(elements, ELEMENTS_LEAST), ELEMENTS_MOST), length - wire->tip, wire->shaft, wire->tip_sections, wire->damping);
+}
+
+// The axis of the model whose positive direction is `letter`, or whose negative one is `opposite`.
+static bool direction_in(const char *frame, char letter, char opposite, int axis[3])
+{
+    for (int k = 0; strlen(frame) == 3 && k < 3; k++)
+        if (frame[k] == letter || frame[k] == opposite) {
+            axis[k] = frame[k] == letter ? 1 : -1;
+            return true;
+        }
+    return false;
+}
+
+static void write_patient(FILE *out, const CaseScene *options)
+{
+    int front[3] = {0}, up[3] = {0};
+    if (direction_in(options->frame, 'A', 'P', front) && direction_in(options->frame, 'S', 'I', up))
+        fprintf(out, "fluoroscopy:\n  anterior: [%d, %d, %d]\n  superior: [%d, %d, %d]\n", front[0], front[1], front[2], up[0], up[1], up[2]);
+    else if (options->behind)
+        fprintf(out, "fluoroscopy: {lao_deg: 0}\n");
+}
+
+static void write_exercise(FILE *out, const VesselTree *tree, const CaseScene *options, int node, double path)
+{
+    double radius = fmin(fmax(tree->radius[node], 1), 3), seconds = 5 * ceil((20 + path / 3) / 5);
+    Vec3 x = options->target;
+    fprintf(out, "targets:\n  - {name: target, point_mm: [%.9g, %.9g, %.9g], radius_mm: %.2g}\n", x.x, x.y, x.z, radius);
+    fprintf(
+        out,
+        "exercise:\n  title: Reach the target\n  instructions: Bring the tip of the wire to the target, %.0f mm along the vessels, and keep it there for 2 s.\n"
+        "  target: target\n  rules: {wrong_branch_mm: %.2g, tip_force_n: 0.5, blind_mm: 10}\n"
+        "  par: {time_s: %.0f, fluoroscopy_s: %.0f, path_ratio: 1.5, wall_force_n: 0.5}\n",
+        path, fmax(5, 2 * tree->radius[node]), seconds, seconds);
+}
+
+// The node of the target, 0 without one; -1 with a fault if it lies in no vessel.
+static int target_node(const VesselTree *tree, const CaseScene *options, Faults *faults)
+{
+    int node = options->has_target ? nearest_node(tree, options->target) : 0;
+    Vec3 at = tree->center[node];
+    double gap = vec3_distance(options->target, at) - tree->radius[node];
+    if (!options->has_target || gap <= tree->radius[node])
+        return node;
+    faults_add(faults, "--target", 0, 0, "lies %.1f mm outside the nearest vessel, which passes (%.2f, %.2f, %.2f); expected a point in a vessel or a sac", gap,
+               at.x, at.y, at.z);
+    return -1;
+}
+
+static bool write_scene(OutputText *text, const VesselTree *tree, const CaseScene *options, int node)
+{
+    double *path = paths_from_root(tree), farthest = 0;
+    if (!path)
+        return output_text_forget(text);
+    for (int i = 0; i < tree->node_count; i++)
+        farthest = fmax(farthest, path[i]);
+    fprintf(text->stream,
+            "# A case: `seldinger nav` opens its folder. Change what you like (docs/scene-format.md).\n"
+            "seldinger: 1\nvessel:\n  model: %s\n  contact: %s\n  friction: 0.04\n",
+            options->model, contact_name[options->contact]);
+    write_wire(text->stream, tree, farthest);
+    fprintf(text->stream, "sheath: {inlet: root, inserted_mm: 2}\n");
+    write_patient(text->stream, options);
+    if (options->has_target)
+        write_exercise(text->stream, tree, options, node, path[node]);
+    free(path);
+    if (!ferror(text->stream) && fclose(text->stream) == 0)
+        return true;
+    free(text->bytes);
+    return false;
+}
+
+char *case_scene_text(const VesselTree *tree, const CaseScene *options, Faults *faults)
+{
+    OutputText text;
+    int node = target_node(tree, options, faults);
+    if (node < 0)
+        return NULL;
+    char *written = output_text_open(&text) && write_scene(&text, tree, options, node) ? text.bytes : NULL, *whole = written;
+    if (written && options->behind) {        // the path may need quotes
+        whole = yaml_edit(written, "fluoroscopy.volume", options->behind, true);
+        free(written);
+    }
+    if (!whole)
+        faults_add(faults, options->model, 0, 0, "the scene of the case cannot be written: out of memory, or the name of its volume has a line break");
+    return whole;
+}

@@ -1,0 +1,120 @@
+// Cases: a folder from a volume or a tree, which runs, can be copied, and comes out the same again.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+static char folder[] = "/tmp/seldinger-case-XXXXXX";
+#include "tests/folder.h"
+
+#include "program.h"
+
+static int make_volume(void **state)
+{
+    return make_folder_with_cache(state) == 0 && run_in("", "synth y --quiet -o 'a y.nrrd'") == 0 && run_in("", "synth y --quiet -o tree.h5") == 0 ? 0 : -1;
+}
+
+static void same_file(const char *a, const char *b)
+{
+    char command[500];
+    snprintf(command, sizeof command, "cmp '%s' '%s'", in_folder(a), in_folder(b));
+    assert_int_equal(system(command), 0);
+}
+
+static void refused(const char *arguments, const char *message)
+{
+    int code = run_in("", arguments);
+    if (code != 2 || !strstr(output, message))
+        fail_msg("%s: ended with %d and said: %s", arguments, code, output);
+}
+
+static void a_volume_becomes_a_case(void **state)
+{
+    (void)state;
+    assert_int_equal(run_in("", "case 'a y.nrrd' --start -2,0,0 --target 0,0,0 --behind -o one"), 0);
+    assert_non_null(strstr(output, "seldinger nav one"));
+    // from its own trace: the same bytes
+    assert_int_equal(run_in("", "case 'a y.nrrd' --trace one/trace.yaml --target 0,0,0 --behind --threads 1 --quiet -o two"), 0);
+    assert_string_equal(output, "");
+    same_file("one/model.h5", "two/model.h5");
+    same_file("one/scene.yaml", "two/scene.yaml");
+    same_file("one/trace.yaml", "two/trace.yaml");
+    // a copy elsewhere runs, and the target is reached
+    assert_int_equal(run_in("mkdir sub && cp -r one sub/three &&", "info sub/three/scene.yaml"), 0);
+    put("push.csv", "t_s,push_mm_s,twist_deg_s\n0,10,0\n0.5,0,0\n");
+    assert_int_equal(run_in("", "run sub/three --script push.csv"), 0);
+    assert_non_null(strstr(output, "target target: reached"));
+}
+
+static void a_tree_becomes_a_case(void **state)
+{
+    (void)state;
+    assert_int_equal(run_in("", "case tree.h5 --model sweep -o swept"), 0);
+    char *text = text_of(in_folder("swept/scene.yaml"));
+    assert_non_null(strstr(text, "contact: sweep"));
+    assert_null(strstr(text, "exercise"));
+    free(text);
+    // a file that has the model is not fitted again, and keeps it when another is fitted
+    assert_int_equal(run_in("", "case swept/model.h5 --model lim -o both"), 0);
+    assert_int_equal(run_in("", "info both/model.h5 --model sweep"), 0);
+    assert_int_equal(run_in("", "info both/model.h5 --model lim"), 0);
+    assert_int_equal(run_in("", "case both/model.h5 --model sweep -o again"), 0);
+    assert_int_equal(run_in("", "run both --duration-s 0.05"), 0);
+    assert_int_equal(run_in("", "run again --duration-s 0.05"), 0);
+}
+
+static void bad_cases_are_refused(void **state)
+{
+    (void)state;
+    refused("case 'a y.nrrd' -o none", "is a volume; add --start X,Y,Z");
+    refused("case tree.h5 --start -2,0,0 -o none", "is a tree; --start, --trace and --behind are for volumes");
+    refused("case push.csv -o none", "is neither a volume nor a tree");
+    refused("case nosuch.h5 -o none", "nosuch.h5");
+    refused("case tree.h5", "missing -o CASE");
+    refused("case tree.h5 --target 0,0 -o none", "--target takes a point");
+    refused("case 'a y.nrrd' --start -2,0,0 --trace t.yaml -o none", "either --trace F.yaml or --start X,Y,Z");
+    refused("case 'a y.nrrd' --start 0,0,900 -o outside", "--start");
+    refused("case tree.h5 --target 0,0,90 -o far", "outside the nearest vessel");
+    refused("case tree.h5 -o tree.h5", "cannot be created as a folder");
+    refused("run far", "far/scene.yaml");
+    // a folder without a scene is no case yet
+    assert_int_equal(run_in("", "case tree.h5 --quiet -o far"), 0);
+    refused("case tree.h5 -o far", "is a case already");
+}
+
+static void nav_names_the_command(void **state)
+{
+    (void)state;
+#ifdef SELDINGER_RENDER
+    refused("nav 'a y.nrrd'", "seldinger case a y.nrrd --start X,Y,Z -o CASE");
+    refused("nav push.csv", "seldinger run SCENE --script push.csv");
+    assert_int_equal(run_in("", "export tree.h5 --model sweep -o s.stl"), 2);
+    assert_int_equal(run_in("", "synth y --quiet -o s.stl"), 0);
+    refused("nav s.stl", "seldinger import --surface s.stl -o TREE.h5");
+    assert_int_equal(run_in("", "run far --duration-s 0.01 --record r.h5"), 0);
+    refused("nav r.h5", "seldinger replay r.h5");
+    refused("nav nosuch", "nosuch: cannot be opened");
+    // a tree opens as a case from the cache; without a display that is all that happens
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(run_in("env -u DISPLAY -u WAYLAND_DISPLAY", "nav tree.h5 --no-record"), 2);
+    assert_int_equal(run_in("ls cases/tree-*/scene.yaml &&", "--version"), 0);
+#else
+    skip();
+#endif
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_volume_becomes_a_case),
+        cmocka_unit_test(a_tree_becomes_a_case),
+        cmocka_unit_test(bad_cases_are_refused),
+        cmocka_unit_test(nav_names_the_command),
+    };
+    return cmocka_run_group_tests(tests, make_volume, remove_folder);
+}
