@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "base/base.h"
+#include "cli/start.h"
 
 #include <string.h>
 
@@ -28,10 +29,13 @@ static const OptionTable program = {
 
 static void print_help(FILE *out)
 {
-    fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
+    fprintf(out,
+            "Usage: seldinger VERB ARGUMENTS\n       seldinger\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical "
+            "device.\n\n",
             SELDINGER_VERSION);
     cli_list_verbs(out, verbs, 34);
-    fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
+    fprintf(out, "\nWithout arguments, on a display, a window offers exercises, sessions and files. `seldinger VERB --help` explains every option with its "
+                 "unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
                  "`seldinger --completion` a bash script that completes verbs and options.\n"
                  "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation cannot be trusted.\n"
                  "When stopped (SIGINT, SIGTERM, SIGHUP), a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends normally.\n");
@@ -70,6 +74,10 @@ static int print_completion(void)
 static int call_verb(int argc, char **argv)
 {
     const char *name = argc > 1 ? argv[1] : "";
+#ifdef SELDINGER_RENDER
+    if (argc < 2 && start_is_possible())
+        return start_run();
+#endif
     if (argc < 2) {
         print_help(stderr);
         return EXIT_BAD_INPUT;

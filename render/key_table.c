@@ -222,6 +222,7 @@ void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured)
             break;
         case WINDOW_FOCUS_LOST_EVENT: key_state_release(state); break;
         case WINDOW_SCROLL_EVENT:
+        case WINDOW_DROP_EVENT:
         case WINDOW_DEVICE_EVENT: break;
         }
     }

@@ -17,6 +17,7 @@
 // the window
 #include "render/edit_window.h"
 #include "render/replay_window.h"
+#include "render/start_window.h"
 #include "render/trainer.h"
 #include "render/trainer_figures.h"
 

@@ -31,6 +31,7 @@ struct Window {
     int left, top, width, height;    // of the window before full screen
     bool is_present[WINDOW_GAMEPADS];
     char gamepad[WINDOW_GAMEPADS][128];
+    char dropped[4096];
     struct sigaction previous_action[SIGNALS];
 };
 
@@ -176,6 +177,14 @@ static void on_focus(GLFWwindow *window, int has_focus)
     add_event(w, (WindowEvent){.kind = WINDOW_FOCUS_LOST_EVENT});
 }
 
+static void on_drop(GLFWwindow *window, int count, const char **path)
+{
+    Window *w = glfwGetWindowUserPointer(window);
+    if (count < 1 || (size_t)snprintf(w->dropped, sizeof w->dropped, "%s", path[0]) >= sizeof w->dropped)
+        return;
+    add_event(w, (WindowEvent){.kind = WINDOW_DROP_EVENT});
+}
+
 static void look_for_joysticks(Window *w)
 {
     for (int i = 0; i < WINDOW_GAMEPADS; i++) {
@@ -249,6 +258,8 @@ void window_swap(Window *w)
         glfwShowWindow(w->window);
     glfwSwapBuffers(w->window);
 }
+
+const char *window_dropped(const Window *w) { return w->dropped; }
 
 int64_t window_frames_skipped(const Window *w) { return w->skipped; }
 
@@ -391,6 +402,7 @@ Window *window_create(const char *title, int width, int height, double hz, char 
     glfwSetScrollCallback(window, on_scroll);
     glfwSetMouseButtonCallback(window, on_button);
     glfwSetWindowFocusCallback(window, on_focus);
+    glfwSetDropCallback(window, on_drop);
 
     ended_by_signal = 0;
     struct sigaction action = {.sa_handler = on_end_signal, .sa_flags = (int)SA_RESETHAND};   // a second signal ends the program at once

@@ -44,6 +44,7 @@ typedef enum WindowEventKind {
     WINDOW_TEXT_EVENT,       // `character`, for text fields and for signs at other positions on other keyboards; `is_repeat`
     WINDOW_SCROLL_EVENT,     // `scroll_x`, `scroll_y`: notches, y > 0 away from the user
     WINDOW_FOCUS_LOST_EVENT, // counts as a release of all keys and mouse buttons
+    WINDOW_DROP_EVENT,       // a file was dropped on the window: window_dropped
     WINDOW_DEVICE_EVENT      // `device`, `is_present`: a joystick was connected or removed; its name by window_gamepad or window_gamepad_name
 } WindowEventKind;
 
@@ -93,6 +94,7 @@ void window_destroy(Window *window);   // restores signal handlers and the previ
 // false if nothing should be drawn: iconified or of zero size. *input is valid until the next call.
 bool window_next_frame(Window *window, const WindowInput **input);
 void window_swap(Window *window);   // the first call also shows the window, which is hidden until then
+const char *window_dropped(const Window *window);   // the path of the file that was dropped last; "" if none was
 int64_t window_frames_skipped(const Window *window);   // periods skipped because a frame took longer
 
 // The present state of a joystick, `index` 0 to 15. Returns false if there is none.

@@ -3,6 +3,7 @@
 #define SELDINGER_TESTS_CLI_DISPLAY_H
 
 #include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,0 +1,97 @@
+// `seldinger` without arguments: the start window as a user drives it by keys alone, and what runs from it.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "tests/cli/display.h"
+
+static char folder[] = "/tmp/seldinger-start-XXXXXX";
+#include "tests/folder.h"
+
+static int begin(void **state)
+{
+    return make_folder(state) == 0 && setenv("SELDINGER_CACHE", in_folder("cache"), 1) == 0 && setenv("XDG_DATA_HOME", folder, 1) == 0 ? display_start() : 1;
+}
+
+static int end(void **state)
+{
+    display_stop();
+    return remove_folder(state);
+}
+
+static int shell(const char *script)
+{
+    static char command[6000];
+    snprintf(command, sizeof command, "cd '%s' || exit 9; S='%s'; %s", folder, SELDINGER_PROGRAM, script);
+    int status = system(command);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+// Waits for the window, presses keys with a pause, as pictures take long under a sanitizer, and waits for what they start.
+static const char hand[] = "window() { xdotool search --sync --onlyvisible --name Seldinger >/dev/null; sleep 0.5; }; "
+                           "keys() { for k in \"$@\"; do xdotool key $k; sleep 0.4; done; }; "
+                           "until_true() { for i in $(seq 300); do eval \"$1\" && return 0; sleep 0.1; done; echo \"never: $1\"; exit 1; }; ";
+
+static void no_display_prints_the_usage(void **state)
+{
+    (void)state;
+    assert_int_equal(shell("env -u DISPLAY -u WAYLAND_DISPLAY $S > usage 2>&1; [ $? = 2 ] && grep -q 'Usage: seldinger VERB' usage"), 0);
+}
+
+static void a_user_leaves(void **state)
+{
+    (void)state;
+    need_display();
+    char script[3000];
+    snprintf(script, sizeof script, "%s $S > left 2>&1 & P=$!; window; keys Down Tab Tab shift+Tab Escape; wait $P; [ $? = 0 ] && ! [ -s left ]", hand);
+    assert_int_equal(shell(script), 0);
+}
+
+// Cases, then a session of the first one, its report, and back.
+static void a_user_trains(void **state)
+{
+    (void)state;
+    need_display();
+    char script[3000];
+    snprintf(script, sizeof script,
+             "%s $S > trained 2>&1 & P=$!; window; keys n A d a Return; keys Return; "
+             "until_true 'pgrep -P '$P' >/dev/null'; C=$(pgrep -P $P); window; sleep 1; kill -TERM $C; "
+             "until_true 'ls seldinger/sessions/*.json >/dev/null 2>&1'; until_true '! pgrep -P '$P' >/dev/null'; window; "
+             "keys Tab r; until_true 'ls seldinger/sessions/*.html >/dev/null 2>&1'; until_true '! pgrep -P '$P' >/dev/null'; window; keys Escape; wait $P; [ "
+             "$? = 0 ] || exit 1; "
+             "grep -q '\"trainee\":.*\"[Aa]da\"' seldinger/sessions/*.json",
+             hand);
+    int code = shell(script);
+    if (code != 0)
+        fail_msg("ended with %d: %s", code, text_of(in_folder("trained")));
+}
+
+// A volume names the command for it, in the window and on standard error; the folder is remembered.
+static void a_user_opens_a_volume(void **state)
+{
+    (void)state;
+    need_display();
+    char script[3000];
+    snprintf(script, sizeof script,
+             "%s mkdir files; $S synth capsule --quiet -o files/a.nrrd && rm -f files/*.h5; printf '%%s' \"$PWD/files\" > cache/last-folder; "
+             "$S 2> said & P=$!; window; keys Tab Tab Return; until_true 'grep -q volume said'; sleep 1; window; keys Escape; wait $P; [ $? = 0 ] && "
+             "grep -q 'files/a.nrrd: is a volume; make a case of it' said && [ \"$(cat cache/last-folder)\" = \"$PWD/files\" ]",
+             hand);
+    int code = shell(script);
+    if (code != 0)
+        fail_msg("ended with %d: %s", code, text_of(in_folder("said")));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_display_prints_the_usage),
+        cmocka_unit_test(a_user_leaves),
+        cmocka_unit_test(a_user_trains),
+        cmocka_unit_test(a_user_opens_a_volume),
+    };
+    return cmocka_run_group_tests(tests, begin, end);
+}
