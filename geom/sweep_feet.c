@@ -26,6 +26,7 @@ void sweep_block_begin(SweepBlock *b)
     memset(&b->ring, 0, sizeof b->ring);
     memset(b->alone, 0, sizeof b->alone);
     b->harmonics = 1;
+    b->unsettled = 0;
 }
 
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int i, int segment, int sac, double t)
@@ -147,7 +148,7 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
     if (feet->field->model->stretch_count > 0)
         apply_stretches(feet, b, k, lanes);
     // far from the curve t may not settle; then the point is not in the section's plane, where its radius would be too small
-    for (int i = 0; i < FOOT_BLOCK && !bends; i++)
+    for (int i = 0; i < FOOT_BLOCK; i++)
         if (p->absent[i] == 0 && p->settled[i] == 0)
             p->f[i] = fmin(p->f[i], p->segment[i]->largest - p->away[i]);
     for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -304,6 +305,19 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
     return evaluated;
 }
 
+// The lanes of `lanes` in which a part whose t has not settled may be part of F.
+static unsigned lanes_unsettled(const SweepBlock *b, unsigned lanes, unsigned evaluated)
+{
+    unsigned found = 0;
+    for (; evaluated != 0; evaluated &= evaluated - 1) {
+        const SweepPartLanes *p = &b->part[__builtin_ctz(evaluated)];
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            if (p->settled[i] == 0 && p->absent[i] == 0 && (b->view[i]->count == 1 || p->f[i] > b->foot.at.f[i] - 3 * p->width[i]))
+                found |= 1u << i;
+    }
+    return found & lanes;
+}
+
 static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool bends)
 {
     int parts = 0;
@@ -353,6 +367,7 @@ static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool be
         memset(b->share, 0, sizeof b->share), memset(b->sac_share, 0, sizeof b->sac_share);
     if (parts == 1 && sacs == 0) {
         copy_part(&b->foot.at, &b->part[0]);
+        b->unsettled = (b->unsettled & ~lanes) | lanes_unsettled(b, lanes, evaluated);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if (lanes >> i & 1)
                 b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true, b->apart[i] = 0, b->share[0][i] = 1;
@@ -372,6 +387,7 @@ static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool be
     }
     if (sacs != 0)
         blend_sacs(feet, b, lanes, sacs, &sac, bends);
+    b->unsettled = (b->unsettled & ~lanes) | lanes_unsettled(b, lanes, evaluated);
     for (int i = 0; i < FOOT_BLOCK; i++)
         if (lanes >> i & 1) {
             b->keeps_t[i] = true;
@@ -480,7 +496,7 @@ static unsigned run_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, c
         for (int i = 0; i < FOOT_BLOCK; i++)
             from[i] = lane_foot(f, i);
         sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : *all & ~done);
-        done = feet->kernels->newton(f, true);
+        done = feet->kernels->newton(f, true) & ~b->unsettled;
         for (int i = 0; i < FOOT_BLOCK; i++) {
             Vec3 step = vec3_sub(lane_foot(f, i), from[i]);
             if (vec3_dot(step, last[i]) < BACK * vec3_norm2(last[i]))
@@ -529,7 +545,7 @@ unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *st
         sweep_block_sample(feet, &b, several);
     for (int i = 0; i < count; i++) {
         foot[i].doubtful = several >> i & 1 && fabs(b.foot.at.f[i]) > OFF_WALL * b.foot.radius[i];
-        if (all >> i & 1 && is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
+        if ((all & ~b.unsettled) >> i & 1 && is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
             sound |= 1u << i;
     }
     return sound;

@@ -656,6 +656,50 @@ static void bad_points_and_no_heap(void **state)
     sweep_model_free(m);
 }
 
+// --- Points from which t is not found ---
+
+// F is at most the largest radius less the distance from the curve and its straight continuation, from wherever t is looked for. Beyond the centres of curvature Newton may not find it.
+static void an_unsettled_t_is_no_lumen(void **state)
+{
+    (void)state;
+    static SweepShape shape[1] = {{.pitch = 0.6, .parent = -1, .radius = 1, .knots = 121}};
+    for (int i = 0; i < 121; i++)
+        shape[0].knot[i] = vec3(1.6 * cos(0.1 * PI * i), 1.6 * sin(0.1 * PI * i), 0.25 * i);
+    SweepModel *model = sweep_model_of(shape, 1);
+    SweepField *field = sweep_field_create(model);
+    SweepFeet feet = {.field = field, .kernels = sweep_kernels(1), .harmonics = sweep_model_harmonics(model)};
+    assert_non_null(field);
+    const double length = sweep_model_length(model, 0);
+    static Vec3 curve[4000];                     // 0.02 mm apart
+    for (int k = 0; k < 4000; k++)
+        curve[k] = sweep_curve_at(field->curve[0], (length + 20) * k / 3999 - 10).s;
+    uint64_t seed = 1;
+    int unsettled = 0;
+    for (int n = 0; n < 500; n++) {
+        SweepBlock b;
+        Vec3 x[FOOT_BLOCK];
+        sweep_block_begin(&b);
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            double t = random_in(&seed, 0, length);
+            x[i] = vec3(random_in(&seed, -6, 6), random_in(&seed, -6, 6), random_in(&seed, -6, 36));
+            sweep_block_place(&feet, &b, i, sweep_field_segment(field, 0, t), -1, t);
+            b.foot.at.x[i] = x[i].x, b.foot.at.y[i] = x[i].y, b.foot.at.z[i] = x[i].z;
+        }
+        sweep_block_sample(&feet, &b, FOOT_ALL);
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            double near = HUGE_VAL;
+            for (int k = 0; k < 4000; k++)
+                near = fmin(near, vec3_distance(x[i], curve[k]));
+            assert_true(b.foot.at.f[i] < 1.05 - near);       // the field knows its largest radius to 2 %
+            unsettled += (b.unsettled >> i & 1) != 0;
+        }
+    }
+    print_message("t was not found for %d of %d points\n", unsettled, 500 * FOOT_BLOCK);
+    assert_true(unsettled > 0);
+    sweep_field_free(field);
+    sweep_model_free(model);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -665,7 +709,7 @@ int main(void)
         cmocka_unit_test(sac_beside_a_tube),      cmocka_unit_test(kissing_tubes_keep_apart),
         cmocka_unit_test(inlet_is_open),          cmocka_unit_test(same_bits),
         cmocka_unit_test(moved_and_mirrored),     cmocka_unit_test(bad_points_and_no_heap),
-        cmocka_unit_test(the_counter_counts),
+        cmocka_unit_test(the_counter_counts),     cmocka_unit_test(an_unsettled_t_is_no_lumen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
