@@ -16,7 +16,10 @@ static char folder[] = "/tmp/seldinger-case-XXXXXX";
 
 static int make_volume(void **state)
 {
-    return make_folder_with_cache(state) == 0 && run_in("", "synth y --quiet -o 'a y.nrrd'") == 0 && run_in("", "synth y --quiet -o tree.h5") == 0 ? 0 : -1;
+    return make_folder_with_cache(state) == 0 && run_in("", "synth capsule --voxel-mm 0.3 --quiet -o 'a tube.nrrd'") == 0 &&
+                   run_in("", "synth capsule --quiet -o tree.h5") == 0
+               ? 0
+               : -1;
 }
 
 static void same_file(const char *a, const char *b)
@@ -36,10 +39,10 @@ static void refused(const char *arguments, const char *message)
 static void a_volume_becomes_a_case(void **state)
 {
     (void)state;
-    assert_int_equal(run_in("", "case 'a y.nrrd' --start -2,0,0 --target 0,0,0 --behind -o one"), 0);
+    assert_int_equal(run_in("", "case 'a tube.nrrd' --start 2,0,0 --target 2,0,0 --behind -o one"), 0);
     assert_non_null(strstr(output, "seldinger nav one"));
     // from its own trace: the same bytes
-    assert_int_equal(run_in("", "case 'a y.nrrd' --trace one/trace.yaml --target 0,0,0 --behind --threads 1 --quiet -o two"), 0);
+    assert_int_equal(run_in("", "case 'a tube.nrrd' --trace one/trace.yaml --target 2,0,0 --behind --threads 1 --quiet -o two"), 0);
     assert_string_equal(output, "");
     same_file("one/model.h5", "two/model.h5");
     same_file("one/scene.yaml", "two/scene.yaml");
@@ -71,14 +74,14 @@ static void a_tree_becomes_a_case(void **state)
 static void bad_cases_are_refused(void **state)
 {
     (void)state;
-    refused("case 'a y.nrrd' -o none", "is a volume; add --start X,Y,Z");
-    refused("case tree.h5 --start -2,0,0 -o none", "is a tree; --start, --trace and --behind are for volumes");
+    refused("case 'a tube.nrrd' -o none", "is a volume; add --start X,Y,Z");
+    refused("case tree.h5 --start 2,0,0 -o none", "is a tree; --start, --trace and --behind are for volumes");
     refused("case push.csv -o none", "is neither a volume nor a tree");
     refused("case nosuch.h5 -o none", "nosuch.h5");
     refused("case tree.h5", "missing -o CASE");
     refused("case tree.h5 --target 0,0 -o none", "--target takes a point");
-    refused("case 'a y.nrrd' --start -2,0,0 --trace t.yaml -o none", "either --trace F.yaml or --start X,Y,Z");
-    refused("case 'a y.nrrd' --start 0,0,900 -o outside", "--start");
+    refused("case 'a tube.nrrd' --start 2,0,0 --trace t.yaml -o none", "either --trace F.yaml or --start X,Y,Z");
+    refused("case 'a tube.nrrd' --start 0,0,900 -o outside", "--start");
     refused("case tree.h5 --target 0,0,90 -o far", "outside the nearest vessel");
     refused("case tree.h5 -o tree.h5", "cannot be created as a folder");
     refused("run far", "far/scene.yaml");
@@ -91,10 +94,10 @@ static void nav_names_the_command(void **state)
 {
     (void)state;
 #ifdef SELDINGER_RENDER
-    refused("nav 'a y.nrrd'", "seldinger case a y.nrrd --start X,Y,Z -o CASE");
+    refused("nav 'a tube.nrrd'", "seldinger case a tube.nrrd --start X,Y,Z -o CASE");
     refused("nav push.csv", "seldinger run SCENE --script push.csv");
     assert_int_equal(run_in("", "export tree.h5 --model sweep -o s.stl"), 2);
-    assert_int_equal(run_in("", "synth y --quiet -o s.stl"), 0);
+    assert_int_equal(run_in("", "synth capsule --quiet -o s.stl"), 0);
     refused("nav s.stl", "seldinger import --surface s.stl -o TREE.h5");
     assert_int_equal(run_in("", "run far --duration-s 0.01 --record r.h5"), 0);
     refused("nav r.h5", "seldinger replay r.h5");
