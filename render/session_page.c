@@ -19,20 +19,6 @@ static const char own_style[] =
     "tr.own{background:var(--panel);font-weight:600}td.mark-letter{color:var(--bad);font-weight:700}meter{width:7rem}\n"
     "@media print{body{font-size:10pt}section{break-inside:auto}figure{max-width:100%}}\n";
 
-static const char *const part_words[PART_COUNT] = {
-    "Time", "Fluoroscopy time", "Contrast agent", "Path of the tip", "Largest wall force", "Wall force over time"};
-static const char *const part_unit[PART_COUNT] = {"s", "s", "ml", "times the straight distance", "N", "N s"};
-
-static void figures_of(const ScoreFigures *f, double figure[PART_COUNT])
-{
-    figure[PART_TIME] = f->time_s;
-    figure[PART_FLUOROSCOPY] = f->fluoroscopy_s;
-    figure[PART_CONTRAST] = f->contrast_ml;
-    figure[PART_PATH] = f->way_mm > 0 ? f->path_mm / f->way_mm : 0;
-    figure[PART_WALL_FORCE] = f->wall_force_peak_n;
-    figure[PART_WALL_IMPULSE] = f->wall_impulse_n_s;
-}
-
 static void item(FILE *out, const char *term, const char *text)
 {
     fprintf(out, "<dt>%s</dt><dd>", term);
@@ -54,44 +40,57 @@ static void print_top(const SessionPage *page)
     item(out, "Trainee", s->trainee);
     item(out, "Date", s->date);
     item(out, "Device", s->device);
+    item(out, "Mode", s->is_examination ? "examination: without 3D view and angioscopy" : "practice");
     item(out, "Target", s->target);
     fprintf(out, "</dl></section>\n");
+}
+
+// The figures with the points of each part. Sessions of older versions do not hold them: they follow from the exercise if its scene is known.
+static ScoreFigures with_points(const SessionPage *page)
+{
+    ScoreFigures f = page->session->figures;
+    double most = 0;
+    for (int i = 0; i < PART_COUNT; i++)
+        most += f.judged[i].most;
+    if (most <= 0 && page->scene && page->scene->exercise)
+        score_parts_judge(&f, page->scene->exercise);
+    return f;
+}
+
+static void print_part(FILE *out, const ScoreFigures *f, ScorePart part)
+{
+    const ScorePartFigures *judged = &f->judged[part];
+    char why[120];
+    score_part_reason(f, part, why, sizeof why);
+    fprintf(out, "<tr><th scope=\"row\">%s [%s]</th>", score_part_words[part].title, score_part_words[part].unit);
+    if (judged->most > 0)
+        fprintf(out,
+                "<td>%.2f</td><td>%g</td><td>%.1f of %.1f</td><td class=\"words\"><meter min=\"0\" max=\"1\" value=\"%.3f\">%.0f %%</meter></td><td "
+                "class=\"words\">%s</td></tr>\n",
+                judged->measured, judged->par, judged->points, judged->most, f->part[part], 100 * f->part[part], why);
+    else
+        fprintf(out, "<td>%.2f</td><td>not scored</td><td>–</td><td class=\"words\">–</td><td class=\"words\"></td></tr>\n", judged->measured);
 }
 
 static void print_parts(const SessionPage *page)
 {
     FILE *out = page->out;
-    const ScoreFigures *f = &page->session->figures;
+    const ScoreFigures f = with_points(page);
     const Exercise *e = page->scene ? page->scene->exercise : NULL;
-    double figure[PART_COUNT], weights = 0;
-    figures_of(f, figure);
-    if (!f->has_exercise)
+    if (!f.has_exercise)
         return;
-    for (int i = 0; e && i < PART_COUNT; i++)
-        weights += e->par[i] > 0 ? e->weight[i] : 0;
     fprintf(out, "<section id=\"parts\"><h2>Points</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Measured</th><th "
-                 "scope=\"col\">Full points up to</th><th scope=\"col\">Weight</th><th scope=\"col\" class=\"words\">Reached</th></tr></thead><tbody>\n");
-    for (int i = 0; i < PART_COUNT; i++) {
-        bool judged = !e || (e->par[i] > 0 && e->weight[i] > 0);
-        fprintf(out, "<tr><th scope=\"row\">%s [%s]</th><td>%.2f</td>", part_words[i], part_unit[i], figure[i]);
-        if (e && judged)
-            fprintf(out, "<td>%g</td><td>%.0f %%</td>", e->par[i], 100 * e->weight[i] / weights);
-        else
-            fprintf(out, "<td>%s</td><td>–</td>", e ? "not scored" : "unknown");
-        if (judged)
-            fprintf(out, "<td class=\"words\"><meter min=\"0\" max=\"1\" value=\"%.3f\">%.0f %%</meter> %.0f %%</td></tr>\n", f->part[i], 100 * f->part[i],
-                    100 * f->part[i]);
-        else
-            fprintf(out, "<td class=\"words\">–</td></tr>\n");
-    }
-    fprintf(out, "</tbody></table></div>\n<p>The parts reached are weighted, ");
-    if (f->state == SCORE_REACHED)
+                 "scope=\"col\">Full points up to</th><th scope=\"col\">Points</th><th scope=\"col\" class=\"words\">Reached</th><th scope=\"col\" "
+                 "class=\"words\">Why points were lost</th></tr></thead><tbody>\n");
+    for (int i = 0; i < PART_COUNT; i++)
+        print_part(out, &f, (ScorePart)i);
+    fprintf(out, "</tbody></table></div>\n<p>The points of the parts are added, ");
+    if (f.state == SCORE_REACHED)
         fprintf(out, "in full since the target was held");
     else
-        fprintf(out, "multiplied by half of the fraction of the distance covered (%.0f %%), since the target was not held",
-                f->way_mm > 0 ? 100 * fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0);
-    if (e && f->error_total > 0)
-        fprintf(out, "; minus %g points for each of %d error%s", e->error_points, f->error_total, f->error_total == 1 ? "" : "s");
+        fprintf(out, "multiplied by half of the fraction of the distance covered (%.0f %%), since the target was not held", 200 * score_share(&f));
+    if (e && f.error_total > 0)
+        fprintf(out, "; minus %g points for each of %d error%s", e->error_points, f.error_total, f.error_total == 1 ? "" : "s");
     fprintf(out, ".</p></section>\n");
 }
 
@@ -107,8 +106,11 @@ static void print_figures(const SessionPage *page)
             f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n,
             f->wall_impulse_n_s, f->tip_force_peak_n);
     if (f->has_xray)
-        fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
-                (long long)f->pulses, f->dose_area_cm2, f->contrast_ml);
+        fprintf(out,
+                "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n"
+                "<dt>Sight</dt><dd>tools were moved by %.1f mm without a fresh X-ray image (pulling counts half), and for %.1f s with the 3D view or "
+                "angioscopy in sight</dd>\n",
+                f->fluoroscopy_s, (long long)f->pulses, f->dose_area_cm2, f->contrast_ml, f->blind_total_mm, f->guided_s);
     else
         fprintf(out, "<dt>X-rays</dt><dd>none: a headless run</dd>\n");
     fprintf(out, "</dl></section>\n");

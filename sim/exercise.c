@@ -3,9 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const score_part_name[PART_COUNT + 1] = {"time", "fluoroscopy", "contrast", "path", "wall_force", "wall_impulse", NULL};
-static const char *const par_name[PART_COUNT + 1] = {"time_s", "fluoroscopy_s", "contrast_ml", "path_ratio", "wall_force_n", "wall_impulse_n_s", NULL};
-
 static const double longest_s = 86400, largest = 1e6;
 
 Exercise exercise_default(void)
@@ -106,7 +103,8 @@ static void read_rules(YamlValue value, ExerciseRules *rules)
 void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
 {
     static const char *const keys[] = {"title",        "instructions", "target", "tool",    "exchange",     "stays", "hold_s",
-                                       "time_limit_s", "rules",        "par",    "weights", "error_points", NULL};
+                                       "time_limit_s", "rules",        "par",    "weights", "error_points", "mode",  NULL};
+    static const char *const mode[] = {"practice", "examination", NULL};
     *exercise = exercise_default();
     YamlMap map = yaml_map(value, keys);
     if (!map.value.node)
@@ -122,12 +120,14 @@ void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exerci
     yaml_map_number(&map, "hold_s", false, (NumberRange){0, 60, false}, &exercise->hold_s);
     yaml_map_number(&map, "time_limit_s", false, (NumberRange){0, longest_s, true}, &exercise->time_limit_s);
     read_rules(yaml_get(&map, "rules", false), &exercise->rules);
-    YamlMap par = yaml_map(yaml_get(&map, "par", false), par_name), weight = yaml_map(yaml_get(&map, "weights", false), score_part_name);
+    YamlMap par = yaml_map(yaml_get(&map, "par", false), score_part_par_name), weight = yaml_map(yaml_get(&map, "weights", false), score_part_name);
     for (int i = 0; i < PART_COUNT; i++) {
-        yaml_map_number(&par, par_name[i], false, (NumberRange){0, largest, false}, &exercise->par[i]);
+        yaml_map_number(&par, score_part_par_name[i], false, (NumberRange){0, largest, false}, &exercise->par[i]);
         yaml_map_number(&weight, score_part_name[i], false, (NumberRange){0, 1000, false}, &exercise->weight[i]);
     }
     yaml_map_number(&map, "error_points", false, (NumberRange){0, 100, false}, &exercise->error_points);
+    if (yaml_has(&map, "mode"))
+        exercise->is_examination = yaml_choice(yaml_get(&map, "mode", false), mode) == 1;
 }
 
 void exercise_free(Exercise *exercise)

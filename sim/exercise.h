@@ -28,19 +28,19 @@
 //       path_ratio: 1.5                     # path of the tip over the shortest path to the target
 //       wall_force_n: 0.5
 //       wall_impulse_n_s: 10
-//     weights: {time: 1, fluoroscopy: 1, contrast: 1, path: 1, wall_force: 1, wall_impulse: 1}   # 0 to 1000, relative
+//       blind_mm: 5                         # sum of all movements without a fresh X-ray image, backwards half
+//       guidance_s: 2                       # time of movements with the 3D view or angioscopy in sight
+//     weights: {time: 1, fluoroscopy: 1, contrast: 1, path: 1, wall_force: 1, wall_impulse: 1, blind: 1, guidance: 1}   # 0 to 1000, relative
 //     error_points: 5                       # 0 to 100, what each handling error costs
+//     mode: practice                        # or examination: the trainer hides the 3D view and angioscopy
 #ifndef SELDINGER_SIM_EXERCISE_H
 #define SELDINGER_SIM_EXERCISE_H
 
 #include "base/base.h"
 #include "input/input.h"
+#include "sim/score_part.h"
 
 enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };
-
-// The parts of a score, each with a par and a weight; names in files: score_part_name.
-typedef enum { PART_TIME, PART_FLUOROSCOPY, PART_CONTRAST, PART_PATH, PART_WALL_FORCE, PART_WALL_IMPULSE, PART_COUNT } ScorePart;
-extern const char *const score_part_name[PART_COUNT + 1];      // "time", "fluoroscopy", …; NULL at the end
 
 typedef struct ExerciseRules {   // limits; 0: not checked
     double tip_force_n;
@@ -63,9 +63,10 @@ typedef struct Exercise {
     int stays, stays_at;         // the tool whose tip must stay in a target once there, and that target; -1: none
     double hold_s, time_limit_s;
     ExerciseRules rules;
-    double par[PART_COUNT];      // s, s, ml, ratio, N, N s; 0: not scored
+    double par[PART_COUNT];      // of each part: s, s, ml, ratio, N, N s, mm, s; 0: not scored
     double weight[PART_COUNT];
     double error_points;
+    bool is_examination;
 } Exercise;
 
 // The defaults: 2 s, 600 s, buckling only, no par, all weights 1, 5 points per error.

@@ -232,7 +232,7 @@ static int64_t read_tool_frames(const Reader *reader, const char *group, bool is
 
 static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
 
-// The controls of each step; older rows, without a tool for contrast agent, are one value shorter.
+// The controls of each step; older rows are shorter.
 static XrayControl *read_xray(const Reader *reader, uint64_t *count)
 {
     uint64_t shape[2] = {0, 0};
@@ -240,12 +240,13 @@ static XrayControl *read_xray(const Reader *reader, uint64_t *count)
     *count = shape[0];
     if (!value || shape[1] == XRAY_VALUES)
         return (XrayControl *)value;
-    XrayControl *xray = shape[1] == XRAY_VALUES_BEFORE_TOOLS ? calloc((size_t)shape[0] + 1, sizeof *xray) : NULL;
+    const bool is_older = shape[1] == XRAY_VALUES_BEFORE_SEEN || shape[1] == XRAY_VALUES_BEFORE_TOOLS;
+    XrayControl *xray = is_older ? calloc((size_t)shape[0] + 1, sizeof *xray) : NULL;
     if (!xray)
-        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; expected %d, or %d in older recordings", (unsigned long long)shape[1],
-                   XRAY_VALUES, XRAY_VALUES_BEFORE_TOOLS);
+        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; expected %d, or %d or %d in older recordings",
+                   (unsigned long long)shape[1], XRAY_VALUES, XRAY_VALUES_BEFORE_SEEN, XRAY_VALUES_BEFORE_TOOLS);
     for (uint64_t i = 0; xray && i < shape[0]; i++)
-        memcpy(&xray[i], value + i * XRAY_VALUES_BEFORE_TOOLS, XRAY_VALUES_BEFORE_TOOLS * sizeof *value);
+        memcpy(&xray[i], value + i * shape[1], (size_t)shape[1] * sizeof *value);
     free(value);
     return xray;
 }
@@ -426,9 +427,9 @@ static void check_xray(const Reader *reader, const RecordedRun *run)
 {
     static const struct {
         float least, most;
-    } valid[XRAY_VALUES] = {{0, 1},        {0, 1000}, {-360, 360},    {-360, 360}, {0, 1e4F}, {-1e5F, 1e5F}, {-1e5F, 1e5F},
-                            {-1e5F, 1e5F}, {0, 1},    {0, 1},         {0, 1},      {0, 1},    {0, 1000},     {XRAY_LIVE, XRAY_ROADMAP},
-                            {0, 1e9F},     {0, 1e9F}, {0, TOOLS_MOST}};
+    } valid[XRAY_VALUES] = {{0, 1},        {0, 1000}, {-360, 360},     {-360, 360},    {0, 1e4F}, {-1e5F, 1e5F}, {-1e5F, 1e5F},
+                            {-1e5F, 1e5F}, {0, 1},    {0, 1},          {0, 1},         {0, 1},    {0, 1000},     {XRAY_LIVE, XRAY_ROADMAP},
+                            {0, 1e9F},     {0, 1e9F}, {0, TOOLS_MOST}, {0, SEEN_MOST}, {0, 1e9F}};
     for (int64_t i = 0; i < run->step_count; i++) {
         float value[XRAY_VALUES];
         memcpy(value, &run->xray[i], sizeof value);

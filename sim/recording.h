@@ -23,7 +23,7 @@
 // Values beyond 2^30 units are infinite; nodes that do not exist (beyond /wire/count) repeat another node; /motion/wire/step is the row itself.
 //
 // Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 while the tool
-// is released, /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force),
+// is released, /xray (S,19: sim/xray.h; 17 in recordings from before it was recorded what the window showed, 16 from before contrast agent had a tool), /report/penetration_mm, contacts (with force),
 // iterations and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2): largest and sum; frames:
 // /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3), /contact/gap_mm (K,M),
 // /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256, of a session trainee

@@ -1,6 +1,7 @@
 #include "sim/score.h"
 
 #include "geom/geom.h"
+#include "sim/score_points.h"
 #include "sim/score_path.h"
 #include "sim/score_tool.h"
 
@@ -23,6 +24,9 @@ static const double LOOK_MS = 10;            // interval between locations of th
 static const double CHORD_MM = 0.2;          // of the tip's path
 static const double QUIET_MS = 500;          // duration after which an episode is over
 static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // fraction of a limit below which an episode may end
+static const double FRESH_MS = 200;          // an image older than this does not show where a moving tool is: five pulses a second are enough
+static const double PULLED = 0.5;            // what a movement backwards counts as blind: a tip that is pulled follows its own shaft
+static const double GLANCE_MS = 2000;        // for how long a view is remembered, so that glances between movements do not come free
 enum { HOPS = 8 };
 
 struct Score {
@@ -39,6 +43,10 @@ struct Score {
     ScoreEpisode episode[ERROR_COUNT];       // of errors that belong to no single tool
     double pulse_phase;          // phase of the next X-ray pulse; 1: due now
     bool had_pedal;
+    double fed[TOOLS_MOST];      // [mm] in this step
+    double since_shown[TOOLS_MOST];      // [ms] since a pulse showed the tool's tip
+    double since_glance;         // [ms] since the 3D view or angioscopy was in sight
+    float looks;                 // of the last step
     int64_t held_steps, stood_steps;         // within the target; of the tool that must stay, within its own target
     bool stands;                 // the tool has reached the target in which it must stay …
     Vec3 stood_at;               // … at this place
@@ -151,6 +159,9 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     for (int i = 0; i < PART_COUNT; i++)
         f->part[i] = 1;
     score->path_from = tip;
+    score->since_glance = HUGE_VAL;
+    for (int k = 0; k < TOOLS_MOST; k++)
+        score->since_shown[k] = HUGE_VAL;
     return score;
 }
 
@@ -198,23 +209,72 @@ static double open_area_cm2(const XrayControl *xray)
     return (double)xray->field_mm * xray->field_mm * wide * high / 100;
 }
 
-static void count_pulses(Score *score, const XrayControl *xray, double seconds)
+// Returns the number of pulses in this step.
+static int64_t count_pulses(Score *score, const XrayControl *xray, double seconds)
 {
     ScoreFigures *f = &score->figures;
     bool pedal = xray->pedal > 0.5F;
+    int64_t pulses = 0;
     if (pedal) {
         double rate = fmin(fmax((double)xray->pulses_s, 0), 1000);
         f->fluoroscopy_s += seconds;
         score->pulse_phase = score->had_pedal ? score->pulse_phase + rate * seconds : 1;
-        int64_t pulses = (int64_t)(score->pulse_phase + 1e-9);
+        pulses = (int64_t)(score->pulse_phase + 1e-9);
         score->pulse_phase -= (double)pulses;
         f->pulses += pulses;
         f->dose_area_cm2 += (double)pulses * open_area_cm2(xray);
     }
     score->had_pedal = pedal;
+    return pulses;
 }
 
-static void watch_xrays(Score *score, const XrayControl *xray, double moved, double now_s)
+// A pulse shows the tips that lie in the open field, if the trainee's window shows the live image.
+static void see_pulses(Score *score, const XrayControl *xray, int64_t pulses)
+{
+    const int seen = (int)xray->seen;
+    for (int k = 0; k < score->tool_count; k++) {
+        bool is_open = !(seen & SEEN_KNOWN) || (seen & SEEN_XRAY && seen & SEEN_TIP << k);
+        score->since_shown[k] = pulses > 0 && is_open ? 0 : score->since_shown[k] + score->dt;
+    }
+}
+
+// A tool's movement is seen by its own tip or by that of a tool that reaches further, e.g. of the wire over which a catheter is exchanged.
+static bool is_seen(const Score *score, const Stepper *stepper, int tool)
+{
+    double inserted = stepper_tool_inserted(stepper, tool) - 1e-9;
+    for (int k = 0; k < score->tool_count && score->had_pedal; k++)
+        if (stepper_tool_inserted(stepper, k) >= inserted && score->since_shown[k] <= FRESH_MS)
+            return true;
+    return false;
+}
+
+// Of tools that move together the one that counts most is taken.
+static void watch_blind(Score *score, const Stepper *stepper)
+{
+    ScoreFigures *f = &score->figures;
+    double unseen = 0, counted = 0;
+    bool all_seen = true;
+    for (int k = 0; k < score->tool_count; k++) {
+        const double fed = score->fed[k];
+        if (is_seen(score, stepper, k))
+            continue;
+        all_seen = false;
+        unseen = fmax(unseen, fabs(fed));
+        counted = fmax(counted, fed > 0 ? fed : -PULLED * fed);
+    }
+    f->blind_mm = all_seen ? 0 : f->blind_mm + unseen;
+    f->blind_total_mm += counted;
+}
+
+// Also before the clock runs, so that only looks from then on count as new.
+static void watch_glances(Score *score, const XrayControl *xray)
+{
+    const bool is_glance = xray && ((int)xray->seen & (SEEN_3D | SEEN_ANGIOSCOPY) || xray->looks != score->looks);
+    score->since_glance = is_glance ? 0 : score->since_glance + score->dt;
+    score->looks = xray ? xray->looks : 0;
+}
+
+static void watch_xrays(Score *score, const Stepper *stepper, const XrayControl *xray, bool is_moved, double now_s)
 {
     ScoreFigures *f = &score->figures;
     const ExerciseRules *rules = &score->exercise.rules;
@@ -222,9 +282,10 @@ static void watch_xrays(Score *score, const XrayControl *xray, double moved, dou
     if (!xray)
         return;
     f->has_xray = true;
-    count_pulses(score, xray, seconds);
+    see_pulses(score, xray, count_pulses(score, xray, seconds));
+    watch_blind(score, stepper);
+    f->guided_s += is_moved && score->since_glance <= GLANCE_MS ? seconds : 0;
     f->contrast_ml += fmax((double)xray->contrast_ml_s, 0) * seconds;
-    f->blind_mm = score->had_pedal ? 0 : f->blind_mm + moved;
     if (rules->contrast_ml > 0)
         judge(score, ERROR_CONTRAST, -1, f->contrast_ml > rules->contrast_ml * (1 + 1e-9), false, QUIET_MS, score->dt, now_s);
     if (rules->blind_mm > 0)
@@ -353,22 +414,19 @@ static void look(Score *score, const Stepper *stepper, int led, double now_s)
         judge_limit(score, ERROR_WRONG_BRANCH, k, f->tool[k].off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);
 }
 
-// Returns how far the fastest tool was moved [mm].
-static double watch_sheath(Score *score, const Stepper *stepper, const ToolCommands *commands, double now_s)
+static void watch_sheath(Score *score, const Stepper *stepper, const ToolCommands *commands, double now_s)
 {
     ScoreFigures *f = &score->figures;
-    double moved = 0;
     f->inserted_mm = f->withdrawn_mm = 0;
     for (int k = 0; k < score->tool_count; k++) {
         ScoreToolFigures *own = &f->tool[k];
-        moved = fmax(moved, fabs(score_tool_feed(&score->tool[k], stepper, score->dt, own)));
+        score->fed[k] = score_tool_feed(&score->tool[k], stepper, score->dt, own);
         f->inserted_mm += own->inserted_mm;
         f->withdrawn_mm += own->withdrawn_mm;
         if (score->exercise.rules.buckling && own->lost_limit_mm > 0)
             judge(score, ERROR_BUCKLING, k, own->lost_mm > own->lost_limit_mm && commands->tool[k].push_mm_s > 0, own->lost_mm < AGAIN * own->lost_limit_mm,
                   QUIET_MS, score->dt, now_s);
     }
-    return moved;
 }
 
 // --- points ---
@@ -377,25 +435,10 @@ static void give_points(Score *score)
 {
     ScoreFigures *f = &score->figures;
     const Exercise *exercise = &score->exercise;
-    double figure[PART_COUNT] = {[PART_TIME] = f->time_s,
-                                 [PART_FLUOROSCOPY] = f->fluoroscopy_s,
-                                 [PART_CONTRAST] = f->contrast_ml,
-                                 [PART_PATH] = f->way_mm > 0 ? f->path_mm / f->way_mm : 0,
-                                 [PART_WALL_FORCE] = f->wall_force_peak_n,
-                                 [PART_WALL_IMPULSE] = f->wall_impulse_n_s};
-    double sum = 0, weights = 0;
-    for (int i = 0; i < PART_COUNT; i++) {
-        if (!(exercise->par[i] > 0))
-            continue;
-        f->part[i] = exercise->par[i] / fmax(exercise->par[i], figure[i]);
-        sum += exercise->weight[i] * f->part[i];
-        weights += exercise->weight[i];
-    }
-    double covered = f->way_mm > 0 ? fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0;
+    double mean = score_parts_judge(f, exercise), covered = f->way_mm > 0 ? fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0;
     f->efficiency = f->path_mm > 0 ? fmin(f->way_mm * covered / f->path_mm, 1) : 0;
-    double share = f->state == SCORE_REACHED ? 1 : 0.5 * covered;
     if (f->has_exercise)
-        f->points = fmax(100 * share * (weights > 0 ? sum / weights : 1) - exercise->error_points * f->error_total, 0);
+        f->points = fmax(100 * score_share(f) * mean - exercise->error_points * f->error_total, 0);
 }
 
 static bool is_moved(const Score *score, const ToolCommands *commands)
@@ -423,18 +466,20 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
         return;
     const Stepper *stepper = simulator_stepper(simulator);
     double now_s = simulator_time_s(simulator);
-    bool acts = is_moved(score, commands) || (xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0));
+    const bool moves = is_moved(score, commands);
+    bool acts = moves || (xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0));
     if (f->state == SCORE_WAITING && acts) {
         f->state = SCORE_RUNNING;
         f->start_s = now_s - score->dt / 1000;
     }
     refit_tools(score, simulator);
-    double moved = watch_sheath(score, stepper, commands, now_s);
+    watch_sheath(score, stepper, commands, now_s);
+    watch_glances(score, xray);
     if (f->state == SCORE_WAITING)       // while waiting, initial settling of the tools is not an error of the trainee
         return;
     int led = leader(score, stepper);
     f->time_s = now_s - f->start_s;
-    watch_xrays(score, xray, moved, now_s);
+    watch_xrays(score, stepper, xray, moves, now_s);
     watch_tip(score, score->tool[led].at);
     watch_tools(score, stepper, commands, now_s);
     watch_stay(score, now_s);

@@ -9,7 +9,7 @@
 // furthest in, is the one whose tip has to reach the target; its path is measured, and contrast agent leaves from its tip.
 //
 // Points: 100 g (sum of w q / sum of w) - e n, at least 0, over the parts that are judged (par > 0, w > 0), with
-//   q = par / max(par, figure), 1 down to 0; the figures are time, fluoroscopy time, contrast, path ratio, wall-force peak, wall-force impulse;
+//   q = par / max(par, figure), 1 down to 0; sim/score_points.c lists the figures;
 //   g = 1 once the target was held, else half the largest fraction of the path to it that was covered;
 //   e n = error_points times the number of errors.
 // So a worse figure never gives more points, and doing nothing gives none.
@@ -27,7 +27,7 @@
 //                 wall to wall, which takes pi^2 c^2 / l (a half wave of amplitude a takes pi^2 a^2 / (4 l): Timoshenko and Gere, Theory of Elastic
 //                 Stability, 1961, 1.9); c is the lumen's radius minus the tool's. If more than that plus 1 mm is lost while the hand pushes, the tool
 //                 is folded between mouth and l.
-//   blind         the tools were moved by more than blind_mm since the pedal was last down; of tools that move together the fastest counts
+//   blind         the tools were moved by more than blind_mm since they were last seen; of tools that move together the fastest counts
 //   contrast      more than contrast_ml in total
 //   wire lost     an inner tool's tip is more than wire_behind_mm behind the tip of the tool around it, or its proximal end has been drawn to less
 //                 than 1 mm from that tool's hub, where no hand can hold it any more. A tool that may be exchanged has to be withdrawn for that: its
@@ -35,6 +35,11 @@
 //   kick          a tool's tip moves faster than kick_mm_s, mean of its velocity over 20 ms, while its own hand has rested for 0.1 s: energy that
 //                 another tool's friction or bending stiffness had stored in it was released
 //   tip moved     the tip of the tool that must stay has left its target, after it had been there for hold_s
+//
+// What a trainee sees. A movement is seen while the pedal is down and a pulse of the last 0.2 s showed the tool's tip, or that of a tool that reaches further:
+// the tip lay in the open field, and the window showed the live image (XrayControl.seen). All other movements add up in blind_total_mm however short each
+// was, pulling with half its length. Time in which a tool is moved with the 3D view or angioscopy in sight, or within 2 s after a look at them, adds up in
+// guided_s. What the window shows is recorded step by step, so that a recording has one score. Without a window nothing is blind and nothing is guided.
 //
 // An exchange counts as no motion: length, tip and shape at the sheath are measured again for the new device.
 #ifndef SELDINGER_SIM_SCORE_H

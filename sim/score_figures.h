@@ -45,11 +45,18 @@ typedef struct ScoreToolFigures {
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the path
 } ScoreToolFigures;
 
+// A part as it was judged, so that the points can be explained from a session's file alone.
+typedef struct ScorePartFigures {
+    double measured, par;        // in the part's unit; par 0: not judged
+    double most, points;         // points that it gives at most, 100 times its share of the weights, and those reached
+} ScorePartFigures;
+
 typedef struct ScoreFigures {
     ScoreState state;
     bool has_exercise, has_xray;     // has_xray: there is a viewer (xray not NULL)
     double points;               // 0 to 100; 0 without exercise
     double part[PART_COUNT];     // q of each part, 0 to 1; 1 where not judged
+    ScorePartFigures judged[PART_COUNT];
     double start_s;              // simulated time at which the clock began
     double time_s;               // since then
     double fluoroscopy_s;        // pedal down
@@ -66,7 +73,9 @@ typedef struct ScoreFigures {
     double wall_impulse_n_s;     // sum of all contact forces over time
     double tip_force_n, tip_force_peak_n;    // the largest of any tool's
     int tip_node;                // of the tool that has to reach the target
-    double blind_mm;             // moved since the pedal was last down
+    double blind_mm;             // moved since the X-ray image last showed the tool
+    double blind_total_mm;       // sum of all movements without a fresh X-ray image of the tool's tip; pulling counts half
+    double guided_s;             // time in which a tool was moved with the 3D view or angioscopy in sight
     double target_distance_mm;   // from that tool's tip, straight
     double held_s;               // time within the target without interruption
     double reached_s;            // simulated time when the target had been held; 0 before

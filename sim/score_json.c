@@ -1,5 +1,7 @@
 #include "sim/score_json.h"
 
+#include "sim/score_points.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -35,11 +37,13 @@ static const struct Figure {
     FIGURE(target_distance_mm, 1e9),
     FIGURE(held_s, 1e7),
     FIGURE(reached_s, 1e7),
+    {"blind_total_mm", offsetof(ScoreFigures, blind_total_mm), 1e12, true},
+    {"guided_s", offsetof(ScoreFigures, guided_s), 1e7, true},
 #undef FIGURE
 };
 enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
 // the keys after those of the table; "tools" with several tools only
-static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors", "tools"};
+static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "points_of", "errors", "tools"};
 // Figures of a tool. An episode still in progress is not written.
 static const struct Figure tool_table[] = {
 #define FIGURE(name, most)                                                                                                                                     \
@@ -56,8 +60,9 @@ static const struct Figure tool_table[] = {
 #undef FIGURE
 };
 enum { TOOL_FIGURES = sizeof tool_table / sizeof tool_table[0] };
-// Whether files of older versions do not have this error.
+// Whether files of older versions do not have this error or part.
 static bool is_later(ScoreError kind) { return kind > ERROR_CONTRAST; }
+static bool is_later_part(ScorePart part) { return part > PART_WALL_IMPULSE; }
 enum { OTHERS = sizeof other_key / sizeof other_key[0] };
 
 static bool add(cJSON *to, const char *name, double value) { return cJSON_AddNumberToObject(to, name, value) != NULL; }
@@ -85,15 +90,26 @@ static bool add_tools(cJSON *object, const ScoreFigures *f)
     return list || f->tool_count <= 1;
 }
 
+static bool add_part(cJSON *to, const ScoreFigures *f, ScorePart part)
+{
+    const ScorePartFigures *judged = &f->judged[part];
+    char why[120];
+    score_part_reason(f, part, why, sizeof why);
+    cJSON *object = cJSON_AddObjectToObject(to, score_part_name[part]);
+    return object && add(object, "points", judged->points) && add(object, "most", judged->most) && add(object, "measured", judged->measured) &&
+           add(object, "par", judged->par) && cJSON_AddStringToObject(object, "why", why);
+}
+
 bool score_add_json(cJSON *object, const ScoreFigures *f)
 {
     bool good = cJSON_AddStringToObject(object, "state", score_state_name[f->state]) && cJSON_AddBoolToObject(object, "has_exercise", f->has_exercise) &&
                 cJSON_AddBoolToObject(object, "has_xray", f->has_xray);
     good = good && add_figures(object, FIGURES, figure_table, f) && add(object, "pulses", (double)f->pulses) && add(object, "error_total", f->error_total);
-    cJSON *parts = good ? cJSON_AddObjectToObject(object, "parts") : NULL, *errors = parts ? cJSON_AddObjectToObject(object, "errors") : NULL;
-    good = good && parts && errors;
+    cJSON *parts = good ? cJSON_AddObjectToObject(object, "parts") : NULL, *points = parts ? cJSON_AddObjectToObject(object, "points_of") : NULL;
+    cJSON *errors = points ? cJSON_AddObjectToObject(object, "errors") : NULL;
+    good = good && errors;
     for (int i = 0; good && i < PART_COUNT; i++)
-        good = add(parts, score_part_name[i], f->part[i]);
+        good = add(parts, score_part_name[i], f->part[i]) && add_part(points, f, (ScorePart)i);
     for (int i = 0; good && i < ERROR_COUNT; i++) {
         cJSON *error = cJSON_AddObjectToObject(errors, score_error_name[i]);
         good = error && add(error, "count", f->error[i].count) && add(error, "last_s", f->error[i].last_s);
@@ -214,6 +230,24 @@ static void read_tools(const JsonReading *reading, const cJSON *list, ScoreFigur
     }
 }
 
+// Absent from files of older versions. `why` follows from the rest.
+static void read_points(const JsonReading *reading, const cJSON *points, ScoreFigures *f)
+{
+    static const char *const keys[] = {"points", "most", "measured", "par", "why", NULL};
+    if (!points || !json_keys(reading, points, "score.points_of", score_part_name))
+        return;
+    for (int i = 0; i < PART_COUNT; i++) {
+        const char *name = score_part_name[i];
+        const cJSON *part = cJSON_GetObjectItemCaseSensitive(points, name);
+        if (!json_keys(reading, part, name, keys))
+            continue;
+        f->judged[i] = (ScorePartFigures){.measured = json_number(reading, part, name, "measured", 0, 1e15),
+                                          .par = json_number(reading, part, name, "par", 0, 1e6),
+                                          .most = json_number(reading, part, name, "most", 0, 100),
+                                          .points = json_number(reading, part, name, "points", 0, 100)};
+    }
+}
+
 void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *f)
 {
     static const char *const error_key[] = {"count", "last_s", NULL};
@@ -235,7 +269,10 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
     const cJSON *parts = cJSON_GetObjectItemCaseSensitive(object, "parts"), *errors = cJSON_GetObjectItemCaseSensitive(object, "errors");
     if (json_keys(reading, parts, "score.parts", score_part_name))
         for (int i = 0; i < PART_COUNT; i++)
-            f->part[i] = json_number(reading, parts, "score.parts", score_part_name[i], 0, 1);
+            f->part[i] = is_later_part((ScorePart)i) && !cJSON_GetObjectItemCaseSensitive(parts, score_part_name[i])
+                             ? 1
+                             : json_number(reading, parts, "score.parts", score_part_name[i], 0, 1);
+    read_points(reading, cJSON_GetObjectItemCaseSensitive(object, "points_of"), f);
     int64_t sum = 0;
     if (!json_keys(reading, errors, "score.errors", score_error_name))
         return;

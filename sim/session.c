@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const char *const session_mode[] = {"practice", "examination", NULL};
+
 // Copies at most `capacity` - 1 bytes, ending with a whole character.
 static void copy_text(char *to, size_t capacity, const char *from)
 {
@@ -64,14 +66,18 @@ void session_set_score(Session *session, const Score *score)
     memcpy(session->event, event, (size_t)session->event_count * sizeof *event);
 }
 
-// The tool of the contrast agent enters the digest only if one was chosen, so digests of older sessions stay valid.
+// Controls that were added later enter the digest only if one of them was used, so digests of older sessions stay valid.
 static void digest_xray(Sha256 *sha, const RecordedRun *run)
 {
-    bool has_tool = false;
+    int values = XRAY_VALUES_BEFORE_TOOLS;
+    for (int64_t i = 0; i < run->step_count; i++) {
+        float value[XRAY_VALUES];
+        memcpy(value, &run->xray[i], sizeof value);
+        for (int k = values; k < XRAY_VALUES; k++)
+            values = value[k] != 0 ? k + 1 : values;
+    }
     for (int64_t i = 0; i < run->step_count; i++)
-        has_tool |= run->xray[i].contrast_tool != 0;
-    for (int64_t i = 0; i < run->step_count; i++)
-        sha256_add(sha, &run->xray[i], (size_t)(has_tool ? XRAY_VALUES : XRAY_VALUES_BEFORE_TOOLS) * sizeof(float));
+        sha256_add(sha, &run->xray[i], (size_t)values * sizeof(float));
 }
 
 static void digest(const RecordedRun *run, char hex[65])
@@ -99,6 +105,9 @@ void session_set_run(Session *session, const RecordedRun *run, const char *path)
     session->steps = run->step_count;
     session->step_ms = run->step_ms;
     session->state_hash = run->step_count > 0 ? run->state_hash[run->step_count - 1] : 0;
+    session->is_examination = run->xray && run->step_count > 0;
+    for (int64_t i = 0; run->xray && i < run->step_count; i++)
+        session->is_examination &= ((int)run->xray[i].seen & SEEN_EXAMINATION) != 0;
     digest(run, session->series_sha256);
 }
 
@@ -147,11 +156,18 @@ char *session_json(const Session *s)
 {
     cJSON *root = cJSON_CreateObject();
     bool good = root && add_number(root, "seldinger_session", 1) && add_text(root, "trainee", s->trainee) && add_text(root, "date", s->date) &&
-                add_text(root, "device", s->device) && add_text(root, "version", s->version) && add_scene(root, s) && add_recording(root, s);
+                add_text(root, "device", s->device) && add_text(root, "version", s->version) && add_text(root, "mode", session_mode[s->is_examination]) &&
+                add_scene(root, s) && add_recording(root, s);
     cJSON *score = good ? cJSON_AddObjectToObject(root, "score") : NULL;
     char *text = score && score_add_json(score, &s->figures) && add_events(root, s) ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     return text;
+}
+
+// Sessions of older versions were practice.
+static bool read_is_examination(const JsonReading *reading, const cJSON *root)
+{
+    return cJSON_GetObjectItemCaseSensitive(root, "mode") && json_choice(reading, root, "session", "mode", session_mode) == 1;
 }
 
 static bool is_hex(const char *text, size_t digits) { return strlen(text) == digits && strspn(text, "0123456789abcdef") == digits; }
@@ -206,7 +222,7 @@ static void read_events(const JsonReading *reading, const cJSON *list, Session *
 
 static void read_session(const JsonReading *reading, const cJSON *root, Session *s)
 {
-    static const char *const keys[] = {"seldinger_session", "trainee", "date", "device", "version", "scene", "recording", "score", "events", NULL};
+    static const char *const keys[] = {"seldinger_session", "trainee", "date", "device", "version", "mode", "scene", "recording", "score", "events", NULL};
     static const char *const scene_keys[] = {"path", "sha256", "title", "target", NULL};
     if (!json_keys(reading, root, "session", keys))
         return;
@@ -214,6 +230,7 @@ static void read_session(const JsonReading *reading, const cJSON *root, Session 
     json_text(reading, root, "session", "trainee", sizeof s->trainee, s->trainee);
     json_text(reading, root, "session", "device", sizeof s->device, s->device);
     json_text(reading, root, "session", "version", sizeof s->version, s->version);
+    s->is_examination = read_is_examination(reading, root);
     json_text(reading, root, "session", "date", sizeof s->date, s->date);
     if (!session_is_date(s->date))
         faults_add(reading->faults, reading->file, 0, 0, "'date' is '%.24s'; expected the form 2025-11-21T22:05:00Z", s->date);

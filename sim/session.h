@@ -1,10 +1,11 @@
 // A trainee's session as a JSON file next to its recording: who, when, with what, the score, the errors with their times, and a proof that the
 // recording belongs to the session (digest of its time series, hash of its last state). Keys are those of the struct, times simulated seconds:
 //
-//   {"seldinger_session": 1, "trainee": "", "date": "2025-11-21T22:05:00Z", "device": "", "version": "",
+//   {"seldinger_session": 1, "trainee": "", "date": "2025-11-21T22:05:00Z", "device": "", "version": "", "mode": "practice" or "examination",
 //    "scene": {"path": "", "sha256": "", "title": "", "target": ""},
 //    "recording": {"path": "", "steps": 0, "step_ms": 1, "series_sha256": "", "state_hash": ""},
-//    "score": {figures of score.h, "parts": {}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}, "tools": [{"name": "", …}] of several},
+//    "score": {figures of score.h, "parts": {"time": 1, …: fraction of each reached},
+//       "points_of": {"time": {"points": 0, "most": 0, "measured": 0, "par": 0, "why": ""}, …}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}, "tools": [{"name": "", …}] of several},
 //   "events": [{"kind": "wrong_branch", "time_s": 0}]}       and, with several tools, "tool": the tool that caused it
 #ifndef SELDINGER_SIM_SESSION_H
 #define SELDINGER_SIM_SESSION_H
@@ -23,6 +24,7 @@ typedef struct Session {
     char scene_path[SESSION_PATH], scene_sha256[65];     // of its text
     char title[EXERCISE_TITLE], target[64];              // "" without exercise
     char recording_path[SESSION_PATH];                   // relative to the session's folder
+    bool is_examination;         // from its first to its last step
     int64_t steps;
     double step_ms;
     char series_sha256[65];      // of time, command, X-ray controls and state hash of all steps

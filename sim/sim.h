@@ -41,6 +41,7 @@
 #include "sim/contrast_injection.h"
 #include "sim/rescore.h"
 #include "sim/score.h"
+#include "sim/score_points.h"
 #include "sim/session.h"
 #include "sim/session_files.h"
 #include "sim/shelf.h"

@@ -134,14 +134,14 @@ static void a_session_becomes_a_script_that_injects_the_same(void **state)
     recorded_run_free(run);
 }
 
-// Rewrites /xray without its last column, as in versions without injection through a tool.
-static void cut_xray(const char *path, const RecordedRun *run)
+// Rewrites /xray with its first `values` columns, as older versions wrote it.
+static void cut_xray(const char *path, const RecordedRun *run, int values)
 {
-    float *rows = malloc((size_t)run->step_count * XRAY_VALUES_BEFORE_TOOLS * sizeof *rows);
+    float *rows = malloc((size_t)run->step_count * (size_t)values * sizeof *rows);
     for (int64_t i = 0; i < run->step_count; i++)
-        memcpy(rows + i * XRAY_VALUES_BEFORE_TOOLS, &run->xray[i], XRAY_VALUES_BEFORE_TOOLS * sizeof *rows);
+        memcpy(rows + i * values, &run->xray[i], (size_t)values * sizeof *rows);
     hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
-    hsize_t shape[2] = {(hsize_t)run->step_count, XRAY_VALUES_BEFORE_TOOLS};
+    hsize_t shape[2] = {(hsize_t)run->step_count, (hsize_t)values};
     hid_t space = H5Screate_simple(2, shape, NULL);
     assert_true(file >= 0 && H5Ldelete(file, "/xray", H5P_DEFAULT) >= 0);
     hid_t set = H5Dcreate2(file, "/xray", H5T_NATIVE_FLOAT, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
@@ -152,26 +152,36 @@ static void cut_xray(const char *path, const RecordedRun *run)
     free(rows);
 }
 
+// Without the tool of the contrast agent, or without what the trainee saw. The checksum of a session includes a column only if it was used.
 static void a_recording_from_before_is_read_and_is_its_session_s(void **state)
 {
     (void)state;
-    RecordedRun *run = record("older.h5", true);
-    cut_xray(in_folder("older.h5"), run);
-    RecordedRun *older = recorded_run_load(in_folder("older.h5"), &faults);
-    if (!older)
-        fail_msg("%s", faults.text[0]);
-    for (int i = 0; i < STEPS; i++) {
-        assert_memory_equal(&older->xray[i], &run->xray[i], XRAY_VALUES_BEFORE_TOOLS * sizeof(float));
-        assert_true(older->xray[i].contrast_tool <= 0);
+    static const int values[] = {XRAY_VALUES_BEFORE_TOOLS, XRAY_VALUES_BEFORE_SEEN};
+    for (int k = 0; k < 2; k++) {
+        const bool has_tool = values[k] > XRAY_VALUES_BEFORE_TOOLS;
+        RecordedRun *run = record("older.h5", true);
+        cut_xray(in_folder("older.h5"), run, values[k]);
+        RecordedRun *older = recorded_run_load(in_folder("older.h5"), &faults);
+        if (!older)
+            fail_msg("%s", faults.text[0]);
+        for (int i = 0; i < STEPS; i++) {
+            assert_memory_equal(&older->xray[i], &run->xray[i], (size_t)values[k] * sizeof(float));
+            assert_true(older->xray[i].seen <= 0 && (has_tool || older->xray[i].contrast_tool <= 0));
+        }
+        Session now, before;
+        session_set_run(&now, run, "older.h5");
+        session_set_run(&before, older, "older.h5");
+        assert_true(session_is_of(&now, run) && session_is_of(&before, older) && session_is_of(&now, older) == has_tool);
+        run->xray[STEPS / 2].seen = SEEN_KNOWN | SEEN_EXAMINATION;
+        assert_false(session_is_of(&now, run) || now.is_examination);
+        for (int i = 0; i < STEPS; i++)
+            run->xray[i].seen = SEEN_KNOWN | SEEN_EXAMINATION;
+        session_set_run(&now, run, "older.h5");
+        assert_true(now.is_examination);
+        assert_int_equal(recorded_run_commands(older, 50).contrast_tool, has_tool ? recorded_run_commands(run, 50).contrast_tool : 0);
+        recorded_run_free(run);
+        recorded_run_free(older);
     }
-    // the checksum of a session includes the tool if there is one, and is unchanged if there is none
-    Session with, without;
-    session_set_run(&with, run, "older.h5");
-    session_set_run(&without, older, "older.h5");
-    assert_true(session_is_of(&with, run) && session_is_of(&without, older) && !session_is_of(&with, older));
-    assert_int_equal(recorded_run_commands(older, 50).contrast_tool, 0);
-    recorded_run_free(run);
-    recorded_run_free(older);
 }
 
 int main(void)

@@ -8,6 +8,7 @@
 
 #include "../heap_calls.h"
 #include "score_scene.h"
+#include "sim/score_points.h"
 #include "sim/score_path.h"
 #include "tests/short_run.h"
 
@@ -21,7 +22,7 @@ static void an_exercise_is_read(void **state)
 {
     (void)state;
     Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, "
-                                                      "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7"),
+                                                      "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7, mode: examination"),
                                  NULL);
     const Exercise *e = p->scene->exercise;
     assert_string_equal(e->title, "Go there");
@@ -38,6 +39,7 @@ static void an_exercise_is_read(void **state)
     assert_near(e->weight[PART_PATH], 3, 0);
     assert_near(e->weight[PART_TIME], 1, 0);
     assert_near(e->error_points, 7, 0);
+    assert_true(e->is_examination && !exercise_default().is_examination);
     practice_end(p);
 }
 
@@ -92,6 +94,7 @@ static void a_wrong_exercise_is_refused(void **state)
         {IN_THE_OPEN EXERCISE(", par: {time: 3}"), "time_s"},
         {IN_THE_OPEN EXERCISE(", weights: {path: -1}"), "out of range"},
         {IN_THE_OPEN EXERCISE(", error_points: 101"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", mode: exam"), "practice, examination"},
         {IN_THE_OPEN EXERCISE(", colour: red"), "expected title"},
         {IN_THE_OPEN "fluoroscopy: {volumes: a}\n", "'volume'"},
         {IN_THE_OPEN "fluoroscopy: {anterior: [0, 1, 0]}\n", "together give"},
@@ -910,6 +913,156 @@ static void nothing_done_is_worth_nothing(void **state)
     practice_end(p);
 }
 
+// --- what the trainee sees ---
+
+// Movements without X-rays add up however short each is; a pull counts half. A single pulse between them does not make them seen.
+static void blind_distance_adds_up(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", rules: {blind_mm: 4}, par: {blind_mm: 2}"), NULL);
+    p->watched = true;
+    ScoreFigures f = {0};
+    for (int i = 0; i < 10; i++) {
+        f = practice_go(p, 10, 0.1);
+        assert_near(f.blind_mm, 1, 1e-6);
+        p->xray.pedal = 1;
+        f = practice_go(p, 0, 0.001);
+        p->xray.pedal = 0;
+    }
+    assert_near(f.blind_total_mm, 10, 1e-6);
+    assert_near(f.part[PART_BLIND], 0.2, 1e-6);
+    assert_int_equal(f.error_total, 0);
+    f = practice_go(p, -10, 0.3);
+    assert_near(f.blind_total_mm, 11.5, 1e-6);
+    p->xray.pedal = 1;
+    f = practice_go(p, 10, 0.5);
+    assert_near(f.blind_total_mm, 11.5, 1e-6);
+    practice_end(p);
+}
+
+// The pedal alone does not show a tool: the image must be on the screen, its tip in the open field, and the pulses frequent.
+static void only_an_image_of_the_tip_is_sight(void **state)
+{
+    (void)state;
+    static const struct {
+        int seen;
+        float pulses_s;
+        double blind_mm;     // of 10 mm
+    } cases[] = {{0, 15, 0},
+                 {SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 15, 0},
+                 {SEEN_KNOWN | SEEN_XRAY, 15, 10},
+                 {SEEN_KNOWN | SEEN_TIP, 15, 10},
+                 {SEEN_KNOWN | SEEN_XRAY | SEEN_TIP << 1, 15, 10},
+                 {SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 7.5F, 0},
+                 {SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 1, 8}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        Practice *p = practice_begin(IN_THE_OPEN EXERCISE(""), NULL);
+        p->watched = true;
+        p->xray.pedal = 1;
+        p->xray.seen = (float)cases[i].seen;
+        p->xray.pulses_s = cases[i].pulses_s;
+        ScoreFigures f = practice_go(p, 10, 1);
+        assert_near(f.blind_total_mm, cases[i].blind_mm, 0.1);
+        practice_end(p);
+    }
+}
+
+// A catheter that is drawn back over its wire is seen by the wire's tip; a wire that is pushed on is not seen by the catheter's.
+static void a_tool_is_seen_by_the_tip_ahead_of_it(void **state)
+{
+    (void)state;
+    for (int tip = 0; tip < 2; tip++)
+        for (int pushed = 0; pushed < 2; pushed++) {
+            Practice *p = practice_begin(TWO_IN_THE_OPEN EXERCISE(""), NULL);
+            practice_go_tools(p, 0, 20, 0.2);
+            p->watched = true;
+            p->xray.pedal = 1;
+            p->xray.seen = (float)(SEEN_KNOWN | SEEN_XRAY | SEEN_TIP << tip);
+            ScoreFigures f = practice_go_tools(p, pushed == 0 ? 10 : 0, pushed == 1 ? 10 : 0, 0.2);
+            assert_near(f.blind_total_mm, tip == 0 && pushed == 1 ? 2 : 0, 1e-6);
+            practice_end(p);
+        }
+}
+
+// Time with a 3D view in sight counts while a tool moves, and for 2 s after a look, also if it was taken during a pause; looking at rest is free.
+static void looking_at_3d_while_moving_is_guidance(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", par: {guidance_s: 0.5}"), NULL);
+    p->watched = true;
+    p->xray.pedal = 1;
+    p->xray.looks = 3;           // before the clock runs
+    practice_go(p, 0, 0.1);
+    p->xray.pedal = 0;
+    practice_go(p, 0, 2.5);
+    ScoreFigures f = practice_go(p, 1, 1);
+    assert_near(f.guided_s, 0, 0);
+    p->xray.seen = SEEN_KNOWN | SEEN_3D;
+    f = practice_go(p, 0, 1);
+    assert_near(f.guided_s, 0, 0);
+    f = practice_go(p, 1, 1);
+    assert_near(f.guided_s, 1, 1e-9);
+    assert_near(f.part[PART_GUIDANCE], 0.5, 1e-9);
+    p->xray.seen = SEEN_KNOWN;
+    f = practice_go(p, 1, 3);
+    assert_near(f.guided_s, 3, 0.002);
+    p->xray.looks++;             // shown and hidden again between two steps
+    f = practice_go(p, 1, 3);
+    assert_near(f.guided_s, 5, 0.004);
+    practice_end(p);
+}
+
+// Going past the target again and again, never far enough for an error, costs more each time.
+static void retries_below_the_limit_cost_points(void **state)
+{
+    (void)state;
+    VesselTree *t = forked(1);
+    double before = 101;
+    for (int retries = 0; retries < 4; retries++) {
+        Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", rules: {wrong_branch_mm: 5}, par: {path_ratio: 1.2, time_s: 2}"), t);
+        p->watched = true;
+        p->xray.pedal = 1;
+        practice_go(p, 10, 1.5);
+        for (int i = 0; i < retries; i++) {
+            practice_go(p, 10, 1);
+            practice_go(p, -10, 1);
+        }
+        practice_go(p, 10, 0.4);
+        ScoreFigures f = practice_go(p, 0, 2);
+        assert_int_equal(f.state, SCORE_REACHED);
+        assert_int_equal(f.error_total, 0);
+        assert_true(f.points < before - 5);
+        before = f.points;
+        practice_end(p);
+    }
+    vessel_tree_free(t);
+}
+
+// The points of the parts add up to the whole, and a part that lost some says why.
+static void points_are_those_of_the_parts(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", rules: {blind_mm: 5}, par: {time_s: 1, blind_mm: 5, path_ratio: 2}, weights: {blind: 2}"), NULL);
+    p->watched = true;
+    practice_go(p, 10, 1.9);
+    ScoreFigures f = practice_go(p, 0, 2.5);
+    assert_int_equal(f.state, SCORE_REACHED);
+    assert_int_equal(f.error_total, 1);
+    double points = -5 * f.error_total, most = 0;
+    for (int i = 0; i < PART_COUNT; i++) {
+        char why[120];
+        points += f.judged[i].points;
+        most += f.judged[i].most;
+        score_part_reason(&f, (ScorePart)i, why, sizeof why);
+        assert_int_equal(i == PART_TIME || i == PART_BLIND, why[0] != 0);
+    }
+    assert_near(most, 100, 1e-9);
+    assert_near(points, f.points, 1e-9);
+    assert_near(f.judged[PART_BLIND].most, 50, 1e-9);
+    assert_near(f.judged[PART_BLIND].measured, 19, 1e-6);
+    practice_end(p);
+}
+
 static ScoreFigures through_a_bend(bool mirrored)
 {
     VesselTree *tree = forked(mirrored ? -1 : 1);
@@ -1016,6 +1169,12 @@ int main(void)
         cmocka_unit_test(a_tools_place_is_where_it_is),
         cmocka_unit_test(a_worse_figure_never_gives_more_points),
         cmocka_unit_test(nothing_done_is_worth_nothing),
+        cmocka_unit_test(blind_distance_adds_up),
+        cmocka_unit_test(only_an_image_of_the_tip_is_sight),
+        cmocka_unit_test(a_tool_is_seen_by_the_tip_ahead_of_it),
+        cmocka_unit_test(looking_at_3d_while_moving_is_guidance),
+        cmocka_unit_test(retries_below_the_limit_cost_points),
+        cmocka_unit_test(points_are_those_of_the_parts),
         cmocka_unit_test(a_mirrored_scene_gives_the_same_score),
         cmocka_unit_test(the_counter_counts),
         cmocka_unit_test(a_step_allocates_nothing),
