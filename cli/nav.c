@@ -26,6 +26,7 @@ static const Option rows[] = {
     {"trainee", "NAME", OPTION_TEXT, AT(trainer.trainee), "name of the trainee, for the report"},
     {"sessions", "FOLDER", OPTION_FOLDER, AT(sessions), "where sessions are stored",
      .otherwise = "$XDG_DATA_HOME/seldinger/sessions, else ~/.local/share/seldinger/sessions"},
+    {"examination", NULL, OPTION_FLAG, AT(trainer.is_examination), "hides the 3D view and angioscopy; the session's file says so"},
     {"no-record", NULL, OPTION_CLEARED, AT(trainer.is_recorded), "writes no recording and no session file"},
     {"resume", "REC.h5", OPTION_FILE, AT(resume), "continues at the end of this recording of the scene …"},
     {"at", "S", OPTION_NUMBER, AT(trainer.resume_s), "… or at this moment of it [s of simulated time]", .most = SCRIPT_LONGEST_S, .otherwise = ""},
@@ -50,6 +51,8 @@ static void set_defaults(void *structure)
 static const char *check(void *structure)
 {
     const NavOptions *nav = structure;
+    if (nav->trainer.is_examination && nav->trainer.view != VIEW_FLUOROSCOPY)
+        return "an --examination shows the X-ray image alone: no other --view";
     return nav->trainer.resume_s < SCRIPT_LONGEST_S && !nav->resume ? "--at needs --resume REC.h5" : NULL;
 }
 

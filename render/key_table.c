@@ -229,3 +229,5 @@ void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured)
     if (!input->has_focus)
         key_state_release(state);
 }
+
+bool key_table_is_of_3d(ActionId id) { return key_table[id].group == GROUP_VIEW && id != ACTION_VIEW_FLUOROSCOPY; }

@@ -124,4 +124,7 @@ void key_state_begin(KeyState *state);   // at the start of a frame: clears pres
 void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured);
 void key_state_release(KeyState *state); // releases all keys: the tool stops
 
+// Whether an action is for the 3D view or angioscopy, which examinations hide.
+bool key_table_is_of_3d(ActionId id);
+
 #endif

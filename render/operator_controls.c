@@ -161,6 +161,46 @@ void controls_obey(OperatorControls *controls, const VesselScene *scene, const P
     obey_mouse(controls, scene, actions, layout);
 }
 
+bool controls_refuse_hidden(const OperatorControls *controls, PanelActions *actions)
+{
+    bool is_refused = false;
+    for (int i = 0; controls->is_examination && i < ACTION_COUNT; i++)
+        if (key_table_is_of_3d((ActionId)i)) {
+            is_refused |= actions->pressed[i] > 0;
+            actions->held[i] = false;
+            actions->pressed[i] = 0;
+        }
+    return is_refused;
+}
+
+// Whether the tip lies in the open field: the blades cover parts of half the field, from its borders.
+static bool is_in_open_field(const CArm *arm, const XrayControl *xray, Vec3 tip)
+{
+    const float *blade = xray->collimator;
+    Vec3 at = c_arm_project(arm, tip);
+    return at.z > C_ARM_NEAREST_MM - C_ARM_SOURCE_MM && 2 * at.x >= (double)blade[0] - 1 && 2 * at.x <= 1 - (double)blade[1] &&
+           2 * at.y >= (double)blade[2] - 1 && 2 * at.y <= 1 - (double)blade[3];
+}
+
+static bool is_shown(const PanelLayout *layout, PanelView view) { return layout->view[view].width > 0 && layout->view[view].height > 0; }
+
+void controls_note_sight(const OperatorControls *controls, const PanelLayout *layout, const Pose *pose, bool is_live, const XrayControl *before,
+                         XrayControl *xray)
+{
+    const int guides = SEEN_3D | SEEN_ANGIOSCOPY;
+    const CArm arm = c_arm_place(xray, &controls->patient);
+    int seen = SEEN_KNOWN | (controls->is_examination ? SEEN_EXAMINATION : 0);
+    seen |= is_live && is_shown(layout, VIEW_FLUOROSCOPY) ? SEEN_XRAY : 0;
+    seen |= is_shown(layout, VIEW_3D) ? SEEN_3D : 0;
+    seen |= is_shown(layout, VIEW_ANGIOSCOPY) ? SEEN_ANGIOSCOPY : 0;
+    for (int k = 0; pose && k < pose->tool_count; k++) {
+        const PoseTool *tool = &pose->tool[k];
+        seen |= tool->node_count > 0 && is_in_open_field(&arm, xray, tool->node[tool->node_count - 1].position) ? SEEN_TIP << k : 0;
+    }
+    xray->looks = before->looks + (float)(seen & guides && !((int)before->seen & guides));
+    xray->seen = (float)seen;
+}
+
 static Command command_by(const OperatorControls *controls, const PanelActions *actions, ActionId push, ActionId pull, ActionId left, ActionId right)
 {
     if (actions->held[ACTION_STOP])

@@ -13,6 +13,7 @@ typedef struct OperatorControls {
     PatientAxes patient;         // in the model's frame
     bool pedal_latched;
     PanelView view;
+    bool is_examination;         // only the X-ray image is shown
     VesselSceneLook look;        // settings of the 3D view
     double contrast_ml_s;        // during injection, default 3
     double push_mm_s, twist_deg_s;   // of the keys at normal speed, default 10 and 120
@@ -23,6 +24,8 @@ typedef struct OperatorControls {
 // Sets the isocentre to the middle of `points`, and the field so that they are visible.
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
 
+// In an examination, takes the actions for hidden views out of `actions`. Returns whether there was one.
+bool controls_refuse_hidden(const OperatorControls *controls, PanelActions *actions);
 // One frame of `seconds`: applies held and pressed actions. `layout`: positions of the views, for the mouse.
 void controls_obey(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds);
 // The speeds that held keys request for the selected tool and its partner (0 if there is none): fast is three times and slow a fifth of the normal speed.
@@ -30,5 +33,9 @@ Command controls_command(const OperatorControls *controls, const PanelActions *a
 Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions);
 // The X-ray controls including input devices (HAND_ bits) and held keys: pedal, contrast through the selected tool.
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons);
+// Records in `xray` what a window shows (XrayControl.seen) and counts looks at the 3D view and angioscopy; `before`: the controls of the last frame. `pose` NULL:
+// none yet. `is_live`: the X-ray view shows the live image, not a cine loop.
+void controls_note_sight(const OperatorControls *controls, const PanelLayout *layout, const Pose *pose, bool is_live, const XrayControl *before,
+                         XrayControl *xray);
 
 #endif

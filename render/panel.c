@@ -320,7 +320,12 @@ void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state,
 {
     for (int k = 0; k < state->tool_count; k++)
         panel_sample(panel, k, state->time_s, state->tool[k].force_n, state->tool[k].torque_n_mm, state->wall_max_n);
-    PanelLayout layout = panel_layout(input->width, input->height, input->scale, state->view, panel->has_panels);
+    PanelLayout layout = state->is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, panel->has_panels)
+                                               : panel_layout(input->width, input->height, input->scale, state->view, panel->has_panels);
+    // the result opens once; it can be closed and opened again like the text of the exercise, and goes with a new session
+    if (state->is_finished != panel->was_finished)
+        panel->briefing = state->is_finished ? BRIEFING_OPEN : BRIEFING_CLOSED;
+    panel->was_finished = state->is_finished;
     bool is_new = !panel->is_drawn || panel->width != input->width || panel->height != input->height || layout.scale != panel->layout.scale;
     panel->layout = layout;
     panel->width = input->width;

@@ -28,7 +28,7 @@ void panel_draw_briefing(Panel *panel, const PanelState *state)
 {
     Gui *gui = panel->gui;
     panel->briefing_at = (GuiRect){0};
-    bool is_wanted = panel->briefing == BRIEFING_OPEN ||
+    bool is_wanted = (panel->briefing == BRIEFING_OPEN && panel->is_interactive) ||
                      (panel->briefing == BRIEFING_AT_BEGIN && panel->is_interactive && panel->has_hints && panel_has_more_lines(state->instructions));
     if (!is_wanted || !panel_text(state->instructions)[0])
         return;
@@ -40,7 +40,7 @@ void panel_draw_briefing(Panel *panel, const PanelState *state)
     float height = gui_wrapped_height(gui, GUI_NORMAL, text, width - pad) + floorf(84 * s);
     height = floorf(fminf(height, view.height - 2 * margin));
     GuiRect at = {floorf(view.x + (view.width - width) / 2), floorf(view.y + (view.height - height) / 2), width, height};
-    gui_window_begin(gui, "briefing", at, GUI_FRAMED);
+    gui_window_begin(gui, "briefing", at, GUI_ON_TOP | GUI_FRAMED);   // also above the labels of the views
     gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, panel_text(state->title));
     gui_space(gui, floorf(2 * s));
     gui_text_wrapped(gui, GUI_NORMAL, gui_colors.text, text);

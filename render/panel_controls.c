@@ -108,9 +108,13 @@ static void button_row(Panel *panel, const PanelState *state, const ButtonRow *b
         return;
     for (int i = 0; i < buttons->count; i++) {
         int tool = (int)buttons->action[i] - ACTION_TOOL_1;
+        if (state->is_examination && key_table_is_of_3d(buttons->action[i]))
+            continue;
         if (tool < state->tool_count || tool >= PANEL_TOOLS)
             action[count++] = buttons->action[i];
     }
+    if (count == 0)
+        return;
     float gap = floorf(3 * gui_scale(panel->gui)), all = gui_width(panel->gui);
     float width = floorf((all - gap * (float)(count - 1)) / (float)count);
     for (int i = 0; i < count; i++) {
@@ -180,6 +184,8 @@ static void draw_tab(Panel *panel, const PanelState *state, int tab)
     for (int i = 0; i < panel_button_row_count; i++)
         if (panel_button_row[i].tab == tab)
             button_row(panel, state, &panel_button_row[i]);
+    if (tab == TAB_VIEWS && state->is_examination)
+        gui_text_wrapped(panel->gui, GUI_NORMAL, gui_colors.dim, "This is an examination: the 3D view and angioscopy are hidden.");
     if (tab == TAB_XRAY) {
         pulse_buttons(panel, state);
         xray_slider(panel, state, &panel->xray.field_mm, 40, 400, "field %.0f mm", "side of the square field at the isocentre", 0);

@@ -148,6 +148,10 @@ static void draw_top(Panel *panel, const PanelState *state)
         gui_beside(gui, 2 * gap);
         gui_text(gui, GUI_LARGE, gui_colors.dim, state->trainee);
     }
+    if (state->is_examination) {
+        gui_beside(gui, 2 * gap);
+        gui_text(gui, GUI_LARGE, gui_colors.warning, "Examination");
+    }
     gui_window_end(gui);
     gui_window_begin(gui, "badges", badges, GUI_NO_INPUT | GUI_KEPT);
     if (state->xray.pedal > 0)

@@ -67,3 +67,14 @@ PanelLayout panel_layout(int width, int height, double scale, PanelView view, bo
     layout.right.height = y + middle - inset_y;
     return layout;
 }
+
+PanelLayout panel_layout_xray_alone(int width, int height, double scale, bool has_panels)
+{
+    PanelLayout layout = panel_layout(width, height, scale, VIEW_FLUOROSCOPY, has_panels);
+    for (int i = 0; i < VIEW_COUNT; i++)
+        if (i != VIEW_FLUOROSCOPY)
+            place_view(&layout, (PanelView)i, (PanelRect){0}, height);
+    layout.right.y = layout.left.y;
+    layout.right.height = layout.left.height;
+    return layout;
+}

@@ -22,5 +22,7 @@ typedef struct PanelLayout {
 
 // `has_panels` false: the views fill the window.
 PanelLayout panel_layout(int width, int height, double scale, PanelView view, bool has_panels);
+// Only the X-ray image, for examinations; the place of the other views goes to the controls.
+PanelLayout panel_layout_xray_alone(int width, int height, double scale, bool has_panels);
 
 #endif

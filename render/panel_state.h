@@ -75,6 +75,7 @@ typedef struct PanelState {
     double now_s;                  // wall clock of the session, for messages and hints
     double time_s;                 // simulated
     bool is_paused;
+    bool is_examination;           // only the X-ray image is shown
     // exercise
     const char *title;
     const char *instructions;      // its first line is always shown, the whole text in a box at the start and on request

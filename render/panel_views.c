@@ -100,7 +100,7 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
                    {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may be late"}};
     float y = at.y + floorf(52 * gui_scale(panel->gui));
     char text[300], line[280];
-    if (state->is_finished && panel_first_line(state->instructions, line, sizeof line)) {
+    if (state->is_finished && !panel->is_interactive && panel_first_line(state->instructions, line, sizeof line)) {
         bool is_reached = state->hold_needed_s > 0 && state->hold_s >= state->hold_needed_s;
         snprintf(text, sizeof text, "%s%s", panel_sign[is_reached ? MARK_GOOD : MARK_NONE], line);
         y = banner(panel, at, y, gui_colors.accent, text);

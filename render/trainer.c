@@ -138,6 +138,13 @@ static void offer_recovery(Trainer *trainer)
     session_free_cut_off(&found);
 }
 
+// The looks at the 3D view that the first `time_s` of a recording count, so that the counter goes on from there.
+static float looks_until(const RecordedRun *run, double time_s)
+{
+    int64_t steps = run && run->xray ? (int64_t)fmin((double)run->step_count, time_s * 1000 / run->step_ms) : 0;
+    return steps > 0 ? run->xray[steps - 1].looks : 0;
+}
+
 static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *faults)
 {
     const TrainerOptions *options = trainer->options;
@@ -151,6 +158,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     for (int i = 0; trainer->hands && i < HANDS_MOST * MAP_HANDS; i++)
         hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
     trainer->controls.grip = (HandGrip){.chosen = trainer->controls.grip.chosen};    // a new session: nothing is locked or released
+    trainer->controls.xray.looks = looks_until(resume, resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S);
     session_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
     LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL,
                                   .trainee = trainer->trainee,
@@ -666,6 +674,23 @@ static void measure_frame(Trainer *trainer)
         trainer->figures->resident_mb[0] = resident_mb();
 }
 
+static PanelLayout layout_of(const Trainer *trainer, const WindowInput *input)
+{
+    const bool has_panels = panel_has_panels(trainer->panel);
+    return trainer->controls.is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, has_panels)
+                                            : panel_layout(input->width, input->height, input->scale, trainer->controls.view, has_panels);
+}
+
+// The controls of the next steps, with what the window shows during them.
+static void send_xray(Trainer *trainer, const PanelLayout *layout, XrayControl *xray)
+{
+    const Moment *moment = realtime_moment(trainer->session.realtime);
+    controls_note_sight(&trainer->controls, layout, moment ? moment->pose : NULL, !trainer->cine.is_shown, &trainer->controls.xray, xray);
+    trainer->controls.xray.seen = xray->seen;
+    trainer->controls.xray.looks = xray->looks;
+    realtime_set_xray(trainer->session.realtime, xray);
+}
+
 static void run_window(Trainer *trainer, Faults *faults)
 {
     const WindowInput *input;
@@ -675,7 +700,9 @@ static void run_window(Trainer *trainer, Faults *faults)
         bool visible = window_next_frame(trainer->window, &input);
         double now = since_begin(trainer);
         panel_take_input(trainer->panel, input, &actions);
-        PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->controls.view, panel_has_panels(trainer->panel));
+        if (controls_refuse_hidden(&trainer->controls, &actions))
+            show_message(trainer, MARK_WARNING, "this is an examination: the 3D view and angioscopy are hidden, steer by the X-ray image");
+        PanelLayout layout = layout_of(trainer, input);
         const HandGrip grip = trainer->controls.grip;
         controls_obey(&trainer->controls, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
         unsigned buttons = buttons_of_hands(trainer);
@@ -689,12 +716,13 @@ static void run_window(Trainer *trainer, Faults *faults)
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);
         XrayControl xray = controls_xray(&trainer->controls, &actions, buttons_of_hands(trainer));
-        realtime_set_xray(trainer->session.realtime, &xray);
+        layout = layout_of(trainer, input);
+        send_xray(trainer, &layout, &xray);
         is_running = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) &&
                      !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
         if (!is_running || !visible)
             continue;
-        layout = panel_layout(input->width, input->height, input->scale, trainer->controls.view, panel_has_panels(trainer->panel));
+        layout = layout_of(trainer, input);
         draw(trainer, input, &layout, &xray, now - drawn);
         drawn = now;
         window_swap(trainer->window);
@@ -708,7 +736,9 @@ static bool open_views(Trainer *trainer, Faults *faults)
 {
     char note[512];
     trainer->views = scene_views_create(trainer->scene, trainer->open, &trainer->controls, note, sizeof note, faults);
-    trainer->controls.view = trainer->options->view;
+    trainer->controls.is_examination = trainer->options->is_examination || (trainer->scene->exercise && trainer->scene->exercise->is_examination);
+    trainer->controls.view = trainer->controls.is_examination ? VIEW_FLUOROSCOPY : trainer->options->view;
+    trainer->controls.xray.seen = (float)(SEEN_KNOWN | (trainer->controls.is_examination ? SEEN_EXAMINATION : 0));     // until the first picture
     if (*note)
         show_message(trainer, MARK_WARNING, "%s", note);
     return trainer->views != NULL;

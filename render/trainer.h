@@ -12,6 +12,7 @@ enum { TRAINER_MAPS = 8 };
 typedef struct TrainerOptions {
     const char *folder;              // folder of recordings, session files, videos and screenshots; created if it does not exist
     bool is_recorded;
+    bool is_examination;             // hides 3D view and angioscopy; an exercise may require it
     const char *trainee;             // "" if not known yet
     int map_count;
     DeviceMap *const *map;           // (map_count) the user's device maps

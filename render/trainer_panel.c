@@ -1,6 +1,7 @@
 #include "render/trainer_panel.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -57,6 +58,41 @@ static PanelMark mark_of_part(const Scene *scene, const ScoreFigures *score, Sco
     return score->part[part] >= 1 ? MARK_GOOD : score->part[part] > 0.6 ? MARK_WARNING : MARK_BAD;
 }
 
+__attribute__((format(printf, 3, 4))) static void add_line(char *text, size_t capacity, const char *format, ...)
+{
+    size_t used = strlen(text);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text + used, capacity - used, format, arguments);
+    va_end(arguments);
+}
+
+// The result: a first line, then the points of each part with the reason for those that were lost, then what the sum is multiplied by and the errors.
+static void tell_result(char *text, size_t capacity, const Scene *scene, const ScoreFigures *score)
+{
+    snprintf(text, capacity, "%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.\n",
+             score->state == SCORE_REACHED ? "Target reached and held" : "Time is up", score->points, score->time_s, score->error_total,
+             score->error_total == 1 ? "" : "s");
+    for (int i = 0; i < PART_COUNT; i++) {
+        const ScorePartFigures *part = &score->judged[i];
+        const ScorePartWords *words = &score_part_words[i];
+        char why[120];
+        if (!(part->most > 0))
+            continue;
+        score_part_reason(score, (ScorePart)i, why, sizeof why);
+        add_line(text, capacity, "- %s: %.1f of %.1f points", words->title, part->points, part->most);
+        if (*why)
+            add_line(text, capacity, " (%.4g %s, full points up to %.4g): %s", part->measured, words->unit, part->par, why);
+        add_line(text, capacity, ".\n");
+    }
+    if (score->state != SCORE_REACHED)
+        add_line(text, capacity, "- Only %.0f %% of these points count: the target was not held.\n", 100 * score_share(score));
+    for (int i = 0; i < ERROR_COUNT; i++)
+        if (score->error[i].count > 0)
+            add_line(text, capacity, "- %d \u00d7 %s: %.1f points lost.\n", score->error[i].count, score_error_words[i],
+                     scene->exercise->error_points * score->error[i].count);
+}
+
 static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score)
 {
     PanelState *state = &panel->state;
@@ -87,9 +123,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->hold_s = score->held_s;
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
-        snprintf(panel->instructions, sizeof panel->instructions, "%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.",
-                 score->state == SCORE_REACHED ? "Target reached and held" : "Time is up", score->points, score->time_s, score->error_total,
-                 score->error_total == 1 ? "" : "s");
+        tell_result(panel->instructions, sizeof panel->instructions, scene, score);
         state->instructions = panel->instructions;
     }
     state->fluoro_s = score->fluoroscopy_s;
@@ -193,6 +227,7 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
     label_scene(panel, controls, views_scene(views));
     state->chosen_tool = controls->grip.chosen;
     state->view = controls->view;
+    state->is_examination = controls->is_examination;
     state->is_following = controls->look.follow_tip;
     state->has_section = controls->look.section;
     state->has_model = controls->look.show_model;

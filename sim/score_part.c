@@ -11,7 +11,7 @@
     PART(WALL_FORCE, "wall_force", "wall_force_n", "Largest wall force", "N", "a tool was pressed hard against the wall")                                      \
     PART(WALL_IMPULSE, "wall_impulse", "wall_impulse_n_s", "Wall force over time", "N s", "tools pressed against the wall for long")                           \
     PART(BLIND, "blind", "blind_mm", "Moved without X-rays", "mm", "tools were moved without a fresh X-ray image of their tip")                                \
-    PART(GUIDANCE, "guidance", "guidance_s", "Moved by 3D views", "s", "tools were moved with the 3D view or angioscopy in sight")
+    PART(GUIDANCE, "guidance", "guidance_s", "Use of 3D views", "s", "tools were moved with the 3D view or angioscopy in sight")
 
 #define NAME(part, name, par, title, unit, why) [PART_##part] = (name),
 const char *const score_part_name[PART_COUNT + 1] = {PARTS(NAME)};

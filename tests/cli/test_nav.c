@@ -209,6 +209,41 @@ static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
     assert_int_equal(access(in_folder("seen.png"), R_OK), 0);
 }
 
+// In practice all views are seen from the start; in an examination the 3D view is refused, and the session says what it was.
+static const char examined_hand[] =
+    "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "xdotool key 6; sleep 0.3; xdotool key e; xdotool keydown Up; sleep 1; xdotool keyup Up; "
+    "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+
+static void an_examination_hides_the_3d_view(void **state)
+{
+    (void)state;
+    need_display();
+    for (int examined = 0; examined < 2; examined++) {
+        RUNS(0, "rm -rf examined");
+        WINDOW_RUNS("(%s) & exec %s nav scene.yaml %s --sessions examined --duration-s 60 --size 800x600 >out.txt 2>&1", examined_hand, SELDINGER_PROGRAM,
+                    examined ? "--examination" : "");
+        RUNS(0, "mv examined/*.h5 examined.h5 && mv examined/*.json examined.json");
+        RecordedRun *recorded = load(in_folder("examined.h5"));
+        int any = 0, all = SEEN_MOST;
+        for (int64_t i = 0; i < recorded->step_count; i++) {
+            any |= (int)recorded->xray[i].seen;
+            all &= (int)recorded->xray[i].seen;
+        }
+        assert_true(recorded->step_count > 0 && any & SEEN_TIP && any & SEEN_XRAY);
+        assert_int_equal(all & (SEEN_KNOWN | SEEN_EXAMINATION), SEEN_KNOWN | (examined ? SEEN_EXAMINATION : 0));
+        assert_int_equal(any & (SEEN_3D | SEEN_ANGIOSCOPY), examined ? 0 : SEEN_3D | SEEN_ANGIOSCOPY);
+        recorded_run_free(recorded);
+        static Session session;
+        faults_clear(&faults);
+        assert_true(session_load(in_folder("examined.json"), &session, &faults));
+        assert_int_equal(session.is_examination, examined);
+        assert_true(examined ? session.figures.guided_s <= 0 : session.figures.guided_s > 0);
+        RUNS(0, "%s replay examined.h5 --verify --quiet", SELDINGER_PROGRAM);
+    }
+    RUNS(2, "%s nav scene.yaml --examination --view 3d >out.txt 2>&1", SELDINGER_PROGRAM);
+}
+
 static void a_session_continues_from_a_moment_of_another(void **state)
 {
     (void)state;
@@ -359,6 +394,7 @@ int main(int argc, char **argv)
     self[length] = 0;
     setenv("TEST_NAV", self, 1);
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
+                                       cmocka_unit_test(an_examination_hides_the_3d_view),
                                        cmocka_unit_test(a_session_continues_from_a_moment_of_another),
                                        cmocka_unit_test(a_recording_is_shown_in_the_window),
                                        cmocka_unit_test(two_tools_are_moved_by_keys),

@@ -419,6 +419,63 @@ static void keys_choose_what_is_seen(void **state)
     assert_true(controls.look.camera.width_mm < width);
 }
 
+// A tip is in the open field until a blade, the table or the magnification takes it out; views count only if they have a place.
+static void what_a_window_shows_is_noted(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    Pose *pose = pose_create(4, 1, &(int){4});
+    assert_non_null(pose);
+    pose->tool[0].node_count = 4;
+    pose->tool[0].node[3].position = vec3(-30, 0, 0);        // in the left half of the image, on the patient's right
+    PanelLayout alone = layout;
+    alone.view[VIEW_3D].width = alone.view[VIEW_ANGIOSCOPY].width = 0;
+    XrayControl before = controls.xray, xray = controls.xray;
+    controls_note_sight(&controls, &alone, pose, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 0);
+    assert_near(xray.looks, 0, 0);
+    controls_note_sight(&controls, &alone, pose, false, &before, &xray);        // a cine loop
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_TIP, 0);
+    controls_note_sight(&controls, &alone, NULL, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY, 0);
+    xray.collimator[0] = 0.7F;   // left blade: from -80 to -24 mm
+    controls_note_sight(&controls, &alone, pose, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY, 0);
+    xray.collimator[0] = 0.5F;
+    xray.collimator[1] = xray.collimator[2] = xray.collimator[3] = 0.9F;
+    controls_note_sight(&controls, &alone, pose, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 0);
+    xray.field_mm = 50;
+    controls_note_sight(&controls, &alone, pose, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY, 0);
+    // a view that comes into sight is a look, one that stays is none
+    controls_note_sight(&controls, &layout, NULL, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY | SEEN_3D | SEEN_ANGIOSCOPY, 0);
+    assert_near(xray.looks, 1, 0);
+    before = xray;
+    controls_note_sight(&controls, &layout, NULL, true, &before, &xray);
+    assert_near(xray.looks, 1, 0);
+    pose_free(pose);
+}
+
+static void an_examination_refuses_the_keys_of_hidden_views(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    for (int examined = 0; examined < 2; examined++) {
+        PanelActions actions = {.mouse.view = -1};
+        controls.is_examination = examined;
+        actions.held[ACTION_ORBIT_LEFT] = actions.held[ACTION_PUSH] = true;
+        actions.pressed[ACTION_VIEW_FLUOROSCOPY] = 1;
+        assert_false(controls_refuse_hidden(&controls, &actions));
+        actions.pressed[ACTION_VIEW_3D] = 1;
+        assert_int_equal(controls_refuse_hidden(&controls, &actions), examined);
+        assert_true(actions.held[ACTION_PUSH] && actions.pressed[ACTION_VIEW_FLUOROSCOPY] == 1);
+        assert_int_equal(actions.held[ACTION_ORBIT_LEFT], !examined);
+        assert_int_equal(actions.pressed[ACTION_VIEW_3D], !examined);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_c_arm_stops_at_its_limits),
@@ -433,6 +490,8 @@ int main(void)
                                        cmocka_unit_test(a_second_hand_moves_the_other_of_the_pair),
                                        cmocka_unit_test(the_mouse_turns_the_c_arm_and_magnifies),
                                        cmocka_unit_test(the_mouse_moves_the_free_camera),
-                                       cmocka_unit_test(keys_choose_what_is_seen)};
+                                       cmocka_unit_test(keys_choose_what_is_seen),
+                                       cmocka_unit_test(what_a_window_shows_is_noted),
+                                       cmocka_unit_test(an_examination_refuses_the_keys_of_hidden_views)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

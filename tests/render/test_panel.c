@@ -194,10 +194,13 @@ static void nothing_overlaps_at_any_size(void **unused)
     static const double scales[] = {1, 1.25, 1.5, 2, 3};
     for (int width = 640; width <= 3840; width += 71)
         for (int height = 400; height <= 2160; height += 53)
-            for (int i = 0; i < 5 * 4 * 2; i++) {
-                PanelView view = (PanelView)(i / 2 % 4);
+            for (int i = 0; i < 5 * 5 * 2; i++) {
+                const int which = i / 2 % 5;         // the last: the X-ray image alone
+                const PanelView view = which < 4 ? (PanelView)which : VIEW_FLUOROSCOPY;
                 bool has_panels = i % 2;
-                PanelLayout l = panel_layout(width, height, scales[i / 8], view, has_panels);
+                PanelLayout l = which < 4 ? panel_layout(width, height, scales[i / 10], view, has_panels)
+                                          : panel_layout_xray_alone(width, height, scales[i / 10], has_panels);
+                assert_true(which < 4 || (l.view[VIEW_3D].width == 0 && l.view[VIEW_ANGIOSCOPY].width == 0));
                 assert_true(l.scale >= 0.5 && (width < 1024 || height < 600 || l.scale >= 0.85));
                 PanelRect rect[VIEW_COUNT + 4] = {l.view_rect[0], l.view_rect[1], l.view_rect[2], l.top, l.left, l.right, l.bottom};
                 for (int a = 0; a < VIEW_COUNT + 4; a++) {
@@ -212,7 +215,7 @@ static void nothing_overlaps_at_any_size(void **unused)
                     assert_true((float)(height - p.y - p.height) == rect[v].y || p.width == 0);
                     assert_true(p.width * p.height <= l.view[l.main].width * l.view[l.main].height);
                 }
-                bool is_usual = has_panels && width >= 1024 && height >= 600 && scales[i / 8] * 1024 <= width && scales[i / 8] * 600 <= height;
+                bool is_usual = has_panels && width >= 1024 && height >= 600 && scales[i / 10] * 1024 <= width && scales[i / 10] * 600 <= height;
                 assert_true(!is_usual || l.right.height >= (float)(250 * l.scale));   // room for the longest tab
                 assert_true(!is_usual || l.view[l.main].width * l.view[l.main].height * 6 > width * height);
             }
@@ -714,6 +717,33 @@ static void instructions_are_shown_until_followed(void **unused)
     end_controls(&controls);
 }
 
+// It opens by itself, stays closed once it was closed, and goes when the exercise begins again.
+static void the_result_is_shown_once(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    OperatorControls controls = new_controls(1280, 720);
+    Panel *panel = controls.panel;
+    controls.state.instructions = "One line.";
+    controls.state.is_finished = false;
+    frame(&controls);
+    frame(&controls);
+    assert_true(panel->briefing_at.width == 0);
+    controls.state.is_finished = true;
+    frame(&controls);
+    assert_true(panel->briefing_at.width > 0);
+    tap(&controls, WINDOW_KEY_ESCAPE);
+    frame(&controls);
+    assert_true(panel->briefing_at.width == 0 && !panel_is_asking(panel));
+    tap(&controls, 'O');
+    assert_true(panel->briefing_at.width > 0);
+    controls.state.is_finished = false;
+    frame(&controls);
+    assert_true(panel->briefing_at.width == 0);
+    end_controls(&controls);
+}
+
 // Following the hints one after the other ends them; each names its keys and fits its place.
 static void hints_lead_on_with_use(void **unused)
 {
@@ -924,6 +954,7 @@ int main(void)
                                        cmocka_unit_test(names_are_typed_and_trimmed),
                                        cmocka_unit_test(broken_lines_are_joined),
                                        cmocka_unit_test(instructions_are_shown_until_followed),
+                                       cmocka_unit_test(the_result_is_shown_once),
                                        cmocka_unit_test(hints_lead_on_with_use),
                                        cmocka_unit_test(strange_states_draw),
                                        cmocka_unit_test(several_tools_are_listed),
