@@ -82,7 +82,7 @@ static void tell_result(char *text, size_t capacity, const Scene *scene, const S
         score_part_reason(score, (ScorePart)i, why, sizeof why);
         add_line(text, capacity, "- %s: %.1f of %.1f points", words->title, part->points, part->most);
         if (*why)
-            add_line(text, capacity, " (%.4g %s, full points up to %.4g): %s", part->measured, words->unit, part->par, why);
+            add_line(text, capacity, " (%.3g %s, full points up to %.3g): %s", part->measured, words->unit, part->par, why);
         add_line(text, capacity, ".\n");
     }
     if (score->state != SCORE_REACHED)
