@@ -91,11 +91,14 @@ static void listen(int input, char message[MESSAGE])
 // Runs a verb. Its last messages, or how it ended, go to `message`. Returns false if a signal ended it, as the user ends a program.
 static bool run_verb_of(const char *verb, const StartState *state, char message[MESSAGE])
 {
-    char *arguments[] = {(char *)(size_t) "seldinger", (char *)(size_t)verb, (char *)(size_t)state->path, NULL, NULL, NULL};
-    int pipes[2], status = 0;
+    char *arguments[7] = {(char *)(size_t) "seldinger", (char *)(size_t)verb, (char *)(size_t)state->path};
+    int pipes[2], status = 0, count = 3;
+    const bool steers = !strcmp(verb, "nav");
     message[0] = 0;
-    if (!strcmp(verb, "nav") && state->trainee[0])
-        arguments[3] = (char *)(size_t) "--trainee", arguments[4] = (char *)(size_t)state->trainee;
+    if (steers && state->trainee[0])
+        arguments[count++] = (char *)(size_t) "--trainee", arguments[count++] = (char *)(size_t)state->trainee;
+    if (steers && state->is_examination)
+        arguments[count++] = (char *)(size_t) "--examination";
     if (pipe2(pipes, O_CLOEXEC) != 0)
         return false;
     fflush(NULL);

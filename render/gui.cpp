@@ -32,6 +32,7 @@ struct Gui {
     ImFont *font[GUI_FONTS];
     float scale;
     bool has_backend, is_silent;
+    bool takes_text;                 // a text field of this frame has the keys
     bool scrolls_to_end;             // of the window begun last
     bool released[WINDOW_KEYS];
     KeptWindow kept[KEPT_WINDOWS];
@@ -189,6 +190,7 @@ static void feed_keys(Gui *gui, ImGuiIO &io, const WindowInput *input)
 
 extern "C" void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent)
 {
+    gui->takes_text = false;
     gui->previous = ImGui::GetCurrentContext();
     ImGui::SetCurrentContext(gui->context);
     gui->is_silent = is_silent;
@@ -377,6 +379,8 @@ extern "C" void gui_end(Gui *gui, unsigned framebuffer)
 }
 
 extern "C" float gui_scale(const Gui *gui) { return gui->scale; }
+
+extern "C" bool gui_takes_text(const Gui *gui) { return gui->takes_text; }
 
 // ---- windows and flow
 
@@ -567,13 +571,14 @@ extern "C" void gui_tabs_end(Gui *)
     ImGui::PopFont();
 }
 
-extern "C" bool gui_text_field(Gui *, const char *id, char *text, size_t capacity, bool take_focus)
+extern "C" bool gui_text_field(Gui *gui, const char *id, char *text, size_t capacity, bool take_focus)
 {
     if (take_focus)
         ImGui::SetKeyboardFocusHere();
     ImGui::PushID(id);
     ImGui::SetNextItemWidth(-1);
     bool is_entered = ImGui::InputText("##text", text, capacity, ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+    gui->takes_text = gui->takes_text || ImGui::IsItemActive();
     ImGui::PopID();
     return is_entered;
 }

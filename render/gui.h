@@ -74,6 +74,8 @@ void gui_tabs_end(Gui *gui);
 
 // One line of UTF-8. Returns true when Enter was pressed. Takes the keyboard focus if `take_focus`.
 bool gui_text_field(Gui *gui, const char *id, char *text, size_t capacity, bool take_focus);
+// Whether a text field of the last frame had the keys.
+bool gui_takes_text(const Gui *gui);
 
 // Drawing in the current window.
 void gui_draw_fill(Gui *gui, GuiRect at, Color color);

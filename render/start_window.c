@@ -30,7 +30,7 @@ typedef struct StartWindow {
     FileRow *file;
     char message[600];           // shown below the list
     bool has_moved;              // the chosen row must be scrolled to
-    bool is_typing;              // the name of the trainee
+    int takes_name;              // frames until the field of the trainee's name has the keys
     StartChoice choice;
     bool ends;
 } StartWindow;
@@ -170,7 +170,8 @@ static void press(StartWindow *w, const WindowEvent *event)
         if (w->state->page == PAGE_SESSIONS && w->state->row < row_count(w))
             choose(w, START_REPORT, w->options->shelf->session[w->state->row].path);
         break;
-    case 'N': w->is_typing = true; break;
+    case 'N': w->takes_name = 2; break;
+    case 'X': w->state->is_examination = !w->state->is_examination; break;
     default: break;
     }
 }
@@ -238,8 +239,11 @@ static void draw_side(StartWindow *w, GuiRect at)
             turn_page(w, i);
     gui_space(gui, floorf(14 * gui_scale(gui)));
     gui_text(gui, GUI_SMALL, gui_colors.dim, "Your name, for the report (N; Enter ends)");
-    if (gui_text_field(gui, "trainee", w->state->trainee, sizeof w->state->trainee, w->is_typing))
-        w->is_typing = false;
+    gui_text_field(gui, "trainee", w->state->trainee, sizeof w->state->trainee, w->takes_name > 0);
+    w->takes_name -= w->takes_name > 0;
+    gui_space(gui, floorf(14 * gui_scale(gui)));
+    if (gui_button(gui, "examination", "Examination: X-ray alone", "X", 0, w->state->is_examination).pressed)
+        w->state->is_examination = !w->state->is_examination;
     gui_space(gui, floorf(14 * gui_scale(gui)));
     if (w->state->page == PAGE_SESSIONS && w->state->row < row_count(w)) {
         const char *path = w->options->shelf->session[w->state->row].path;
@@ -284,10 +288,8 @@ static void run_frames(StartWindow *w)
         bool visible = window_next_frame(w->window, &input);
         for (int i = 0; i < input->event_count && !w->ends; i++) {
             const WindowEvent *event = &input->event[i];
-            if (event->kind == WINDOW_KEY_DOWN_EVENT && !w->is_typing)
+            if (event->kind == WINDOW_KEY_DOWN_EVENT && !gui_takes_text(w->gui) && w->takes_name == 0)
                 press(w, event);
-            else if (event->kind == WINDOW_KEY_DOWN_EVENT && event->key == WINDOW_KEY_ESCAPE)
-                w->is_typing = false;
             else if (event->kind == WINDOW_DROP_EVENT)
                 choose(w, START_STEER, window_dropped(w->window));
         }

@@ -18,6 +18,7 @@ typedef struct StartState {
     int page, row;
     char folder[4096];           // that the page of files shows
     char trainee[64];
+    bool is_examination;         // steer without 3D view and angioscopy
     char path[4096];             // result: the scene or case, the file to open, or the session file
 } StartState;
 

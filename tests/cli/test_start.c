@@ -57,12 +57,12 @@ static void a_user_trains(void **state)
     need_display();
     char script[3000];
     snprintf(script, sizeof script,
-             "%s $S > trained 2>&1 & P=$!; window; keys n A d a Return; keys Return; "
+             "%s $S > trained 2>&1 & P=$!; window; keys n A d a Return; keys x Return; "
              "until_true 'pgrep -P '$P' >/dev/null'; C=$(pgrep -P $P); window; sleep 1; kill -TERM $C; "
              "until_true 'ls seldinger/sessions/*.json >/dev/null 2>&1'; until_true '! pgrep -P '$P' >/dev/null'; window; "
              "keys Tab r; until_true 'ls seldinger/sessions/*.html >/dev/null 2>&1'; until_true '! pgrep -P '$P' >/dev/null'; window; keys Escape; wait $P; [ "
              "$? = 0 ] || exit 1; "
-             "grep -q '\"trainee\":.*\"[Aa]da\"' seldinger/sessions/*.json",
+             "grep -q '\"trainee\":.*\"[Aa]da\"' seldinger/sessions/*.json && grep -q '\"mode\":.*\"examination\"' seldinger/sessions/*.json",
              hand);
     int code = shell(script);
     if (code != 0)
