@@ -270,7 +270,7 @@ static const char *about_row(const StartWindow *w)
 
 static void draw(StartWindow *w, const WindowInput *input)
 {
-    float k = (float)input->scale, side = floorf(300 * k), foot = floorf(150 * k), width = (float)input->width, height = (float)input->height;
+    float k = (float)input->scale, side = floorf(300 * k), foot = floorf(190 * k), width = (float)input->width, height = (float)input->height;
     gui_begin(w->gui, input, input->scale, false);
     draw_side(w, (GuiRect){0, 0, side, height});
     draw_list(w, (GuiRect){side, 0, width - side, height - foot});

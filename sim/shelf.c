@@ -30,7 +30,7 @@ static bool take_case(const char *path, const char *name, ShelfCase *out)
         const char *needed = scene_needed_file(scene);
         snprintf(out->path, sizeof out->path, "%s", path);
         snprintf(out->title, sizeof out->title, "%.90s", scene->exercise ? scene->exercise->title : name);
-        snprintf(out->text, sizeof out->text, "%.390s", scene->exercise ? scene->exercise->instructions : "");
+        snprintf(out->text, sizeof out->text, "%.990s", scene->exercise ? scene->exercise->instructions : "");
         snprintf(out->missing, sizeof out->missing, "%s", needed && access(needed, R_OK) != 0 ? needed : "");
     }
     scene_free(scene);
