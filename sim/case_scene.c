@@ -94,7 +94,7 @@ static void write_exercise(FILE *out, const VesselTree *tree, const CaseScene *o
         out,
         "exercise:\n  title: Reach the target\n  instructions: Bring the tip of the wire to the target, %.0f mm along the vessels, and keep it there for 2 s.\n"
         "  target: target\n  rules: {wrong_branch_mm: %.2g, tip_force_n: 0.5, blind_mm: 10}\n"
-        "  par: {time_s: %.0f, fluoroscopy_s: %.0f, path_ratio: 1.5, wall_force_n: 0.5}\n",
+        "  par: {time_s: %.0f, fluoroscopy_s: %.0f, path_ratio: 1.5, wall_force_n: 0.5, blind_mm: 5, guidance_s: 2}\n",
         path, fmax(5, 2 * tree->radius[node]), seconds, seconds);
 }
 
