@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 static const double per_m_s2 = 1e-3;           // mm/ms2
 static const double farthest_mm = 1e5;
@@ -540,15 +541,27 @@ Scene *scene_parse(const char *text, size_t length, const char *path, Faults *fa
     return scene;
 }
 
+// The scene of a case's folder, otherwise `path` itself; NULL with a fault. The caller frees it.
+static char *scene_file(const char *path, Faults *faults)
+{
+    struct stat status;
+    bool is_folder = stat(path, &status) == 0 && S_ISDIR(status.st_mode);
+    char *file = is_folder ? text_file_in(path, "scene.yaml") : text_file_beside("", path);
+    if (!file)
+        faults_add(faults, path, 0, 0, "out of memory");
+    if (!file || !is_folder || access(file, F_OK) == 0)
+        return file;
+    faults_add(faults, path, 0, 0, "is a folder without scene.yaml; expected a scene, or a case (`seldinger case`)");
+    free(file);
+    return NULL;
+}
+
 Scene *scene_load(const char *path, Faults *faults)
 {
     size_t length;
-    struct stat status;
-    char *inside = stat(path, &status) == 0 && S_ISDIR(status.st_mode) ? text_file_in(path, "scene.yaml") : NULL;
-    const char *file = inside ? inside : path;
-    char *text = text_file_read(file, &length, faults);
+    char *file = scene_file(path, faults), *text = file ? text_file_read(file, &length, faults) : NULL;
     Scene *scene = text ? scene_parse(text, length, file, faults) : NULL;
     free(text);
-    free(inside);
+    free(file);
     return scene;
 }

@@ -84,7 +84,7 @@ static void bad_cases_are_refused(void **state)
     refused("case 'a tube.nrrd' --start 0,0,900 -o outside", "--start");
     refused("case tree.h5 --target 0,0,90 -o far", "outside the nearest vessel");
     refused("case tree.h5 -o tree.h5", "cannot be created as a folder");
-    refused("run far", "far/scene.yaml");
+    refused("run far", "far: is a folder without scene.yaml");
     // a folder without a scene is no case yet
     assert_int_equal(run_in("", "case tree.h5 --quiet -o far"), 0);
     refused("case tree.h5 -o far", "is a case already");

@@ -94,7 +94,7 @@ static void bad_input_ends_with_2_and_says_where(void **state)
     expect_bad(GOOD, "run bad.yaml other.yaml", "one scene at a time");
     expect_bad(NULL, "run", "missing the scene");
     expect_bad(NULL, "run nowhere.yaml", "nowhere.yaml: cannot be opened");
-    expect_bad(NULL, "run .", "is not a regular file");
+    expect_bad(NULL, "run .", "is a folder without scene.yaml");
     expect_bad("", "run bad.yaml", "bad.yaml:1:1: is empty");
     expect_bad("seldinger: 1\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nrig: {}\n", "run bad.yaml", "has no script");
     const char *models[] = {"model.h5", "cut.h5", "nowhere.h5"};
