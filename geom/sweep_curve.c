@@ -181,7 +181,7 @@ double sweep_curve_project(const SweepCurve *c, Vec3 x, double from, double long
         Vec3 u = vec3_sub(x, polynomial(i->s, at));
         double now2 = vec3_norm2(u);
         // close to the foot, rounding hides whether the distance decreases
-        if (now2 > far2 * (1 + 1e-12) && fabs(step) > 1e-6 * longest) {
+        if (now2 > far2 * (1 + SWEEP_ROUNDING) && fabs(step) > 1e-6 * longest) {
             step *= 0.5;
             t -= step;
             continue;

@@ -41,6 +41,8 @@ SweepJet sweep_curve_at(const SweepCurve *curve, double t);
 
 // The factor D = |S'|^2 - u.S'' of Newton's step is limited to at least this times |S'|^2: beyond the curve's focal line D is negative.
 #define SWEEP_LEAST_D 0.02
+// Relative to the square of a distance: an increase that may be rounding.
+#define SWEEP_ROUNDING 1e-12
 // t of the point of the curve nearest to x, (x - S).S' = 0, by Newton from t = from; `longest`: bound of a step [mm] > 0. Beyond the focal line, a point where
 // the distance does not decrease further.
 double sweep_curve_project(const SweepCurve *curve, Vec3 x, double from, double longest);

@@ -26,7 +26,6 @@ void sweep_block_begin(SweepBlock *b)
     memset(&b->ring, 0, sizeof b->ring);
     memset(b->alone, 0, sizeof b->alone);
     b->harmonics = 1;
-    b->unsettled = 0;
 }
 
 void sweep_block_place(const SweepFeet *feet, SweepBlock *b, int i, int segment, int sac, double t)
@@ -62,9 +61,9 @@ static int neighbour(const SweepField *field, const SweepSegment *s, double t)
 // Finds t of a part for the lanes of `lanes`.
 static void seek_part(const SweepFeet *feet, SweepBlock *b, SweepPartLanes *p, unsigned lanes)
 {
-    enum { ROUNDS = 12 };
+    enum { ROUNDS = 60 };
     for (int i = 0; i < FOOT_BLOCK; i++)
-        p->settled[i] = lanes >> i & 1 ? 0 : 1;
+        p->settled[i] = lanes >> i & 1 ? 0 : 1, p->far2[i] = HUGE_VAL, p->last[i] = 0;
     for (int round = 0; round < ROUNDS; round++) {
         unsigned outside, again = feet->kernels->seek(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, &outside) & lanes;
         for (outside &= lanes; outside != 0; outside &= outside - 1) {
@@ -147,10 +146,6 @@ static void evaluate_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned 
         feet->kernels->evaluate_slope(p, b->foot.at.x, b->foot.at.y, b->foot.at.z, harmonics);
     if (feet->field->model->stretch_count > 0)
         apply_stretches(feet, b, k, lanes);
-    // far from the curve t may not settle; then the point is not in the section's plane, where its radius would be too small
-    for (int i = 0; i < FOOT_BLOCK; i++)
-        if (p->absent[i] == 0 && p->settled[i] == 0)
-            p->f[i] = fmin(p->f[i], p->segment[i]->largest - p->away[i]);
     for (int i = 0; i < FOOT_BLOCK; i++) {
         if (own[i] > 0) {
             b->is_flat[i] = p->segment[i]->rise == 0 && p->segment[i]->is_shaped == 0;
@@ -305,19 +300,6 @@ static unsigned evaluate_parts(const SweepFeet *feet, SweepBlock *b, int parts, 
     return evaluated;
 }
 
-// The lanes of `lanes` in which a part whose t has not settled may be part of F.
-static unsigned lanes_unsettled(const SweepBlock *b, unsigned lanes, unsigned evaluated)
-{
-    unsigned found = 0;
-    for (; evaluated != 0; evaluated &= evaluated - 1) {
-        const SweepPartLanes *p = &b->part[__builtin_ctz(evaluated)];
-        for (int i = 0; i < FOOT_BLOCK; i++)
-            if (p->settled[i] == 0 && p->absent[i] == 0 && (b->view[i]->count == 1 || p->f[i] > b->foot.at.f[i] - 3 * p->width[i]))
-                found |= 1u << i;
-    }
-    return found & lanes;
-}
-
 static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool bends)
 {
     int parts = 0;
@@ -356,9 +338,6 @@ static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool be
         }
         if (others != 0)
             seek_part(feet, b, &b->part[k], others);
-        for (int i = 0; i < FOOT_BLOCK; i++)
-            if ((lanes >> i & 1) && k == b->own[i])
-                b->part[k].settled[i] = first.settled[i];
         if (parts > 1)
             feet->kernels->width(&b->part[k]);
     }
@@ -367,7 +346,6 @@ static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool be
         memset(b->share, 0, sizeof b->share), memset(b->sac_share, 0, sizeof b->sac_share);
     if (parts == 1 && sacs == 0) {
         copy_part(&b->foot.at, &b->part[0]);
-        b->unsettled = (b->unsettled & ~lanes) | lanes_unsettled(b, lanes, evaluated);
         for (int i = 0; i < FOOT_BLOCK; i++)
             if (lanes >> i & 1)
                 b->owner[i] = 0, b->pure[i] = b->keeps_t[i] = true, b->apart[i] = 0, b->share[0][i] = 1;
@@ -387,7 +365,6 @@ static void sample(const SweepFeet *feet, SweepBlock *b, unsigned lanes, bool be
     }
     if (sacs != 0)
         blend_sacs(feet, b, lanes, sacs, &sac, bends);
-    b->unsettled = (b->unsettled & ~lanes) | lanes_unsettled(b, lanes, evaluated);
     for (int i = 0; i < FOOT_BLOCK; i++)
         if (lanes >> i & 1) {
             b->keeps_t[i] = true;
@@ -496,7 +473,7 @@ static unsigned run_block(const SweepFeet *feet, SweepBlock *b, const Vec3 *x, c
         for (int i = 0; i < FOOT_BLOCK; i++)
             from[i] = lane_foot(f, i);
         sweep_block_sample(feet, b, round == 0 ? FOOT_ALL : *all & ~done);
-        done = feet->kernels->newton(f, true) & ~b->unsettled;
+        done = feet->kernels->newton(f, true);
         for (int i = 0; i < FOOT_BLOCK; i++) {
             Vec3 step = vec3_sub(lane_foot(f, i), from[i]);
             if (vec3_dot(step, last[i]) < BACK * vec3_norm2(last[i]))
@@ -545,7 +522,7 @@ unsigned sweep_follow(const SweepFeet *feet, const Vec3 *x, const SweepStart *st
         sweep_block_sample(feet, &b, several);
     for (int i = 0; i < count; i++) {
         foot[i].doubtful = several >> i & 1 && fabs(b.foot.at.f[i]) > OFF_WALL * b.foot.radius[i];
-        if ((all & ~b.unsettled) >> i & 1 && is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
+        if (all >> i & 1 && is_number(&foot[i]) && (done >> i & 1 || is_one_of_many(&b, i, x[i], &foot[i])))
             sound |= 1u << i;
     }
     return sound;

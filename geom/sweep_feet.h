@@ -38,7 +38,6 @@ typedef struct SweepBlock {
     bool keeps_t[FOOT_BLOCK];            // the parts' t are near the feet; else they start from the view
     bool alone[FOOT_BLOCK];              // the own branch is evaluated alone, whatever is seen
     SweepLane share[SWEEP_PARTS], sac_share;     // of the parts, after sweep_block_slope
-    unsigned unsettled;                  // after a sample: bits of lanes in which a part whose t was not found may matter: F is only a bound there
     double apart[FOOT_BLOCK];            // after a sample of a pure lane: see VesselSweepMemory
     SweepLane own_t;                     // t on the own branch
     SweepLane is_flat;                   // 1: the ring holds (the own segment is no dome)

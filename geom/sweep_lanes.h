@@ -17,6 +17,7 @@ typedef struct SweepPartLanes {
     const SweepSegment *segment[FOOT_BLOCK];     // the one that holds t
     SweepLane t, longest;                // longest: bound of a step of t [mm]
     SweepLane settled;                   // 1: t is the foot on the curve
+    SweepLane far2, last;                // the search for t: the square of the least distance so far, first HUGE_VAL [mm^2], and the step from there [mm]
     SweepLane away;                      // distance of the point from the curve [mm]
     SweepLane absent;                    // 1: f is -1e300 and the derivatives are 0
     SweepLane delta, reach_inverse;      // the blend with the parts before, see SweepFork; reach_inverse 0: delta everywhere
@@ -55,8 +56,8 @@ typedef struct SweepNear {
 } SweepNear;
 
 typedef struct SweepKernels {
-    // Up to three Newton steps of t for the lanes that are not settled, on their segments. Returns the bits of lanes that are not settled, or whose t lies
-    // outside its segment (`outside`): these need another segment.
+    // Up to three steps of t for the lanes that are not settled, on their segments: Newton's, halved where the last one led away from the point. Returns the
+    // bits of lanes that are not settled; those whose t lies outside its segment (`outside`) need another one.
     unsigned (*seek)(SweepPartLanes *part, const double *x, const double *y, const double *z, unsigned *outside);
     // f, gradient and Hessian at the points. Terms beyond `harmonics` are 0 on all segments. `ring` may be NULL; only lanes with own[i] = 1 are
     // stored to it.

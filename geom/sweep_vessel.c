@@ -450,7 +450,7 @@ static void follow_block(const SweepVessel *v, Batch *batch, const int *which, i
     }
     for (int round = 0; round < (again ? ROUNDS_AGAIN : 1) && (done & all) != all; round++) {
         sweep_block_sample(&v->feet, &b, round == 0 ? FOOT_ALL : all & ~done);
-        done = v->feet.kernels->newton(f, false) & ~b.unsettled;
+        done = v->feet.kernels->newton(f, false);
         usual = round == 0 ? done : usual;
     }
     v->feet.kernels->finish(f);
