@@ -102,7 +102,7 @@ static void set_part(const SweepFeet *feet, SweepBlock *b, int k, unsigned lanes
                 double length = b->segment[i] >= 0 ? field->curve[view->of[b->own[i]].branch]->length : 0;
                 p->t[i] = c->t + c->slope * fmax(0, fmin(length, b->own_t[i]));
             }
-            p->segment[i] = field->segment + sweep_field_segment(field, c->branch, p->t[i]);
+            p->segment[i] = field->segment + neighbour(field, &field->segment[c->segment], p->t[i]);
         }
     }
 }
@@ -794,7 +794,7 @@ int sweep_starts(const SweepFeet *feet, Vec3 x, SweepPlace place, int segment, c
         double t = own ? place.t : c->t + c->slope * own_t;
         int k = seen.count++;
         seen.branch[k] = c->branch;
-        seen.segment[k] = own ? segment : sweep_field_segment(field, c->branch, t);
+        seen.segment[k] = own ? segment : neighbour(field, &field->segment[c->segment], t);
         seen.t[k] = near_t(field, x, t, 2 * field->model->branch[c->branch].radius, &seen.segment[k]);
     }
     for (int i = 0; i < seen.count && (seen.count > 1 || seen.sac >= 0); i++)

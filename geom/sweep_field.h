@@ -12,7 +12,7 @@
 
 // A branch that is seen from a segment of another: its t near a place t' of the segment is about t + slope t', t' limited to 0 ... length of its own branch.
 typedef struct SweepCandidate {
-    int branch;
+    int branch, segment;     // segment: the branch's that holds t near the middle of the place's
     double t, slope;
 } SweepCandidate;
 

@@ -762,7 +762,7 @@ Vessel *sweep_vessel_create_with(const SweepModel *model, int isa)
         return NULL;
     }
     for (int i = 0; i < model->branch_count; i++)
-        v->feet.alone[i] = (SweepView){.count = 1, .sac = -1, .of[0] = {i, 0, 1}};
+        v->feet.alone[i] = (SweepView){.count = 1, .sac = -1, .of[0] = {i, v->field->first_segment[i], 0, 1}};
     fill_places(v);
     if (!power_blocks_create(&v->blocks, v->knots) || !sweep_sac_points_create(v->field, &v->feet.sacs)) {
         sweep_destroy(&v->vessel);

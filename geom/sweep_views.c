@@ -27,7 +27,7 @@ static void add_candidate(SweepField *field, SweepView *view, int branch, double
     }
     for (int i = view->count; i > at; i--)
         view->of[i] = view->of[i - 1];
-    view->of[at] = (SweepCandidate){branch, t, slope};
+    view->of[at] = (SweepCandidate){branch, sweep_field_segment(field, branch, t), t, slope};
     view->count++;
 }
 
@@ -138,6 +138,7 @@ static void refine_starts(SweepField *field, int branch)
             Vec3 s1 = sweep_curve_at(field->curve[c->branch], t).s1;
             c->slope = vec3_dot(here.s1, s1) / vec3_norm2(s1);
             c->t = t - c->slope * at;
+            c->segment = sweep_field_segment(field, c->branch, t);
         }
     }
 }
