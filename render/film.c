@@ -138,16 +138,14 @@ static void sample_plots(Film *film, double time_s)
 static void film_draw(Film *film, double time_s)
 {
     const FilmOptions *options = film->options;
-    bool jumped = playback_seek(film->playback, time_s);
+    playback_seek(film->playback, time_s);
     const Pose *pose = playback_pose(film->playback);
     PanelLayout layout = panel_layout(options->width, options->height, 1, options->view, options->has_panels);
-    if (jumped)
-        fluoroscope_forget(views_fluoroscope(film->views));
     ViewsFrame frame = {.pose = pose,
                         .xray = &pose->xray,
                         .contrast = playback_contrast(film->playback),
                         .filling = playback_filling(film->playback),
-                        .pulse = (uint32_t)playback_pulses(film->playback)->count,
+                        .past = playback_past(film->playback),
                         .look = &film->controls.look,
                         .is_still = true};
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
@@ -164,37 +162,12 @@ static void film_draw(Film *film, double time_s)
     gl_canvas_read(&film->canvas, film->rgb);
 }
 
-// DSA and roadmap depend on earlier pulses, so those of the last two minutes are simulated.
-static void take_earlier_pulses(Film *film, double time_s)
-{
-    const double most_s = 120;
-    playback_seek(film->playback, time_s);
-    if (playback_pose(film->playback)->xray.mode == (float)XRAY_LIVE)
-        return;
-    int64_t drawn = -1;
-    fluoroscope_forget(views_fluoroscope(film->views));
-    for (double t = fmax(0, time_s - most_s); t < time_s; t += 1.0 / 60) {
-        playback_seek(film->playback, t);
-        const PulseClock *pulses = playback_pulses(film->playback);
-        const Pose *pose = playback_pose(film->playback);
-        FluoroscopeFrame frame = {.pose = pose,
-                                  .xray = pose->xray,
-                                  .contrast = playback_contrast(film->playback),
-                                  .filling = playback_filling(film->playback),
-                                  .pulse = (uint32_t)pulses->count};
-        if (pulses->count != drawn)
-            fluoroscope_draw(views_fluoroscope(film->views), &frame, (ViewPort){film->canvas.framebuffer, 0, 0, film->options->height, film->options->height});
-        drawn = pulses->count;
-    }
-}
-
 bool film_picture(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
     Film film;
     char message[256];
     if (!film_open(&film, path, options, run, scene, open, faults))
         return false;
-    take_earlier_pulses(&film, options->from_s);
     film_draw(&film, options->from_s);
     film_draw(&film, options->from_s);   // drawn twice: the layout of a panel is known only from the previous frame
     bool good = png_file_write(path, options->width, options->height, film.rgb, message, sizeof message);
@@ -222,7 +195,6 @@ bool film_movie(const char *path, const FilmOptions *options, const RecordedRun 
     ProgressBar bar;
     Progress progress = progress_bar(&bar, "film", options->is_quiet);
     bool good = true;
-    take_earlier_pulses(&film, options->from_s);
     film_draw(&film, options->from_s);
     for (long i = 0; good && i < count; i++) {
         film_draw(&film, options->from_s + (double)i * options->speed / options->fps);

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const float least_contrast = 0.002f;      // lowest visible concentration
+static const double least_move_mm = 1e-3;        // of the C-arm
 static const double median_transmission = 0.27;  // target of the automatic exposure: brightness 0.68
 
 FluoroscopeOptions fluoroscope_default_options(void)
@@ -114,6 +114,21 @@ static const RibbonPath *path_of(Fluoroscope *f, int k, const PoseTool *tool)
     return path->node_count == tool->node_count ? path : NULL;
 }
 
+static bool exposure_make(Exposure *exposure, size_t tool_nodes, size_t nodes)
+{
+    exposure->position = calloc(tool_nodes, sizeof *exposure->position);
+    exposure->filling = calloc(tool_nodes, sizeof *exposure->filling);
+    exposure->contrast = calloc(nodes, sizeof *exposure->contrast);
+    return exposure->position && exposure->filling && exposure->contrast;
+}
+
+static void exposure_free(Exposure *exposure)
+{
+    free(exposure->position);
+    free(exposure->filling);
+    free(exposure->contrast);
+}
+
 static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
 {
     size_t tool_nodes = 1, nodes = (size_t)lumen_nodes(f) + 1;
@@ -121,13 +136,10 @@ static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
     f->tool_count = options->tools ? options->tools->count : 0;
     for (int k = 0; k < f->tool_count; k++)
         f->tool_capacity[k] = options->pose->tool[k].node_capacity, tool_nodes += (size_t)f->tool_capacity[k];
-    f->shown.position = calloc(tool_nodes, sizeof *f->shown.position);
-    f->shown.filling = calloc(tool_nodes, sizeof *f->shown.filling);
-    f->shown.contrast = calloc(nodes, sizeof *f->shown.contrast);
     f->lumen_contrast = calloc(nodes, sizeof *f->lumen_contrast);
-    f->bolus = calloc(nodes, sizeof *f->bolus);
-    f->roadmap = calloc(nodes, sizeof *f->roadmap);
-    bool good = f->shown.position && f->shown.filling && f->shown.contrast && f->lumen_contrast && f->bolus && f->roadmap;
+    f->roadmap_contrast = calloc(nodes, sizeof *f->roadmap_contrast);
+    bool good = f->lumen_contrast && f->roadmap_contrast && exposure_make(&f->shown, tool_nodes, nodes) && exposure_make(&f->masked, tool_nodes, nodes) &&
+                pulse_memory_make(&f->memory, lumen_nodes(f));
     for (int k = 0; good && k < f->tool_count; k++)
         good = path_of(f, k, &options->pose->tool[k]) != NULL;
     return good;
@@ -191,82 +203,56 @@ void fluoroscope_destroy(Fluoroscope *f)
     for (int k = 0; k < f->tool_count; k++)
         for (int i = 0; i <= EXCHANGES_MOST; i++)
             ribbon_path_free(&f->tool[k][i]);
-    free(f->shown.position), free(f->shown.filling), free(f->shown.contrast);
-    free(f->lumen_contrast), free(f->bolus), free(f->roadmap);
+    exposure_free(&f->shown);
+    exposure_free(&f->masked);
+    pulse_memory_free(&f->memory);
+    free(f->lumen_contrast);
+    free(f->roadmap_contrast);
     free(f);
 }
 
 void fluoroscope_forget(Fluoroscope *f)
 {
-    size_t nodes = (size_t)lumen_nodes(f);
-    f->has_picture = f->has_mask = f->mask_is_due = f->was_opacified = false;
+    f->has_picture = f->has_mask = f->mask_is_due = false;
     f->layers_are_stale = true;
-    f->mask_count = -1;
-    memset(f->bolus, 0, nodes * sizeof *f->bolus);
-    memset(f->roadmap, 0, nodes * sizeof *f->roadmap);
-    f->roadmap_has_changed = true;
+    pulse_memory_clear(&f->memory);
 }
 
 // --- a pulse ---
 
-static bool is_seen(const float *contrast, int count)
-{
-    for (int n = 0; n < count; n++)
-        if (contrast[n] > least_contrast)
-            return true;
-    return false;
-}
-
-static bool has_these_tools(Fluoroscope *f, const Pose *pose)
+static bool has_these_tools(Fluoroscope *f, Exposure *exposure, const Pose *pose)
 {
     bool same = pose && pose->tool_count == f->tool_count;
     for (int k = 0; same && k < f->tool_count; k++)
-        same = pose->tool[k].node_count <= f->tool_capacity[k] && (f->shown.tool[k] = path_of(f, k, &pose->tool[k]));
+        same = pose->tool[k].node_count <= f->tool_capacity[k] && (exposure->tool[k] = path_of(f, k, &pose->tool[k]));
     return same;
 }
 
-// Stores what the pulse shows; updates mask and roadmap.
-static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
+// Stores what the pulse shows.
+static void take_exposure(Fluoroscope *f, Exposure *exposure, const FluoroscopeFrame *frame)
 {
-    int nodes = lumen_nodes(f);
     const Pose *pose = frame->pose;
-    f->shown.xray = frame->xray;
-    f->shown.pulse = frame->pulse;
-    f->shown.has_tools = has_these_tools(f, pose);
+    exposure->xray = frame->xray;
+    exposure->pulse = frame->pulse;
+    exposure->has_tools = has_these_tools(f, exposure, pose);
     const float *filling = frame->filling;
-    for (int k = 0, i = 0; f->shown.has_tools && k < f->tool_count; k++) {
+    for (int k = 0, i = 0; exposure->has_tools && k < f->tool_count; k++) {
         for (int j = 0; j < pose->tool[k].node_count; j++, i++) {
-            f->shown.position[i] = pose->tool[k].node[j].position;
-            f->shown.filling[i] = filling && filling[j] > 0 ? fminf(filling[j], 1) : 0;
+            exposure->position[i] = pose->tool[k].node[j].position;
+            exposure->filling[i] = filling && filling[j] > 0 ? fminf(filling[j], 1) : 0;
         }
         filling = filling ? filling + f->tool_capacity[k] : NULL;
     }
-    for (int n = 0; n < nodes; n++) {
+    for (int n = 0; n < lumen_nodes(f); n++) {
         float c = frame->contrast ? frame->contrast[n] : 0;
-        f->shown.contrast[n] = c > 0 ? fminf(c, 1) : 0;   // NaN counts as none
-    }
-    bool is_opacified = is_seen(f->shown.contrast, nodes);
-    if (is_opacified && !f->was_opacified)
-        memset(f->bolus, 0, (size_t)nodes * sizeof *f->bolus);
-    f->was_opacified = is_opacified;
-    bool is_new = isfinite(frame->xray.mask) && (frame->xray.mask < f->mask_count || frame->xray.mask > f->mask_count);
-    for (int n = 0; n < nodes; n++) {
-        f->bolus[n] = fmaxf(f->bolus[n], f->shown.contrast[n]);
-        float before = f->roadmap[n];
-        // a new mask starts with the last visible bolus and accumulates
-        f->roadmap[n] = is_new && f->mask_count >= 0 ? f->bolus[n] : lroundf(frame->xray.mode) == XRAY_ROADMAP ? fmaxf(before, f->shown.contrast[n]) : before;
-        f->roadmap_has_changed |= fabsf(f->roadmap[n] - before) > least_contrast;
-    }
-    if (is_new) {
-        f->mask_is_due = f->mask_count >= 0;
-        f->mask_count = frame->xray.mask;
+        exposure->contrast[n] = c > 0 ? fminf(c, 1) : 0;   // NaN counts as none
     }
 }
 
-static bool c_arms_differ(const CArm *a, const CArm *b)
+static bool c_arms_differ(const CArm *a, const CArm *b, double least_mm)
 {
     double shift = vec3_distance(a->isocentre, b->isocentre) + fabs(a->field_mm - b->field_mm);
-    return shift > 1e-3 || vec3_distance(a->towards, b->towards) > 1e-5 || vec3_distance(a->up, b->up) > 1e-5;
+    return shift > least_mm || vec3_distance(a->towards, b->towards) > 0.01 * least_mm || vec3_distance(a->up, b->up) > 0.01 * least_mm;
 }
 
 // The mean attenuation in the beam, from rays between the blades, which the automatic exposure compensates.
@@ -316,7 +302,7 @@ static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
 
 static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const float *contrast, bool coarse, bool *is_empty)
 {
-    *is_empty = !f->lumen.is_there || f->lumen_out_of_beam || !is_seen(contrast, f->lumen.node_count) ||
+    *is_empty = !f->lumen.is_there || f->lumen_out_of_beam || !contrast_is_seen(contrast, f->lumen.node_count) ||
                 !layer_fit(layer, coarse ? (f->side + 1) / 2 : f->side, LAYER_R32F);
     if (*is_empty)
         return;
@@ -324,10 +310,11 @@ static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const fl
     lumen_layer_draw(&f->lumen, c_arm, contrast, coarse);
 }
 
-static bool contrast_differs(const Fluoroscope *f)
+static bool contrast_differs(const Fluoroscope *f, const float *a, const float *b)
 {
+    float least = f->is_exact ? 0 : least_contrast;
     for (int n = 0; n < lumen_nodes(f); n++)
-        if (fabsf(f->shown.contrast[n] - f->lumen_contrast[n]) > least_contrast)
+        if (fabsf(a[n] - b[n]) > least)
             return true;
     return false;
 }
@@ -339,36 +326,38 @@ typedef struct LayerChanges {
 // Updates anatomy, lumen and roadmap to the exposure. After a move of the C-arm the fine anatomy is drawn in strips over the next pulses, then the fine lumen,
 // so that no single
 // frame takes too long.
-static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
+static LayerChanges update_layers(Fluoroscope *f, const Exposure *exposure, bool is_fresh)
 {
-    CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
-    bool moved = is_fresh || c_arms_differ(&c_arm, &f->c_arm), flowed = contrast_differs(f), is_roadmap = lroundf(f->shown.xray.mode) == XRAY_ROADMAP;
+    CArm c_arm = c_arm_place(&exposure->xray, &f->options.patient);
+    bool at_once = is_fresh || f->is_exact, moved = is_fresh || c_arms_differ(&c_arm, &f->c_arm, f->is_exact ? 0 : least_move_mm);
+    bool flowed = contrast_differs(f, exposure->contrast, f->lumen_contrast), is_roadmap = lroundf(exposure->xray.mode) == XRAY_ROADMAP;
     bool anatomy = moved || f->anatomy_is_coarse, refine = !anatomy && !flowed && f->lumen_is_coarse;
-    bool lumen = moved || flowed || refine, coarse = !is_fresh && !refine && (lumen || f->lumen_is_coarse);
-    f->roadmap_has_changed |= lumen;
-    bool roadmap = is_roadmap && f->roadmap_has_changed;
+    bool lumen = moved || flowed || refine, coarse = !at_once && !refine && (lumen || f->lumen_is_coarse);
+    f->roadmap_is_stale |= lumen || contrast_differs(f, f->memory.roadmap, f->roadmap_contrast);
+    bool roadmap = is_roadmap && f->roadmap_is_stale;
     f->c_arm = c_arm;
     f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
     if (moved) {
         f->tone.exposure = find_exposure(f, &c_arm);
         f->anatomy_rows = 0;
     }
-    if (moved && !is_fresh)
+    if (moved && !at_once)
         draw_coarse_anatomy(f, &c_arm);
     else if (anatomy)
-        anatomy = draw_fine_anatomy(f, &c_arm, is_fresh);
+        anatomy = draw_fine_anatomy(f, &c_arm, at_once);
     if (anatomy) {
-        f->anatomy_is_coarse = moved && !is_fresh;
+        f->anatomy_is_coarse = moved && !at_once;
         f->now = f->anatomy_is_coarse ? &f->turning : &f->still;
     }
     if (lumen) {
         f->lumen_is_coarse = coarse;
-        draw_lumen(f, &f->lumen_layer, &c_arm, f->shown.contrast, coarse, &f->lumen_is_empty);
-        memcpy(f->lumen_contrast, f->shown.contrast, (size_t)lumen_nodes(f) * sizeof *f->lumen_contrast);
+        draw_lumen(f, &f->lumen_layer, &c_arm, exposure->contrast, coarse, &f->lumen_is_empty);
+        memcpy(f->lumen_contrast, exposure->contrast, (size_t)lumen_nodes(f) * sizeof *f->lumen_contrast);
     }
     if (roadmap) {
-        draw_lumen(f, &f->roadmap_layer, &c_arm, f->roadmap, coarse, &f->roadmap_is_empty);
-        f->roadmap_has_changed = false;
+        draw_lumen(f, &f->roadmap_layer, &c_arm, f->memory.roadmap, coarse, &f->roadmap_is_empty);
+        memcpy(f->roadmap_contrast, f->memory.roadmap, (size_t)lumen_nodes(f) * sizeof *f->roadmap_contrast);
+        f->roadmap_is_stale = false;
     }
     return (LayerChanges){anatomy, lumen || roadmap};
 }
@@ -376,15 +365,15 @@ static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 static const Layer *anatomy_of(const Fluoroscope *f) { return has_anatomy(f) ? &f->anatomy_layer : NULL; }
 static const Layer *lumen_of(const Fluoroscope *f) { return f->lumen_is_empty ? NULL : &f->lumen_layer; }
 
-static void lay_tools(Fluoroscope *f, int side)
+static void lay_tools(Fluoroscope *f, const Exposure *exposure, int side)
 {
-    const Vec3 *position = f->shown.position;
-    const float *filling = f->shown.filling;
+    const Vec3 *position = exposure->position;
+    const float *filling = exposure->filling;
     ribbon_begin(&f->ribbon);
-    for (int k = 0; f->shown.has_tools && k < f->tool_count; k++) {
-        ribbon_add(&f->ribbon, &f->c_arm, side, f->shown.tool[k], position, filling, f->tone.contrast);
-        position += f->shown.tool[k]->node_count;
-        filling += f->shown.tool[k]->node_count;
+    for (int k = 0; exposure->has_tools && k < f->tool_count; k++) {
+        ribbon_add(&f->ribbon, &f->c_arm, side, exposure->tool[k], position, filling, f->tone.contrast);
+        position += exposure->tool[k]->node_count;
+        filling += exposure->tool[k]->node_count;
     }
     ribbon_end(&f->ribbon, side);
 }
@@ -393,12 +382,11 @@ static void take_mask(Fluoroscope *f)
 {
     if (!layer_fit(&f->mask, f->side, LAYER_R32F))
         return;
-    lay_tools(f, f->side);
+    lay_tools(f, &f->masked, f->side);
     layers_draw_total(&f->programs, anatomy_of(f), lumen_of(f), &f->c_arm, &f->tone, &f->mask);
     layers_draw_tools(&f->programs, &f->ribbon, &f->tone, true, &f->mask);
     f->has_mask = true;
     f->mask_is_due = false;
-    f->mask_pulse = f->shown.pulse;
     f->mask_c_arm = f->c_arm;
 }
 
@@ -420,7 +408,7 @@ static void bake(Fluoroscope *f)
 {
     // DSA has its own dose
     f->tone.quanta = f->options.quanta * (f->tone.is_subtracted ? f->options.dsa_dose : 1);
-    layers_bake(&f->programs, anatomy_of(f), f->tone.is_subtracted ? &f->mask : NULL, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->now->bare);
+    layers_bake(&f->programs, anatomy_of(f), f->tone.is_subtracted ? &f->mask : NULL, &f->tone, f->shown.xray.collimator, f->masked.pulse, &f->now->bare);
     f->baked = f->shown.xray;
 }
 
@@ -441,19 +429,24 @@ static void opacify(Fluoroscope *f)
     layers_opacify(&f->programs, &f->now->bare, lumen, roadmap, &f->c_arm, &f->tone, low, high, &f->now->base);
 }
 
-// Makes the picture without noise for the exposure taken.
+// Makes the picture without noise for the exposure taken. The mask comes first, since both use the same layers.
 static void make_picture(Fluoroscope *f, bool is_fresh)
 {
-    LayerChanges changes = update_layers(f, is_fresh);
+    LayerChanges changes = {0};
+    bool has_new_mask = f->mask_is_due, is_mask = has_new_mask && f->masked.pulse == f->shown.pulse;
+    if (has_new_mask) {
+        changes = update_layers(f, &f->masked, is_fresh);
+        take_mask(f);
+    }
+    if (!is_mask) {
+        LayerChanges more = update_layers(f, &f->shown, is_fresh);
+        changes = (LayerChanges){changes.anatomy || more.anatomy, changes.lumen || more.lumen};
+    }
     PictureLayers *now = f->now;
     long mode = lroundf(f->shown.xray.mode);
-    bool has_roadmap = mode == XRAY_ROADMAP && f->lumen.is_there && !f->roadmap_is_empty, has_new_mask = false;
+    bool has_roadmap = mode == XRAY_ROADMAP && f->lumen.is_there && !f->roadmap_is_empty;
     changes.lumen |= has_roadmap != f->tone.has_roadmap;
     f->tone.has_roadmap = has_roadmap;
-    if (f->mask_is_due || (mode == XRAY_DSA && !f->has_mask)) {
-        take_mask(f);
-        has_new_mask = true;
-    }
     f->tone.is_subtracted = mode == XRAY_DSA && f->has_mask;
     bool is_baked = changes.anatomy || has_new_mask || is_fresh || blades_or_mode_differ(&f->baked, &f->shown.xray);
     if (is_baked)
@@ -465,7 +458,7 @@ static void make_picture(Fluoroscope *f, bool is_fresh)
         copy_all(base, &now->picture);
     else
         copy_box(base, &now->picture, f->drawn_low, f->drawn_high);
-    lay_tools(f, now->picture.side);
+    lay_tools(f, &f->shown, now->picture.side);
     layers_draw_tools(&f->programs, &f->ribbon, &f->tone, false, &now->picture);
     memcpy(f->drawn_low, f->ribbon.low, sizeof f->drawn_low);
     memcpy(f->drawn_high, f->ribbon.high, sizeof f->drawn_high);
@@ -510,35 +503,74 @@ static bool fit_picture(PictureLayers *layers, int side, LayerFormat format)
     return layer_fit(&layers->bare, side, format) && layer_fit(&layers->base, side, format) && layer_fit(&layers->picture, side, format);
 }
 
-void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort port)
+// Prepares the square of a port. Returns false if it is too small or the driver fails.
+static bool begin_drawing(Fluoroscope *f, ViewPort port)
 {
     int side = port.width < port.height ? port.width : port.height;
+    bool is_resized = side != f->side;
     if (side < 8)
-        return;
-    bool has_pedal = frame->xray.pedal > 0.5f, is_resized = side != f->side;
-    bool is_pulse = !f->has_picture || (has_pedal && frame->pulse != f->shown.pulse);
+        return false;
     if (is_resized && (!fit_picture(&f->still, side, LAYER_RGBA16) || !fit_picture(&f->turning, (side + 1) / 2, LAYER_RGBA16_SMOOTH)))
-        return;
+        return false;
     layers_set_state();
     f->side = side;
     f->corner[0] = port.x + (port.width - side) / 2;
     f->corner[1] = port.y + (port.height - side) / 2;
-    f->is_held = !has_pedal;
-    if (is_pulse)
-        take_exposure(f, frame);
-    if (is_pulse || is_resized)
-        make_picture(f, f->layers_are_stale || is_resized);
+    f->layers_are_stale |= is_resized;
+    f->mask_is_due |= is_resized && f->has_mask;
+    return true;
+}
+
+static void finish_drawing(Fluoroscope *f, bool is_pulse, bool is_held, ViewPort port, bool leaves_surroundings)
+{
+    if (is_pulse || f->layers_are_stale)
+        make_picture(f, f->layers_are_stale);
+    f->is_held = is_held;
     f->has_picture = true;
     f->layers_are_stale = false;
-    layers_show(&f->programs, &f->now->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1], side);
-    draw_surroundings(f, port, frame->leaves_surroundings);
+    layers_show(&f->programs, &f->now->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1], f->side);
+    draw_surroundings(f, port, leaves_surroundings);
+}
+
+void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort port)
+{
+    bool has_pedal = frame->xray.pedal > 0.5f, is_pulse = !f->has_picture || (has_pedal && frame->pulse != f->shown.pulse);
+    if (!begin_drawing(f, port))
+        return;
+    f->is_exact = false;
+    if (is_pulse) {
+        take_exposure(f, &f->shown, frame);
+        if (pulse_memory_take(&f->memory, &f->shown.xray, f->shown.contrast)) {
+            take_exposure(f, &f->masked, frame);
+            f->mask_is_due = true;
+        }
+    }
+    finish_drawing(f, is_pulse, !has_pedal, port, frame->leaves_surroundings);
+}
+
+void fluoroscope_recall(Fluoroscope *f, const FluoroscopePast *past, ViewPort port, bool leaves_surroundings)
+{
+    bool is_pulse = !f->has_picture || !f->is_exact || past->last.pulse != f->shown.pulse, has_mask = past->memory->has_mask;
+    if (!begin_drawing(f, port))
+        return;
+    f->layers_are_stale |= !f->is_exact;
+    f->is_exact = true;
+    if (is_pulse) {
+        take_exposure(f, &f->shown, &past->last);
+        f->mask_is_due = has_mask && (f->mask_is_due || !f->has_mask || past->mask.pulse != f->masked.pulse);
+        f->has_mask &= has_mask;
+        if (f->mask_is_due)
+            take_exposure(f, &f->masked, &past->mask);
+        pulse_memory_copy(&f->memory, past->memory);
+    }
+    finish_drawing(f, is_pulse, past->is_held, port, leaves_surroundings);
 }
 
 FluoroscopeState fluoroscope_state(const Fluoroscope *f)
 {
     return (FluoroscopeState){.is_held = f->is_held,
                               .has_mask = f->has_mask,
-                              .mask_has_moved = f->has_mask && c_arms_differ(&f->mask_c_arm, &f->c_arm),
+                              .mask_has_moved = f->has_mask && c_arms_differ(&f->mask_c_arm, &f->c_arm, least_move_mm),
                               .has_roadmap = f->tone.has_roadmap,
                               .is_out_of_beam = f->lumen_out_of_beam,
                               .shown = f->shown.xray,

@@ -11,6 +11,7 @@
 #define SELDINGER_RENDER_FLUOROSCOPE_H
 
 #include "render/fluoroscope_options.h"
+#include "render/pulse_memory.h"
 #include "render/view_port.h"
 #include "sim/sim.h"
 
@@ -33,7 +34,15 @@ typedef struct FluoroscopeFrame {
 } FluoroscopeFrame;
 
 void fluoroscope_draw(Fluoroscope *fluoroscope, const FluoroscopeFrame *frame, ViewPort port);
-// Forgets held picture, mask and roadmap: call after a jump in time. The next draw makes a picture even with the pedal off.
+// The pulses of a recording up to a moment. `pulse` numbers must be those of the recording: a number that is already drawn is not drawn again.
+typedef struct FluoroscopePast {
+    FluoroscopeFrame last, mask;   // the last pulse; the mask's, if the memory has one
+    const PulseMemory *memory;
+    bool is_held;                  // the pedal is off
+} FluoroscopePast;
+// Draws the picture that these pulses leave, in full detail. It depends on them alone, not on what was drawn before.
+void fluoroscope_recall(Fluoroscope *fluoroscope, const FluoroscopePast *past, ViewPort port, bool leaves_surroundings);
+// Forgets held picture, mask and roadmap: call where other pulses begin. The next draw makes a picture even with the pedal off.
 void fluoroscope_forget(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeState {

@@ -4,6 +4,7 @@
 
 #include "render/fluoroscope_layers.h"
 #include "render/fluoroscope_vessel.h"
+#include "render/pulse_memory.h"
 
 // The objects in a picture.
 typedef struct Exposure {
@@ -35,22 +36,20 @@ struct Fluoroscope {
     PictureLayers still, turning, *now;   // at full and at half resolution; the one that is shown
     Ribbon ribbon;
     int drawn_low[2], drawn_high[2];   // box of the tools in `picture`
-    Exposure shown;
+    Exposure shown, masked;      // the picture's and the mask's
     bool has_picture;
+    bool is_exact;               // layers are drawn finely at any difference, so that a picture does not depend on the ones before
     // contents of the layers
-    bool layers_are_stale, lumen_is_coarse, anatomy_is_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
+    bool layers_are_stale, roadmap_is_stale, lumen_is_coarse, anatomy_is_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
     CArm c_arm;                  // C-arm of the layers
-    float *lumen_contrast;       // (N) contrast of the lumen layer
+    float *lumen_contrast, *roadmap_contrast;   // (N) contrast of these layers
     XrayControl baked;           // settings of the base
     LayerTone tone;
     int side;
     // mask and roadmap
-    bool has_mask, mask_is_due;
-    float mask_count;
-    uint32_t mask_pulse;
+    PulseMemory memory;
+    bool has_mask, mask_is_due;  // the mask's layer is drawn; the exposure of the mask is not yet drawn
     CArm mask_c_arm;
-    float *bolus, *roadmap;      // (N) maximum during the last bolus; maximum in the roadmap
-    bool was_opacified, roadmap_has_changed;
     bool is_held;
     int corner[2];
 };

@@ -3,6 +3,7 @@
 #ifndef SELDINGER_RENDER_PLAYBACK_H
 #define SELDINGER_RENDER_PLAYBACK_H
 
+#include "render/fluoroscope.h"
 #include "render/pulse_clock.h"
 #include "sim/sim.h"
 
@@ -25,6 +26,8 @@ double playback_injected_ml(const Playback *playback);
 int playback_contrast_tool(const Playback *playback);            // tool that injects the requested contrast agent, -1: none
 double playback_flow_ml_s(const Playback *playback);             // its actual flow
 const PulseClock *playback_pulses(const Playback *playback);
+// The pulses so far, for fluoroscope_recall; valid until the next seek. The first step is shown without a pulse.
+const FluoroscopePast *playback_past(const Playback *playback);
 // Times of the bookmarks, at most `capacity`; returns their number.
 int playback_bookmarks(const Playback *playback, double *time_s, int capacity);
 

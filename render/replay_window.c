@@ -78,10 +78,8 @@ static void replay_close(ReplayWindow *replay)
 
 static void seek(ReplayWindow *replay, double time_s)
 {
-    if (playback_seek(replay->playback, fmax(0, fmin(time_s, replay->line.end_s)))) {
-        fluoroscope_forget(views_fluoroscope(replay->views));
+    if (playback_seek(replay->playback, fmax(0, fmin(time_s, replay->line.end_s))))
         panel_forget_samples(replay->panel);
-    }
 }
 
 static void obey(ReplayWindow *replay, const PanelActions *actions, double passed_s)
@@ -120,7 +118,7 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
                         .xray = &pose->xray,
                         .contrast = playback_contrast(replay->playback),
                         .filling = playback_filling(replay->playback),
-                        .pulse = (uint32_t)playback_pulses(replay->playback)->count,
+                        .past = playback_past(replay->playback),
                         .look = &replay->controls.look,
                         .scope_tool = replay->controls.grip.chosen + 1};
     views_draw(replay->views, &frame, layout, input->width, input->height, 0);

@@ -85,7 +85,9 @@ void views_destroy(Views *views)
 
 static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port, bool is_cleared)
 {
-    if (view == VIEW_FLUOROSCOPY) {
+    if (view == VIEW_FLUOROSCOPY && frame->past) {
+        fluoroscope_recall(views->fluoroscope, frame->past, port, is_cleared);
+    } else if (view == VIEW_FLUOROSCOPY) {
         FluoroscopeFrame xray = {.pose = frame->pose,
                                  .xray = *frame->xray,
                                  .contrast = frame->contrast,

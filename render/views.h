@@ -32,6 +32,7 @@ typedef struct ViewsFrame {
     const float *contrast;           // (N of the tree), NULL: none
     const float *filling;            // (nodes of all tools) filling of their lumens with contrast agent, NULL: none
     uint32_t pulse;                  // number of X-ray pulses so far
+    const FluoroscopePast *past;     // NULL: fluoroscopy shows the pulses as they come. Otherwise it shows what these pulses leave, whatever was drawn before
     const VesselSceneLook *look;
     int scope_tool;                  // tool from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
     bool is_still;                   // an independent picture: nothing is reused from the previous frame

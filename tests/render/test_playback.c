@@ -1,4 +1,4 @@
-// Playback of a recording: a moment is the same however it is reached; and the score of the repeated simulation is the session's.
+// Playback of a recording: a moment and its picture are the same however they are reached; and the score of the repeated simulation is the session's.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -6,7 +6,10 @@
 
 #include <cmocka.h>
 
+#include "render/gl_canvas.h"
+#include "render/gl_context.h"
 #include "render/playback.h"
+#include "render/scene_views.h"
 #include "sim/rescore.h"
 #include "tests/geom/near.h"
 #include "tests/geom/random_numbers.h"
@@ -35,6 +38,9 @@ static XrayControl controls_at(int64_t step)
     xray.pulses_s = step < 4000 ? 15 : step < 4700 ? 7.5F : 30;
     xray.contrast_ml_s = step % 3000 > 700 && step % 3000 < 1403 ? 2.5F : 0;
     xray.lao_deg = (float)(step / 100);
+    // live, roadmap and subtraction, each with a mask of its own and while contrast agent flows and the C-arm turns; then live again
+    xray.mode = step < 2900 ? XRAY_LIVE : step < 5200 ? XRAY_ROADMAP : step < 9000 ? XRAY_DSA : XRAY_LIVE;
+    xray.mask = (float)((step >= 2900) + (step >= 4300) + (step >= 5200) + (step >= 7300));
     xray.bookmark = (float)((step >= 1234) + (step >= 7007));
     return xray;
 }
@@ -190,6 +196,84 @@ static void a_moment_is_the_same_whichever_way_it_is_come_to(void **state)
         free(through[i].concentration);
 }
 
+// --- pictures ---
+
+enum { SIDE = 96, PICTURES = 40 };
+
+typedef struct Screen {
+    GlContext *context;
+    GlCanvas canvas;
+    Views *views;
+    FluoroscopeState state;
+    uint8_t rgb[PICTURES][SIDE * SIDE * 3], one[SIDE * SIDE * 3];
+} Screen;
+
+static void make_views(Screen *screen)
+{
+    OperatorControls controls;
+    char note[512];
+    views_destroy(screen->views);
+    screen->views = scene_views_create(trainer.scene, &trainer.open, &controls, note, sizeof note, &faults);
+    assert_non_null(screen->views);
+}
+
+static void draw(Screen *screen, Playback *playback, double time_s, uint8_t *rgb)
+{
+    playback_seek(playback, time_s);
+    fluoroscope_recall(views_fluoroscope(screen->views), playback_past(playback), (ViewPort){screen->canvas.framebuffer, 0, 0, SIDE, SIDE}, false);
+    screen->state = fluoroscope_state(views_fluoroscope(screen->views));
+    gl_canvas_read(&screen->canvas, rgb);
+}
+
+static void a_picture_is_the_same_whichever_way_its_moment_is_come_to(void **state)
+{
+    (void)state;
+    char message[256];
+    Screen *screen = calloc(1, sizeof *screen);
+    screen->context = gl_context_create(message, sizeof message);
+    if (!screen->context) {
+        print_message("no EGL: %s\n", message);
+        free(screen);
+        skip();
+    }
+    assert_true(gl_canvas_create(&screen->canvas, SIDE, SIDE, 1, message, sizeof message));
+    make_views(screen);
+    XrayControl none = {0};
+    Playback *playback = playback_open(run, trainer.scene, trainer.open.tree, &none);
+    // played from the beginning, with a frame rate that misses pulses
+    int64_t at[PICTURES];
+    int held = 0, masked = 0, roadmaps = 0, different = 0;
+    for (int i = 0, step = 1; i < PICTURES; i++) {
+        at[i] = (i + 1) * (int64_t)(STEPS / PICTURES);
+        for (; step < at[i]; step += 41)
+            draw(screen, playback, step_s(step), screen->one);
+        draw(screen, playback, step_s(at[i]), screen->rgb[i]);
+        held += screen->state.is_held;
+        masked += screen->state.has_mask;
+        roadmaps += screen->state.has_roadmap;
+        different += i > 0 && memcmp(screen->rgb[i], screen->rgb[i - 1], sizeof screen->one) != 0;
+    }
+    assert_true(held > 5 && masked > 5 && roadmaps > 2 && different > PICTURES / 2);   // there is something to compare
+    // backwards, at random, and each in a fluoroscope and a playback that have seen nothing
+    uint64_t seed = 5;
+    for (int i = 0; i < 3 * PICTURES; i++) {
+        int k = i < PICTURES ? PICTURES - 1 - i : i < 2 * PICTURES ? (int)random_in(&seed, 0, PICTURES) : i - 2 * PICTURES;
+        if (i >= 2 * PICTURES) {
+            make_views(screen);
+            playback_close(playback);
+            playback = playback_open(run, trainer.scene, trainer.open.tree, &none);
+        }
+        draw(screen, playback, step_s(at[k]), screen->one);
+        if (memcmp(screen->one, screen->rgb[k], sizeof screen->one) != 0)
+            fail_msg("the picture at %.3f s is another one (attempt %d)", step_s(at[k]), i);
+    }
+    playback_close(playback);
+    views_destroy(screen->views);
+    gl_canvas_destroy(&screen->canvas);
+    gl_context_destroy(screen->context);
+    free(screen);
+}
+
 static void what_was_injected_is_what_the_session_says(void **state)
 {
     (void)state;
@@ -339,6 +423,7 @@ static void the_score_stops_where_the_recording_is_not_what_was_simulated(void *
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_moment_is_the_same_whichever_way_it_is_come_to),
+                                       cmocka_unit_test(a_picture_is_the_same_whichever_way_its_moment_is_come_to),
                                        cmocka_unit_test(what_was_injected_is_what_the_session_says),
                                        cmocka_unit_test(times_outside_are_cut_and_jumps_reported),
                                        cmocka_unit_test(bookmarks_are_where_they_were_set),
