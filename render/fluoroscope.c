@@ -477,7 +477,7 @@ static void fill(int x, int y, int width, int height, float red, float green, fl
     glClear(GL_COLOR_BUFFER_BIT);
 }
 
-// Draws the area outside the square, and the pause sign of a held picture (two bars).
+// Draws the area outside the square, and the pause sign of a held picture (two bars) in the corner without text.
 static void draw_surroundings(const Fluoroscope *f, ViewPort port, bool leaves_surroundings)
 {
     int x = f->corner[0], y = f->corner[1], side = f->side;
@@ -490,7 +490,7 @@ static void draw_surroundings(const Fluoroscope *f, ViewPort port, bool leaves_s
         fill(x, y + side, side, port.y + port.height - y - side, dark, dark, dark);
     }
     if (f->is_held) {
-        int unit = side / 90 > 2 ? side / 90 : 2, left = x + 5 * unit, bottom = y + side - 8 * unit;
+        int unit = side / 90 > 2 ? side / 90 : 2, left = x + side - 8 * unit, bottom = y + side - 8 * unit;
         fill(left - unit, bottom - unit, 5 * unit, 5 * unit, 0.05f, 0.05f, 0.05f);
         fill(left, bottom, unit, 3 * unit, 1.0f, 0.78f, 0.2f);
         fill(left + 2 * unit, bottom, unit, 3 * unit, 1.0f, 0.78f, 0.2f);

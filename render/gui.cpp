@@ -522,14 +522,27 @@ extern "C" void gui_progress(Gui *gui, double part, const char *text)
     gui_draw_fill(gui, at, gui_colors.frame);
     full.width = whole((float)(at.width * part));
     gui_draw_fill(gui, full, gui_colors.frame_on);
-    gui_text_extent(gui, GUI_NORMAL, text, &text_width, &text_height);
-    gui_draw_text(gui, at.x + (at.width - text_width) / 2, at.y + (height - text_height) / 2, GUI_NORMAL, gui_colors.text, text);
+    GuiFont font = GUI_NORMAL;
+    gui_text_extent(gui, font, text, &text_width, &text_height);
+    if (text_width > at.width) {
+        font = GUI_SMALL;
+        gui_text_extent(gui, font, text, &text_width, &text_height);
+    }
+    gui_draw_text(gui, at.x + std::fmax(0.0f, at.width - text_width) / 2, at.y + (height - text_height) / 2, font, gui_colors.text, text);
 }
 
 extern "C" void gui_tooltip(Gui *gui, const char *title, const char *text, const char *last)
 {
     if (!ImGui::IsItemHovered() || ImGui::GetCurrentContext()->HoveredIdTimer < 0.5f)
         return;
+    // beside a column and below a bar, so that it covers none of the buttons near the mouse
+    ImVec2 window = ImGui::GetWindowPos(), size = ImGui::GetWindowSize(), item = ImGui::GetItemRectMin(), all = ImGui::GetIO().DisplaySize;
+    bool is_column = size.y > size.x / 2, is_right = window.x + size.x / 2 > all.x / 2;
+    float gap = whole(4 * gui->scale), x = is_right ? window.x - gap : window.x + size.x + gap;
+    if (is_column)
+        ImGui::SetNextWindowPos(ImVec2(x, item.y), ImGuiCond_Always, ImVec2(is_right ? 1.0f : 0.0f, item.y > all.y / 2 ? 0.5f : 0.0f));
+    else
+        ImGui::SetNextWindowPos(ImVec2(is_right ? window.x + size.x : item.x, window.y + size.y + gap), ImGuiCond_Always, ImVec2(is_right ? 1.0f : 0.0f, 0));
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(whole(320 * gui->scale));
     if (title)

@@ -134,6 +134,8 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
     panel->answer = 0;
 }
 
+static bool is_inside(GuiRect r, double x, double y) { return x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height; }
+
 // The text of the exercise is hidden after the first actions.
 static void take_briefing(Panel *panel, PanelActions *actions)
 {
@@ -169,16 +171,14 @@ static void take_own_actions(Panel *panel, const WindowInput *input, PanelAction
         panel->has_hints = !panel->has_hints;
     if (pressed[ACTION_QUIT] > 0 || input->close == WINDOW_CLOSE_REQUESTED)
         open_dialogue(panel, DIALOGUE_QUIT);
-    else if (pressed[ACTION_RESTART] > 0)
+    else if (pressed[ACTION_RESTART] > 0 && !panel->is_replay)
         open_dialogue(panel, DIALOGUE_RESTART);
-    else if (pressed[ACTION_TRAINEE] > 0)
+    else if (pressed[ACTION_TRAINEE] > 0 && !panel->is_replay)
         open_dialogue(panel, DIALOGUE_TRAINEE);
     pressed[ACTION_QUIT] = pressed[ACTION_RESTART] = 0;
     if (panel->dialogue != DIALOGUE_NONE)
         memset(actions->held, 0, sizeof actions->held);
 }
-
-static bool is_inside(GuiRect r, double x, double y) { return x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height; }
 
 static int view_at(const Panel *panel, double x, double y)
 {
@@ -290,6 +290,7 @@ void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text)
 
 void panel_show_help(Panel *panel, bool is_shown) { panel->has_help = is_shown; }
 bool panel_has_panels(const Panel *panel) { return panel->has_panels; }
+void panel_show_replay(Panel *panel) { panel->is_replay = true; }
 void panel_show_hints(Panel *panel, bool is_shown) { panel->has_hints = is_shown; }
 bool panel_is_asking(const Panel *panel) { return panel->dialogue != DIALOGUE_NONE; }
 

@@ -30,6 +30,7 @@ void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text)
 void panel_show_help(Panel *panel, bool is_shown);
 bool panel_has_panels(const Panel *panel);       // Tab hides them; pass the result to panel_layout
 void panel_show_hints(Panel *panel, bool is_shown);
+void panel_show_replay(Panel *panel);            // nothing is saved: Esc asks for less, and there is no restart and no trainee
 bool panel_is_asking(const Panel *panel);        // true if a dialogue has the keyboard
 void panel_ask(Panel *panel, PanelQuestion question);    // Enter, Esc or a button gives PanelActions.answer
 // The tray: the caller opens it (ACTION_EXCHANGE, a button of a device), the user or the caller closes it. While open it has the keyboard.

@@ -119,7 +119,10 @@ void panel_draw_dialogue(Panel *panel, const WindowInput *input)
         [DIALOGUE_QUIT] = {"End the session?", "The session is saved as it is now.", "End", "Continue"},
         [DIALOGUE_RESTART] = {"Restart?", "The exercise starts again from the beginning; this attempt is kept in the recording.", "Restart", "Continue"},
         [DIALOGUE_TRAINEE] = {"Who is practising?", "The name is shown in the report, which compares earlier sessions of the same name.", "Accept", "Cancel"}};
-    const PanelQuestion *question = panel->dialogue == DIALOGUE_QUESTION ? &panel->question : &own[panel->dialogue];
+    static const PanelQuestion end_replay = {"Close the replay?", "The recording stays as it is.", "Close", "Continue"};
+    const PanelQuestion *question = panel->dialogue == DIALOGUE_QUESTION                   ? &panel->question
+                                    : panel->dialogue == DIALOGUE_QUIT && panel->is_replay ? &end_replay
+                                                                                           : &own[panel->dialogue];
     Gui *gui = panel->gui;
     float s = gui_scale(gui), width = floorf(fminf(420 * s, (float)input->width - 20 * s));
     float height = floorf((panel->dialogue == DIALOGUE_TRAINEE || panel->dialogue == DIALOGUE_QUESTION ? 142 : 112) * s);

@@ -229,6 +229,8 @@ static void draw_bottom(Panel *panel, const PanelState *state)
         gui_place(gui, floorf(4 * s), 1);
         gui_beside(gui, 0);
         panel_hint_text(hint, text, sizeof text);
+        if (state->advice)
+            snprintf(text, sizeof text, "%s", state->advice);
         if (state->is_finished) {
             char restart[16], quit[16];
             snprintf(text, sizeof text, "The exercise is over. %s restarts it, %s ends the session; its report compares it with earlier ones.",

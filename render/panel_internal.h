@@ -47,6 +47,7 @@ struct Panel {
     bool has_help, has_panels, has_hints;
     Briefing briefing;
     bool was_finished;             // the exercise, in the last frame
+    bool is_replay;
     bool is_interactive;           // there is a user: panel_take_input was called
     GuiRect briefing_at;           // as last drawn; zero width: not shown
     double used_s[ACTION_COUNT];   // how long an action was held, or 1 s for each press: hints disappear with use

@@ -79,6 +79,7 @@ typedef struct PanelState {
     // exercise
     const char *title;
     const char *instructions;      // its first line is always shown, the whole text in a box at the start and on request
+    const char *advice;            // what to do about an error that is happening, instead of the next hint; or NULL
     const char *trainee;
     const char *target;            // name of the target to reach now
     double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target
@@ -103,6 +104,8 @@ typedef struct PanelState {
     bool is_following, has_section, has_model, has_arrows;
     int label_count;
     const PanelLabel *label;       // (label_count) of the 3D view
+    bool has_way;                  // the tip and the target to reach are in that view, at these pixels from its upper left corner
+    double tip[2], goal[2];
     double bar_mm, bar_pixels;     // its scale bar; 0: none
     double force_full_scale_n;     // top of its colours; 0: no legend
     // machine

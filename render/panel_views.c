@@ -36,7 +36,8 @@ static void label_right(Panel *panel, float right, float y, GuiFont font, Color 
     label(panel, right - width, y, font, color, text);
 }
 
-static void draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRect at, bool is_main)
+// Returns the y below the labels at the upper left.
+static float draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRect at, bool is_main)
 {
     Gui *gui = panel->gui;
     float s = gui_scale(gui), pad = floorf(10 * s), normal = gui_line_height(gui, GUI_NORMAL) + floorf(5 * s);
@@ -44,7 +45,7 @@ static void draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRe
     char text[64], time[32];
     label(panel, at.x + pad, at.y + at.height - pad - gui_line_height(gui, large), large, gui_colors.text, angles(text, sizeof text, &state->xray));
     if (!is_main)
-        return;
+        return at.y;
     float right = at.x + at.width - pad, y = at.y + at.height - pad - normal;
     snprintf(text, sizeof text, "contrast %.1f ml", isfinite(state->contrast_ml) ? state->contrast_ml : 0);
     label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
@@ -69,12 +70,15 @@ static void draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRe
         label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.bad, "\u25a0 recording cine");
         y += normal;
     }
-    if ((state->mode == PANEL_DSA || state->mode == PANEL_ROADMAP) && !state->is_roadmap_ready)
+    if ((state->mode == PANEL_DSA || state->mode == PANEL_ROADMAP) && !state->is_roadmap_ready) {
         label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.warning, "\u25b2 no mask yet: take one with the X-ray on");
+        y += normal;
+    }
+    return y;
 }
 
-// Text in a box, centred in the view; returns the y of the next box.
-static float banner(Panel *panel, GuiRect at, float y, Color ground, const char *text)
+// Text in a box, centred in the view; returns the box.
+static GuiRect banner(Panel *panel, GuiRect at, float y, Color ground, const char *text)
 {
     Gui *gui = panel->gui;
     float s = gui_scale(gui), pad = floorf(8 * s), room = at.width - 4 * pad, width, height;
@@ -84,10 +88,10 @@ static float banner(Panel *panel, GuiRect at, float y, Color ground, const char 
     GuiRect box = {floorf(at.x + (at.width - width) / 2 - pad), y, width + 2 * pad, height + pad};
     gui_draw_fill(gui, box, ground);
     gui_draw_wrapped(gui, box.x + pad, y + pad / 2, GUI_NORMAL, gui_colors.window, text, width);
-    return y + box.height + floorf(3 * s);
+    return box;
 }
 
-static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
+static void draw_banners(Panel *panel, const PanelState *state, GuiRect at, float y)
 {
     static const struct {
         unsigned bit;
@@ -98,12 +102,14 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
                    {WARN_NOT_CONVERGED, "Contact forces did not converge in the last step"},
                    {WARN_SLOW, "Simulation slower than real time"},
                    {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may be late"}};
-    float y = at.y + floorf(52 * gui_scale(panel->gui));
+    float gap = floorf(3 * gui_scale(panel->gui));
     char text[300], line[280];
+    y = fmaxf(y, at.y + floorf(52 * gui_scale(panel->gui)));
     if (state->is_finished && !panel->is_interactive && panel_first_line(state->instructions, line, sizeof line)) {
         bool is_reached = state->hold_needed_s > 0 && state->hold_s >= state->hold_needed_s;
         snprintf(text, sizeof text, "%s%s", panel_sign[is_reached ? MARK_GOOD : MARK_NONE], line);
-        y = banner(panel, at, y, gui_colors.accent, text);
+        GuiRect box = banner(panel, at, y, gui_colors.accent, text);
+        y = box.y + box.height + gap;
     }
     for (size_t i = 0; i < sizeof warning / sizeof warning[0]; i++) {
         if (!(state->warnings & warning[i].bit))
@@ -111,7 +117,8 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
         snprintf(text, sizeof text, "%s%s", panel_sign[MARK_WARNING], warning[i].text);
         if (warning[i].bit == WARN_SLOW && isfinite(state->real_time_factor))
             snprintf(text, sizeof text, "%s%s: \u00d7%.2f", panel_sign[MARK_WARNING], warning[i].text, state->real_time_factor);
-        y = banner(panel, at, y, gui_colors.warning, text);
+        GuiRect box = banner(panel, at, y, gui_colors.warning, text);
+        y = box.y + box.height + gap;
     }
     if (panel_text(state->warning)[0]) {
         snprintf(text, sizeof text, "%s%s", panel_sign[MARK_WARNING], state->warning);
@@ -154,6 +161,20 @@ GuiRect panel_free_place(GuiRect wanted, const GuiRect *taken, int count)
     return wanted;
 }
 
+// A line with an arrowhead from the foremost tip towards the target.
+static void draw_way(Panel *panel, const PanelState *state, GuiRect at)
+{
+    float dx = (float)(state->goal[0] - state->tip[0]), dy = (float)(state->goal[1] - state->tip[1]), length = hypotf(dx, dy);
+    float s = gui_scale(panel->gui), head = floorf(6 * s), x = at.x + (float)state->goal[0], y = at.y + (float)state->goal[1];
+    if (!state->has_way || length < 2 * head)
+        return;
+    dx *= head / length;
+    dy *= head / length;
+    gui_draw_line(panel->gui, at.x + (float)state->tip[0], at.y + (float)state->tip[1], x, y, gui_colors.accent, floorf(s));
+    gui_draw_line(panel->gui, x, y, x - dx - dy / 2, y - dy + dx / 2, gui_colors.accent, floorf(2 * s));
+    gui_draw_line(panel->gui, x, y, x - dx + dy / 2, y - dy - dx / 2, gui_colors.accent, floorf(2 * s));
+}
+
 static void draw_3d_words(Panel *panel, const PanelState *state, GuiRect at)
 {
     Gui *gui = panel->gui;
@@ -165,6 +186,7 @@ static void draw_3d_words(Panel *panel, const PanelState *state, GuiRect at)
         gui_text_extent(gui, GUI_SMALL, words->text, &width, &height);
         bool is_left = words->x < (double)at.width / 2;      // outwards, because the vessel lies inwards
         GuiRect wanted = {is_left ? x - away - width - pad : x + away - pad, at.y + (float)words->y - height / 2 - pad / 2, width + 2 * pad, height + pad};
+        wanted.x = fmaxf(at.x, fminf(wanted.x, at.x + at.width - wanted.width));
         GuiRect place = panel_free_place(wanted, taken, i < LABELS_PLACED ? i : LABELS_PLACED);
         if (i < LABELS_PLACED)
             taken[i] = place;
@@ -176,6 +198,7 @@ static void draw_3d_labels(Panel *panel, const PanelState *state, GuiRect at)
 {
     Gui *gui = panel->gui;
     float s = gui_scale(gui), pad = floorf(10 * s), half = gui_line_height(gui, GUI_SMALL) / 2;
+    draw_way(panel, state, at);
     draw_3d_words(panel, state, at);
     if (state->force_full_scale_n > 0)
         draw_force_legend(panel, at, state->force_full_scale_n);
@@ -201,9 +224,10 @@ void panel_draw_over_views(Panel *panel, const PanelState *state)
         bool is_main = i == (int)panel->layout.main;
         if (at.width <= 0)
             continue;
+        float below = at.y;
         gui_window_begin(gui, view_name[i], at, GUI_NO_BACKGROUND | GUI_NO_INPUT);
         if (i == VIEW_FLUOROSCOPY)
-            draw_fluoroscopy_labels(panel, state, at, is_main);
+            below = draw_fluoroscopy_labels(panel, state, at, is_main);
         if (i != VIEW_FLUOROSCOPY || !is_main) {
             char text[48], key[16];
             snprintf(text, sizeof text, "%s  (%s)", view_name[i], key_table_text(view_action[i], key, sizeof key));
@@ -212,7 +236,7 @@ void panel_draw_over_views(Panel *panel, const PanelState *state)
         if (i == VIEW_3D && is_main)
             draw_3d_labels(panel, state, at);
         if (is_main)
-            draw_banners(panel, state, at);
+            draw_banners(panel, state, at, below);
         gui_window_end(gui);
     }
 }

@@ -57,6 +57,7 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
         return false;
     replay->controls.view = options->view;
     panel_show_hints(replay->panel, false);
+    panel_show_replay(replay->panel);
     trainer_panel_begin(&replay->shown, replay->scene, "");
     replay->line = (TimelineState){.end_s = playback_end_s(replay->playback), .is_playing = true, .speed = 1, .note = options->name};
     replay->line.mark_count = playback_bookmarks(replay->playback, replay->line.mark_s, TIMELINE_MARKS);

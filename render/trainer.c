@@ -10,10 +10,13 @@
 #include "render/trainer_tray.h"
 #include "sim/sim.h"
 
+#include <pthread.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { PADS = 4 };
@@ -39,7 +42,9 @@ typedef struct Trainer {
     PulseClock pulses;
     TrainerCine cine;
     double begun_s;                  // wall clock at the start
+    double swapped_s;                // time of the last frame
     double frame_cpu_s;              // process CPU time at the last frame
+    XrayControl xray_at_start;       // C-arm, table and mode with which a session begins
     TrainerTray tray;
     bool has_tray, is_tray_due;      // the tray is open; the selected device is inserted after the next picture
     double progress_s;               // time of the last progress update of a resumed session
@@ -67,6 +72,14 @@ __attribute__((format(printf, 3, 4))) static void show_message(Trainer *trainer,
 
 // --- start and end of a session ---
 
+static void swap(Trainer *trainer)
+{
+    window_swap(trainer->window);
+    const double now = since_begin(trainer);
+    trainer->figures->longest_gap_s = fmax(trainer->figures->longest_gap_s, trainer->swapped_s > 0 ? now - trainer->swapped_s : 0);
+    trainer->swapped_s = now;
+}
+
 // Draws the panel with a line of text and no views, for use without a session.
 static void draw_panel_alone(Trainer *trainer, const WindowInput *input, const char *line)
 {
@@ -79,7 +92,7 @@ static void draw_panel_alone(Trainer *trainer, const WindowInput *input, const c
     state.now_s = since_begin(trainer);
     views_draw(trainer->views, &(ViewsFrame){0}, &(PanelLayout){0}, input->width, input->height, 0);
     panel_draw(trainer->panel, input, &state, 0);
-    window_swap(trainer->window);
+    swap(trainer);
 }
 
 // Keeps the window responsive while a session is simulated again.
@@ -202,27 +215,68 @@ static void name_devices(Trainer *trainer, char out[SESSION_NAME])
     snprintf(out, SESSION_NAME, "%.*s", SESSION_NAME - 1, all);
 }
 
-// Ends the thread, closes the recording, and writes the session file into its folder.
+// What closes a session besides the window: this takes seconds on a slow disk, or after a long session.
+typedef struct Closing {
+    Trainer *trainer;
+    Faults *faults;
+    const char *device;
+    RealtimeFigures real;
+    bool is_whole;
+    _Atomic bool is_done;
+} Closing;
+
+// Ends the thread of the simulation, closes the recording, and writes the session file into its folder.
+static void *close_session(void *context)
+{
+    Closing *closing = context;
+    Trainer *trainer = closing->trainer;
+    const LiveSession *session = &trainer->session;
+    bool whole = live_session_stop(&trainer->session, &closing->real, closing->faults);
+    if (whole && session->record_path[0])
+        whole = session_files_save(trainer->scene, trainer->trainee, closing->device, trainer->date, session_tracker_score(session->tracker),
+                                   session->record_path, closing->faults);
+    closing->is_whole = whole;
+    atomic_store(&closing->is_done, true);
+    return NULL;
+}
+
+// Closes the session in a thread while the window goes on. A short closing is not announced.
+static void close_beside_window(Trainer *trainer, Closing *closing)
+{
+    const double announced_s = 0.15;
+    const WindowInput *input;
+    double begun = since_begin(trainer);
+    pthread_t thread;
+    if (pthread_create(&thread, NULL, close_session, closing) != 0) {
+        close_session(closing);
+        return;
+    }
+    while (!atomic_load(&closing->is_done)) {
+        if (since_begin(trainer) - begun < announced_s || !window_next_frame(trainer->window, &input))
+            nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
+        else
+            draw_panel_alone(trainer, input, "Saving the session");
+    }
+    pthread_join(thread, NULL);
+}
+
 static bool end_session(Trainer *trainer, Faults *faults)
 {
-    RealtimeFigures real;
     TrainerFigures *figures = trainer->figures;
     LiveSession *session = &trainer->session;
     char device[SESSION_NAME];
-    bool whole = live_session_stop(session, &real, faults);
-    memcpy(figures->step_us, real.step_us, sizeof figures->step_us);
-    memcpy(figures->late_us, real.late_us, sizeof figures->late_us);
-    figures->deadline_misses = real.deadline_misses;
-    figures->slowed_s = real.slowed_s;
-    figures->real_time_priority = real.real_time_priority;
+    name_devices(trainer, device);
+    Closing closing = {.trainer = trainer, .faults = faults, .device = device};
+    close_beside_window(trainer, &closing);
+    memcpy(figures->step_us, closing.real.step_us, sizeof figures->step_us);
+    memcpy(figures->late_us, closing.real.late_us, sizeof figures->late_us);
+    figures->deadline_misses = closing.real.deadline_misses;
+    figures->slowed_s = closing.real.slowed_s;
+    figures->real_time_priority = closing.real.real_time_priority;
     snprintf(figures->hash, sizeof figures->hash, "%016llx", (unsigned long long)simulator_hash(session->simulator));
     snprintf(figures->recording, sizeof figures->recording, "%s", session->record_path);
-    name_devices(trainer, device);
-    if (whole && session->record_path[0])
-        whole =
-            session_files_save(trainer->scene, trainer->trainee, device, trainer->date, session_tracker_score(session->tracker), session->record_path, faults);
     live_session_free(session);
-    return whole;
+    return closing.is_whole;
 }
 
 // --- hands ---
@@ -537,6 +591,8 @@ static bool restart(Trainer *trainer, Faults *faults)
                  faults->text[0]);
     faults_clear(faults);
     trainer->is_paused = false;
+    trainer->controls.pedal_latched = false;
+    trainer->controls.xray = trainer->xray_at_start;
     session_date(time(NULL), trainer->date);
     return begin_session(trainer, NULL, faults);
 }
@@ -723,9 +779,10 @@ static void run_window(Trainer *trainer, Faults *faults)
         if (!is_running || !visible)
             continue;
         layout = layout_of(trainer, input);
+        xray = controls_xray(&trainer->controls, &actions, buttons_of_hands(trainer));   // a new session has begun with others
         draw(trainer, input, &layout, &xray, now - drawn);
         drawn = now;
-        window_swap(trainer->window);
+        swap(trainer);
         measure_frame(trainer);
     }
 }
@@ -739,6 +796,7 @@ static bool open_views(Trainer *trainer, Faults *faults)
     trainer->controls.is_examination = trainer->options->is_examination || (trainer->scene->exercise && trainer->scene->exercise->is_examination);
     trainer->controls.view = trainer->controls.is_examination ? VIEW_FLUOROSCOPY : trainer->options->view;
     trainer->controls.xray.seen = (float)(SEEN_KNOWN | (trainer->controls.is_examination ? SEEN_EXAMINATION : 0));     // until the first picture
+    trainer->xray_at_start = trainer->controls.xray;
     if (*note)
         show_message(trainer, MARK_WARNING, "%s", note);
     return trainer->views != NULL;

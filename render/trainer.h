@@ -33,6 +33,7 @@ typedef struct TrainerOptions {
 typedef struct TrainerFigures {
     double first_picture_s;          // from the call to the first frame on the screen
     int64_t frames, frames_skipped;
+    double longest_gap_s;            // between two frames on the screen, also while a session is saved
     double frame_cpu_ms[3];          // CPU time of a frame, all threads of drawing: median, p99, worst
     double step_us[3], late_us[3];   // see RealtimeFigures
     int64_t deadline_misses;

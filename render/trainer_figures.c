@@ -10,6 +10,7 @@ bool trainer_figures_write(const char *path, const TrainerFigures *figures, Faul
     cJSON_AddNumberToObject(out, "first_picture_s", figures->first_picture_s);
     cJSON_AddNumberToObject(out, "frames", (double)figures->frames);
     cJSON_AddNumberToObject(out, "frames_skipped", (double)figures->frames_skipped);
+    cJSON_AddNumberToObject(out, "longest_gap_s", figures->longest_gap_s);
     static const char *const quantile[] = {"median", "p99", "max"}, *const step_quantile[] = {"median", "p999", "max"};
     cJSON *frame = cJSON_AddObjectToObject(out, "frame_cpu_ms"), *step = cJSON_AddObjectToObject(out, "step_us"),
           *late = cJSON_AddObjectToObject(out, "late_us");

@@ -93,6 +93,22 @@ static void tell_result(char *text, size_t capacity, const Scene *scene, const S
                      scene->exercise->error_points * score->error[i].count);
 }
 
+// What to do about the first of the errors that are happening, or NULL.
+static const char *advice(const ScoreFigures *score)
+{
+    static const char *const of[ERROR_COUNT] = {[ERROR_BUCKLING] = "The tool buckles at the sheath: its tip is held. Pull back, turn the tip, and push slowly.",
+                                                [ERROR_TIP_FORCE] = "The tip presses against the wall. Pull back a little and turn it before you push again.",
+                                                [ERROR_WALL_FORCE] =
+                                                    "The tool presses hard on the wall, as when it coils or is jammed. Pull back until the force falls.",
+                                                [ERROR_WRONG_BRANCH] = "The tip is in a wrong branch. Pull back past the fork, turn the tip, and try again.",
+                                                [ERROR_WIRE_LOST] = "The wire is inside the catheter. Push the wire, not the catheter, until it leads again.",
+                                                [ERROR_BLIND] = "The tool moves without X-rays: keep the X-ray on while you push."};
+    for (int i = 0; i < ERROR_COUNT; i++)
+        if (score->error[i].is_on && of[i])
+            return of[i];
+    return NULL;
+}
+
 static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score)
 {
     PanelState *state = &panel->state;
@@ -105,7 +121,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     add_figure(panel, "Contrast", score->contrast_ml, "ml", 1, mark_of_part(scene, score, PART_CONTRAST));
     add_figure(panel, "Tip path", score->path_mm, "mm", 0, mark_of_part(scene, score, PART_PATH));
     if (scene->exercise) {
-        add_figure(panel, "Path left", score->remaining_mm, "mm", 0, MARK_NONE);
+        add_figure(panel, "To target, along vessel", score->remaining_mm, "mm", 0, MARK_NONE);
         add_figure(panel, "Efficiency", 100 * score->efficiency, "%", 0, MARK_NONE);
     }
     add_figure(panel, "Wall force, peak", score->wall_force_peak_n, "N", 2, mark_of_part(scene, score, PART_WALL_FORCE));
@@ -120,6 +136,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
         snprintf(text, sizeof panel->error_text[0], "%s%s: %d, last at %.1f s", error->is_on ? "NOW " : "", score_error_words[i], error->count, error->last_s);
         panel->error[state->error_count++] = text;
     }
+    state->advice = advice(score);
     state->hold_s = score->held_s;
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
@@ -203,13 +220,25 @@ static void label_scene(TrainerPanel *panel, const OperatorControls *controls, c
     int count = vessel_scene_labels(scene, found, PANEL_LABELS);
     state->label_count = 0;
     state->label = panel->label;
+    state->has_way = false;
+    const VesselSceneLabel *tip = NULL, *goal = NULL;
+    for (int i = 0; i < count; i++) {
+        bool is_goal = found[i].kind == LABEL_TARGET && strcmp(found[i].name, panel->target) == 0;
+        tip = found[i].kind == LABEL_TIP && found[i].is_in_view ? &found[i] : tip;
+        goal = is_goal && found[i].is_in_view && controls->look.show_targets ? &found[i] : goal;
+    }
+    if (tip && goal) {
+        state->has_way = true;
+        state->tip[0] = tip->x, state->tip[1] = tip->y;
+        state->goal[0] = goal->x, state->goal[1] = goal->y;
+    }
     for (int i = 0; i < count && i < PANEL_LABELS; i++) {
         const VesselSceneLabel *it = &found[i];
         if (!it->is_in_view || (it->kind == LABEL_TIP && state->tool_count < 2) || (it->kind == LABEL_TARGET && !controls->look.show_targets))
             continue;
         char *text = panel->label_text[state->label_count];
         if (it->kind == LABEL_TARGET && isfinite(it->distance_mm))
-            snprintf(text, sizeof panel->label_text[0], "%.63s, %.0f mm", it->name, it->distance_mm);
+            snprintf(text, sizeof panel->label_text[0], "%.63s, %.0f mm in a straight line", it->name, it->distance_mm);
         else
             snprintf(text, sizeof panel->label_text[0], "%.63s", it->name);
         panel->label[state->label_count++] = (PanelLabel){it->x, it->y, it->radius, text};

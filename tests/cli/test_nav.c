@@ -244,6 +244,44 @@ static void an_examination_hides_the_3d_view(void **state)
     RUNS(2, "%s nav scene.yaml --examination --view 3d >out.txt 2>&1", SELDINGER_PROGRAM);
 }
 
+// X-ray latched, a roadmap, the C-arm turned: the next session begins without them, and saving the last one does not stop the window.
+static const char restarting[] =
+    "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "moved() { $TEST_NAV --moved \"$(ls -t sessions/*.h5 2>/dev/null | head -1)\" $1 $2; }; xdotool key e; sleep 0.3; xdotool key r; "
+    "xdotool keydown d; sleep 0.5; xdotool keyup d; xdotool keydown Up; until moved 3 -1; do sleep 0.3; done; xdotool keyup Up; "
+    "xdotool key F4; sleep 0.5; xdotool key Return; sleep 0.5; xdotool keydown Up; until moved 3 -1; do sleep 0.3; done; xdotool keyup Up; "
+    "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+
+static void a_new_session_begins_without_x_rays(void **state)
+{
+    (void)state;
+    need_display();
+    WINDOW_RUNS("rm -rf sessions; (%s) & exec %s nav scene.yaml --sessions sessions --duration-s 60 --size 800x600 --figures figures.json >out.txt 2>&1",
+                restarting, SELDINGER_PROGRAM);
+    char path[2][700];
+    char command[900];
+    snprintf(command, sizeof command, "ls -tr '%s'/*.h5", in_folder("sessions"));
+    FILE *pipe = popen(command, "r");
+    for (int i = 0; i < 2; i++) {
+        assert_non_null(fgets(path[i], sizeof path[i], pipe));
+        path[i][strcspn(path[i], "\n")] = 0;
+    }
+    pclose(pipe);
+    RecordedRun *before = load(path[0]), *after = load(path[1]);
+    const XrayControl *last = &before->xray[before->step_count - 1], *first = &before->xray[0];
+    assert_true(last->pedal > 0 && lroundf(last->mode) == XRAY_ROADMAP && last->lao_deg != first->lao_deg);
+    assert_true(after->step_count > 100);
+    for (int64_t i = 0; i < after->step_count; i++)
+        assert_true(after->xray[i].pedal == 0 && lroundf(after->xray[i].mode) == XRAY_LIVE && after->xray[i].lao_deg == first->lao_deg);
+    recorded_run_free(before);
+    recorded_run_free(after);
+    char *figures = text_of(in_folder("figures.json"));
+    const char *gap = strstr(figures, "\"longest_gap_s\":");
+    assert_non_null(gap);
+    print_message("%.50s\n", gap);
+    free(figures);
+}
+
 static void a_session_continues_from_a_moment_of_another(void **state)
 {
     (void)state;
@@ -400,6 +438,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(two_tools_are_moved_by_keys),
                                        cmocka_unit_test(a_tip_is_shaped_and_put_in_from_the_tray),
                                        cmocka_unit_test(a_session_that_was_cut_off_is_recovered),
+                                       cmocka_unit_test(a_new_session_begins_without_x_rays),
                                        cmocka_unit_test(a_missing_display_is_reported)};
     return cmocka_run_group_tests(tests, open_display, close_display);
 }
