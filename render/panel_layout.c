@@ -2,6 +2,9 @@
 
 #include <math.h>
 
+// Letters are then 10 to 11 pixels high; below that they cannot be read, and the views of a small window rather give way.
+static const double least_scale = 0.78;
+
 // 1 at 1280x720; grows more slowly than the window so that views gain more than text. Multiplied by the display density, as far as 1024x600 points fit into the
 // window.
 static double text_scale(double width, double height, double density)
@@ -9,7 +12,7 @@ static double text_scale(double width, double height, double density)
     double fits = fmin(width / 1024, height / 600);
     density = fmax(0.6, fmin(density, fmax(fits, 0.6)));
     double wide = 1 + 0.00042 * (width / density - 1280), high = 1 + 0.00075 * (height / density - 720);
-    return density * fmax(0.85, fmin(wide, high));
+    return fmax(least_scale, density * fmax(0.85, fmin(wide, high)));
 }
 
 static PanelRect place_view(PanelLayout *layout, PanelView view, PanelRect rect, int window_height)

@@ -136,6 +136,33 @@ static void outputs_that_cannot_be_written_are_found_before_the_run(void **state
 
 // --- runs ---
 
+// The sheath straightens a curved tip; with the wall far away it presses the tip out with the bending energy per length, EI k^2 / 2, and the hand holds that
+// much back. Curves of both signs, without friction; the step of the elements is small beside the curved section.
+static void a_curved_tip_presses_out_of_its_sheath(void **state)
+{
+    (void)state;
+    static const double curvature[] = {0, 0.015, 0.03, -0.03};
+    const double pi = acos(-1), diameter = 0.89, modulus = 2000, stiffness = modulus * pi * pow(diameter, 4) / 64;
+    for (int i = 0; i < 4; i++) {
+        char scene[700];
+        snprintf(scene, sizeof scene,
+                 "seldinger: 1\n"
+                 "vessel: {tube: {start_mm: [-20, 0, 0], radius_mm: 60, normal: [0, 1, 0], path: [{line_mm: 150}]}, contact: tube, friction: 0}\n"
+                 "wire: {elements: 120, sections: [{length_mm: 30, diameter_mm: 0.89, young_modulus_gpa: 2}, "
+                 "{length_mm: 30, diameter_mm: 0.89, young_modulus_gpa: 2, rest_curvature_1_mm: %g}], damping: {mass_1_s: 5, stiffness_s: 0.002}}\n"
+                 "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n"
+                 "script: [[0, 0, 0], [0.1, 0, 0]]\n",
+                 curvature[i]);
+        put("curved.yaml", scene);
+        assert_int_equal(run("run curved.yaml --settle-s 5 --summary curved.json --quiet"), 0);
+        cJSON *json = json_of("curved.json");
+        double push = figure(json, "proximal", "force_n"), expected = -stiffness * curvature[i] * curvature[i] / 2;
+        print_message("curvature %g / mm: push %.5f N, expected %.5f N\n", curvature[i], push, expected);
+        assert_true(fabs(push - expected) <= 0.01 * fabs(expected) + 1e-5);
+        cJSON_Delete(json);
+    }
+}
+
 static void a_tool_that_touches_itself_is_reported(void **state)
 {
     (void)state;
@@ -437,6 +464,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bad_input_ends_with_2_and_says_where),
         cmocka_unit_test(outputs_that_cannot_be_written_are_found_before_the_run),
+        cmocka_unit_test(a_curved_tip_presses_out_of_its_sheath),
         cmocka_unit_test(a_tool_that_touches_itself_is_reported),
         cmocka_unit_test(a_run_leaves_its_files_and_repeats_bit_for_bit),
         cmocka_unit_test(a_script_on_the_command_line_and_a_duration_win),

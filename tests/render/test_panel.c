@@ -201,7 +201,7 @@ static void nothing_overlaps_at_any_size(void **unused)
                 PanelLayout l = which < 4 ? panel_layout(width, height, scales[i / 10], view, has_panels)
                                           : panel_layout_xray_alone(width, height, scales[i / 10], has_panels);
                 assert_true(which < 4 || (l.view[VIEW_3D].width == 0 && l.view[VIEW_ANGIOSCOPY].width == 0));
-                assert_true(l.scale >= 0.5 && (width < 1024 || height < 600 || l.scale >= 0.85));
+                assert_true(l.scale >= 0.75 && (width < 1024 || height < 600 || l.scale >= 0.85));
                 PanelRect rect[VIEW_COUNT + 4] = {l.view_rect[0], l.view_rect[1], l.view_rect[2], l.top, l.left, l.right, l.bottom};
                 for (int a = 0; a < VIEW_COUNT + 4; a++) {
                     assert_true(rect[a].x >= 0 && rect[a].y >= 0 && rect[a].x + rect[a].width <= (float)width && rect[a].y + rect[a].height <= (float)height);
@@ -472,8 +472,8 @@ static void the_mouse_chooses_on_the_tray(void **unused)
     panel_open_tray(controls.panel, 3, 0);
     frame(&controls);
     bool chosen[3] = {false}, taken = false, shaped = false, closed = false;
-    for (float y = 130; y < 480; y += 14)
-        for (float x = 180; x < 700; x += 200) {
+    for (float y = 10; y < 590; y += 14)
+        for (float x = 40; x < 790; x += 100) {
             if (!panel_is_asking(controls.panel))
                 panel_open_tray(controls.panel, 3, 0);
             controls.input.mouse_x = x;
