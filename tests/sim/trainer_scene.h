@@ -53,8 +53,7 @@ static inline TrainerScene trainer_scene_open(bool with_tree)
 
 static inline void trainer_scene_close(TrainerScene *it)
 {
-    it->open.vessel->destroy(it->open.vessel);
-    vessel_tree_free(it->open.tree);
+    open_vessel_close(&it->open);
     scene_free(it->scene);
     *it = (TrainerScene){0};
 }
