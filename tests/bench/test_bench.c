@@ -333,15 +333,15 @@ static void random_runs_stay_inside(void **state)
     (void)state;
     char folder[] = "/tmp/seldinger-torture-XXXXXX", command[300];
     assert_non_null(mkdtemp(folder));
-    snprintf(command, sizeof command, "bench torture --runs %d --steps 200 --finer 4 --keep %s --json %s/t.json >/dev/null 2>&1", WHOLE_OR_SHORT(12, 3), folder,
+    snprintf(command, sizeof command, "bench torture --runs %d --steps 200 --finer 4 --keep %s --json %s/t.json >/dev/null 2>&1", WHOLE_OR_SHORT(12, 1), folder,
              folder);
     int code = run(command);
     snprintf(command, sizeof command, "%s/t.json", folder);
     cJSON *root = load(command), *rows = cJSON_GetObjectItem(root, "rows"), *all = cJSON_GetArrayItem(rows, cJSON_GetArraySize(rows) - 1);
     static const char *const never[] = {"outside the wall", "outside and not reported", "diverged or not a number", "refused"};
     assert_true(code == 0 || code == 1);
-    assert_int_equal(cJSON_GetObjectItem(all, "runs")->valueint, WHOLE_OR_SHORT(12, 3));
-    assert_int_equal(cJSON_GetObjectItem(all, "steps")->valueint, 200 * WHOLE_OR_SHORT(12, 3));
+    assert_int_equal(cJSON_GetObjectItem(all, "runs")->valueint, WHOLE_OR_SHORT(12, 1));
+    assert_int_equal(cJSON_GetObjectItem(all, "steps")->valueint, 200 * WHOLE_OR_SHORT(12, 1));
     for (size_t i = 0; i < sizeof never / sizeof never[0]; i++)
         assert_int_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(all, "failed"), never[i])->valueint, 0);
     cJSON_Delete(root);

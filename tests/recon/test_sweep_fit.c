@@ -121,7 +121,7 @@ static Errors shaped_errors(ShapedTube tube, double noise)
 static void sections_of_any_shape_are_found(void **state)
 {
     (void)state;
-    for (int tube = 0; tube < 2; tube++) {
+    for (int tube = 0; tube < WHOLE_OR_SHORT(2, 1); tube++) {
         Errors exact = shaped_errors((ShapedTube)tube, 0), noisy = shaped_errors((ShapedTube)tube, 0.05);
         assert_true(exact.mean < 0.001 && exact.most < 0.008 && exact.normal_deg < 0.5);
         assert_true(noisy.mean < 0.0105 && noisy.most < 0.06 && noisy.normal_deg < 3);
@@ -136,7 +136,7 @@ static void forks_are_followed(void **state)
         const char *name;
         double mean, p99, most;
     } of[] = {{"y", 0.0012, 0.006, 0.01}, {"bifurcation", 0.0025, 0.04, 0.12}, {"kissing", 0.0001, 0.0005, 0.001}, {"twig", 0.0005, 0.005, 0.02}};
-    for (size_t i = 0; i < sizeof of / sizeof of[0]; i++) {
+    for (size_t i = WHOLE_OR_SHORT(0, 1); i < sizeof of / sizeof of[0]; i++) {
         SweepFitFigures figures;
         Shape *shape = make(of[i].name, 0, NULL);
         VesselTree *tree = shape_sample(shape, &faults);
@@ -168,7 +168,7 @@ static void a_turned_tree_has_the_turned_wall(void **state)
 {
     (void)state;
     const Mat3 turn[] = {{{{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}}, {{{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}}, {{{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}}}};
-    for (int i = 0; i < 3; i++) {
+    for (int i = WHOLE_OR_SHORT(0, 2); i < 3; i++) {
         Shape *shape = make("y", 0, NULL);
         VesselTree *tree = shape_sample(shape, &faults), *other = shape_sample(shape, &faults);
         turn_tree(other, &turn[i]);
