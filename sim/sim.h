@@ -43,6 +43,7 @@
 #include "sim/score.h"
 #include "sim/score_points.h"
 #include "sim/session.h"
+#include "sim/session_archive.h"
 #include "sim/session_files.h"
 #include "sim/shelf.h"
 #include "sim/xray.h"
