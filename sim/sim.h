@@ -40,6 +40,7 @@
 // sessions
 #include "sim/contrast_injection.h"
 #include "sim/rescore.h"
+#include "sim/run_marks.h"
 #include "sim/score.h"
 #include "sim/score_points.h"
 #include "sim/session.h"
