@@ -8,7 +8,7 @@ enum { COLUMNS = 4 };
 typedef struct Box {
     Gui *gui;
     GuiFont font;
-    float x[COLUMNS];            // where columns begin; the last is the reason, or the same figure of the other session
+    float x[COLUMNS];            // where columns begin; the last is that of the other session
 } Box;
 
 static void print_row(const Box *box, Color color, const char *const text[COLUMNS])
@@ -18,29 +18,36 @@ static void print_row(const Box *box, Color color, const char *const text[COLUMN
         gui_draw_text(box->gui, at.x + box->x[i], at.y, box->font, i == 0 ? gui_colors.dim : color, text[i]);
 }
 
-// "12.3 of 20.0" and "4.5 s of 3"; "–" where the part is not judged.
-static void describe(const ScoreFigures *f, ScorePart part, char points[40], char measured[60])
+// "12.3 of 20.0", a dash where the part is not judged.
+static void print_points(const ScorePartFigures *judged, char text[40])
 {
-    const ScorePartFigures *judged = &f->judged[part];
-    snprintf(points, 40, "\u2013");
+    snprintf(text, 40, "\u2013");
     if (judged->most > 0)
-        snprintf(points, 40, "%.1f of %.1f", judged->points, judged->most);
-    snprintf(measured, 60, "%.3g %s, full up to %.3g", judged->measured, score_part_words[part].unit, judged->par);
-    if (!(judged->most > 0))
-        snprintf(measured, 60, "%.3g %s, not scored", judged->measured, score_part_words[part].unit);
+        snprintf(text, 40, "%.1f of %.1f", judged->points, judged->most);
 }
 
+// The reason for lost points has a line of its own.
 static void print_part(const Box *box, const ScoreFigures *f, const ScoreFigures *beside, ScorePart part)
 {
-    char points[40], measured[60], other[40], other_measured[60], last[160];
-    describe(f, part, points, measured);
-    score_part_reason(f, part, last, 120);
-    const bool has_lost = last[0] != 0;
+    const ScorePartFigures *judged = &f->judged[part];
+    char title[100], points[40], measured[60], other[100] = "", why[120];
+    snprintf(title, sizeof title, "%s [%s]", score_part_words[part].title, score_part_words[part].unit);
+    print_points(judged, points);
+    if (judged->most > 0)
+        snprintf(measured, sizeof measured, "%.3g (full up to %.3g)", judged->measured, judged->par);
+    else
+        snprintf(measured, sizeof measured, "%.3g (not scored)", judged->measured);
     if (beside) {
-        describe(beside, part, other, other_measured);
-        snprintf(last, sizeof last, "%s: %.60s", other, other_measured);
+        char theirs[40];
+        print_points(&beside->judged[part], theirs);
+        snprintf(other, sizeof other, "%s at %.3g", theirs, beside->judged[part].measured);
     }
-    print_row(box, has_lost ? gui_colors.warning : gui_colors.text, (const char *const[COLUMNS]){score_part_words[part].title, points, measured, last});
+    score_part_reason(f, part, why, sizeof why);
+    print_row(box, *why ? gui_colors.warning : gui_colors.text, (const char *const[COLUMNS]){title, points, measured, other});
+    if (*why) {
+        GuiRect at = gui_place(box->gui, 0, gui_line_height(box->gui, box->font) + 2 * gui_scale(box->gui));
+        gui_draw_text(box->gui, at.x + 14 * gui_scale(box->gui), at.y, box->font, gui_colors.warning, why);
+    }
 }
 
 static void print_errors(const Box *box, const ScoreFigures *f, const ScoreFigures *beside)
@@ -58,17 +65,21 @@ static void print_errors(const Box *box, const ScoreFigures *f, const ScoreFigur
     }
 }
 
-void score_parts_box(Gui *gui, const ScoreFigures *f, const ScoreFigures *beside, GuiRect over)
+void score_parts_box(Gui *gui, const ScoreFigures *f, const ScoreFigures *beside, GuiRect over, float window_width)
 {
-    const float s = gui_scale(gui), width = fminf(760 * s, over.width - 16 * s);
-    const Box box = {gui, GUI_SMALL, {0, 0.24F * width, 0.37F * width, 0.64F * width}};
+    const float s = gui_scale(gui), width = fminf(680 * s, window_width - 16 * s), left = fminf(over.x + 8 * s, window_width - width - 8 * s);
+    const Box box = {gui, GUI_SMALL, {0, 0.36F * width, 0.51F * width, 0.73F * width}};
     char title[120], text[160];
     int rows = PART_COUNT + 2;
+    for (int i = 0; i < PART_COUNT; i++) {
+        score_part_reason(f, (ScorePart)i, text, sizeof text);
+        rows += *text != 0;
+    }
     for (int i = 0; i < ERROR_COUNT; i++)
         rows += f->error[i].count > 0 || (beside && beside->error[i].count > 0);
     // the parts are judged with every step, so they are those of the moment
-    const float height = (float)rows * (gui_line_height(gui, GUI_SMALL) + 6 * s) + gui_line_height(gui, GUI_NORMAL) + 20 * s;
-    gui_window_begin(gui, "score-parts", (GuiRect){over.x + 8 * s, over.y + 34 * s, width, fminf(height, over.height - 42 * s)}, GUI_ON_TOP | GUI_FRAMED);
+    const float height = (float)rows * (gui_line_height(gui, GUI_SMALL) + 5 * s) + gui_line_height(gui, GUI_NORMAL) + 16 * s;
+    gui_window_begin(gui, "score-parts", (GuiRect){left, over.y + 34 * s, width, fminf(height, over.height - 42 * s)}, GUI_ON_TOP | GUI_FRAMED);
     snprintf(title, sizeof title, "%.0f points after %.1f s, %s", f->points, f->time_s,
              f->state == SCORE_REACHED    ? "target held"
              : f->state == SCORE_TIME_OUT ? "out of time"
@@ -76,7 +87,7 @@ void score_parts_box(Gui *gui, const ScoreFigures *f, const ScoreFigures *beside
     if (beside)
         snprintf(text, sizeof text, "%s; beside: %.0f after %.1f s", title, beside->points, beside->time_s);
     gui_text(gui, GUI_NORMAL, gui_colors.text, beside ? text : title);
-    print_row(&box, gui_colors.dim, (const char *const[COLUMNS]){"Part", "Points", "Measured", beside ? "Beside" : "Why points were lost"});
+    print_row(&box, gui_colors.dim, (const char *const[COLUMNS]){"Part", "Points", "Measured", beside ? "Beside" : ""});
     for (int i = 0; i < PART_COUNT; i++)
         print_part(&box, f, beside, (ScorePart)i);
     print_errors(&box, f, beside);

@@ -5,7 +5,8 @@
 #include "render/gui.h"
 #include "sim/sim.h"
 
-// In the upper left corner of `over`, between gui_begin() and gui_end(). `beside` NULL: one session.
-void score_parts_box(Gui *gui, const ScoreFigures *figures, const ScoreFigures *beside, GuiRect over);
+// In the upper left corner of the view `over`, between gui_begin() and gui_end(); beyond its right edge where it is too narrow, within the window. `beside` NULL: one
+// session.
+void score_parts_box(Gui *gui, const ScoreFigures *figures, const ScoreFigures *beside, GuiRect over, float window_width);
 
 #endif

@@ -88,7 +88,7 @@ static Color color_of(const RunMark *mark)
 
 static void sign_of(const RunMark *mark, char text[8])
 {
-    const char *sign = mark->kind == RUN_MARK_BOOKMARK ? "\u25bc" : mark->kind == RUN_MARK_TARGET ? "\u2713" : "+";
+    const char *sign = mark->kind == RUN_MARK_BOOKMARK ? "\u25cf" : mark->kind == RUN_MARK_TARGET ? "\u2713" : "+";
     if (mark->kind == RUN_MARK_ERROR)
         snprintf(text, 8, "%c", session_error_letter(mark->error));
     else
@@ -96,21 +96,21 @@ static void sign_of(const RunMark *mark, char text[8])
 }
 
 // The mark under the mouse, which may be up to 5 points beside it; -1: none.
-static int mark_under(const TimelineState *state, const WindowInput *input, GuiRect lane, float scale)
+static int mark_under(const TimelineState *state, const WindowInput *input, GuiRect bar, float scale)
 {
     int nearest = -1;
     double best = 5 * (double)scale;
-    bool is_over = input->mouse_y >= (double)lane.y && input->mouse_y < (double)(lane.y + lane.height);
+    bool is_over = input->mouse_y >= (double)bar.y && input->mouse_y < (double)(bar.y + bar.height);
     for (int i = 0; is_over && state->marks && i < state->marks->count; i++) {
-        double away = fabs(input->mouse_x - (double)place(state, lane, state->marks->mark[i].time_s));
+        double away = fabs(input->mouse_x - (double)place(state, bar, state->marks->mark[i].time_s));
         if (away < best)
             best = away, nearest = i;
     }
     return nearest;
 }
 
-// Over the slider `bar`: a band of the X-ray pulses along its lower edge, a line for each mark, and its sign in the lane above it.
-static void draw_marks(Gui *gui, const TimelineState *state, GuiRect bar, GuiRect lane, float scale)
+// Over the slider `bar`: a tag with its letter for each mark, a band for each injection along the upper edge, the X-ray pulses along the lower one.
+static void draw_marks(Gui *gui, const TimelineState *state, GuiRect bar, float scale)
 {
     const RunMarks *marks = state->marks;
     float last_x = -100;
@@ -122,7 +122,7 @@ static void draw_marks(Gui *gui, const TimelineState *state, GuiRect bar, GuiRec
     }
     if (state->known_s < state->end_s) {
         float from = place(state, bar, state->known_s);
-        gui_draw_fill(gui, (GuiRect){from, lane.y + lane.height - 2 * scale, bar.x + bar.width - from, 2 * scale}, gui_colors.line);
+        gui_draw_fill(gui, (GuiRect){from, bar.y, bar.x + bar.width - from, 2 * scale}, gui_colors.dim);
     }
     for (int i = 0; i < marks->count; i++) {
         const RunMark *mark = &marks->mark[i];
@@ -130,13 +130,15 @@ static void draw_marks(Gui *gui, const TimelineState *state, GuiRect bar, GuiRec
         float x = place(state, bar, mark->time_s), width, height;
         sign_of(mark, sign);
         gui_text_extent(gui, GUI_SMALL, sign, &width, &height);
-        gui_draw_line(gui, x, lane.y + lane.height - 3 * scale, x, bar.y + bar.height, color_of(mark), 2 * scale);
+        gui_draw_fill(gui, (GuiRect){x - scale, bar.y, 2 * scale, bar.height}, color_of(mark));
         if (mark->kind == RUN_MARK_INJECTION)
-            gui_draw_fill(gui, (GuiRect){x, bar.y, fmaxf(place(state, bar, mark->time_s + mark->seconds) - x, 1), 3 * scale}, gui_colors.accent);
-        if (x - width / 2 < last_x)      // its neighbour's sign is there; the line and the text remain
+            gui_draw_fill(gui, (GuiRect){x, bar.y, fmaxf(place(state, bar, mark->time_s + mark->seconds) - x, 1), 3 * scale}, color_of(mark));
+        GuiRect tag = {x - width / 2 - 2 * scale, bar.y + (bar.height - height) / 2, width + 4 * scale, height};
+        if (tag.x < last_x)              // its neighbour's tag is there; the line and the text remain
             continue;
-        gui_draw_text(gui, x - width / 2, lane.y, GUI_SMALL, color_of(mark), sign);
-        last_x = x + width / 2 + scale;
+        gui_draw_fill(gui, tag, color_of(mark));
+        gui_draw_text(gui, x - width / 2, tag.y, GUI_SMALL, gui_colors.window, sign);
+        last_x = tag.x + tag.width;
     }
 }
 
@@ -161,8 +163,7 @@ static void draw_caption(Gui *gui, const char *id, GuiRect over, const char *tex
 {
     float width, height;
     gui_text_extent(gui, GUI_NORMAL, text, &width, &height);
-    GuiRect at = {over.x + fmaxf(0, (over.width - width) / 2 - 8 * s), over.y + over.height - height - 14 * s, fminf(width + 16 * s, over.width),
-                  height + 10 * s};
+    GuiRect at = {over.x + fmaxf(0, (over.width - width) / 2 - 8 * s), over.y + 6 * s, fminf(width + 16 * s, over.width), height + 10 * s};
     gui_window_begin(gui, id, at, GUI_NO_INPUT | GUI_VEIL);
     gui_draw_text(gui, at.x + 8 * s, at.y + 5 * s, GUI_NORMAL, gui_colors.text, text);
     gui_window_end(gui);
@@ -237,7 +238,7 @@ static GuiRect draw_bar(Gui *gui, PanelRect at, TimelineActions *actions, const 
         actions->seek_side = gui_slider(gui, "side", &other, 0, (float)side->end_s, label, 0);
         actions->seek_side_s = (double)other;
     }
-    return (GuiRect){at.x + 8 * s, at.y + at.height - height - 13 * s, width, height};
+    return (GuiRect){at.x + 8 * s, at.y + at.height - height - 17 * s, width, height + 6 * s};
 }
 
 TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, const TimelineState *state, double scale, PanelRect at, unsigned framebuffer)
@@ -248,11 +249,10 @@ TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, cons
     gui_begin(gui, input, scale, false);
     gui_window_begin(gui, "timeline", at, 0);
     draw_buttons(gui, state, &actions, s);
-    GuiRect bar = draw_bar(gui, at, &actions, state, s), lane = {bar.x, bar.y - 12 * s, bar.width, 12 * s};
-    draw_marks(gui, state, bar, lane, s);
+    GuiRect bar = draw_bar(gui, at, &actions, state, s);
+    draw_marks(gui, state, bar, s);
     gui_window_end(gui);
-    GuiRect marks_at = {lane.x, lane.y, lane.width, lane.height + bar.height + 4 * s};
-    int shown = mark_under(state, input, marks_at, s);
+    int shown = mark_under(state, input, bar, s);
     if (shown < 0 && state->marks)
         shown = run_marks_at(state->marks, state->time_s);
     if (shown >= 0)
@@ -260,7 +260,7 @@ TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, cons
     if (state->side)
         draw_captions(gui, state, s);
     if (state->has_parts)
-        score_parts_box(gui, state->figures, state->side ? state->side->figures : NULL, state->main);
+        score_parts_box(gui, state->figures, state->side ? state->side->figures : NULL, state->main, (float)input->width);
     gui_end(gui, framebuffer);
     return actions;
 }
