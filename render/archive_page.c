@@ -296,7 +296,7 @@ static void print_case(Page *page, const char *title, int number)
     fprintf(out, "<section id=\"case-%d\"><h2>", number);
     page_text(out, title_of(&all.at[0]->session));
     fprintf(out, "</h2>\n<figure>");
-    print_curve(page, &figure_table[0], series, name, count, 620, 180);
+    print_curve(page, &figure_table[0], series, name, count, 620, count * CURVE_NAME_LINE > 180 ? count * CURVE_NAME_LINE : 180);      // room for the names
     fprintf(out, "<figcaption>Points by session, a line for each trainee; filled: target held, open: not.</figcaption></figure>\n");
     print_heads(out, heads, 1);
     print_figure_heads(out);

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEFT = 44, TOP = 24, FOOT = 24, RIGHT = 14, NAMES = 190, NAME_LINE = 14 };
+enum { LEFT = 44, TOP = 24, FOOT = 24, RIGHT = 14, NAMES = 190 };
 
 typedef struct Axes {
     double top, step_x;          // largest value; pixels from one session to the next
@@ -91,9 +91,9 @@ static void draw_names(FILE *out, const LearningCurve *curve, const Axes *axes)
     }
     qsort(place, (size_t)count, sizeof *place, compare_places);
     for (int i = 1; i < count; i++)
-        place[i].y = fmax(place[i].y, place[i - 1].y + NAME_LINE);
+        place[i].y = fmax(place[i].y, place[i - 1].y + CURVE_NAME_LINE);
     for (int i = count - 1; i >= 0; i--)
-        place[i].y = fmin(place[i].y, i == count - 1 ? TOP + curve->height : place[i + 1].y - NAME_LINE);
+        place[i].y = fmin(place[i].y, i == count - 1 ? TOP + curve->height : place[i + 1].y - CURVE_NAME_LINE);
     for (int i = 0; i < count; i++) {
         const CurveSeries *series = &curve->series[place[i].series];
         const double from = place_y(curve, axes, series->point[series->count - 1].value), x = LEFT + curve->width + 8;

@@ -26,7 +26,8 @@ typedef struct LearningCurve {
     const CurveSeries *series;   // (series_count)
 } LearningCurve;
 
-enum { CURVE_STYLES = 6 };       // colours and dashes, one for each series; then they repeat
+// Colours and dashes, one for each series, then they repeat; and the height that each name needs [px].
+enum { CURVE_STYLES = 6, CURVE_NAME_LINE = 14 };
 
 // Inline SVG with a title, for the classes of page_style.
 void learning_curve(FILE *out, const LearningCurve *curve);
