@@ -1,4 +1,5 @@
-// Debriefing as a user does it: `seldinger replay --beside` under a virtual X server, with another recording and with the script of a hand, and keys by xdotool.
+// Debriefing as a user does it: `seldinger replay --beside` under a virtual X server, with another recording and with the script of a hand, and keys by xdotool. And a
+// running session as a browser on this machine sees it: `nav --instructor-port`.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -6,6 +7,10 @@
 
 #include <cmocka.h>
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/time.h>
 #include <time.h>
 
 static char folder[] = "/tmp/seldinger-debrief-XXXXXX";
@@ -73,8 +78,72 @@ static void recordings_and_scripts_run_side_by_side(void **state)
     assert_int_equal(run("! ls -d /tmp/seldinger-beside-* 2>/dev/null"), 0);
 }
 
+// A socket bound to a free port of 127.0.0.1; nobody else can have the port while it is open.
+static int bind_port(int *port)
+{
+    struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    socklen_t size = sizeof address;
+    int at = socket(AF_INET, SOCK_STREAM, 0);
+    assert_int_equal(bind(at, (const struct sockaddr *)&address, size), 0);
+    assert_int_equal(listen(at, 1), 0);
+    assert_int_equal(getsockname(at, (struct sockaddr *)&address, &size), 0);
+    *port = ntohs(address.sin_port);
+    return at;
+}
+
+// Whether GET `path` is answered with status 200 and a body that begins with `begin`.
+static bool answers(int port, const char *path, const char *begin)
+{
+    char request[200], reply[4096] = "";
+    const struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    const struct timeval patience = {.tv_sec = 5};
+    int at = socket(AF_INET, SOCK_STREAM, 0), bytes;
+    setsockopt(at, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    bytes = snprintf(request, sizeof request, "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: close\r\n\r\n", path, port);
+    size_t length = 0;
+    if (connect(at, (const struct sockaddr *)&address, sizeof address) == 0 && send(at, request, (size_t)bytes, MSG_NOSIGNAL) == bytes)
+        for (ssize_t got; length + 1 < sizeof reply && (got = recv(at, reply + length, sizeof reply - 1 - length, 0)) > 0;)
+            length += (size_t)got;
+    close(at);
+    const char *body = strstr(reply, "\r\n\r\n");
+    return !strncmp(reply, "HTTP/1.1 200", 12) && body && !strncmp(body + 4, begin, strlen(begin));
+}
+
+static void an_instructor_watches_the_session(void **state)
+{
+    (void)state;
+    need_display();
+    char command[600];
+    int port, taken = bind_port(&port);
+    snprintf(command, sizeof command, "\"$S\" nav scene.yaml --no-record --instructor-port %d --quiet 2>out.txt", port);
+    assert_int_equal(run(command), 2);
+    if (run("grep -q libmicrohttpd out.txt") == 0) {
+        print_message("skipped: built without libmicrohttpd\n");
+        skip();
+    }
+    assert_int_equal(run("grep -q 'cannot be opened' out.txt"), 0);      // another program has the port
+    close(taken);
+    snprintf(command, sizeof command,
+             "{ \"$S\" nav scene.yaml --no-record --trainee Ada --instructor-port %d --duration-s 12 --size 640x480 --quiet; echo $?; } >end.txt 2>&1 &", port);
+    assert_int_equal(run(command), 0);
+    bool has_score = false, has_picture = false;
+    for (int i = 0; i < 300 && !(has_score && has_picture); i++) {
+        has_score = has_score || answers(port, "/score.json", "{\"trainee\":\"Ada\"");
+        has_picture = has_picture || answers(port, "/view.png", "\x89PNG");
+        nanosleep(&(struct timespec){.tv_nsec = 50000000}, NULL);
+    }
+    assert_true(has_score && has_picture);
+    for (int i = 0; i < 400 && run("[ -s end.txt ]") != 0; i++)
+        nanosleep(&(struct timespec){.tv_nsec = 100000000}, NULL);
+    char *end = text_of(in_folder("end.txt"));
+    assert_string_equal(end, "0\n");
+    free(end);
+    assert_false(answers(port, "/", ""));                                // it goes with the session
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_shown_beside_is_reported), cmocka_unit_test(recordings_and_scripts_run_side_by_side)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_shown_beside_is_reported), cmocka_unit_test(recordings_and_scripts_run_side_by_side),
+                                       cmocka_unit_test(an_instructor_watches_the_session)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
