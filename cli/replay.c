@@ -1,6 +1,7 @@
 // seldinger replay: a recording shown, simulated again, made into a scene.
 #include "cli/cli.h"
 
+#include "cli/replay_beside.h"
 #include "cli/replay_options.h"
 #include "cli/output_plan.h"
 #include "sim/sim.h"
@@ -59,7 +60,14 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
 // The window; a session can be continued from any moment of the recording.
 static int show(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
+    ReplayBeside beside = {0};
+    if (options->beside && !replay_beside_open(&beside, options->beside, run, options->recording, options->threads, options->quiet, faults)) {
+        replay_beside_close(&beside);
+        return EXIT_BAD_INPUT;
+    }
+    ReplayRecording other = {options->beside, beside.run, beside.scene, &beside.open};
     ReplayWindowOptions window = {.name = options->recording,
+                                  .beside = options->beside ? &other : NULL,
                                   .width = options->width,
                                   .height = options->height,
                                   .view = (PanelView)options->view,
@@ -69,7 +77,9 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
                                   .cra_deg = options->cra_deg};
     bool resumes = false;
     double resume_s = 0;
-    if (!replay_window_run(&window, run, scene, open, &resumes, &resume_s, faults))
+    bool is_shown = replay_window_run(&window, run, scene, open, &resumes, &resume_s, faults);
+    replay_beside_close(&beside);
+    if (!is_shown)
         return EXIT_BAD_INPUT;
     if (!resumes)
         return EXIT_DONE;
@@ -107,6 +117,7 @@ static void plan_outputs(const ReplayOptions *options, const RecordedRun *run, c
         if (snprintf(path[i], sizeof path[i], "%s/%s", options->scene_folder, part[i]) < (int)sizeof path[i])
             output_plan_write_file(&plan, "--scene", path[i]);
     output_plan_read(&plan, "the recording", options->recording);
+    output_plan_read(&plan, "--beside", options->beside);
     output_plan_read_scene(&plan, scene);
     if (run && run->scene_path)
         output_plan_read(&plan, "the recording's scene", run->scene_path);

@@ -27,6 +27,8 @@ static const Option options[] = {
      .otherwise = "that of the scene"},
     {"cra", "DEG", OPTION_NUMBER, AT(cra_deg), "cranial C-arm angle for such a recording; negative: CAU", .least = -45, .most = 45,
      .otherwise = "that of the scene"},
+    {"beside", "REC.h5|HAND.csv", OPTION_FILE, AT(beside),
+     "in the window: another recording beside it, or the script of a hand, such as the one that solves an exercise, in the same scene"},
     {"sessions", "FOLDER", OPTION_FOLDER, AT(sessions), "where a continued session is recorded, as for `nav`"},
     {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "the window closes after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
     CLI_THREADS(ReplayOptions, threads),
@@ -43,8 +45,11 @@ const OptionTable replay_options = {
     .program = "seldinger replay",
     .does = "shows a recording, simulates it again and compares, or makes a scene from it",
     .usage = "REC.h5 [options]",
-    .intro = "Shows a recording of `nav` or `run --record` in a window: play, pause, seek (Left, Right, the strip below), and continue from any moment (F5) "
-             "as a new session. With one of the first four options no window is opened.",
+    .intro =
+        "Shows a recording of `nav` or `run --record` in a window: play, pause, seek (Left, Right, the strip below), jump to what happened (Up, Down: "
+        "errors, bookmarks, injections, the target), see the parts of the score at each moment (Y), and continue from any moment (F5) as a new session. With "
+        "--beside a second recording runs in step with it, counted from the first action in each (9: by its own time; Ctrl with Left and Right moves it "
+        "alone). With one of the first four options no window is opened.",
     .exits = "0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged",
     CLI_OPTIONS(options, ReplayOptions),
     .set_defaults = set_defaults,

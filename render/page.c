@@ -63,3 +63,15 @@ void page_text(FILE *out, const char *text)
         s += length > 0 ? length : 1;
     }
 }
+
+void page_begin(FILE *out, const char *kind, const char *title, const char *style)
+{
+    fprintf(out,
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\"/>\n<title>%s: ",
+            kind);
+    page_text(out, title);
+    fprintf(out, "</title>\n<style>\n%s%s</style></head>\n<body><header><h1>", page_style, style);
+    page_text(out, title);
+    fprintf(out, "</h1>\n");
+}

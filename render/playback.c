@@ -295,13 +295,3 @@ int playback_contrast_tool(const Playback *playback) { return contrast_injection
 double playback_flow_ml_s(const Playback *playback) { return playback->flow_ml_s; }
 const PulseClock *playback_pulses(const Playback *playback) { return &playback->now.pulses; }
 const FluoroscopePast *playback_past(const Playback *playback) { return &playback->past; }
-
-int playback_bookmarks(const Playback *playback, double *time_s, int capacity)
-{
-    const RecordedRun *run = playback->run;
-    int count = 0;
-    for (int64_t i = 1; run->xray && i < run->step_count && count < capacity; i++)
-        if (run->xray[i].bookmark != run->xray[i - 1].bookmark)
-            time_s[count++] = run->time_s[i];
-    return count;
-}

@@ -28,7 +28,5 @@ double playback_flow_ml_s(const Playback *playback);             // its actual f
 const PulseClock *playback_pulses(const Playback *playback);
 // The pulses so far, for fluoroscope_recall; valid until the next seek. The first step is shown without a pulse.
 const FluoroscopePast *playback_past(const Playback *playback);
-// Times of the bookmarks, at most `capacity`; returns their number.
-int playback_bookmarks(const Playback *playback, double *time_s, int capacity);
 
 #endif

@@ -3,6 +3,7 @@
 #define SELDINGER_RENDER_RENDER_H
 
 // pages
+#include "render/archive_page.h"
 #include "render/page_pdf.h"
 #include "render/session_report.h"
 #include "render/tree_page.h"

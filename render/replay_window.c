@@ -1,6 +1,8 @@
 #include "render/replay_window.h"
 
+#include "base/base.h"
 #include "render/playback.h"
+#include "render/replay_side.h"
 #include "render/scene_views.h"
 #include "render/timeline.h"
 #include "render/trainer_panel.h"
@@ -10,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// Real time per frame for simulating the recording again, and simulated seconds per second for a held arrow key.
+// Real time per frame for simulating the recordings again, and simulated seconds per second for a held arrow key.
 static const double rescore_budget_s = 0.01, scrub_s_s = 4;
 
 typedef struct ReplayWindow {
@@ -24,11 +26,58 @@ typedef struct ReplayWindow {
     OperatorControls controls;
     Playback *playback;
     Rescore *rescore;
+    Session *session;                // of the recording's session file: all errors are known at once. NULL: they come with the repeated simulation
+    RunMarks marks;
+    int marked_events;
+    double marked_reached_s;
+    ReplaySide *side;                // NULL: none
     TrainerPanel shown;
     TimelineState line;
     bool resumes, has_reported_difference;
     double begun_s;
 } ReplayWindow;
+
+static void seek(ReplayWindow *replay, double time_s)
+{
+    if (playback_seek(replay->playback, fmax(0, fmin(time_s, replay->line.end_s))))
+        panel_forget_samples(replay->panel);
+    if (replay->side)
+        replay_side_follow(replay->side, playback_time_s(replay->playback));
+}
+
+// The session file beside the recording, if it belongs to it.
+static Session *load_session(const ReplayWindowOptions *options, const RecordedRun *run)
+{
+    char path[4096];
+    Faults *ignored = calloc(1, sizeof *ignored);
+    Session *session = calloc(1, sizeof *session);
+    session_file_beside(options->name, ".json", path, sizeof path);
+    bool good = ignored && session && session_load(path, session, ignored) && session_is_of(session, run);
+    free(ignored);
+    if (good)
+        return session;
+    free(session);
+    return NULL;
+}
+
+// Makes the marks again if an error was found or the target was held since.
+static void refresh_marks(ReplayWindow *replay)
+{
+    int count = 0;
+    const ScoreEvent *event = score_events(rescore_score(replay->rescore), &count);
+    double reached_s = score_figures(rescore_score(replay->rescore)).reached_s;
+    if (replay->session) {
+        count = replay->session->event_count, event = replay->session->event;
+        reached_s = replay->session->figures.reached_s;
+    }
+    replay->line.known_s = replay->session ? replay->line.end_s : (double)rescore_steps(replay->rescore) * replay->run->step_ms / 1000;
+    if (replay->line.marks && count == replay->marked_events && reached_s == replay->marked_reached_s)
+        return;
+    run_marks_free(&replay->marks);
+    replay->line.marks = run_marks_make(&replay->marks, replay->run, event, count, reached_s) ? &replay->marks : NULL;
+    replay->marked_events = count;
+    replay->marked_reached_s = reached_s;
+}
 
 static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
 {
@@ -51,6 +100,8 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
         snprintf(message, sizeof message, "the recording contains no frame");
         good = replay->playback != NULL;
     }
+    if (good && options->beside)
+        good = (replay->side = replay_side_create(options->beside, replay->run, faults)) != NULL;
     if (!good && faults->count == before)
         faults_add(faults, options->name, 0, 0, "no window: %s", message);
     if (!good)
@@ -60,13 +111,16 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
     panel_show_replay(replay->panel);
     trainer_panel_begin(&replay->shown, replay->scene, "");
     replay->line = (TimelineState){.end_s = playback_end_s(replay->playback), .is_playing = true, .speed = 1, .note = options->name};
-    replay->line.mark_count = playback_bookmarks(replay->playback, replay->line.mark_s, TIMELINE_MARKS);
-    playback_seek(replay->playback, options->at_s);
+    replay->session = load_session(options, replay->run);
+    seek(replay, options->at_s);
     return true;
 }
 
 static void replay_close(ReplayWindow *replay)
 {
+    run_marks_free(&replay->marks);
+    free(replay->session);
+    replay_side_free(replay->side);
     playback_close(replay->playback);
     rescore_free(replay->rescore);
     views_destroy(replay->views);
@@ -75,12 +129,6 @@ static void replay_close(ReplayWindow *replay)
         panel_destroy(replay->panel);
     if (replay->window)
         window_destroy(replay->window);
-}
-
-static void seek(ReplayWindow *replay, double time_s)
-{
-    if (playback_seek(replay->playback, fmax(0, fmin(time_s, replay->line.end_s))))
-        panel_forget_samples(replay->panel);
 }
 
 static void obey(ReplayWindow *replay, const PanelActions *actions, double passed_s)
@@ -92,7 +140,9 @@ static void obey(ReplayWindow *replay, const PanelActions *actions, double passe
     if (actions->pressed[ACTION_FULL_SCREEN] & 1)
         window_set_full_screen(replay->window, !window_is_full_screen(replay->window));
     replay->resumes |= actions->pressed[ACTION_SAVE] > 0;
-    if (held != 0)
+    if (held != 0 && replay->side && actions->held[ACTION_SLOW])
+        replay_side_seek(replay->side, replay_side_state(replay->side)->time_s + held * scrub_s_s * passed_s, now);
+    else if (held != 0)
         seek(replay, now + held * scrub_s_s * passed_s);
     else if (line->is_playing)
         seek(replay, now + passed_s * (double)line->speed);
@@ -100,9 +150,27 @@ static void obey(ReplayWindow *replay, const PanelActions *actions, double passe
         line->is_playing = false;
 }
 
+static void obey_timeline(ReplayWindow *replay, const TimelineActions *actions)
+{
+    TimelineState *line = &replay->line;
+    line->is_playing ^= actions->toggle_play;
+    line->speed = actions->speed;
+    line->has_parts ^= actions->toggle_parts;
+    replay->resumes |= actions->resume;
+    line->is_playing &= !actions->stop;
+    if (actions->seek)
+        seek(replay, actions->seek_s);
+    if (actions->seek_side)
+        replay_side_seek(replay->side, actions->seek_side_s, playback_time_s(replay->playback));
+    if (actions->toggle_step)
+        replay_side_toggle_step(replay->side, playback_time_s(replay->playback));
+}
+
+// Both scores are computed to their ends, whatever is shown, so that a jump finds them.
 static const ScoreFigures *score_now(ReplayWindow *replay)
 {
-    rescore_advance(replay->rescore, playback_pose(replay->playback)->step, rescore_budget_s);
+    const bool is_done = !replay->side || replay_side_compute(replay->side, rescore_budget_s / 2);
+    rescore_advance(replay->rescore, replay->run->step_count, is_done ? rescore_budget_s : rescore_budget_s / 2);
     int64_t different = rescore_first_different(replay->rescore);
     if (different >= 0 && !replay->has_reported_difference) {
         replay->has_reported_difference = true;
@@ -122,8 +190,16 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
                         .past = playback_past(replay->playback),
                         .look = &replay->controls.look,
                         .scope_tool = replay->controls.grip.chosen + 1};
-    views_draw(replay->views, &frame, layout, input->width, input->height, 0);
-    trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
+    PanelLayout left = *layout;
+    ViewPort right = {0};
+    if (replay->side)
+        replay_side_split(layout, &left, &right);
+    views_draw(replay->views, &frame, &left, input->width, input->height, 0);
+    if (replay->side)
+        replay_side_draw(replay->side, layout->main, right, frame.look, input->width, input->height, 0);
+    const ScoreFigures *figures = score_now(replay);
+    refresh_marks(replay);
+    trainer_panel_show(&replay->shown, replay->scene, pose, figures, NULL, &pose->xray);
     PanelState *state = &replay->shown.state;
     state->now_s = clock_s(CLOCK_MONOTONIC) - replay->begun_s;
     trainer_panel_views(&replay->shown, &replay->controls, replay->views, &pose->xray);
@@ -132,12 +208,11 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
     state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
     panel_draw(replay->panel, input, state, 0);
     replay->line.time_s = pose->time_s;
+    replay->line.figures = figures;
+    replay->line.side = replay->side ? replay_side_state(replay->side) : NULL;
+    replay->line.main = layout->view_rect[layout->main];
     TimelineActions actions = timeline_draw(replay->timeline, input, &replay->line, layout->scale, layout->bottom, 0);
-    replay->line.is_playing ^= actions.toggle_play;
-    replay->line.speed = actions.speed;
-    replay->resumes |= actions.resume;
-    if (actions.seek)
-        seek(replay, actions.seek_s);
+    obey_timeline(replay, &actions);
 }
 
 static void run_window(ReplayWindow *replay)
@@ -153,6 +228,10 @@ static void run_window(ReplayWindow *replay)
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
         controls_obey(&replay->controls, views_scene(replay->views), &actions, &layout, passed);
         obey(replay, &actions, passed);
+        if (!panel_is_asking(replay->panel)) {
+            TimelineActions keys = timeline_take_keys(input, &replay->line);
+            obey_timeline(replay, &keys);
+        }
         is_running = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
                      !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);
         if (!is_running || !visible)

@@ -1,12 +1,14 @@
-// Replays a recording in the trainer's window: play, pause, seek and resume.
+// Replays a recording in the trainer's window: play, pause, seek, jump to what happened, and resume; the score's parts at each moment; another recording beside it.
 #ifndef SELDINGER_RENDER_REPLAY_WINDOW_H
 #define SELDINGER_RENDER_REPLAY_WINDOW_H
 
 #include "render/panel.h"
+#include "render/replay_recording.h"
 #include "sim/sim.h"
 
 typedef struct ReplayWindowOptions {
-    const char *name;                // of the recording, for the strip below the views
+    const char *name;                // path of the recording, shown in the strip below the views; its session file beside it gives the errors at once
+    const ReplayRecording *beside;   // shown beside it; NULL: none
     int width, height;
     PanelView view;
     double at_s;                     // first moment

@@ -225,12 +225,8 @@ void session_page(const SessionPage *page)
     FILE *out = page->out;
     const Session *s = page->session;
     const char *title = *s->title ? s->title : "Session without an exercise";
-    fprintf(out, "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
-                 "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\"/>\n<title>Session: ");
-    page_text(out, title);
-    fprintf(out, "</title>\n<style>\n%s%s</style></head>\n<body><header><h1>", page_style, own_style);
-    page_text(out, title);
-    fprintf(out, "</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not a medical device:</strong> points compare sessions at this "
+    page_begin(out, "Session", title, own_style);
+    fprintf(out, "<p class=\"notice\" role=\"note\"><strong>For training and research. Not a medical device:</strong> points compare sessions at this "
                  "simulator; they say nothing about the treatment of patients.</p>\n");
     if (page->run && !page->run_is_its)
         fprintf(out, "<p class=\"notice\" role=\"alert\">The recording in the folder belongs to another session: plots and path below are not those of this "

@@ -2,6 +2,7 @@
 
 #include "input/input.h"
 #include "render/gl_canvas.h"
+#include "render/instructor_view.h"
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
 #include "render/scene_views.h"
@@ -56,6 +57,7 @@ typedef struct Trainer {
     const char *progress;            // title of the current computation
     TimeHistogram frame_cpu_ns;
     TrainerFigures *figures;
+    InstructorView *instructor;      // NULL: none
 } Trainer;
 
 static double since_begin(const Trainer *trainer) { return clock_s(CLOCK_MONOTONIC) - trainer->begun_s; }
@@ -675,6 +677,15 @@ static void show_devices(Trainer *trainer)
     }
 }
 
+static void show_to_instructor(Trainer *trainer, const WindowInput *input, double time_s, const ScoreFigures *score)
+{
+    uint8_t *rgb = instructor_view_is_due(trainer->instructor) ? instructor_view_pixels(trainer->instructor, input->width, input->height) : NULL;
+    if (!rgb)
+        return;
+    gl_framebuffer_read(0, input->width, input->height, rgb);
+    instructor_view_show(trainer->instructor, &(InstructorFigures){trainer->trainee, time_s, trainer->is_paused, score, trainer->scene});
+}
+
 static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *layout, const XrayControl *xray, double passed_s)
 {
     const Moment *moment = realtime_moment(trainer->session.realtime);
@@ -706,6 +717,7 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     show_events(trainer, moment);
     show_devices(trainer);
     panel_draw(trainer->panel, input, state, 0);
+    show_to_instructor(trainer, input, pose->time_s, &tracked->score);
 }
 
 static double resident_mb(void)
@@ -826,6 +838,10 @@ static bool open_window(Trainer *trainer, Faults *faults)
 {
     char message[512] = "", title[300];
     const TrainerOptions *options = trainer->options;
+    if (options->instructor_port && !(trainer->instructor = instructor_view_open(options->instructor_port, message, sizeof message))) {
+        faults_add(faults, "--instructor-port", 0, 0, "%s", message);
+        return false;
+    }
     snprintf(title, sizeof title, "Seldinger: %.200s", trainer->scene->exercise ? trainer->scene->exercise->title : trainer->scene->path);
     trainer->window = window_create(title, options->width, options->height, 0, message, sizeof message);
     trainer->panel = trainer->window ? panel_create(message, sizeof message) : NULL;
@@ -898,6 +914,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     trainer_tray_close(&trainer->tray);
     scene_free(trainer->own_scene);
     panel_destroy(trainer->panel);
+    instructor_view_close(trainer->instructor);
     if (trainer->window)
         window_destroy(trainer->window);
     free(trainer);

@@ -25,6 +25,7 @@ typedef struct TrainerOptions {
     PanelView view;
     bool is_full_screen;
     double duration_s;               // ends after this much real time; 0: never
+    int instructor_port;             // of 127.0.0.1, for a browser that watches (render/instructor_view.h); 0: none
     int threads;
     NoteFunction note;               // receives remarks on the vessel of a recovered session; may be NULL
 } TrainerOptions;

@@ -129,7 +129,8 @@ void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout
     glViewport(0, 0, width, height);
     glDisable(GL_SCISSOR_TEST);
     glClearColor(0.03F, 0.035F, 0.045F, 1);
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    if (!frame->leaves_surroundings)
+        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     for (int i = 0; i < VIEW_COUNT; i++) {
         ViewPort port = layout->view[i];
         port.framebuffer = framebuffer;

@@ -35,6 +35,7 @@ typedef struct ViewsFrame {
     const FluoroscopePast *past;     // NULL: fluoroscopy shows the pulses as they come. Otherwise it shows what these pulses leave, whatever was drawn before
     const VesselSceneLook *look;
     int scope_tool;                  // tool from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
+    bool leaves_surroundings;        // of the views: does not clear what lies outside them
     bool is_still;                   // an independent picture: nothing is reused from the previous frame
 } ViewsFrame;
 

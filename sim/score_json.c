@@ -65,6 +65,15 @@ static bool is_later(ScoreError kind) { return kind > ERROR_CONTRAST; }
 static bool is_later_part(ScorePart part) { return part > PART_WALL_IMPULSE; }
 enum { OTHERS = sizeof other_key / sizeof other_key[0] };
 
+const char *score_figure_name(int index) { return index >= 0 && index < FIGURES ? figure_table[index].name : NULL; }
+
+double score_figure(const ScoreFigures *figures, int index)
+{
+    double value;
+    memcpy(&value, (const char *)figures + figure_table[index].offset, sizeof value);
+    return value;
+}
+
 static bool add(cJSON *to, const char *name, double value) { return cJSON_AddNumberToObject(to, name, value) != NULL; }
 
 static bool add_figures(cJSON *object, int count, const struct Figure *table, const void *figures)

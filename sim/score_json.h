@@ -8,6 +8,9 @@
 
 // Adds all figures to an object; false if out of memory.
 bool score_add_json(cJSON *object, const ScoreFigures *figures);
+// The plain numbers of the figures by index, in the file's order and with its names; NULL beyond the last.
+const char *score_figure_name(int index);
+double score_figure(const ScoreFigures *figures, int index);
 
 // Reads an object by its keys; every error is reported as a fault of `file`.
 typedef struct JsonReading {

@@ -40,9 +40,11 @@
 // sessions
 #include "sim/contrast_injection.h"
 #include "sim/rescore.h"
+#include "sim/run_marks.h"
 #include "sim/score.h"
 #include "sim/score_points.h"
 #include "sim/session.h"
+#include "sim/session_archive.h"
 #include "sim/session_files.h"
 #include "sim/shelf.h"
 #include "sim/xray.h"

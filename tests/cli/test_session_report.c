@@ -187,6 +187,71 @@ static void missing_parts_are_reported(void **state)
     assert_int_equal(rename(in_folder("kept.h5"), in_folder("other.h5")), 0);
 }
 
+// A trainee's page: only their sessions, a figure for each quantity, the files that cannot be read with the reason; names are escaped.
+static void a_trainees_page_has_all_their_sessions(void **state)
+{
+    (void)state;
+    char arguments[900], *text;
+    put("broken <i>&.json", "{\"seldinger_session\": 1");
+    snprintf(arguments, sizeof arguments, "--trainee 'Ada <script>' '%s'", folder);
+    assert_int_equal(report(arguments), 0);
+    Seen seen = look_at(in_folder("trainee.html"), &text);
+    assert_int_equal(seen.pictures, 8);
+    assert_int_equal(seen.circles, 2 * 8);
+    assert_int_equal(seen.polylines, 8);
+    assert_int_equal(seen.rows, 1 + 2 + 1 + 1);
+    assert_non_null(strstr(text, "<h1>Ada &lt;script&gt;</h1>"));
+    assert_non_null(strstr(text, "Into the &lt;bend&gt;"));
+    assert_non_null(strstr(text, "broken &lt;i&gt;&amp;.json"));
+    assert_non_null(strstr(text, "is not JSON"));
+    assert_null(strstr(text, "Bob"));
+    char points[64];
+    static Session session;
+    static Faults faults;
+    assert_true(session_load(in_folder("second.json"), &session, &faults));
+    snprintf(points, sizeof points, "<td>%.0f</td><td>%.1f</td>", session.figures.points, session.figures.time_s);
+    assert_non_null(strstr(text, points));
+    free(text);
+    text = text_of(in_folder("out.txt"));
+    assert_non_null(strstr(text, "broken <i>&.json: byte"));
+    free(text);
+    snprintf(arguments, sizeof arguments, "--trainee Nobody '%s'", folder);
+    assert_int_equal(report(arguments), 2);
+    unlink(in_folder("broken <i>&.json"));
+}
+
+// The instructor's page: a line for each trainee; and the table, which alone makes no page.
+static void the_instructors_page_has_all_trainees(void **state)
+{
+    (void)state;
+    char arguments[900], *text;
+    snprintf(arguments, sizeof arguments, "'%s'", folder);
+    assert_int_equal(report(arguments), 0);
+    Seen seen = look_at(in_folder("sessions.html"), &text);
+    assert_int_equal(seen.pictures, 1);
+    assert_int_equal(seen.polylines, 2);
+    assert_int_equal(seen.circles, 3);
+    assert_int_equal(seen.rows, (1 + 2) + (1 + 2));
+    assert_non_null(strstr(text, "Bob"));
+    assert_non_null(strstr(text, "Ada &lt;script&gt;"));
+    free(text);
+    unlink(in_folder("sessions.html"));
+    snprintf(arguments, sizeof arguments, "'%s' --csv '%s'", folder, in_folder("all.csv"));
+    assert_int_equal(report(arguments), 0);
+    text = text_of(in_folder("all.csv"));
+    int rows = 0;
+    for (const char *at = text; (at = strstr(at, "\r\n")); at += 2)
+        rows++;
+    assert_int_equal(rows, 1 + 3);
+    assert_non_null(strstr(text, "\"second.json\",\"Ada <script>\","));
+    free(text);
+    assert_int_not_equal(access(in_folder("sessions.html"), F_OK), 0);
+    snprintf(arguments, sizeof arguments, "'%s' --csv '%s'", in_folder("first.json"), in_folder("one.csv"));
+    assert_int_equal(report(arguments), 2);
+    snprintf(arguments, sizeof arguments, "'%s' --csv '%s'", folder, in_folder("first.json"));
+    assert_int_equal(report(arguments), 2);
+}
+
 static void wrong_use_is_refused(void **state)
 {
     (void)state;
@@ -292,6 +357,8 @@ int main(void)
         cmocka_unit_test(the_page_holds_the_session),
         cmocka_unit_test(the_same_bytes_twice),
         cmocka_unit_test(missing_parts_are_reported),
+        cmocka_unit_test(a_trainees_page_has_all_their_sessions),
+        cmocka_unit_test(the_instructors_page_has_all_trainees),
         cmocka_unit_test(a_browser_prints_it),
         cmocka_unit_test(no_browser_is_reported),
         cmocka_unit_test(a_stopped_report_leaves_no_page),

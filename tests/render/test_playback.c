@@ -11,6 +11,7 @@
 #include "render/playback.h"
 #include "render/scene_views.h"
 #include "sim/rescore.h"
+#include "sim/run_marks.h"
 #include "tests/geom/near.h"
 #include "tests/geom/random_numbers.h"
 #include "tests/short_run.h"
@@ -317,13 +318,24 @@ static void times_outside_are_cut_and_jumps_reported(void **state)
 static void bookmarks_are_where_they_were_set(void **state)
 {
     (void)state;
+    RunMarks marks;
+    int count = 0;
+    double at[8] = {0};
+    assert_true(run_marks_make(&marks, run, NULL, 0, 0));
+    for (int i = 0; i < marks.count; i++)
+        if (marks.mark[i].kind == RUN_MARK_BOOKMARK)
+            at[count++ % 8] = marks.mark[i].time_s;
+    assert_int_equal(count, 2);
+    assert_true(at[0] == run->time_s[1234] && at[1] == run->time_s[7007]);
+    assert_int_equal(marks.count, 2 + 4);        // and four injections
+    // the moment of a mark is shown in the step at it
     XrayControl none = {0};
-    double mark[8] = {0};
     Playback *playback = playback_open(run, trainer.scene, NULL, &none);
-    assert_int_equal(playback_bookmarks(playback, mark, 8), 2);
-    assert_true(mark[0] == run->time_s[1234] && mark[1] == run->time_s[7007]);
-    assert_int_equal(playback_bookmarks(playback, mark, 1), 1);
+    playback_seek(playback, at[0]);
+    assert_int_equal(playback_pose(playback)->step, 1235);
+    assert_true(playback_time_s(playback) == at[0]);
     playback_close(playback);
+    run_marks_free(&marks);
 }
 
 static void a_recording_cut_by_a_kill_is_shown_as_far_as_it_goes(void **state)
@@ -364,7 +376,6 @@ static void what_nobody_watched_is_shown_with_the_controls_given(void **state)
         playback_seek(playback, 0.65);
         assert_memory_equal(&playback_pose(playback)->xray, &given, sizeof given);
         assert_int_equal(playback_pulses(playback)->count, 7);   // at 0.001, 0.101 … 0.601 s
-        assert_int_equal(playback_bookmarks(playback, &(double){0}, 1), 0);
         playback_seek(playback, 0.05);
         assert_memory_equal(&playback_pose(playback)->xray, &given, sizeof given);
         assert_int_equal(playback_pulses(playback)->count, 1);
