@@ -120,7 +120,8 @@ static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, Sc
         simulator_step(simulator, &commands);
         for (int i = 0; i < TRAINEES; i++) {
             now.since_pulse_mm = since_pulse[i] += speed * scene->dt / 1000;
-            const XrayControl xray = trainee[i].watch(&now);
+            XrayControl xray = trainee[i].watch(&now);
+            xray.contrast_ml_s = (float)commands.contrast_ml_s;
             since_pulse[i] = xray.pedal > 0 ? 0 : since_pulse[i];
             score_step(score[i], simulator, &commands, &xray);
         }
@@ -139,7 +140,7 @@ static void pars_follow(const char *name, const Exercise *exercise, const ScoreF
     static const double times[PART_COUNT] = {2, 2, 1.5, 1.25, 1.5, 2, 0, 0}, step[PART_COUNT] = {5, 5, 1, 0.1, 0.1, 0.5, 0, 0};
     int wrong = exercise->par[PART_BLIND] != 0.5 * exercise->rules.blind_mm || exercise->par[PART_GUIDANCE] != 2;
     for (int i = 0; i <= PART_WALL_IMPULSE; i++) {
-        const double par = ceil(times[i] * solved->judged[i].measured / step[i]) * step[i];
+        const double par = ceil(times[i] * solved->judged[i].measured / step[i] - 1e-6) * step[i];
         if (fabs(par - exercise->par[i]) > 1e-9)
             wrong++, print_error("%s: %s is %g, the solving hand's %g gives %g\n", name, score_part_par_name[i], exercise->par[i], solved->judged[i].measured, par);
     }
