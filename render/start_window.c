@@ -184,13 +184,16 @@ static void describe(const StartWindow *w, int row, char left[300], char right[2
     const Shelf *shelf = w->options->shelf;
     if (w->state->page == PAGE_CASES) {
         const ShelfCase *c = &shelf->cases[row];
+        char level[20] = "";
+        if (c->level)
+            snprintf(level, sizeof level, "level %d, ", c->level);
         snprintf(left, 300, "%s", c->title);
         if (c->missing[0])
-            snprintf(right, 200, "its model is not made yet");
+            snprintf(right, 200, "%sits model is not made yet", level);
         else if (c->sessions)
-            snprintf(right, 200, "best %.0f of 100, %d session%s", c->best, c->sessions, c->sessions == 1 ? "" : "s");
+            snprintf(right, 200, "%sbest %.0f of 100, %d session%s", level, c->best, c->sessions, c->sessions == 1 ? "" : "s");
         else
-            snprintf(right, 200, "new");
+            snprintf(right, 200, "%snew", level);
     } else if (w->state->page == PAGE_SESSIONS) {
         const ShelfSession *s = &shelf->session[row];
         snprintf(left, 300, "%.10s %.5s  %s", s->date, s->date + 11, s->title[0] ? s->title : "without exercise");

@@ -102,14 +102,16 @@ static void read_rules(YamlValue value, ExerciseRules *rules)
 
 void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
 {
-    static const char *const keys[] = {"title",        "instructions", "target", "tool",    "exchange",     "stays", "hold_s",
-                                       "time_limit_s", "rules",        "par",    "weights", "error_points", "mode",  NULL};
+    static const char *const keys[] = {"title",  "instructions", "level", "target", "tool",    "exchange",     "stays",
+                                       "hold_s", "time_limit_s", "rules", "par",    "weights", "error_points", "mode",  NULL};
     static const char *const mode[] = {"practice", "examination", NULL};
     *exercise = exercise_default();
     YamlMap map = yaml_map(value, keys);
     if (!map.value.node)
         return;
     read_texts(&map, exercise);
+    if (yaml_has(&map, "level"))
+        yaml_integer(yaml_get(&map, "level", false), 1, 5, &exercise->level);
     exercise->target = read_target(yaml_get(&map, "target", true), scene);
     if (yaml_has(&map, "tool") && scene->tool_count > 0)
         exercise->tool = read_name(yaml_get(&map, "tool", false), "tool", scene->tool_count, scene->tool);

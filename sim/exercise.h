@@ -5,6 +5,7 @@
 //     title: Reach the aneurysm             # required, at most 95 bytes
 //     instructions: |                       # text for the screen, at most 4000 bytes; default none
 //       Advance through the siphon …
+//     level: 2                              # difficulty, 1 (easy) to 5; default: not said
 //     target: aneurysm                      # required: the name of one of the scene's targets
 //     tool: microcatheter                   # whose tip has to reach it; default: the tool furthest in
 //     exchange: {wire: 1}                   # the target counts only while these devices are in: 0 the tool itself, 1, 2, … those of its `exchange:`; default: any
@@ -57,6 +58,7 @@ typedef struct ExerciseRules {   // limits; 0: not checked
 typedef struct Exercise {
     char title[EXERCISE_TITLE];
     char *instructions;          // "" if none; owned
+    int level;                   // 1 to 5; 0: not said
     int target;                  // index of the scene's targets; -1 in exercise_default
     int tool;                    // index of the scene's tools; -1: the tool furthest in
     int device[TOOLS_MOST];      // device of each tool that must be inserted; -1: any

@@ -31,6 +31,7 @@ static bool take_case(const char *path, const char *name, ShelfCase *out)
         snprintf(out->path, sizeof out->path, "%s", path);
         snprintf(out->title, sizeof out->title, "%.90s", scene->exercise ? scene->exercise->title : name);
         snprintf(out->text, sizeof out->text, "%.990s", scene->exercise ? scene->exercise->instructions : "");
+        out->level = scene->exercise ? scene->exercise->level : 0;
         snprintf(out->missing, sizeof out->missing, "%s", needed && access(needed, R_OK) != 0 ? needed : "");
     }
     scene_free(scene);

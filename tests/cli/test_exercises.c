@@ -72,16 +72,19 @@ static void is_solved(const char *name, const char *model, AllowedDefects left)
 
 static double errors_of(const cJSON *score, const char *kind) { return number(cJSON_GetObjectItem(cJSON_GetObjectItem(score, "errors"), kind), "count"); }
 
-// `kind`: an error that the script makes in addition to taking a wrong branch; NULL: none in particular.
-static void errs(const char *name, const char *model, const char *kind)
+// `kind`: an error that the script makes; `other`: another one, NULL: none in particular.
+static void makes(const char *name, const char *model, const char *kind, const char *other)
 {
     cJSON *score = run(name, "-errors", model);
     assert_string_equal(state_of(score), "running");
-    assert_true(errors_of(score, "wrong_branch") >= 1);
-    assert_true(!kind || errors_of(score, kind) >= 1);
+    assert_true(errors_of(score, kind) >= 1);
+    assert_true(!other || errors_of(score, other) >= 1);
     assert_true(number(score, "points") < 50);
     cJSON_Delete(score);
 }
+
+// `kind`: an error that the script makes in addition to taking a wrong branch; NULL: none in particular.
+static void errs(const char *name, const char *model, const char *kind) { makes(name, model, "wrong_branch", kind); }
 
 static void the_aneurysm_is_reached(void **state)
 {
@@ -137,6 +140,50 @@ static void the_wire_is_exchanged_for_a_stiff_one(void **state)
     errs("stiff-exchange", SOURCE_DIR "/scenes/arch/arch.h5", "tip_moved");
 }
 
+// --- cases of rising difficulty ---
+
+static void a_gentle_bend_is_followed(void **state)
+{
+    (void)state;
+    is_solved("gentle-bend", NULL, (AllowedDefects){0});
+    errs("gentle-bend", NULL, NULL);
+}
+
+static void a_branch_is_chosen_by_the_shaped_tip(void **state)
+{
+    (void)state;
+    is_solved("fork", NULL, (AllowedDefects){0});
+    errs("fork", NULL, NULL);
+}
+
+static void a_sac_is_entered_off_its_wall(void **state)
+{
+    (void)state;
+    is_solved("sac-untouched", SOURCE_DIR "/scenes/aneurism/aneurism.h5", (AllowedDefects){.limited = 5, .gained = 0.04});
+    makes("sac-untouched", SOURCE_DIR "/scenes/aneurism/aneurism.h5", "wall_force", "wire_lost");
+}
+
+static void a_winding_vessel_is_passed_wire_first(void **state)
+{
+    (void)state;
+    is_solved("tortuous", NULL, (AllowedDefects){0});
+    errs("tortuous", NULL, "wire_lost");
+}
+
+static void a_hook_turns_the_wire_into_the_other_leg(void **state)
+{
+    (void)state;
+    is_solved("cross-over", NULL, (AllowedDefects){.unconverged = 3, .gained = 0.01});
+    errs("cross-over", NULL, NULL);
+}
+
+static void the_straight_wire_is_exchanged_for_a_hooked_one(void **state)
+{
+    (void)state;
+    is_solved("wire-exchange", NULL, (AllowedDefects){.is_drawn_out = true});
+    makes("wire-exchange", NULL, "tip_force", NULL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -147,6 +194,12 @@ int main(void)
         cmocka_unit_test(the_simmons_catheter_takes_the_left_carotid),
         cmocka_unit_test(the_microcatheter_is_exchanged_over_its_wire),
         cmocka_unit_test(the_wire_is_exchanged_for_a_stiff_one),
+        cmocka_unit_test(a_gentle_bend_is_followed),
+        cmocka_unit_test(a_branch_is_chosen_by_the_shaped_tip),
+        cmocka_unit_test(a_sac_is_entered_off_its_wall),
+        cmocka_unit_test(a_winding_vessel_is_passed_wire_first),
+        cmocka_unit_test(a_hook_turns_the_wire_into_the_other_leg),
+        cmocka_unit_test(the_straight_wire_is_exchanged_for_a_hooked_one),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

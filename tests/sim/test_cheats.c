@@ -20,9 +20,9 @@
 
 enum { ALL_TIPS = SEEN_TIP * 15, XRAY_ALONE = SEEN_KNOWN | SEEN_XRAY | ALL_TIPS };
 
-// What a trainee knows in a step: whether a hand moves, how far the tools were moved since his last pulse, how far a pulse may be away, and the time.
+// What a trainee knows in a step: whether a hand moves or injects, how far the tools were moved since his last pulse, how far a pulse may be away, and the time.
 typedef struct Moment {
-    bool moves;
+    bool moves, injects;
     double since_pulse_mm, blind_mm, time_s;
 } Moment;
 
@@ -34,7 +34,7 @@ static XrayControl watching(int seen, bool pedal)
     return xray;
 }
 
-static XrayControl honest(const Moment *now) { return watching(XRAY_ALONE, now->moves); }
+static XrayControl honest(const Moment *now) { return watching(XRAY_ALONE, now->moves || now->injects); }
 static XrayControl in_one_go(const Moment *now)
 {
     (void)now;
@@ -81,7 +81,7 @@ static XrayControl with_rare_pulses(const Moment *now)
 }
 
 // Watches the X-ray image of each movement, with the 3D view and angioscopy beside it as the window begins in practice.
-static XrayControl with_all_views(const Moment *now) { return watching(XRAY_ALONE | SEEN_3D | SEEN_ANGIOSCOPY, now->moves); }
+static XrayControl with_all_views(const Moment *now) { return watching(XRAY_ALONE | SEEN_3D | SEEN_ANGIOSCOPY, now->moves || now->injects); }
 
 // The honest one must lead by so many points.
 static const struct {
@@ -111,7 +111,7 @@ static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, Sc
     int cursor = 0, steps = (int)(script_duration_s(scene->script) * 1000 / scene->dt);
     for (int step = 0; step < steps; step++) {
         const ToolCommands commands = script_tools_at(scene->script, (step + 0.5) * scene->dt / 1000, &cursor);
-        Moment now = {.blind_mm = scene->exercise->rules.blind_mm, .time_s = step * scene->dt / 1000};
+        Moment now = {.injects = commands.contrast_ml_s > 0, .blind_mm = scene->exercise->rules.blind_mm, .time_s = step * scene->dt / 1000};
         double speed = 0;
         for (int k = 0; k < scene->tool_count; k++) {
             speed = fmax(speed, fabs(commands.tool[k].push_mm_s));
@@ -120,7 +120,8 @@ static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, Sc
         simulator_step(simulator, &commands);
         for (int i = 0; i < TRAINEES; i++) {
             now.since_pulse_mm = since_pulse[i] += speed * scene->dt / 1000;
-            const XrayControl xray = trainee[i].watch(&now);
+            XrayControl xray = trainee[i].watch(&now);
+            xray.contrast_ml_s = (float)commands.contrast_ml_s;
             since_pulse[i] = xray.pedal > 0 ? 0 : since_pulse[i];
             score_step(score[i], simulator, &commands, &xray);
         }
@@ -130,6 +131,20 @@ static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, Sc
         score_free(score[i]);
     }
     simulator_destroy(simulator);
+}
+
+// The par values of an exercise with a level follow from the hand that solves it and watches the X-ray image: so many times its figure, rounded up to a whole
+// number of steps.
+static void pars_follow(const char *name, const Exercise *exercise, const ScoreFigures *solved)
+{
+    static const double times[PART_COUNT] = {2, 2, 1.5, 1.25, 1.5, 2, 0, 0}, step[PART_COUNT] = {5, 5, 1, 0.1, 0.1, 0.5, 0, 0};
+    int wrong = exercise->par[PART_BLIND] != 0.5 * exercise->rules.blind_mm || exercise->par[PART_GUIDANCE] != 2;
+    for (int i = 0; i <= PART_WALL_IMPULSE; i++) {
+        const double par = ceil(times[i] * solved->judged[i].measured / step[i] - 1e-6) * step[i];
+        if (fabs(par - exercise->par[i]) > 1e-9)
+            wrong++, print_error("%s: %s is %g, the solving hand's %g gives %g\n", name, score_part_par_name[i], exercise->par[i], solved->judged[i].measured, par);
+    }
+    assert_int_equal(wrong, 0);
 }
 
 static void looking_pays(const char *name, const char *model)
@@ -149,6 +164,8 @@ static void looking_pays(const char *name, const char *model)
     if (!scene || !open_vessel(scene, &(OpenVesselOptions){0}, &open, &faults) || !open_vessel_inlet(scene, &open, &faults))
         fail_msg("%s", faults.text[0]);
     drive(scene, &open, &faults, figures);
+    if (scene->exercise->level)
+        pars_follow(name, scene->exercise, &figures[0]);
     open_vessel_close(&open);
     scene_free(scene);
     int wrong = 0;
@@ -205,12 +222,50 @@ static void with_a_stiff_wire(void **state)
     looking_pays("stiff-exchange", SOURCE_DIR "/scenes/arch/arch.h5");
 }
 
+static void round_a_gentle_bend(void **state)
+{
+    (void)state;
+    looking_pays("gentle-bend", NULL);
+}
+
+static void into_a_branch(void **state)
+{
+    (void)state;
+    looking_pays("fork", NULL);
+}
+
+static void into_a_sac_off_its_wall(void **state)
+{
+    (void)state;
+    looking_pays("sac-untouched", SOURCE_DIR "/scenes/aneurism/aneurism.h5");
+}
+
+static void through_a_winding_vessel(void **state)
+{
+    (void)state;
+    looking_pays("tortuous", NULL);
+}
+
+static void over_the_fork_into_the_other_leg(void **state)
+{
+    (void)state;
+    looking_pays("cross-over", NULL);
+}
+
+static void with_another_wire(void **state)
+{
+    (void)state;
+    looking_pays("wire-exchange", NULL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(in_the_aneurysm),     cmocka_unit_test(with_a_microcatheter),          cmocka_unit_test(over_the_wire),
         cmocka_unit_test(in_the_left_carotid), cmocka_unit_test(in_the_middle_cerebral_artery), cmocka_unit_test(with_a_simmons_catheter),
-        cmocka_unit_test(with_a_stiff_wire),
+        cmocka_unit_test(with_a_stiff_wire),   cmocka_unit_test(round_a_gentle_bend),           cmocka_unit_test(into_a_branch),
+        cmocka_unit_test(into_a_sac_off_its_wall), cmocka_unit_test(through_a_winding_vessel),  cmocka_unit_test(over_the_fork_into_the_other_leg),
+        cmocka_unit_test(with_another_wire),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,7 +22,7 @@ static void an_exercise_is_read(void **state)
 {
     (void)state;
     Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, "
-                                                      "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7, mode: examination"),
+                                                      "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7, level: 4, mode: examination"),
                                  NULL);
     const Exercise *e = p->scene->exercise;
     assert_string_equal(e->title, "Go there");
@@ -39,6 +39,8 @@ static void an_exercise_is_read(void **state)
     assert_near(e->weight[PART_PATH], 3, 0);
     assert_near(e->weight[PART_TIME], 1, 0);
     assert_near(e->error_points, 7, 0);
+    assert_int_equal(e->level, 4);
+    assert_int_equal(exercise_default().level, 0);
     assert_true(e->is_examination && !exercise_default().is_examination);
     practice_end(p);
 }
@@ -95,6 +97,8 @@ static void a_wrong_exercise_is_refused(void **state)
         {IN_THE_OPEN EXERCISE(", weights: {path: -1}"), "out of range"},
         {IN_THE_OPEN EXERCISE(", error_points: 101"), "out of range"},
         {IN_THE_OPEN EXERCISE(", mode: exam"), "practice, examination"},
+        {IN_THE_OPEN EXERCISE(", level: 0"), "1 to 5"},
+        {IN_THE_OPEN EXERCISE(", level: 6"), "1 to 5"},
         {IN_THE_OPEN EXERCISE(", colour: red"), "expected title"},
         {IN_THE_OPEN "fluoroscopy: {volumes: a}\n", "'volume'"},
         {IN_THE_OPEN "fluoroscopy: {anterior: [0, 1, 0]}\n", "together give"},

@@ -34,7 +34,7 @@ static void the_best_of_two_sessions(void **state)
     static const char scene_text[] =
         "seldinger: 1\nvessel: {shape: {name: capsule}}\nwire: {sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
         "sheath: {inlet: root}\ntargets: [{name: end, point_mm: [0, 0, 2], radius_mm: 1}]\n"
-        "exercise: {title: Reach the end, instructions: Push., target: end}\n";
+        "exercise: {title: Reach the end, instructions: Push., level: 3, target: end}\n";
     static const char no_exercise[] =
         "seldinger: 1\nvessel: {model: nosuch.h5}\nwire: {sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
         "sheath: {inlet: root}\n";
@@ -61,6 +61,8 @@ static void the_best_of_two_sessions(void **state)
     assert_non_null(strstr(shelf.cases[0].missing, "nosuch.h5"));
     assert_string_equal(shelf.cases[1].title, "Reach the end");
     assert_string_equal(shelf.cases[1].text, "Push.");
+    assert_int_equal(shelf.cases[0].level, 0);
+    assert_int_equal(shelf.cases[1].level, 3);
     assert_string_equal(shelf.cases[1].missing, "");
     assert_int_equal(shelf.cases[1].sessions, 2);
     assert_true(shelf.cases[1].best == 61 && shelf.cases[0].sessions == 0);
