@@ -28,9 +28,9 @@ double anatomy_along(const Anatomy *anatomy, Vec3 source, Vec3 direction);
 
 // What the display makes of it. A range of attenuations from air to the base of the skull, 0 to 7, is more than a screen can show: as in angiography systems the
 // differences from the mean are reduced, those of brighter places more and more, so that the edges of soft tissue are not burnt out.
-#define SHOWN_SLOPE 0.45
-#define SHOWN_SHIFT 0.35         // so much darker than a picture without anatomy
-#define SHOWN_BRIGHTEST 0.85     // at most so much brighter than the mean
+#define SHOWN_SLOPE 0.6
+#define SHOWN_SHIFT 0.6          // so much darker than a picture without anatomy
+#define SHOWN_BRIGHTEST 1.3      // at most so much brighter than the mean
 double anatomy_shown(double attenuation, double mean);
 
 // The solids as seen from one position of the C-arm: a rectangle for each, two triangles of the picture's square from 0 to 1, with the numbers from which a pixel

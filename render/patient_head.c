@@ -64,9 +64,9 @@ static void add_vault(Body *body)
                         base_offset);
     }
     // the squama of the occiput below it, with the foramen magnum
-    const Vec3 bowl = {0, -57, -18};
+    const Vec3 bowl = {0, -50, -16};
     for (int k = 0; k < 2; k++) {
-        BodyShape *shape = solid(body, bowl, k ? vec3(50, 50, 31) : vec3(54, 55, 35), k ? -0.8 * ADDED_BONE : 0.8 * ADDED_BONE);
+        BodyShape *shape = solid(body, bowl, k ? vec3(53, 45, 31) : vec3(56, 48.5, 34.5), k ? -0.7 * ADDED_BONE : 0.7 * ADDED_BONE);
         body_shape_clip(shape, 0, vec3_negate(base_normal), -base_offset);
         body_shape_clip(shape, 1, vec3(0, 1, 0), -30);
     }
@@ -102,8 +102,8 @@ static void add_suture(Body *body, int count, const Vec3 *key, double amplitude)
             if (k < teeth)
                 at = vec3_add_scaled(at, k % 2 ? amplitude : -amplitude, aside);
             const Vec3 piece[2] = {last, at};
-            BodyTube seam = plain_tube(outward, 0.5 * (ATTENUATION_SOFT - ATTENUATION_BONE));
-            even_tube(body, &seam, 2, piece, 2.6, 0.45);
+            BodyTube seam = plain_tube(outward, 0.8 * (ATTENUATION_SOFT - ATTENUATION_BONE));
+            even_tube(body, &seam, 2, piece, 2.6, 0.6);
             last = at;
         }
     }
@@ -180,7 +180,7 @@ static void add_temporal_bone(Body *body)
 {
     const Vec3 pyramid[] = {{11, -12, -15}, {28, -23, -17}, {45, -34, -19}, {58, -42, -22}};
     const TubeSize size[4] = {{5, 5}, {8, 8}, {11, 10}, {12, 10}};
-    body_add_tube(body, &(BodyTube){.width = {0, 0, 1}, .hollow = 0.8, .wall = ADDED_BONE, .filling = 0.35 * ADDED_BONE}, COUNT(pyramid), pyramid, size);
+    body_add_tube(body, &(BodyTube){.width = {0, 0, 1}, .hollow = 0.8, .wall = ADDED_BONE, .filling = 0.15 * ADDED_BONE}, COUNT(pyramid), pyramid, size);
     const Vec3 ridge[] = {{12, -12, -9}, {28, -22, -8}, {45, -33, -7.5}, {58, -41, -10}};
     BodyTube crest = plain_tube(vec3(0, 0, 0), ADDED_BONE);
     even_tube(body, &crest, COUNT(ridge), ridge, 1.5, 1.5);
@@ -191,9 +191,9 @@ static void add_temporal_bone(Body *body)
     rod(body, vec3(40, -18, -21), vec3(66, -18, -22), 3.4, ADDED_AIR);
     solid(body, vec3(39, -19, -20), vec3(3, 5, 6), ADDED_AIR - 0.3 * ADDED_BONE);
     // the mastoid and its cells
-    solid(body, vec3(55, -40, -32), vec3(9, 13, 19), 0.35 * ADDED_BONE);
+    solid(body, vec3(55, -40, -32), vec3(9, 13, 19), 0.2 * ADDED_BONE);
     Random random = {815};
-    for (int i = 0; i < 45; i++) {
+    for (int i = 0; i < 70; i++) {
         Vec3 u = vec3(random_within(&random, -1, 1), random_within(&random, -1, 1), random_within(&random, -1, 1));
         double size_mm = random_within(&random, 1.2, 3);
         if (vec3_norm(u) < 1)

@@ -16,7 +16,7 @@ static void even_tube(Body *body, const BodyTube *tube, int count, const Vec3 *p
     body_add_tube(body, tube, count, point, semi);
 }
 
-static const BodyTube bone = {.hollow = 0.68, .wall = ADDED_BONE, .filling = ADDED_SPONGY};
+static const BodyTube bone = {.hollow = 0.6, .wall = ADDED_BONE, .filling = ADDED_SPONGY};
 
 static BodyTube bone_of(Vec3 width)
 {
@@ -45,8 +45,9 @@ static void add_rib(Body *body, int number)
     double high = number == 0 ? 8 : number > 9 ? 5 : 6.5;
     // the first rib lies flat
     BodyTube rib = bone_of(number == 0 ? vec3(0.8, 0.6, 0) : vec3(0, 0, 1));
-    rib.hollow = 0.72;
-    even_tube(body, &rib, PIECES + 1, point, high, 3.4);
+    rib.hollow = 0.5;
+    rib.filling = 2 * ADDED_SPONGY;
+    even_tube(body, &rib, PIECES + 1, point, high, 4);
 }
 
 static void add_shoulder(Body *body)
@@ -115,11 +116,11 @@ static void add_vessels(Body *body, Random *random, Vec3 from, Vec3 towards, dou
 static void add_lung(Body *body, int side)
 {
     double bottom = floor_z[side > 0];
-    Vec3 center = {side * 79, -24, -392}, semi = {57, 86, 203};
+    Vec3 center = {side * 75, -24, -335}, semi = {62, 88, 150};
     body_shape_clip(solid(body, center, semi, aerated), 0, vec3(0, 0, -1), -bottom);
     // the dome of the diaphragm
     double high = side > 0 ? 44 : 40;
-    body_shape_clip(solid(body, vec3(side * 77, -20, bottom), vec3(55.5, 82, high), -aerated), 0, vec3(0, 0, -1), -bottom);
+    body_shape_clip(solid(body, vec3(side * 75, -24, bottom), vec3(54.5, 77, high), -aerated), 0, vec3(0, 0, -1), -bottom);
     Random random = {side > 0 ? 31 : 37};
     const Vec3 root = {side * 34, -30, side > 0 ? -286 : -278};
     const Vec3 way[] = {{0.35, 0.1, 0.93}, {0.75, 0.45, 0.4}, {0.8, -0.45, -0.1}, {0.6, 0.4, -0.7}, {0.35, -0.45, -0.82}};
@@ -133,14 +134,14 @@ static void add_heart(Body *body)
 {
     Quat turn = quat_from_rotation_vector(vec3(0, 0.62, 0.35));
     BodyEllipsoid heart = {{-26, 14, -340}, {70, 48, 50}, turn, -aerated};
-    body_shape_clip(body_add_ellipsoid(body, &heart), 0, vec3(1, 0, 0), -24);
-    body_shape_clip(solid(body, vec3(14, 10, -330), vec3(36, 44, 52), -aerated), 0, vec3(-1, 0, 0), -24);
-    body_shape_clip(solid(body, vec3(-24, -36, -248), vec3(17, 26, 17), -aerated), 0, vec3(1, 0, 0), -22);       // aortic knuckle
-    body_shape_clip(solid(body, vec3(-22, 4, -285), vec3(20, 26, 22), -aerated), 0, vec3(1, 0, 0), -24);         // pulmonary trunk
+    body_shape_clip(body_add_ellipsoid(body, &heart), 0, vec3(1, 0, 0), -13);
+    body_shape_clip(solid(body, vec3(14, 10, -330), vec3(36, 44, 52), -aerated), 0, vec3(-1, 0, 0), -13);
+    body_shape_clip(solid(body, vec3(-24, -36, -248), vec3(17, 26, 17), -aerated), 0, vec3(1, 0, 0), -13);       // aortic knuckle
+    body_shape_clip(solid(body, vec3(-22, 4, -285), vec3(20, 26, 22), -aerated), 0, vec3(1, 0, 0), -13);         // pulmonary trunk
     const Vec3 descending[] = {{-22, -50, -255}, {-26, -56, -310}, {-22, -52, -395}};
     BodyTube aorta = {.wall = -0.6 * aerated, .filling = -0.6 * aerated};
     even_tube(body, &aorta, COUNT(descending), descending, 12, 12);
-    body_shape_clip(solid(body, vec3(20, 4, -250), vec3(15, 16, 60), -aerated), 0, vec3(-1, 0, 0), -22);         // superior vena cava
+    body_shape_clip(solid(body, vec3(20, 4, -250), vec3(15, 16, 60), -aerated), 0, vec3(-1, 0, 0), -13);         // superior vena cava
     // trachea and main bronchi
     const Vec3 trachea[] = {{0, -6, -168}, {0, -18, -205}, {1, -34, -262}}, right[] = {{1, -34, -260}, {20, -36, -280}, {34, -34, -292}},
                left[] = {{1, -34, -260}, {-26, -38, -280}, {-44, -36, -290}};
@@ -160,14 +161,14 @@ static void add_trunk(Body *body)
     body_shape_clip(shoulders, 0, vec3(0, 0, 1), -186);
     body_shape_clip(shoulders, 1, vec3(0, 0, -1), 246);
     // [mm] z, y of the middle, half width, half depth: drawn in slices, so that the outline has no steps
-    static const double key[6][4] = {{-246, -32, 172, 104}, {-330, -30, 166, 110}, {-420, -28, 158, 110},
-                                     {-520, -26, 150, 104}, {-610, -28, 168, 104}, {-720, -30, 172, 104}};
-    enum { SLICES = 6 };
-    Vec3 axis[5 * SLICES + 1];
-    TubeSize size[5 * SLICES + 1];
-    for (int i = 0; i <= 5 * SLICES; i++) {
-        const double *a = key[i < 5 * SLICES ? i / SLICES : 4], *b = key[i < 5 * SLICES ? i / SLICES + 1 : 5];
-        double u = i < 5 * SLICES ? (double)(i % SLICES) / SLICES : 1;
+    static const double key[][4] = {{-246, -34, 194, 102}, {-290, -31, 168, 106}, {-340, -30, 165, 110}, {-420, -28, 158, 110},
+                                    {-520, -26, 150, 104}, {-610, -28, 168, 104}, {-720, -30, 172, 104}};
+    enum { KEYS = COUNT(key), SLICES = 6, PIECES = (KEYS - 1) * SLICES };
+    Vec3 axis[PIECES + 1];
+    TubeSize size[PIECES + 1];
+    for (int i = 0; i <= PIECES; i++) {
+        const double *a = key[i < PIECES ? i / SLICES : KEYS - 2], *b = key[i < PIECES ? i / SLICES + 1 : KEYS - 1];
+        double u = i < PIECES ? (double)(i % SLICES) / SLICES : 1;
         axis[i] = vec3(0, a[1] + u * (b[1] - a[1]), a[0] + u * (b[0] - a[0]));
         size[i] = (TubeSize){a[2] + u * (b[2] - a[2]), a[3] + u * (b[3] - a[3])};
     }
