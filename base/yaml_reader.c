@@ -436,7 +436,7 @@ int yaml_choice(YamlValue value, const char *const *names)
     for (int i = 0; names[i]; i++)
         if (!strcmp(names[i], text))
             return i;
-    char all[200];
+    char all[400];
     list_names(names, all, sizeof all);
     yaml_fault(value, "'%s' is '%.40s'; expected one of: %s", value.name, text, all);
     return -1;

@@ -4,6 +4,7 @@
 #define SELDINGER_GEOM_GEOM_H
 
 #include "geom/linear.h"
+#include "geom/similarity.h"
 #include "geom/random.h"
 
 // trees of nodes, with or without a model of the wall

@@ -184,6 +184,7 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     f->options.anatomy_value = NULL;
     f->tone.contrast = options->contrast_attenuation;
     f->tone.gain = options->dsa_gain;
+    f->tone.exposure = log(median_transmission);
     fluoroscope_forget(f);
     return f;
 }
@@ -193,6 +194,7 @@ void fluoroscope_destroy(Fluoroscope *f)
     if (!f)
         return;
     anatomy_free(&f->anatomy);
+    shape_shadows_free(&f->shadows);
     lumen_layer_destroy(&f->lumen);
     layers_destroy(&f->programs);
     Layer *layer[11] = {&f->anatomy_layer, &f->anatomy_next,  &f->lumen_layer,  &f->roadmap_layer, &f->mask,           &f->still.bare,
@@ -256,22 +258,22 @@ static bool c_arms_differ(const CArm *a, const CArm *b, double least_mm)
 }
 
 // The mean attenuation in the beam, from rays between the blades, which the automatic exposure compensates.
-static double find_exposure(const Fluoroscope *f, const CArm *c_arm)
+static double find_mean(const Fluoroscope *f, const CArm *c_arm)
 {
     double sum = 0;
     int count = 0;
     for (int j = -4; j <= 4; j++)
         for (int i = -4; i <= 4; i++) {
             double a = anatomy_along(&f->anatomy, c_arm_source(c_arm), c_arm_ray(c_arm, i * 0.11, j * 0.11));
-            if (a > 0.02) {
+            if (a > 0.1) {
                 sum += a;
                 count++;
             }
         }
-    return (count > 0 ? fmin(sum / count, 6) : 0) + log(median_transmission);
+    return count > 0 ? sum / count : 0;
 }
 
-static bool has_anatomy(const Fluoroscope *f) { return f->anatomy.level || f->anatomy.ellipsoid_count > 0; }
+static bool has_anatomy(const Fluoroscope *f) { return f->anatomy.level || f->anatomy.body.count > 0; }
 
 enum { ANATOMY_STRIPS = 4 };
 
@@ -280,7 +282,7 @@ static void draw_coarse_anatomy(Fluoroscope *f, const CArm *c_arm)
     int side = f->anatomy.level ? 96 : 160;
     f->anatomy_rows = 0;
     if (has_anatomy(f) && layer_fit(&f->anatomy_layer, side, LAYER_R32F))
-        layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
+        layers_draw_anatomy(&f->programs, &f->anatomy, &f->shadows, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
 }
 
 // Draws the next strip of the fine anatomy, or all the rest. Returns true if it is complete and in use.
@@ -289,7 +291,7 @@ static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
     int side = f->anatomy.level ? 256 : 384, rows = at_once ? side - f->anatomy_rows : side / ANATOMY_STRIPS;
     if (!has_anatomy(f) || !layer_fit(&f->anatomy_next, side, LAYER_R32F))
         return true;
-    layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_next, f->anatomy_rows, rows, ANATOMY_GRID);
+    layers_draw_anatomy(&f->programs, &f->anatomy, &f->shadows, c_arm, &f->anatomy_next, f->anatomy_rows, rows, ANATOMY_GRID);
     f->anatomy_rows += rows;
     if (f->anatomy_rows < side)
         return false;
@@ -338,7 +340,9 @@ static LayerChanges update_layers(Fluoroscope *f, const Exposure *exposure, bool
     f->c_arm = c_arm;
     f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
     if (moved) {
-        f->tone.exposure = find_exposure(f, &c_arm);
+        f->tone.mean = find_mean(f, &c_arm);
+        if (!shape_shadows_cast(&f->shadows, &f->anatomy, &c_arm))
+            f->shadows.count = 0;
         f->anatomy_rows = 0;
     }
     if (moved && !at_once)

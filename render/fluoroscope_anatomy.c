@@ -1,8 +1,7 @@
-// The attenuation is chosen for appearance (docs/design.md, "X-ray attenuation"): 0.0045 / mm soft tissue, 0.028 / mm bone, a fifth and a half of the
-// physical values, so that the range of the picture is not exceeded without a window level set by a physician.
-//   CT numbers H: 0.0045 (1 + H / 1000) up to 150, then linear up to 0.028 at 1000 HU.
-//   other volumes (angiograms, mostly cut off at 0): linear from 0 at their minimum to 0.028 at their maximum; shown in a simple head, as they contain no
-//   tissue.
+// Attenuations are physical (render/patient_body.h).
+//   CT numbers H: that of water (1 + H / 1000) up to 150, then linear up to cortical bone at 1500 HU.
+//   other volumes (angiograms, mostly cut off at 0): linear from 0 at their minimum to bone at their maximum; shown in the patient made of solids, as they
+//   contain no tissue.
 #include "render/fluoroscope_anatomy.h"
 
 #include "render/message.h"
@@ -10,62 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double soft = 0.0045, bone = 0.028;
-
-// --- simple bodies ---
-
-static void add_ellipsoid(Anatomy *anatomy, Vec3 center, Vec3 semi, double attenuation)
-{
-    if (anatomy->ellipsoid_count < ELLIPSOIDS_MOST)
-        anatomy->ellipsoid[anatomy->ellipsoid_count++] = (Ellipsoid){center, semi, attenuation};
-}
-
-static void add_shell(Anatomy *anatomy, Vec3 center, Vec3 semi, double thickness, double attenuation)
-{
-    add_ellipsoid(anatomy, center, semi, attenuation);
-    add_ellipsoid(anatomy, center, vec3(semi.x - thickness, semi.y - thickness, semi.z - thickness), -attenuation);
-}
-
-static void add_head(Anatomy *anatomy)
-{
-    add_ellipsoid(anatomy, vec3(0, 0, 0), vec3(78, 98, 116), soft);
-    add_shell(anatomy, vec3(0, 0, 0), vec3(72, 92, 110), 5.5, bone);
-    for (int side = -1; side <= 1; side += 2) {
-        add_shell(anatomy, vec3(side * 32, 64, -14), vec3(20, 22, 18), 1.6, 0.6 * bone);   // orbits
-        add_ellipsoid(anatomy, vec3(side * 36, -12, -36), vec3(25, 11, 9), 0.3 * bone);    // petrous bones
-        add_shell(anatomy, vec3(side * 24, 56, -50), vec3(15, 17, 18), 1.2, 0.5 * bone);   // maxillary sinuses
-    }
-    add_ellipsoid(anatomy, vec3(0, 82, 22), vec3(22, 7, 14), -soft);                       // frontal sinus
-    add_ellipsoid(anatomy, vec3(0, 30, -30), vec3(14, 22, 9), -soft);                      // sphenoid sinus
-    add_shell(anatomy, vec3(0, -28, -96), vec3(22, 20, 30), 3, 0.5 * bone);                // first vertebrae of the neck
-}
-
-static void add_trunk(Anatomy *anatomy, Vec3 half)
-{
-    Vec3 semi = {fmax(170, half.x), fmax(115, half.y), fmax(260, half.z)};
-    add_ellipsoid(anatomy, vec3(0, 0, 0), semi, 0.6 * soft);
-    double behind = -0.45 * semi.y;
-    for (int side = -1; side <= 1; side += 2)
-        add_ellipsoid(anatomy, vec3(side * 0.5 * semi.x, 0.1 * semi.y, 0), vec3(0.32 * semi.x, 0.6 * semi.y, 0.5 * semi.z), -0.4 * soft);   // lungs
-    for (int k = -7; k <= 7; k++)
-        add_shell(anatomy, vec3(0, behind, 29.0 * k), vec3(20, 16, 12.5), 2, 0.45 * bone);
-}
-
-// Placed in the middle of the visible region, with half widths `half`, along the patient's axes.
-static void add_plain_body(Anatomy *anatomy, Vec3 half)
-{
-    if (half.x < 66 && half.y < 86 && half.z < 104)
-        add_head(anatomy);
-    else
-        add_trunk(anatomy, vec3_scale(half, 1.1));
-}
-
 // --- the volume ---
 
 static double tissue_of(double value, double least, double greatest)
 {
+    const double water = ATTENUATION_WATER, bone = ATTENUATION_BONE;
     if (least < -200)
-        return value < 150 ? fmax(soft * (1 + value / 1000), 0) : fmin(soft * 1.15 + (bone - soft * 1.15) * (value - 150) / 850, bone);
+        return value < 150 ? fmax(water * (1 + value / 1000), 0) : fmin(water * 1.15 + (bone - water * 1.15) * (value - 150) / 1350, bone);
     return greatest > least ? bone * (value - least) / (greatest - least) : 0;
 }
 
@@ -171,7 +121,7 @@ static void lay_grid(Anatomy *anatomy, const FluoroscopeOptions *options, const 
 static void fill_grid(Anatomy *anatomy, const FluoroscopeOptions *options, const int part[3], const uint8_t *inside, double least, double greatest)
 {
     const int *n = options->anatomy_size;
-    const double filling = least < -200 ? soft : 0;
+    const double filling = least < -200 ? ATTENUATION_SOFT : 0;
     size_t at = 0;
     for (int k = 0; k < anatomy->size[2]; k++)
         for (int j = 0; j < anatomy->size[1]; j++)
@@ -205,7 +155,7 @@ static bool take_volume(Anatomy *anatomy, const FluoroscopeOptions *options, con
         greatest = fmax(greatest, value);
     }
     lay_grid(anatomy, options, part);
-    anatomy->most = bone;
+    anatomy->most = ATTENUATION_BONE;
     size_t cells = (size_t)anatomy->size[0] * (size_t)anatomy->size[1] * (size_t)anatomy->size[2];
     uint8_t *inside = calloc(cells, 1);
     anatomy->level = malloc(cells);
@@ -215,16 +165,15 @@ static bool take_volume(Anatomy *anatomy, const FluoroscopeOptions *options, con
     free(inside);
     if (!good)
         return message_fail(message, capacity, "out of memory for the volume behind the vessel");
-    if (least >= -200)
-        add_head(anatomy);
+    anatomy->has_tissue = least < -200;
     return true;
 }
 
 // --- both ---
 
-static void find_middle(Anatomy *anatomy, const FluoroscopeOptions *options, Vec3 *half)
+static Vec3 find_middle(const FluoroscopeOptions *options, Vec3 *half)
 {
-    const Vec3 axis[3] = {anatomy->axes.right, anatomy->axes.anterior, anatomy->axes.superior};
+    const Vec3 axis[3] = {options->patient.right, options->patient.anterior, options->patient.superior};
     const TriangleMesh *mesh = options->vessel;
     double low[3] = {0}, high[3] = {0};
     for (int v = 0; mesh && v < mesh->vertex_count; v++)
@@ -233,28 +182,42 @@ static void find_middle(Anatomy *anatomy, const FluoroscopeOptions *options, Vec
             low[k] = v == 0 ? at : fmin(low[k], at);
             high[k] = v == 0 ? at : fmax(high[k], at);
         }
-    anatomy->middle = vec3(0, 0, 0);
+    Vec3 middle = {0};
     for (int k = 0; k < 3; k++)
-        anatomy->middle = vec3_add_scaled(anatomy->middle, (low[k] + high[k]) / 2, axis[k]);
+        middle = vec3_add_scaled(middle, (low[k] + high[k]) / 2, axis[k]);
     *half = vec3((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2);
+    return middle;
+}
+
+// Without landmarks the middle of the vessel is at the middle of its segment; a vessel of unknown name is one of the head if it fits into it, else the aorta.
+static Similarity place_body(const FluoroscopeOptions *options)
+{
+    if (options->has_place)
+        return options->place;
+    Vec3 half, middle = find_middle(options, &half);
+    bool fits_head = half.x < 66 && half.y < 86 && half.z < 104;
+    Vec3 at = options->segment > 0 ? patient_segment[options->segment - 1].middle : fits_head ? vec3(0, 0, 8) : vec3(-4, -40, -330);
+    Similarity place = {.turn = mat3_from_columns(options->patient.right, options->patient.anterior, options->patient.superior), .scale = 1};
+    place.shift = vec3_sub(middle, mat3_mul_vec(&place.turn, at));
+    return place;
 }
 
 bool anatomy_create(Anatomy *anatomy, const FluoroscopeOptions *options, const MeshLids *lids, char *message, size_t capacity)
 {
-    *anatomy = (Anatomy){.axes = options->patient};
-    Vec3 half;
-    find_middle(anatomy, options, &half);
+    *anatomy = (Anatomy){.place = place_body(options)};
     if (options->has_no_anatomy)
         return true;
-    if (options->anatomy_value)
-        return take_volume(anatomy, options, lids, message, capacity);
-    add_plain_body(anatomy, half);
+    if (options->anatomy_value && !take_volume(anatomy, options, lids, message, capacity))
+        return false;
+    if (!anatomy->has_tissue && !body_add_patient(&anatomy->body))
+        return message_fail(message, capacity, "out of memory for the patient around the vessel");
     return true;
 }
 
 void anatomy_free(Anatomy *anatomy)
 {
     free(anatomy->level);
+    body_free(&anatomy->body);
     *anatomy = (Anatomy){0};
 }
 
@@ -295,19 +258,107 @@ static double volume_along(const Anatomy *anatomy, Vec3 source, Vec3 direction)
     return sum * (out - in) / steps;
 }
 
+// A ray in the body's frame. Attenuations are per millimetre of the model, so that the direction is of unit length in it.
+static Vec3 into_body(const Similarity *place, Vec3 direction)
+{
+    Mat3 back = mat3_transpose(&place->turn);
+    return mat3_mul_vec(&back, vec3_scale(direction, 1 / place->scale));
+}
+
 double anatomy_along(const Anatomy *anatomy, Vec3 source, Vec3 direction)
 {
-    Vec3 from = vec3_sub(source, anatomy->middle);
-    const PatientAxes *axes = &anatomy->axes;
-    Vec3 o = {vec3_dot(axes->right, from), vec3_dot(axes->anterior, from), vec3_dot(axes->superior, from)};
-    Vec3 d = {vec3_dot(axes->right, direction), vec3_dot(axes->anterior, direction), vec3_dot(axes->superior, direction)};
-    double sum = anatomy->level ? volume_along(anatomy, source, direction) : 0;
-    for (int i = 0; i < anatomy->ellipsoid_count; i++) {
-        const Ellipsoid *e = &anatomy->ellipsoid[i];
-        Vec3 p = vec3_sub(o, e->center), v = {d.x / e->semi.x, d.y / e->semi.y, d.z / e->semi.z};
-        p = vec3(p.x / e->semi.x, p.y / e->semi.y, p.z / e->semi.z);
-        double a = vec3_norm2(v), b = vec3_dot(p, v), c = vec3_norm2(p) - 1, root = b * b - a * c;
-        sum += root > 0 ? e->attenuation * 2 * sqrt(root) / a : 0;
+    Vec3 o = into_body(&anatomy->place, vec3_sub(source, anatomy->place.shift)), d = into_body(&anatomy->place, direction);
+    double sum = anatomy->level ? volume_along(anatomy, source, direction) : 0, square = vec3_norm2(d);
+    for (int i = 0; i < anatomy->body.count; i++) {
+        const BodyShape *shape = &anatomy->body.shape[i];
+        Vec3 off = vec3_cross(vec3_sub(shape->center, o), d);
+        double reach = vec3_norm2(shape->reach[0]) + vec3_norm2(shape->reach[1]) + vec3_norm2(shape->reach[2]);
+        if (vec3_norm2(off) < reach * square)
+            sum += body_shape_along(shape, o, d);
     }
     return fmax(sum, 0);
+}
+
+// --- shadows ---
+
+// The square of the picture, 0 to 1 each way, that the box of a shape covers; false if none.
+static bool find_box(const BodyShape *shape, const Vec3 axis[3], Vec3 isocentre, double half_field, double distance, float box[4])
+{
+    double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
+    int behind = 0;
+    for (int corner = 0; corner < 8; corner++) {
+        Vec3 p = vec3_sub(shape->center, isocentre);
+        for (int k = 0; k < 3; k++)
+            p = vec3_add_scaled(p, corner >> k & 1 ? 1 : -1, shape->reach[k]);
+        double depth = vec3_dot(p, axis[2]) + distance;
+        behind += depth < 0.01 * distance;
+        for (int k = 0; k < 2; k++) {
+            double at = vec3_dot(p, axis[k]) * distance / (depth * 2 * half_field) + 0.5;
+            low[k] = fmin(low[k], at);
+            high[k] = fmax(high[k], at);
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        box[k] = behind ? 0 : (float)fmax(low[k], 0);
+        box[2 + k] = behind ? 1 : (float)fmin(high[k], 1);
+    }
+    return behind < 8 && box[0] < box[2] && box[1] < box[3];
+}
+
+static void put_vec3(float *at, Vec3 v) { at[0] = (float)v.x, at[1] = (float)v.y, at[2] = (float)v.z; }
+
+bool shape_shadows_cast(ShapeShadows *shadows, const Anatomy *anatomy, const CArm *c_arm)
+{
+    const Body *body = &anatomy->body;
+    const Similarity *place = &anatomy->place;
+    shadows->count = 0;
+    if (shadows->capacity < body->count) {
+        ShadowVertex *more = realloc(shadows->vertex, (size_t)body->count * SHADOW_VERTICES * sizeof *more);
+        if (!more)
+            return false;
+        shadows->vertex = more;
+        shadows->capacity = body->count;
+    }
+    Vec3 source = into_body(place, vec3_sub(c_arm_source(c_arm), place->shift)), isocentre = into_body(place, vec3_sub(c_arm->isocentre, place->shift));
+    Vec3 ray[3] = {vec3_scale(c_arm->towards, C_ARM_SOURCE_MM), vec3_scale(c_arm->right, c_arm->field_mm), vec3_scale(c_arm->up, c_arm->field_mm)};
+    for (int k = 0; k < 3; k++)
+        ray[k] = into_body(place, ray[k]);
+    const Vec3 axis[3] = {vec3_unit(ray[1]), vec3_unit(ray[2]), vec3_unit(ray[0])};
+    for (int i = 0; i < body->count; i++) {
+        const BodyShape *shape = &body->shape[i];
+        float box[4];
+        if (!find_box(shape, axis, isocentre, vec3_norm(ray[1]) / 2, vec3_norm(ray[0]), box))
+            continue;
+        ShadowVertex v = {.solid = {(float)shape->wall, (float)(shape->filling - shape->wall), (float)(shape->hollow * shape->hollow)}};
+        put_vec3(v.from, mat3_mul_vec(&shape->to_unit, vec3_sub(source, shape->center)));
+        for (int k = 0; k < 3; k++)
+            put_vec3(v.ray[k], mat3_mul_vec(&shape->to_unit, ray[k]));
+        for (int k = 0; k < 2; k++) {
+            bool is_cut = vec3_norm2(shape->plane[k]) > 0;
+            for (int j = 0; j < 3; j++)
+                v.plane[k][j] = (float)vec3_dot(shape->plane[k], ray[j]);
+            v.plane[k][3] = is_cut ? (float)(vec3_dot(shape->plane[k], source) - shape->offset[k]) : -1;
+        }
+        static const int corner[SHADOW_VERTICES][2] = {{0, 1}, {2, 1}, {2, 3}, {0, 1}, {2, 3}, {0, 3}};
+        for (int k = 0; k < SHADOW_VERTICES; k++) {
+            v.place[0] = box[corner[k][0]];
+            v.place[1] = box[corner[k][1]];
+            shadows->vertex[shadows->count++] = v;
+        }
+    }
+    return true;
+}
+
+void shape_shadows_free(ShapeShadows *shadows)
+{
+    free(shadows->vertex);
+    *shadows = (ShapeShadows){0};
+}
+
+// --- display ---
+
+double anatomy_shown(double attenuation, double mean)
+{
+    double x = attenuation - mean, bright = SHOWN_BRIGHTEST;
+    return SHOWN_SHIFT + (x > 0 ? SHOWN_SLOPE * x : -bright * (1 - exp(SHOWN_SLOPE * x / bright)));
 }

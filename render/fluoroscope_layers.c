@@ -22,25 +22,44 @@ static const char *const SQUARE_VERTEX = "#version 330 core\n"
                                          "void main() { at = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);\n"
                                          "  gl_Position = vec4(2.0 * at - 1.0, 0.0, 1.0); }\n";
 
-static const char *const ANATOMY_FRAGMENT =
+static const char *const VOLUME_FRAGMENT =
     "#version 330 core\n"
     "in vec2 at; out float result;\n"
-    "uniform vec3 ray[3], source; uniform int count; uniform vec4 ellipsoid[40]; uniform vec3 inverse_semi[40];\n"   // ray: towards, right, up
-    "uniform vec3 grid_ray[3], grid_source; uniform int steps; uniform float most; uniform sampler3D volume;\n"
-    "void main() { vec2 f = at - 0.5;\n"
-    "  vec3 d = ray[0] + f.x * ray[1] + f.y * ray[2]; float size = length(d), sum = 0.0;\n"
-    "  for (int i = 0; i < count; i++) { vec3 p = (source - ellipsoid[i].xyz) * inverse_semi[i], v = d * inverse_semi[i];\n"
+    "uniform vec3 ray[3], grid_ray[3], grid_source; uniform int steps; uniform float most; uniform sampler3D volume;\n"   // ray: towards, right, up
+    "void main() { vec2 f = at - 0.5; float size = length(ray[0] + f.x * ray[1] + f.y * ray[2]);\n"
+    "  vec3 g = grid_ray[0] + f.x * grid_ray[1] + f.y * grid_ray[2];\n"
+    "  vec3 s = 1.0 / (abs(g) + 1e-12) * mix(vec3(-1.0), vec3(1.0), greaterThanEqual(g, vec3(0.0)));\n"
+    "  vec3 u = -grid_source * s, w = (1.0 - grid_source) * s, a = min(u, w), b = max(u, w);\n"
+    "  float t0 = max(max(a.x, a.y), max(a.z, 0.0)), t1 = min(min(b.x, b.y), b.z), step = (t1 - t0) / float(steps), grid = 0.0;\n"
+    "  if (t1 > t0) { vec3 p = grid_source + (t0 + 0.5 * step) * g, by = step * g;\n"
+    "    for (int i = 0; i < steps; i++, p += by) grid += texture(volume, p).r; }\n"
+    "  result = grid * most * step * size; }\n";
+
+// The length of a pixel's ray in a solid (render/body_shape.c), added to the layer.
+static const char *const SHAPE_VERTEX =
+    "#version 330 core\n"
+    "layout(location = 0) in vec2 place; layout(location = 1) in vec3 source; layout(location = 2) in vec3 ray_towards;\n"
+    "layout(location = 3) in vec3 ray_right; layout(location = 4) in vec3 ray_up; layout(location = 5) in vec4 plane_0;\n"
+    "layout(location = 6) in vec4 plane_1; layout(location = 7) in vec3 density;\n"
+    "flat out vec3 from, towards, right, up, solid; flat out vec4 first, second;\n"
+    "void main() { gl_Position = vec4(2.0 * place - 1.0, 0.0, 1.0); from = source; towards = ray_towards; right = ray_right; up = ray_up;\n"
+    "  first = plane_0; second = plane_1; solid = density; }\n";
+static const char *const SHAPE_FRAGMENT =
+    "#version 330 core\n"
+    "flat in vec3 from, towards, right, up, solid; flat in vec4 first, second; out float result; uniform vec3 size; uniform float side;\n"
+    "vec2 cut(vec4 plane, vec2 f) { float rate = plane.x + f.x * plane.y + f.y * plane.z, t = -plane.w / (abs(rate) < 1e-6 ? 1e-6 : rate);\n"
+    "  return rate < 0.0 ? vec2(t, 1e9) : vec2(-1e9, t); }\n"
+    "void main() { vec2 f = gl_FragCoord.xy / side - 0.5; vec3 v = towards + f.x * right + f.y * up;\n"
     // start from the point of the line closest to the centre: b^2 - a c of large numbers would cancel
-    "    float a = dot(v, v); p -= dot(p, v) / a * v; float q = 1.0 - dot(p, p);\n"
-    "    sum += q > 0.0 ? ellipsoid[i].w * 2.0 * sqrt(q / a) * size : 0.0; }\n"
-    "  if (steps > 0) { vec3 g = grid_ray[0] + f.x * grid_ray[1] + f.y * grid_ray[2];\n"
-    "    vec3 s = 1.0 / (abs(g) + 1e-12) * mix(vec3(-1.0), vec3(1.0), greaterThanEqual(g, vec3(0.0)));\n"
-    "    vec3 u = -grid_source * s, w = (1.0 - grid_source) * s, a = min(u, w), b = max(u, w);\n"
-    "    float t0 = max(max(a.x, a.y), max(a.z, 0.0)), t1 = min(min(b.x, b.y), b.z);\n"
-    "    if (t1 > t0) { float step = (t1 - t0) / float(steps), grid = 0.0; vec3 p = grid_source + (t0 + 0.5 * step) * g, by = step * g;\n"
-    "      for (int i = 0; i < steps; i++, p += by) grid += texture(volume, p).r;\n"
-    "      sum += grid * most * step * size; } }\n"
-    "  result = max(sum, 0.0); }\n";
+    "  float a = max(dot(v, v), 1e-9), middle = -dot(from, v) / a; vec3 p = from + middle * v; float q = dot(p, p);\n"
+    "  vec2 c = cut(first, f), d = cut(second, f); float low = max(max(c.x, d.x), 0.0), high = min(c.y, d.y);\n"
+    "  vec2 h = sqrt(max(vec2(1.0, solid.z) - q, 0.0) / a), l = max(min(middle + h, high) - max(middle - h, low), 0.0);\n"
+    "  result = dot(solid.xy, l) * length(vec3(size.x, f * size.y)); }\n";
+
+// What the display makes of the attenuation of the anatomy (anatomy_shown).
+#define SHOWN                                                                                                                                                  \
+    "uniform float mean; uniform vec3 shown;\n"                                                                                                                \
+    "float show(float a) { float x = shown.x * (max(a, 0.0) - mean); return shown.y + (x > 0.0 ? x : shown.z * (exp(x / shown.z) - 1.0)); }\n"
 
 // Shared by the shaders that read the lumen. TAPS_4 is the blur of the detector; a layer of half the resolution is blurred by its single tap. llvmpipe
 // executes both sides of a branch, so variants are compiled separately.
@@ -53,9 +72,10 @@ static const char *const ANATOMY_FRAGMENT =
 #define WITH_ROADMAP "#define ROADMAP\n"
 static const char *const LUMEN_HEAD[2][2] = {{TAPS_4, TAPS_4 WITH_ROADMAP}, {TAPS_1, TAPS_1 WITH_ROADMAP}};   // full or less than full resolution, roadmap
 
-static const char *const TOTAL_FRAGMENT = "in vec2 at; out float result; uniform sampler2D anatomy, lumen; uniform float slant, contrast; uniform bvec2 has;\n"
-                                          "void main() { vec2 f = slant * (at - 0.5); result = has.x ? texture(anatomy, at).r : 0.0;\n"
-                                          "  if (has.y) result += contrast * max(tap(lumen, at), 0.0) * sqrt(1.0 + dot(f, f)); }\n";
+static const char *const TOTAL_FRAGMENT =
+    "in vec2 at; out float result; uniform sampler2D anatomy, lumen; uniform float slant, contrast; uniform bvec2 has;\n" SHOWN
+    "void main() { vec2 f = slant * (at - 0.5); result = has.x ? show(texture(anatomy, at).r) : 0.0;\n"
+    "  if (has.y) result += contrast * max(tap(lumen, at), 0.0) * sqrt(1.0 + dot(f, f)); }\n";
 
 static const char *const OPACIFY_FRAGMENT = "in vec2 at; out vec4 result; uniform sampler2D bare, lumen, roadmap; uniform float slant; uniform vec2 power;\n"
                                             "void main() { vec2 f = slant * (at - 0.5); float along = sqrt(1.0 + dot(f, f)); vec4 b = texture(bare, at);\n"
@@ -69,8 +89,8 @@ static const char *const LIVE_HEAD = "#version 330 core\n";
 static const char *const DSA_HEAD = "#version 330 core\n#define SUBTRACTED\n";
 static const char *const BAKE_FRAGMENT =
     "in vec2 at; out vec4 result; uniform sampler2D anatomy, mask, noise; uniform bool has_anatomy; uniform ivec3 offset;\n"
-    "uniform float exposure, gain, weakest, mask_noise, dark; uniform vec4 blades; uniform vec2 soft; uniform vec2 room;\n"
-    "void main() { float a = has_anatomy ? texture(anatomy, at).r : 0.0; vec2 r;\n"
+    "uniform float exposure, gain, weakest, mask_noise, dark; uniform vec4 blades; uniform vec2 soft; uniform vec2 room;\n" SHOWN
+    "void main() { float a = has_anatomy ? show(texture(anatomy, at).r) : 0.0; vec2 r;\n"
     "#ifdef SUBTRACTED\n"
     "  float m = texture(mask, at).r, d = a - m; ivec2 g = ivec2(gl_FragCoord.xy); g = offset.z != 0 ? g.yx : g;\n"
     "  d += mask_noise * inversesqrt(clamp(exp(exposure - m), weakest, 1.0)) * (texelFetch(noise, (g + offset.xy) & 511, 0).r * 8.0 - 4.0);\n"
@@ -184,18 +204,38 @@ static void send_volume(LayerPrograms *programs, const Anatomy *anatomy)
         glTexParameteri(GL_TEXTURE_3D, (const GLenum[]){GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R}[k], GL_CLAMP_TO_EDGE);
 }
 
+static void add_attribute(unsigned location, int floats, size_t stride, size_t offset)
+{
+    glEnableVertexAttribArray(location);
+    glVertexAttribPointer(location, floats, GL_FLOAT, GL_FALSE, (GLsizei)stride, (const void *)offset);
+}
+
+static void make_shape_array(LayerPrograms *programs)
+{
+    const size_t stride = sizeof(ShadowVertex);
+    glGenVertexArrays(1, &programs->shape_array);
+    glGenBuffers(1, &programs->shape_vertices);
+    glBindVertexArray(programs->shape_array);
+    glBindBuffer(GL_ARRAY_BUFFER, programs->shape_vertices);
+    add_attribute(0, 2, stride, offsetof(ShadowVertex, place));
+    add_attribute(1, 3, stride, offsetof(ShadowVertex, from));
+    for (unsigned k = 0; k < 3; k++)
+        add_attribute(2 + k, 3, stride, offsetof(ShadowVertex, ray) + k * 3 * sizeof(float));
+    for (unsigned k = 0; k < 2; k++)
+        add_attribute(5 + k, 4, stride, offsetof(ShadowVertex, plane) + k * 4 * sizeof(float));
+    add_attribute(7, 3, stride, offsetof(ShadowVertex, solid));
+    glBindVertexArray(0);
+}
+
 static void make_tool_array(LayerPrograms *programs)
 {
     glGenVertexArrays(1, &programs->tool_array);
     glGenBuffers(1, &programs->tool_vertices);
     glBindVertexArray(programs->tool_array);
     glBindBuffer(GL_ARRAY_BUFFER, programs->tool_vertices);
-    glEnableVertexAttribArray(0);
-    glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), NULL);
-    glEnableVertexAttribArray(1);
-    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), (const void *)offsetof(RibbonVertex, across));
-    glEnableVertexAttribArray(2);
-    glVertexAttribPointer(2, 2, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), (const void *)offsetof(RibbonVertex, density));
+    add_attribute(0, 2, sizeof(RibbonVertex), 0);
+    add_attribute(1, 3, sizeof(RibbonVertex), offsetof(RibbonVertex, across));
+    add_attribute(2, 2, sizeof(RibbonVertex), offsetof(RibbonVertex, density));
     glBindVertexArray(0);
 }
 
@@ -205,7 +245,8 @@ bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *messag
     struct {
         unsigned *program;
         const char *vertex, *head, *fragment;
-    } wanted[] = {{&programs->anatomy, SQUARE_VERTEX, "", ANATOMY_FRAGMENT},
+    } wanted[] = {{&programs->volume_march, SQUARE_VERTEX, "", VOLUME_FRAGMENT},
+                  {&programs->shape, SHAPE_VERTEX, "", SHAPE_FRAGMENT},
                   {&programs->total, SQUARE_VERTEX, LUMEN_HEAD[0][0], TOTAL_FRAGMENT},
                   {&programs->bake[0], SQUARE_VERTEX, LIVE_HEAD, BAKE_FRAGMENT},
                   {&programs->bake[1], SQUARE_VERTEX, DSA_HEAD, BAKE_FRAGMENT},
@@ -223,6 +264,7 @@ bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *messag
         return message_fail(message, capacity, "out of memory for the noise of fluoroscopy");
     glGenVertexArrays(1, &programs->empty_array);
     make_tool_array(programs);
+    make_shape_array(programs);
     if (anatomy->level)
         send_volume(programs, anatomy);
     return true;
@@ -230,15 +272,17 @@ bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *messag
 
 void layers_destroy(LayerPrograms *programs)
 {
-    const unsigned program[11] = {programs->anatomy,       programs->total,         programs->bake[0],       programs->bake[1],
-                                  programs->opacify[0][0], programs->opacify[0][1], programs->opacify[1][0], programs->opacify[1][1],
-                                  programs->tool,          programs->show[0],       programs->show[1]};
-    for (int i = 0; i < 11; i++)
+    const unsigned program[12] = {programs->volume_march,  programs->shape,         programs->total,         programs->bake[0],
+                                  programs->bake[1],       programs->opacify[0][0], programs->opacify[0][1], programs->opacify[1][0],
+                                  programs->opacify[1][1], programs->tool,          programs->show[0],       programs->show[1]};
+    for (int i = 0; i < 12; i++)
         if (program[i])
             glDeleteProgram(program[i]);
     glDeleteVertexArrays(1, &programs->empty_array);
     glDeleteVertexArrays(1, &programs->tool_array);
     glDeleteBuffers(1, &programs->tool_vertices);
+    glDeleteVertexArrays(1, &programs->shape_array);
+    glDeleteBuffers(1, &programs->shape_vertices);
     glDeleteTextures(1, &programs->noise);
     glDeleteTextures(1, &programs->volume);
     *programs = (LayerPrograms){0};
@@ -324,43 +368,59 @@ static void set_texture(unsigned program, const char *name, int unit, GLenum tar
     glActiveTexture(GL_TEXTURE0);
 }
 
-void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int first, int rows, int steps)
+static void march_volume(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, int steps)
 {
-    unsigned program = programs->anatomy;
-    const PatientAxes *axes = &anatomy->axes;
-    const Vec3 along[3] = {vec3_scale(c_arm->towards, C_ARM_SOURCE_MM), vec3_scale(c_arm->right, c_arm->field_mm), vec3_scale(c_arm->up, c_arm->field_mm)};
+    unsigned program = programs->volume_march;
     static const char *const ray[2][3] = {{"ray[0]", "ray[1]", "ray[2]"}, {"grid_ray[0]", "grid_ray[1]", "grid_ray[2]"}};
-    const Mat3 to_patient = {{{axes->right.x, axes->right.y, axes->right.z},
-                              {axes->anterior.x, axes->anterior.y, axes->anterior.z},
-                              {axes->superior.x, axes->superior.y, axes->superior.z}}};
-    bind_layer(to);
+    const Vec3 along[3] = {vec3_scale(c_arm->towards, C_ARM_SOURCE_MM), vec3_scale(c_arm->right, c_arm->field_mm), vec3_scale(c_arm->up, c_arm->field_mm)};
     glUseProgram(program);
     for (int k = 0; k < 3; k++) {
-        set_vec3(program, ray[0][k], mat3_mul_vec(&to_patient, along[k]));
+        set_vec3(program, ray[0][k], along[k]);
         set_vec3(program, ray[1][k], mat3_mul_vec(&anatomy->to_grid, along[k]));
     }
-    Vec3 source = c_arm_source(c_arm);
-    set_vec3(program, "source", mat3_mul_vec(&to_patient, vec3_sub(source, anatomy->middle)));
-    set_vec3(program, "grid_source", mat3_mul_vec(&anatomy->to_grid, vec3_sub(source, anatomy->origin)));
-    float ellipsoid[ELLIPSOIDS_MOST][4], inverse[ELLIPSOIDS_MOST][3];
-    for (int i = 0; i < anatomy->ellipsoid_count; i++) {
-        const Ellipsoid *e = &anatomy->ellipsoid[i];
-        ellipsoid[i][0] = (float)e->center.x, ellipsoid[i][1] = (float)e->center.y, ellipsoid[i][2] = (float)e->center.z;
-        ellipsoid[i][3] = (float)e->attenuation;
-        inverse[i][0] = (float)(1 / e->semi.x), inverse[i][1] = (float)(1 / e->semi.y), inverse[i][2] = (float)(1 / e->semi.z);
-    }
-    set_int(program, "count", anatomy->ellipsoid_count);
-    if (anatomy->ellipsoid_count > 0) {
-        glUniform4fv(glGetUniformLocation(program, "ellipsoid"), anatomy->ellipsoid_count, &ellipsoid[0][0]);
-        glUniform3fv(glGetUniformLocation(program, "inverse_semi"), anatomy->ellipsoid_count, &inverse[0][0]);
-    }
-    set_int(program, "steps", programs->volume ? steps : 0);
+    set_vec3(program, "grid_source", mat3_mul_vec(&anatomy->to_grid, vec3_sub(c_arm_source(c_arm), anatomy->origin)));
+    set_int(program, "steps", steps);
     set_float(program, "most", anatomy->most);
     set_texture(program, "volume", 0, GL_TEXTURE_3D, programs->volume);
+    draw_square(programs);
+}
+
+static void add_shapes(const LayerPrograms *programs, const ShapeShadows *shadows, const CArm *c_arm, int side)
+{
+    unsigned program = programs->shape;
+    glUseProgram(program);
+    set_vec3(program, "size", vec3(C_ARM_SOURCE_MM, c_arm->field_mm, 0));
+    set_float(program, "side", side);
+    glEnable(GL_BLEND);
+    glBlendEquation(GL_FUNC_ADD);
+    glBlendFunc(GL_ONE, GL_ONE);
+    glBindVertexArray(programs->shape_array);
+    glBindBuffer(GL_ARRAY_BUFFER, programs->shape_vertices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)shadows->count * sizeof *shadows->vertex), shadows->vertex, GL_STREAM_DRAW);
+    glDrawArrays(GL_TRIANGLES, 0, shadows->count);
+    glBindVertexArray(0);
+    glDisable(GL_BLEND);
+}
+
+void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const ShapeShadows *shadows, const CArm *c_arm, const Layer *to, int first,
+                         int rows, int steps)
+{
+    bind_layer(to);
     glEnable(GL_SCISSOR_TEST);
     glScissor(0, first, to->side, rows);
-    draw_square(programs);
+    glClearColor(0, 0, 0, 0);
+    glClear(GL_COLOR_BUFFER_BIT);
+    if (programs->volume)
+        march_volume(programs, anatomy, c_arm, steps);
+    if (shadows->count > 0)
+        add_shapes(programs, shadows, c_arm, to->side);
     glDisable(GL_SCISSOR_TEST);
+}
+
+static void set_shown(unsigned program, const LayerTone *tone)
+{
+    set_float(program, "mean", tone->mean);
+    set_vec3(program, "shown", vec3(SHOWN_SLOPE, SHOWN_SHIFT, SHOWN_BRIGHTEST));
 }
 
 static unsigned texture_of(const Layer *layer) { return layer ? layer->texture : 0; }
@@ -375,6 +435,7 @@ void layers_draw_total(const LayerPrograms *programs, const Layer *anatomy, cons
     glUniform2i(glGetUniformLocation(program, "has"), anatomy != NULL, lumen != NULL);
     set_float(program, "slant", c_arm->field_mm / C_ARM_SOURCE_MM);
     set_float(program, "contrast", tone->contrast);
+    set_shown(program, tone);
     draw_square(programs);
 }
 
@@ -404,6 +465,7 @@ void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Laye
     set_texture(program, "noise", 2, GL_TEXTURE_2D, programs->noise);
     set_int(program, "has_anatomy", anatomy != NULL);
     set_float(program, "exposure", tone->exposure);
+    set_shown(program, tone);
     set_float(program, "gain", tone->gain);
     set_float(program, "weakest", weakest);
     set_float(program, "mask_noise", tone->quanta > 0 ? 1 / sqrt(tone->quanta) : 0);

@@ -13,12 +13,13 @@ typedef struct Layer {
 typedef enum { LAYER_R32F, LAYER_RGBA16, LAYER_RGBA16_SMOOTH } LayerFormat;   // smooth: to be magnified
 
 typedef struct LayerPrograms {
-    unsigned anatomy, total, tool;
+    unsigned volume_march, shape, total, tool;
     unsigned bake[2];        // live, subtracted
     unsigned opacify[2][2];  // by a lumen of full or lower resolution; without or with a roadmap
     unsigned show[2];        // without or with a roadmap
     unsigned empty_array;    // a full-screen triangle needs no vertices
     unsigned tool_array, tool_vertices;
+    unsigned shape_array, shape_vertices;
     unsigned noise;          // NOISE_TILE^2 R8: normally distributed numbers n as (n + 4) / 8
     unsigned volume;         // 3D R8: Anatomy.level; 0: none
 } LayerPrograms;
@@ -29,6 +30,7 @@ enum { NOISE_TILE = 512 };
 typedef struct LayerTone {
     bool is_subtracted;      // DSA, with a mask
     double exposure;         // attenuation that automatic exposure compensates
+    double mean;             // of the anatomy in the beam (anatomy_shown)
     double contrast;         // [1/mm] attenuation of undiluted contrast agent
     double gain;             // gain of DSA
     double quanta;
@@ -43,10 +45,11 @@ bool layer_fit(Layer *layer, int side, LayerFormat format);
 void layer_destroy(Layer *layer);
 void layer_begin(const Layer *layer);   // binds it, clears it to 0 and sets the viewport
 
-// Draws rows `first` to `first` + `rows` of the layer.
-void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int first, int rows, int steps);
+// Draws the attenuation of rows `first` to `first` + `rows` of the layer.
+void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const ShapeShadows *shadows, const CArm *c_arm, const Layer *to, int first,
+                         int rows, int steps);
 
-// Draws the attenuation of anatomy and contrast agent, without exposure, into a float layer: the mask of DSA. Layers may be NULL if empty.
+// Draws what is shown of the attenuation of anatomy and contrast agent, without exposure, into a float layer: the mask of DSA. Layers may be NULL if empty.
 void layers_draw_total(const LayerPrograms *programs, const Layer *anatomy, const Layer *lumen, const CArm *c_arm, const LayerTone *tone, const Layer *to);
 // Bakes a layer without the lumen. Channels: brightness and noise sigma, each with headroom above white; unused; opening of the blades.
 void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Layer *mask, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,

@@ -17,11 +17,14 @@ typedef struct FluoroscopeOptions {
     const VesselTree *tree;        // NULL: the whole lumen is one node, 0
     const ToolLooks *tools;        // borrowed; NULL: none
     const Pose *pose;              // any pose of these tools; gives their largest numbers of nodes. Borrowed during create only
-    // anatomy: a volume (recon/volume/volume.h); value NULL: a simple head, or a trunk if the vessel is larger than a head
+    // anatomy: a volume (recon/volume/volume.h); value NULL: a patient made of solids (render/patient_body.h)
     int anatomy_size[3];
     Vec3 anatomy_origin;           // [mm] centre of voxel (0,0,0)
     Vec3 anatomy_axis[3];          // [mm] step from voxel to voxel
     const float *anatomy_value;    // (size[2], size[1], size[0]); CT numbers [HU] if the minimum is below -200, else the brightness of an angiogram
+    int segment;                   // what the vessel is: 1 + index in patient_segment; 0: not known
+    bool has_place;                // the vessel's place in the patient is known:
+    Similarity place;              // from the body's frame to the model's
     bool has_no_anatomy;           // true: only air around vessel and tool (for tests)
 
     PatientAxes patient;           // default: LPS

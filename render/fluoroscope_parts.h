@@ -29,6 +29,7 @@ struct Fluoroscope {
     int tool_capacity[TOOLS_MOST]; // upper limit of nodes
     RibbonPath tool[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device, made when it is first seen
     Anatomy anatomy;
+    ShapeShadows shadows;        // of the anatomy's solids, at c_arm
     Lumen lumen;
     LayerPrograms programs;
     Layer anatomy_layer, anatomy_next, lumen_layer, roadmap_layer, mask;

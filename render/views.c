@@ -32,6 +32,9 @@ static Fluoroscope *create_fluoroscope(const Views *views, const ViewsOptions *o
     memcpy(fluoroscope.anatomy_axis, options->anatomy_axis, sizeof fluoroscope.anatomy_axis);
     fluoroscope.anatomy_origin = options->anatomy_origin;
     fluoroscope.patient = options->patient;
+    fluoroscope.segment = options->scene->anatomy_segment;
+    fluoroscope.has_place = options->scene->has_anatomy_fit;
+    fluoroscope.place = options->scene->anatomy_fit;
     return fluoroscope_create(&fluoroscope, message, capacity);
 }
 

@@ -19,7 +19,7 @@ typedef struct ViewsOptions {        // borrowed during create, except scene, ve
     int anatomy_size[3];             // a volume behind the vessel, see FluoroscopeOptions; value NULL: none
     Vec3 anatomy_origin, anatomy_axis[3];
     const float *anatomy_value;
-    PatientAxes patient;
+    PatientAxes patient;             // the vessel's place in the patient is that of the scene's `anatomy:`
 } ViewsOptions;
 
 // Returns NULL with a reason. Otherwise `message` is empty or says what is missing in the pictures.

@@ -98,6 +98,9 @@ typedef struct Scene {
     double marker_length, marker_attenuation;   // [mm], [1/mm] of the first tool's marker
     Vec3 patient_anterior, patient_superior;     // unit, perpendicular, in the model's frame; zero: not given
     double lao, cra;         // [deg] of the C-arm at the start
+    int anatomy_segment;     // 1 + the index in patient_segment (sim/patient_landmarks.h) of what the vessel is; 0: not given
+    bool has_anatomy_fit;    // landmarks place the vessel in the patient:
+    Similarity anatomy_fit;  // from the body's frame to the model's
     char *anatomy_path;      // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
     Exercise *exercise;      // the trainee's exercise; NULL: none
     VerifyPlan verify;       // what `seldinger check` measures; case_count 0: nothing

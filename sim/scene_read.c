@@ -468,8 +468,8 @@ static void read_fluoroscopy(Reading *reading, YamlValue value)
 
 static void read_scene(Reading *reading)
 {
-    static const char *const keys[] = {"seldinger", "vessel",  "wire",     "tools",       "sheath", "rig", "simulation",
-                                       "script",    "targets", "exercise", "fluoroscopy", "verify", NULL};
+    static const char *const keys[] = {"seldinger", "vessel",  "wire",     "tools",       "sheath",  "rig",    "simulation",
+                                       "script",    "targets", "exercise", "fluoroscopy", "anatomy", "verify", NULL};
     YamlValue root = yaml_root(reading->reader);
     YamlMap map = yaml_map(root, keys);
     int version;
@@ -503,6 +503,8 @@ static void read_scene(Reading *reading)
         read_exercise(reading, yaml_get(&map, "exercise", false));
     if (yaml_has(&map, "fluoroscopy"))
         read_fluoroscopy(reading, yaml_get(&map, "fluoroscopy", false));
+    if (yaml_has(&map, "anatomy"))
+        scene_read_anatomy(reading, yaml_get(&map, "anatomy", false));
     if (yaml_has(&map, "verify"))
         read_verify(reading, yaml_get(&map, "verify", false), yaml_has(&map, "script"));
 }

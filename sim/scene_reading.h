@@ -36,6 +36,9 @@ void *scene_zeroed(Reading *reading, int count, size_t size);    // NULL with a 
 char *scene_resolved(Reading *reading, const char *name);        // relative to the scene's file; NULL with a fault
 bool scene_read_piece(YamlValue value, TubePiece *piece);        // a line or an arc, of a tube's path or a rest shape
 
+// `anatomy:`, after `fluoroscopy:`: sets the patient's axes, too, if the landmarks give them.
+void scene_read_anatomy(Reading *reading, YamlValue value);
+
 // `wire:` becomes the scene's only tool, `tools:` up to four; scene->wire is that of the first. To be called before `sheath:` and `rig:` are read …
 void scene_read_wire(Reading *reading, YamlValue value);
 void scene_read_tools(Reading *reading, YamlValue value);

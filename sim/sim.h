@@ -7,6 +7,7 @@
 // scenes
 #include "sim/scene.h"
 #include "sim/scene_list.h"
+#include "sim/patient_landmarks.h"
 #include "sim/open_vessel.h"
 #include "sim/case_make.h"
 #include "sim/tray_devices.h"

@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 
+#include "sim/patient_landmarks.h"
 #include "sim/scene.h"
 
 #include <stdio.h>
@@ -23,6 +24,7 @@
 
 #define REST(list) VERSION SHEATH "wire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]\n  rest: " list "\n"
 #define CASE "{name: a, quantity: push_force_n, reference: 1, tolerance: 1"
+#define ARCH(landmarks) WHOLE "anatomy: {segment: aortic_arch, landmarks: [" landmarks "]}\n"
 #define VERIFY(inner) WHOLE "verify: {cases: [{name: a, " inner "}]}\n"
 
 static Faults faults;
@@ -71,6 +73,34 @@ static void units_are_converted_once(void **state)
     // gravity: 9.81 m/s2 is 0.00981 mm/ms2; falling 0.1 s from rest by g t^2 / 2 is 49.05 mm
     scene = good(VERSION WIRE "rig: {gravity_m_s2: [0, 0, -9.81]}\n");
     assert_near(0.5 * scene->wire.gravity.z * 100 * 100, -49.05, 1e-9);
+    scene_free(scene);
+}
+
+static void landmarks_place_the_vessel_in_the_patient(void **state)
+{
+    (void)state;
+    Scene *scene = good(WHOLE "anatomy: aortic_arch\n");
+    assert_string_equal(patient_segment_name[scene->anatomy_segment - 1], "aortic_arch");
+    assert_false(scene->has_anatomy_fit);
+    const int segment = scene->anatomy_segment - 1;
+    scene_free(scene);
+    // landmarks landmarks of a patient who lies along -x, looks up z and has 1.1 times the usual size
+    const Similarity place = {.turn = mat3_from_columns(vec3(0, 1, 0), vec3(0, 0, 1), vec3(1, 0, 0)), .scale = 1.1, .shift = {100, -20, 7}};
+    char text[2000] = WHOLE "anatomy: {segment: aortic_arch, landmarks: [";
+    static const char *const name[] = {"arch_top", "aortic_fork", "left_carotid_fork", "aortic_valve"};
+    for (int i = 0; i < 4; i++) {
+        Vec3 at;
+        assert_true(patient_landmark_at(name[i], segment, &at));
+        at = similarity_of(&place, at);
+        sprintf(text + strlen(text), "{name: %s, point_mm: [%.17g, %.17g, %.17g]}, ", name[i], at.x, at.y, at.z);
+    }
+    strcat(text, "]}\n");
+    scene = good(text);
+    assert_true(scene->has_anatomy_fit);
+    assert_near(scene->anatomy_fit.scale, 1.1, 1e-12);
+    assert_near(vec3_distance(similarity_of(&scene->anatomy_fit, vec3(10, 20, -300)), similarity_of(&place, vec3(10, 20, -300))), 0, 1e-9);
+    assert_near(vec3_distance(scene->patient_superior, vec3(1, 0, 0)), 0, 1e-12);
+    assert_near(vec3_distance(scene->patient_anterior, vec3(0, 0, 1)), 0, 1e-12);
     scene_free(scene);
 }
 
@@ -237,6 +267,17 @@ static const Broken broken[] = {
     {REST("[{line_mm: 1, arc: {radius_mm: 3, angle_deg: 10}}]"), "5:10", "is one piece"},
     {VERSION SHEATH "wire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.1}]\n  rest: [{line_mm: 1}]\n",
      "5:9", "both give a shape"},
+    // anatomy
+    {WHOLE "anatomy: carotid\n", "4:10", "left_internal_carotid, right_common_carotid"},
+    {WHOLE "anatomy: {landmarks: []}\n", "4:10", "has no key 'segment'"},
+    {ARCH("{name: siphon, point_mm: [0, 0, 0]}"), "4:52", "expected left_ or right_ and one of: carotid_fork, skull_base"},
+    {ARCH("{name: left_arch_top, point_mm: [0, 0, 0]}"), "4:52", "no landmark 'left_arch_top'"},
+    {ARCH("{name: arch_top}"), "4:45", "has no key 'point_mm'"},
+    {ARCH("{name: arch_top, point_mm: [0, 0, 0]}, {name: aortic_fork, point_mm: [0, 0, 300]}"), "4:44", "three that are not on a line"},
+    {ARCH("{name: arch_top, point_mm: [0, 0, 0]}, {name: aortic_fork, point_mm: [0, 0, 300]}") "fluoroscopy: {anterior: [0, -1, 0], superior: [0, 0, 1]}\n",
+     "4:44", "the other way round"},
+    {ARCH("{name: arch_top, point_mm: [0, 0, 0]}, {name: aortic_fork, point_mm: [0, 0, -100]}") "fluoroscopy: {anterior: [0, -1, 0], superior: [0, 0, 1]}\n",
+     "4:44", "times the usual size; expected 0.6 to 1.6"},
     // verify
     {WHOLE "verify: 1\n", "4:9", "not a map"},
     {WHOLE "verify: {cases: []}\n", "4:17", "0 entries"},
@@ -421,6 +462,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(units_are_converted_once),
+        cmocka_unit_test(landmarks_place_the_vessel_in_the_patient),
         cmocka_unit_test(what_is_not_said_has_its_default),
         cmocka_unit_test(a_rest_shape_becomes_sections),
         cmocka_unit_test(a_verify_plan_is_read),
