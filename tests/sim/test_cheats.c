@@ -1,6 +1,6 @@
 // Nothing rewards pushing without looking. In each exercise the hand that solves it is driven once, and scored as seen by trainees who look in different
 // ways: one watches the X-ray image of each movement, the others try to get away with less. The honest one must be ahead of each of them by 30 points.
-// Exercises whose model was not made are skipped by name.
+// Exercises whose model was not made are skipped by name. The hand that solves an exercise is also a careful one: it hurts no vessel.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -148,6 +148,7 @@ static void looking_pays(const char *name, const char *model)
     Scene *scene = scene_load(path, &faults);
     if (!scene || !open_vessel(scene, &(OpenVesselOptions){0}, &open, &faults) || !open_vessel_inlet(scene, &open, &faults))
         fail_msg("%s", faults.text[0]);
+    scene->exercise->consequences.mode = CONSEQUENCES_ON;
     drive(scene, &open, &faults, figures);
     open_vessel_close(&open);
     scene_free(scene);
@@ -157,6 +158,7 @@ static void looking_pays(const char *name, const char *model)
         print_message("%-16s %-30s %5.1f points, %6.1f mm blind, %4.1f s guided, %d errors\n", name, trainee[i].name, f->points, f->blind_total_mm, f->guided_s,
                       f->error_total);
         assert_int_equal(f->state, SCORE_REACHED);
+        assert_int_equal(f->mark_count, 0);
         wrong += !(f->points <= figures[0].points - trainee[i].lead);
     }
     assert_true(figures[0].points > 90);
