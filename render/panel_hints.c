@@ -97,7 +97,7 @@ static const struct Happening {
     [HINT_PRESSES] =
         {"The tip presses on the wall and stays there (%v pushed in vain). Pull back with %s, turn it, push slowly.", 1, 0, "mm", {ACTION_PULL, NO}},
     [HINT_COILS] = {"The tool coils up: what you push in does not reach the tip. Pull back with %s until it lies straight.", 1, 0, "mm", {ACTION_PULL, NO}},
-    [HINT_WRONG_BRANCH] = {"The tip is in a wrong branch. Pull back %v to the fork with %s, turn the tip, and try again.", 1, 0, "mm", {ACTION_PULL, NO}},
+    [HINT_WRONG_BRANCH] = {"The tip is in a wrong branch, or past the target. Pull back %v with %s, turn the tip, try again.", 1, 0, "mm", {ACTION_PULL, NO}},
     [HINT_WIRE_LOST] = {"The wire is inside the catheter. Push the wire, not the catheter, until it leads again.", 1, 0, "", {NO, NO}},
     [HINT_UNSEEN] = {"The tool has moved %v without X-rays. Hold %s while you move it.", 1, 0, "mm", {ACTION_PEDAL, NO}},
     [HINT_NO_CONTRAST] =

@@ -178,7 +178,7 @@ static void draw_way(Panel *panel, const PanelState *state, GuiRect at)
 // The places of consequences: a ring with a word, and in the X-ray image the contrast agent that has leaked.
 static void draw_spots(Panel *panel, const PanelState *state, GuiRect at, bool is_xray)
 {
-    enum { SIDES = 24, BANDS = 24 };
+    enum { SIDES = 24, BANDS = 48, DISCS = 8 };
     Gui *gui = panel->gui;
     const float s = gui_scale(gui), ring = floorf(9 * s), side = fminf(at.width, at.height);
     for (int i = 0; i < state->spot_count; i++) {
@@ -189,10 +189,10 @@ static void draw_spots(Panel *panel, const PanelState *state, GuiRect at, bool i
         const float y = is_xray ? at.y + at.height / 2 - side * (float)spot->xray[1] : at.y + (float)spot->space[1];
         const float blot = is_xray ? side * (float)spot->blot : 0;
         // as a stack of discs: densest in the middle
-        for (int disc = 3; blot > 1 && disc >= 1; disc--)
+        for (int disc = DISCS; blot > 1 && disc >= 1; disc--)
             for (int k = 0; k < BANDS; k++) {
-                const float r = blot * (float)disc / 3, high = 2 * r / BANDS, v = -r + ((float)k + 0.5F) * high, half = sqrtf(r * r - v * v);
-                gui_draw_fill(gui, (GuiRect){x - half, y + v - high / 2, 2 * half, high}, color_with_alpha(gui_colors.window, 0.3));
+                const float r = blot * (float)disc / DISCS, high = 2 * r / BANDS, v = -r + ((float)k + 0.5F) * high, half = sqrtf(r * r - v * v);
+                gui_draw_fill(gui, (GuiRect){x - half, y + v - high / 2, 2 * half, high}, color_with_alpha(gui_colors.window, 0.13));
             }
         for (int k = 0; k < SIDES; k++) {
             const float a = 2 * (float)PI * (float)k / SIDES, b = 2 * (float)PI * (float)(k + 1) / SIDES;

@@ -19,7 +19,7 @@ const char *const score_error_words[ERROR_COUNT] = {"wrong branch",
                                                     "tip jumped while its hand rested",
                                                     "tip left its required place",
                                                     "vessel perforated",
-                                                    "vessel wall dissected",
+                                                    "wall dissected",
                                                     "vessel in spasm",
                                                     "clot on the tools"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
