@@ -1,6 +1,6 @@
 // Scores a trainee's run: figures, handling errors, points. One Score per simulator, stepped by the same thread right after each simulator_step(); the
 // figures are plain data to be copied into a pose. The same steps give the same figures, so a replay has the session's score. A step allocates
-// nothing, makes no vessel query and takes well under 1 us; the tip is located in the tree every 10 ms.
+// nothing, makes no vessel query and takes about 1 us; the tip is located in the tree every 10 ms.
 //
 // The clock starts with the first step in which the tool is moved, the pedal is down or contrast flows. Once the target has been held, or the time is
 // over, all figures are frozen. Without an exercise they continue without limit.
