@@ -580,3 +580,13 @@ FluoroscopeState fluoroscope_state(const Fluoroscope *f)
                               .shown = f->shown.xray,
                               .square = {f->corner[0], f->corner[1], f->side}};
 }
+
+double fluoroscope_locate(const Fluoroscope *f, Vec3 point, double at[2])
+{
+    const CArm arm = c_arm_place(&f->shown.xray, &f->options.patient);
+    const Vec3 p = c_arm_project(&arm, point);
+    const bool is_inside = fabs(p.x) < 0.5 && fabs(p.y) < 0.5;
+    at[0] = p.x;
+    at[1] = p.y;
+    return f->has_picture && is_inside ? 1 / arm.field_mm : 0;
+}

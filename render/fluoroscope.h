@@ -55,5 +55,8 @@ typedef struct FluoroscopeState {
     int square[3];                 // x, y (from the port's lower left corner), side [pixel]: the position of the picture in the port
 } FluoroscopeState;
 FluoroscopeState fluoroscope_state(const Fluoroscope *fluoroscope);
+// Where a point of the model lies in the picture that is shown, as fractions of its side from its middle, y up. Returns the fraction of a millimetre at the
+// isocentre; 0: the point is outside the picture, or there is none.
+double fluoroscope_locate(const Fluoroscope *fluoroscope, Vec3 point, double at[2]);
 
 #endif

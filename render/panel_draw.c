@@ -26,7 +26,9 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     Gui *gui = panel->gui;
     char text[300], value[48];
     panel_heading(panel, "EXERCISE");
-    if (panel_first_line(state->instructions, text, sizeof text)) {
+    panel_draw_steps(panel, state);
+    const bool is_guided = state->guide && state->guide->count > 0 && !state->is_finished;
+    if (!is_guided && panel_first_line(state->instructions, text, sizeof text)) {
         gui_text_wrapped(gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, gui_colors.text, text);
         if (panel_has_more_lines(state->instructions)) {
             snprintf(text, sizeof text, "Full text: %s", key_table_text(ACTION_BRIEFING, value, sizeof value));
@@ -218,25 +220,26 @@ static void draw_bottom(Panel *panel, const PanelState *state)
     float s = gui_scale(gui);
     char text[256];
     int hint = panel->has_hints ? panel_current_hint(panel, state->tool_count) : -1;
+    const bool is_happening = panel->has_hints && panel_happening_text(state, text, sizeof text), is_shown = is_happening || hint >= 0;
     machine.width = floorf(268 * s);
     machine.x = at.width - machine.width;
-    hints.width = hint >= 0 ? floorf(machine.x * 0.58f) : 0;
+    hints.width = is_shown ? floorf(machine.x * 0.58f) : 0;
     log.x = hints.width;
     log.width = machine.x - hints.width;
-    if (hint >= 0) {
+    if (is_shown) {
         gui_window_begin(gui, "hint", hints, GUI_NO_INPUT | GUI_KEPT);
         gui_draw_fill(gui, (GuiRect){hints.x + floorf(5 * s), hints.y + floorf(8 * s), floorf(3 * s), hints.height - floorf(16 * s)}, gui_colors.accent);
         gui_place(gui, floorf(4 * s), 1);
         gui_beside(gui, 0);
-        panel_hint_text(hint, text, sizeof text);
-        if (state->advice)
-            snprintf(text, sizeof text, "%s", state->advice);
+        if (!is_happening)
+            panel_hint_text(hint, text, sizeof text);
         if (state->is_finished) {
             char restart[16], quit[16];
             snprintf(text, sizeof text, "The exercise is over. %s restarts it, %s ends the session; its report compares it with earlier ones.",
                      key_table_text(ACTION_RESTART, restart, sizeof restart), key_table_text(ACTION_QUIT, quit, sizeof quit));
         }
-        gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, text);
+        enum { TWO_LINES = 120 };    // letters of the large font
+        gui_text_wrapped(gui, strlen(text) > TWO_LINES ? GUI_NORMAL : GUI_LARGE, gui_colors.text, text);
         gui_window_end(gui);
     }
     draw_log(panel, log);

@@ -1,4 +1,5 @@
-// Hints for new users, each shown until its action has been used.
+// Hints: about what is happening (sim/hints.h), the present step of a guided exercise, and, for new users, about the keys: each of those is shown until its
+// action has been used.
 #include "render/panel_internal.h"
 
 #include <stdio.h>
@@ -83,15 +84,35 @@ int panel_current_hint(const Panel *panel, int tool_count)
     return -1;
 }
 
-void panel_hint_text(int index, char *text, size_t capacity)
+// What is happening, and what to do. %v is the value with its unit.
+static const struct Happening {
+    const char *text;
+    double scale;                  // of the value
+    int decimals;
+    const char *unit;
+    ActionId key[2];
+} happening[HINT_COUNT] = {
+    [HINT_SAC] = {"The tip presses harder and harder on the aneurysm's wall (%v). Stop, and pull back with %s.", 1000, 0, "mN", {ACTION_PULL, NO}},
+    [HINT_BUCKLES] = {"The tool buckles at the sheath (%v lost): its tip is held. Pull back with %s, turn it, push slowly.", 1, 0, "mm", {ACTION_PULL, NO}},
+    [HINT_PRESSES] =
+        {"The tip presses on the wall and stays there (%v pushed in vain). Pull back with %s, turn it, push slowly.", 1, 0, "mm", {ACTION_PULL, NO}},
+    [HINT_COILS] = {"The tool coils up: what you push in does not reach the tip. Pull back with %s until it lies straight.", 1, 0, "mm", {ACTION_PULL, NO}},
+    [HINT_WRONG_BRANCH] = {"The tip is in a wrong branch, or past the target. Pull back %v with %s, turn the tip, try again.", 1, 0, "mm", {ACTION_PULL, NO}},
+    [HINT_WIRE_LOST] = {"The wire is inside the catheter. Push the wire, not the catheter, until it leads again.", 1, 0, "", {NO, NO}},
+    [HINT_UNSEEN] = {"The tool has moved %v without X-rays. Hold %s while you move it.", 1, 0, "mm", {ACTION_PEDAL, NO}},
+    [HINT_NO_CONTRAST] =
+        {"No contrast agent for %v: you do not see the vessel. Inject with %s, or show a roadmap with %s.", 1, 0, "s", {ACTION_CONTRAST, ACTION_ROADMAP}},
+};
+
+// Writes `from` with the names of keys for each %s and the value for %v.
+static void fill(const char *from, const ActionId *key, const char *value, char *text, size_t capacity)
 {
-    const Hint *h = &hint[index];
     size_t length = 0;
-    int key = 0;
-    for (const char *c = h->text; *c && length + 1 < capacity;) {
-        if (c[0] == '%' && c[1] == 's') {
-            char name[32];
-            int more = snprintf(text + length, capacity - length, "%s", key_table_text(h->key[key++], name, sizeof name));
+    for (const char *c = from; *c && length + 1 < capacity;) {
+        char name[32];
+        const bool is_key = c[0] == '%' && c[1] == 's', is_value = c[0] == '%' && c[1] == 'v';
+        if (is_key || is_value) {
+            int more = snprintf(text + length, capacity - length, "%s", is_key ? key_table_text(*key++, name, sizeof name) : value);
             length = length + (size_t)more < capacity ? length + (size_t)more : capacity - 1;
             c += 2;
         } else {
@@ -99,4 +120,38 @@ void panel_hint_text(int index, char *text, size_t capacity)
         }
     }
     text[length] = 0;
+}
+
+void panel_hint_text(int index, char *text, size_t capacity) { fill(hint[index].text, hint[index].key, "", text, capacity); }
+
+bool panel_happening_text(const PanelState *state, char *text, size_t capacity)
+{
+    char value[32];
+    const bool is_happening = !state->is_examination && state->hint > HINT_NONE && state->hint < HINT_COUNT;
+    const Guide *guide = state->guide;
+    if (is_happening) {
+        const struct Happening *h = &happening[state->hint];
+        panel_figure(value, sizeof value, h->scale * state->hint_value, h->decimals, h->unit);
+        fill(h->text, h->key, value, text, capacity);
+    } else if (guide && state->steps_done < guide->count) {
+        snprintf(text, capacity, "Step %d of %d: %s", state->steps_done + 1, guide->count, guide->step[state->steps_done].text);
+    }
+    return is_happening || (guide && state->steps_done < guide->count);
+}
+
+// The last step done, the present one and the two after it.
+void panel_draw_steps(Panel *panel, const PanelState *state)
+{
+    enum { AHEAD = 2 };
+    const Guide *guide = state->guide;
+    char text[GUIDE_TEXT + 16];
+    if (!guide || guide->count == 0)
+        return;
+    snprintf(text, sizeof text, "%d of %d steps done", state->steps_done, guide->count);
+    gui_text(panel->gui, GUI_SMALL, gui_colors.dim, text);
+    for (int i = state->steps_done > 0 ? state->steps_done - 1 : 0; i < guide->count && i <= state->steps_done + AHEAD; i++) {
+        const bool is_done = i < state->steps_done, is_now = i == state->steps_done;
+        snprintf(text, sizeof text, "%s%s", is_done ? panel_sign[MARK_GOOD] : is_now ? "\u25cf " : "\u25cb ", guide->step[i].text);
+        gui_text_wrapped(panel->gui, GUI_SMALL, is_done ? panel_mark_color(MARK_GOOD) : is_now ? gui_colors.text : gui_colors.dim, text);
+    }
 }

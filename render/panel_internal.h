@@ -94,5 +94,8 @@ void panel_draw_tray(Panel *panel, const WindowInput *input, const PanelState *s
 void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *state);
 int panel_current_hint(const Panel *panel, int tool_count);        // -1: none left
 void panel_hint_text(int hint, char *text, size_t capacity);
+// What is happening and what to do (a HintKind; not in an examination), or the present step of a guided exercise. Returns false if there is neither.
+bool panel_happening_text(const PanelState *state, char *text, size_t capacity);
+void panel_draw_steps(Panel *panel, const PanelState *state);      // the checklist
 
 #endif

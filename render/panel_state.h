@@ -46,6 +46,15 @@ typedef struct PanelLabel {        // a label in the 3D view; pixels from the vi
     const char *text;
 } PanelLabel;
 
+// Where a consequence happened.
+typedef struct PanelSpot {
+    const char *text;
+    bool is_in_xray, is_in_3d;
+    double xray[2];                // in the X-ray image, as fractions of its side from its middle, y up …
+    double blot;                   // … with the radius of the contrast agent that has leaked there
+    double space[2];               // in the 3D view, pixels from its upper left corner
+} PanelSpot;
+
 // A device on the tray: one of the scene, or one that may be added to it.
 enum { TRAY_POINTS = 160, TRAY_STEPS = 64 };
 typedef struct PanelTrayDevice {
@@ -79,7 +88,10 @@ typedef struct PanelState {
     // exercise
     const char *title;
     const char *instructions;      // its first line is always shown, the whole text in a box at the start and on request
-    const char *advice;            // what to do about an error that is happening, instead of the next hint; or NULL
+    HintKind hint;                 // what is happening, shown instead of a hint about the keys …
+    double hint_value;             // … and its value
+    const Guide *guide;            // steps of a guided exercise, or NULL …
+    int steps_done;                // … and how many are done
     const char *trainee;
     const char *target;            // name of the target to reach now
     double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target
@@ -106,6 +118,8 @@ typedef struct PanelState {
     const PanelLabel *label;       // (label_count) of the 3D view
     bool has_way;                  // the tip and the target to reach are in that view, at these pixels from its upper left corner
     double tip[2], goal[2];
+    int spot_count;
+    PanelSpot spot[SCORE_MARKS_MOST];
     double bar_mm, bar_pixels;     // its scale bar; 0: none
     double force_full_scale_n;     // top of its colours; 0: no legend
     // machine

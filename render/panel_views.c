@@ -175,6 +175,33 @@ static void draw_way(Panel *panel, const PanelState *state, GuiRect at)
     gui_draw_line(panel->gui, x, y, x - dx + dy / 2, y - dy - dx / 2, gui_colors.accent, floorf(2 * s));
 }
 
+// The places of consequences: a ring with a word, and in the X-ray image the contrast agent that has leaked.
+static void draw_spots(Panel *panel, const PanelState *state, GuiRect at, bool is_xray)
+{
+    enum { SIDES = 24, BANDS = 48, DISCS = 8 };
+    Gui *gui = panel->gui;
+    const float s = gui_scale(gui), ring = floorf(9 * s), side = fminf(at.width, at.height);
+    for (int i = 0; i < state->spot_count; i++) {
+        const PanelSpot *spot = &state->spot[i];
+        if (!(is_xray ? spot->is_in_xray : spot->is_in_3d))
+            continue;
+        const float x = is_xray ? at.x + at.width / 2 + side * (float)spot->xray[0] : at.x + (float)spot->space[0];
+        const float y = is_xray ? at.y + at.height / 2 - side * (float)spot->xray[1] : at.y + (float)spot->space[1];
+        const float blot = is_xray ? side * (float)spot->blot : 0;
+        // as a stack of discs: densest in the middle
+        for (int disc = DISCS; blot > 1 && disc >= 1; disc--)
+            for (int k = 0; k < BANDS; k++) {
+                const float r = blot * (float)disc / DISCS, high = 2 * r / BANDS, v = -r + ((float)k + 0.5F) * high, half = sqrtf(r * r - v * v);
+                gui_draw_fill(gui, (GuiRect){x - half, y + v - high / 2, 2 * half, high}, color_with_alpha(gui_colors.window, 0.13));
+            }
+        for (int k = 0; k < SIDES; k++) {
+            const float a = 2 * (float)PI * (float)k / SIDES, b = 2 * (float)PI * (float)(k + 1) / SIDES;
+            gui_draw_line(gui, x + ring * cosf(a), y + ring * sinf(a), x + ring * cosf(b), y + ring * sinf(b), gui_colors.bad, floorf(2 * s));
+        }
+        label(panel, x + ring + floorf(6 * s), y - gui_line_height(gui, GUI_SMALL) / 2, GUI_SMALL, gui_colors.bad, spot->text);
+    }
+}
+
 static void draw_3d_words(Panel *panel, const PanelState *state, GuiRect at)
 {
     Gui *gui = panel->gui;
@@ -226,6 +253,8 @@ void panel_draw_over_views(Panel *panel, const PanelState *state)
             continue;
         float below = at.y;
         gui_window_begin(gui, view_name[i], at, GUI_NO_BACKGROUND | GUI_NO_INPUT);
+        if (i == VIEW_FLUOROSCOPY || i == VIEW_3D)
+            draw_spots(panel, state, at, i == VIEW_FLUOROSCOPY);
         if (i == VIEW_FLUOROSCOPY)
             below = draw_fluoroscopy_labels(panel, state, at, is_main);
         if (i != VIEW_FLUOROSCOPY || !is_main) {

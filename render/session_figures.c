@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char error_letter[] = "WTFBXCLKM";
+static const char error_letter[] = "WTFBXCLKMPDSO";
 _Static_assert(sizeof error_letter == ERROR_COUNT + 1, "each error has its letter");
 char session_error_letter(ScoreError kind) { return error_letter[kind]; }
 

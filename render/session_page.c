@@ -90,7 +90,7 @@ static void print_parts(const SessionPage *page)
     else
         fprintf(out, "multiplied by half of the fraction of the distance covered (%.0f %%), since the target was not held", 200 * score_share(&f));
     if (e && f.error_total > 0)
-        fprintf(out, "; minus %g points for each of %d error%s", e->error_points, f.error_total, f.error_total == 1 ? "" : "s");
+        fprintf(out, "; minus %g points for %d error%s", score_lost_to_errors(&f, e), f.error_total, f.error_total == 1 ? "" : "s");
     fprintf(out, ".</p></section>\n");
 }
 
@@ -171,6 +171,49 @@ static void print_errors(const SessionPage *page)
     fprintf(out, "</tbody></table></div></section>\n");
 }
 
+static void print_consequences(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const ScoreFigures *f = &page->session->figures;
+    if (!f->has_consequences)
+        return;
+    fprintf(out, "<section id=\"consequences\"><h2>Consequences</h2>\n");
+    if (f->mark_count == 0)
+        fprintf(out, "<p>None: the vessel was not hurt.</p>");
+    for (int i = 0; i < f->mark_count; i++) {
+        const ScoreMark *mark = &f->mark[i];
+        fprintf(out, "<p>%.2f s: %s at (%.1f, %.1f, %.1f) mm", mark->time_s, score_error_words[mark->kind], mark->at.x, mark->at.y, mark->at.z);
+        if (mark->limit_n > 0)
+            fprintf(out, "; force on the tip %.3f N, %s %.3f N", mark->force_n, mark->kind == ERROR_SPASM ? "a perforation needs" : "limit", mark->limit_n);
+        if (mark->leaked_ml > 0)
+            fprintf(out, "; %.2f ml of contrast agent leaked", mark->leaked_ml);
+        fprintf(out, ".</p>\n");
+    }
+    if (f->narrowest < 1)
+        fprintf(out, "<p>Spasm narrowed the vessel to %.0f %% of its radius at most.</p>", 100 * f->narrowest);
+    fprintf(out, "</section>\n");
+}
+
+static void print_steps(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const GuideProgress *progress = &page->session->figures.guide;
+    const Guide *guide = page->scene && page->scene->exercise ? &page->scene->exercise->guide : NULL;
+    const int count = guide ? guide->count : progress->done;
+    if (count == 0)
+        return;
+    fprintf(out, "<section id=\"steps\"><h2>Steps</h2>\n<ol>\n");
+    for (int i = 0; i < count; i++) {
+        fprintf(out, "<li>");
+        page_text(out, guide ? guide->step[i].text : "");
+        if (i < progress->done)
+            fprintf(out, " (done at %.1f s)</li>\n", progress->done_s[i]);
+        else
+            fprintf(out, " (not done)</li>\n");
+    }
+    fprintf(out, "</ol></section>\n");
+}
+
 static void print_earlier(const SessionPage *page)
 {
     FILE *out = page->out;
@@ -235,6 +278,8 @@ void session_page(const SessionPage *page)
     print_top(page);
     print_parts(page);
     print_errors(page);
+    print_consequences(page);
+    print_steps(page);
     fprintf(out, "<section id=\"time\"><h2>Over time</h2>\n");
     session_time_figure(page);
     fprintf(out, "%s</section>\n<section id=\"path\"><h2>Path of the tip</h2>\n", page->run ? "" : "<p>The recording was not found.</p>");

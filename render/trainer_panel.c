@@ -39,6 +39,7 @@ void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *tr
     state->title = scene->exercise ? scene->exercise->title : "Free practice";
     state->instructions = scene->exercise ? scene->exercise->instructions : "This scene has no exercise: navigate freely.";
     if (scene->exercise) {
+        state->guide = &scene->exercise->guide;
         snprintf(panel->target, sizeof panel->target, "%s", scene->target[scene->exercise->target].name);
         state->target = panel->target;
         state->hold_needed_s = scene->exercise->hold_s;
@@ -90,23 +91,27 @@ static void tell_result(char *text, size_t capacity, const Scene *scene, const S
     for (int i = 0; i < ERROR_COUNT; i++)
         if (score->error[i].count > 0)
             add_line(text, capacity, "- %d \u00d7 %s: %.1f points lost.\n", score->error[i].count, score_error_words[i],
-                     scene->exercise->error_points * score->error[i].count);
+                     score_error_points(scene->exercise, (ScoreError)i) * score->error[i].count);
+    const Guide *guide = &scene->exercise->guide;
+    for (int i = 0; i < guide->count; i++)
+        if (i < score->guide.done)
+            add_line(text, capacity, "- Step %d done at %.1f s: %s\n", i + 1, score->guide.done_s[i], guide->step[i].text);
+        else
+            add_line(text, capacity, "- Step %d not done: %s\n", i + 1, guide->step[i].text);
 }
 
-// What to do about the first of the errors that are happening, or NULL.
-static const char *advice(const ScoreFigures *score)
+// Names of the places of consequences, for the views.
+static void name_spots(TrainerPanel *panel, const ScoreFigures *score)
 {
-    static const char *const of[ERROR_COUNT] = {[ERROR_BUCKLING] = "The tool buckles at the sheath: its tip is held. Pull back, turn the tip, and push slowly.",
-                                                [ERROR_TIP_FORCE] = "The tip presses against the wall. Pull back a little and turn it before you push again.",
-                                                [ERROR_WALL_FORCE] =
-                                                    "The tool presses hard on the wall, as when it coils or is jammed. Pull back until the force falls.",
-                                                [ERROR_WRONG_BRANCH] = "The tip is in a wrong branch. Pull back past the fork, turn the tip, and try again.",
-                                                [ERROR_WIRE_LOST] = "The wire is inside the catheter. Push the wire, not the catheter, until it leads again.",
-                                                [ERROR_BLIND] = "The tool moves without X-rays: keep the X-ray on while you push."};
-    for (int i = 0; i < ERROR_COUNT; i++)
-        if (score->error[i].is_on && of[i])
-            return of[i];
-    return NULL;
+    panel->mark_count = score->mark_count;
+    memcpy(panel->mark, score->mark, sizeof panel->mark);
+    for (int i = 0; i < score->mark_count; i++) {
+        const ScoreMark *mark = &score->mark[i];
+        if (mark->kind == ERROR_SPASM)
+            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], "%s: radius %.0f %%", score_error_words[mark->kind], 100 * score->narrowest);
+        else
+            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], "%s", score_error_words[mark->kind]);
+    }
 }
 
 static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score)
@@ -136,7 +141,10 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
         snprintf(text, sizeof panel->error_text[0], "%s%s: %d, last at %.1f s", error->is_on ? "NOW " : "", score_error_words[i], error->count, error->last_s);
         panel->error[state->error_count++] = text;
     }
-    state->advice = advice(score);
+    state->hint = score->hint;
+    state->hint_value = score->hint_value;
+    state->steps_done = score->guide.done;
+    name_spots(panel, score);
     state->hold_s = score->held_s;
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
@@ -147,7 +155,19 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->contrast_ml = score->contrast_ml;
 }
 
-static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *figures)
+// A consequence is announced for some seconds.
+static const char *announce(const ScoreFigures *score, double time_s)
+{
+    static const double shown_s = 8;
+    static const char *const of[ERROR_COUNT] = {[ERROR_PERFORATION] = "The tip has perforated the vessel: stop, leave the tool where it is, and call for help",
+                                                [ERROR_DISSECTION] = "The tip has dissected the wall: pull it back, and do not inject there",
+                                                [ERROR_SPASM] = "The vessel is in spasm after repeated force: wait, and touch it less",
+                                                [ERROR_CLOT] = "A clot has formed on the tools: inject to flush them before you go on"};
+    const ScoreMark *last = score->mark_count > 0 ? &score->mark[score->mark_count - 1] : NULL;
+    return last && time_s - last->time_s < shown_s ? of[last->kind] : NULL;
+}
+
+static void warn(TrainerPanel *panel, const Pose *pose, const ScoreFigures *score, const RealtimeFigures *figures)
 {
     PanelState *state = &panel->state;
     const StepReport *report = &pose->report;
@@ -160,7 +180,7 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
     const char *line = report->flags & STEP_FULLY_INSERTED ? "The tool is fully inserted and cannot be pushed further"
                        : report->flags & STEP_HAND_SLIPS   ? "The hand slips along the tool: the tool needs more force than the grip holds"
                        : report->flags & STEP_LIMITED      ? "The tool advances less than the hand pushes: it is jammed, or it snaps"
-                                                           : NULL;
+                                                           : announce(score, pose->time_s);
     if (figures) {
         if (figures->state == REALTIME_RUNNING && figures->real_time_factor > 0 && figures->real_time_factor < slow_factor)
             state->warnings |= WARN_SLOW;
@@ -209,7 +229,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         state->missed_deadlines = figures->deadline_misses;
     }
     show_score(panel, scene, score);
-    warn(panel, pose, figures);
+    warn(panel, pose, score, figures);
 }
 
 // Labels of the 3D view: targets with their distance from the tip, and the mouth of the sheath.
@@ -249,11 +269,31 @@ static void label_scene(TrainerPanel *panel, const OperatorControls *controls, c
     state->force_full_scale_n = controls->look.force_full_scale_n;
 }
 
+// Places the marks of consequences in the X-ray image and in the 3D view.
+static void place_spots(TrainerPanel *panel, const Views *views, const Fluoroscope *fluoroscope)
+{
+    const Camera *camera = vessel_scene_projection(views_scene(views));
+    panel->state.spot_count = panel->mark_count;
+    for (int i = 0; i < panel->mark_count; i++) {
+        PanelSpot *spot = &panel->state.spot[i];
+        const ScoreMark *mark = &panel->mark[i];
+        const double scale = fluoroscope_locate(fluoroscope, mark->at, spot->xray), volume = 1000 * mark->leaked_ml;
+        const Vec3 p = camera_project(camera, mark->at);
+        spot->text = panel->spot_text[i];
+        spot->is_in_xray = scale > 0;
+        spot->blot = scale * cbrt(3 * volume / (4 * PI));
+        spot->space[0] = p.x;
+        spot->space[1] = p.y;
+        spot->is_in_3d = p.x > 0 && p.y > 0 && p.x < camera->width && p.y < camera->height;
+    }
+}
+
 void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, Views *views, const XrayControl *xray)
 {
     PanelState *state = &panel->state;
     FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
     label_scene(panel, controls, views_scene(views));
+    place_spots(panel, views, views_fluoroscope(views));
     state->chosen_tool = controls->grip.chosen;
     state->view = controls->view;
     state->is_examination = controls->is_examination;

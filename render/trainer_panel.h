@@ -6,7 +6,7 @@
 #include "render/views.h"
 #include "sim/sim.h"
 
-enum { PANEL_FIGURES = 12, PANEL_ERRORS = 12, PANEL_DEVICES = 14, PANEL_LABELS = 24 };
+enum { PANEL_FIGURES = 12, PANEL_ERRORS = ERROR_COUNT, PANEL_DEVICES = 14, PANEL_LABELS = 24 };
 
 typedef struct TrainerPanel {
     PanelState state;                // the input of panel_draw; its strings are stored below
@@ -20,6 +20,9 @@ typedef struct TrainerPanel {
     int fitted[PANEL_TOOLS];         // fitted device that the texts in `tool` describe
     char tool[PANEL_TOOLS][200], tool_note[PANEL_TOOLS][64], target[96], warning[200];
     char instructions[4200];
+    int mark_count;
+    ScoreMark mark[SCORE_MARKS_MOST];
+    char spot_text[SCORE_MARKS_MOST][64];
 } TrainerPanel;
 
 // Sets the constant data of a session: scene, exercise, tool.

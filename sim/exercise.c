@@ -9,6 +9,7 @@ Exercise exercise_default(void)
 {
     Exercise exercise = {.target = -1, .tool = -1, .hold_s = 2, .time_limit_s = 600, .rules = {.tip_length_mm = 5, .buckling = true}, .error_points = 5};
     exercise.stays = exercise.stays_at = -1;
+    exercise.consequences = consequence_rules_default();
     for (int k = 0; k < TOOLS_MOST; k++)
         exercise.device[k] = -1;
     for (int i = 0; i < PART_COUNT; i++)
@@ -102,8 +103,8 @@ static void read_rules(YamlValue value, ExerciseRules *rules)
 
 void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
 {
-    static const char *const keys[] = {"title",  "instructions", "level", "target", "tool",    "exchange",     "stays",
-                                       "hold_s", "time_limit_s", "rules", "par",    "weights", "error_points", "mode",  NULL};
+    static const char *const keys[] = {"title",        "instructions", "level", "target", "tool",    "exchange",     "stays", "hold_s",
+                                       "time_limit_s", "rules",        "par",   "weights", "error_points", "mode", "consequences", "steps", NULL};
     static const char *const mode[] = {"practice", "examination", NULL};
     *exercise = exercise_default();
     YamlMap map = yaml_map(value, keys);
@@ -130,6 +131,10 @@ void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exerci
     yaml_map_number(&map, "error_points", false, (NumberRange){0, 100, false}, &exercise->error_points);
     if (yaml_has(&map, "mode"))
         exercise->is_examination = yaml_choice(yaml_get(&map, "mode", false), mode) == 1;
+    if (yaml_has(&map, "consequences"))
+        consequence_rules_read(yaml_get(&map, "consequences", false), &exercise->consequences);
+    if (yaml_has(&map, "steps"))
+        guide_read(yaml_get(&map, "steps", false), scene->target_count, scene->target, scene->tool_count, scene->tool, &exercise->guide);
 }
 
 void exercise_free(Exercise *exercise)

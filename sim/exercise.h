@@ -34,11 +34,15 @@
 //     weights: {time: 1, fluoroscopy: 1, contrast: 1, path: 1, wall_force: 1, wall_impulse: 1, blind: 1, guidance: 1}   # 0 to 1000, relative
 //     error_points: 5                       # 0 to 100, what each handling error costs
 //     mode: practice                        # or examination: the trainer hides the 3D view and angioscopy
+//     consequences: true                    # perforation, dissection, spasm, clot: false, true, or a map of limits (sim/consequence.h); default: in an examination
+//     steps: [{text: Hold the pedal., xray_s: 1}, …]    # a guided exercise (sim/guide.h); default: none
 #ifndef SELDINGER_SIM_EXERCISE_H
 #define SELDINGER_SIM_EXERCISE_H
 
 #include "base/base.h"
 #include "input/input.h"
+#include "sim/consequence.h"
+#include "sim/guide.h"
 #include "sim/score_part.h"
 
 enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };
@@ -69,6 +73,8 @@ typedef struct Exercise {
     double weight[PART_COUNT];
     double error_points;
     bool is_examination;
+    ConsequenceRules consequences;
+    Guide guide;
 } Exercise;
 
 // The defaults: 2 s, 600 s, buckling only, no par, all weights 1, 5 points per error.

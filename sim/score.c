@@ -7,8 +7,8 @@
 
 #include <stdlib.h>
 
-const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling",  "blind",
-                                                       "contrast",     "wire_lost", "kick",       "tip_moved", NULL};
+const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force",  "buckling",   "blind", "contrast", "wire_lost",
+                                                       "kick",         "tip_moved", "perforation", "dissection", "spasm", "clot",     NULL};
 const char *const score_error_words[ERROR_COUNT] = {"wrong branch",
                                                     "tip force above the limit",
                                                     "wall force above the limit",
@@ -17,7 +17,11 @@ const char *const score_error_words[ERROR_COUNT] = {"wrong branch",
                                                     "too much contrast agent",
                                                     "wire lost in the catheter",
                                                     "tip jumped while its hand rested",
-                                                    "tip left its required place"};
+                                                    "tip left its required place",
+                                                    "vessel perforated",
+                                                    "wall dissected",
+                                                    "vessel in spasm",
+                                                    "clot on the tools"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
 static const double LOOK_MS = 10;            // interval between locations of the tips in the tree
@@ -28,6 +32,12 @@ static const double FRESH_MS = 200;          // an image older than this does no
 static const double PULLED = 0.5;            // what a movement backwards counts as blind: a tip that is pulled follows its own shaft
 static const double GLANCE_MS = 2000;        // for how long a view is remembered, so that glances between movements do not come free
 enum { HOPS = 8 };
+static const double LEAKS = 0.1;             // part of the injected agent that leaves through a perforation
+// What makes a hint (sim/hints.h).
+static const double SAC_PRESS = 0.3, FIRM = 0.15, FIRM_N = 0.05;     // force on a tip as part of a perforation's, or at most
+static const double RISING = 1.05, SLOW_MS = 500;    // of the force's own mean over that time
+static const double HELD_MM = 3, COILED_MM = 6, OFF_MM = 3, UNSEEN_MM = 5, NO_CONTRAST_S = 20;
+static const double EARLY = 0.6;             // part of a rule's limit at which a hint warns of the error
 
 struct Score {
     const Scene *scene;
@@ -48,6 +58,8 @@ struct Score {
     double since_glance;         // [ms] since the 3D view or angioscopy was in sight
     float looks;                 // of the last step
     int64_t held_steps, stood_steps;         // within the target; of the tool that must stay, within its own target
+    double slow_n[TOOLS_MOST];   // slow mean of the force on each tip
+    Hints hints;
     bool stands;                 // the tool has reached the target in which it must stay …
     Vec3 stood_at;               // … at this place
     int event_count;
@@ -158,6 +170,7 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     f->target_distance_mm = vec3_distance(tip, target);
     for (int i = 0; i < PART_COUNT; i++)
         f->part[i] = 1;
+    f->narrowest = 1;
     score->path_from = tip;
     score->since_glance = HUGE_VAL;
     for (int k = 0; k < TOOLS_MOST; k++)
@@ -174,10 +187,12 @@ void score_free(Score *score)
 }
 
 // An episode of `kind` begins when the measure is `over` its limit and ends once it was `back` for `quiet_ms`. Caused by `tool`, or by no single tool (-1).
-static void judge(Score *score, ScoreError kind, int tool, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
+// Returns true if it begins.
+static bool judge(Score *score, ScoreError kind, int tool, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
 {
     ScoreEpisode *episode = tool < 0 ? &score->episode[kind] : &score->tool[tool].episode[kind];
     ScoreErrorFigures *error = &score->figures.error[kind];
+    const bool begins = over && !episode->is_on;
     if (episode->is_on) {
         episode->quiet = back ? episode->quiet + elapsed_ms : 0;
         episode->is_on = !back || episode->quiet < quiet_ms;
@@ -192,6 +207,7 @@ static void judge(Score *score, ScoreError kind, int tool, bool over, bool back,
     error->is_on = score->episode[kind].is_on;
     for (int k = 0; k < score->tool_count; k++)
         error->is_on |= score->tool[k].episode[kind].is_on;
+    return begins;
 }
 
 static void judge_limit(Score *score, ScoreError kind, int tool, double measure, double limit, double again, double elapsed_ms, double now_s)
@@ -286,6 +302,9 @@ static void watch_xrays(Score *score, const Stepper *stepper, const XrayControl 
     watch_blind(score, stepper);
     f->guided_s += is_moved && score->since_glance <= GLANCE_MS ? seconds : 0;
     f->contrast_ml += fmax((double)xray->contrast_ml_s, 0) * seconds;
+    f->dwell_s = xray->contrast_ml_s > 0 ? 0 : f->dwell_s + seconds;
+    for (int i = 0; i < f->mark_count; i++)
+        f->mark[i].leaked_ml += f->mark[i].kind == ERROR_PERFORATION ? LEAKS * fmax((double)xray->contrast_ml_s, 0) * seconds : 0;
     if (rules->contrast_ml > 0)
         judge(score, ERROR_CONTRAST, -1, f->contrast_ml > rules->contrast_ml * (1 + 1e-9), false, QUIET_MS, score->dt, now_s);
     if (rules->blind_mm > 0)
@@ -429,6 +448,127 @@ static void watch_sheath(Score *score, const Stepper *stepper, const ToolCommand
     }
 }
 
+// --- consequences ---
+
+static ConsequenceWall wall_at(const Score *score, int k)
+{
+    const VesselTree *tree = score->path.tree;
+    const int node = score->figures.tool[k].tip_node;
+    if (tree && node >= 0)
+        return (ConsequenceWall){tree->radius[node], tree->kind[node] == NODE_ANEURYSM};
+    return (ConsequenceWall){score->scene->source == SOURCE_TUBE ? score->scene->tube.radius : HUGE_VAL, false};
+}
+
+static void mark(Score *score, ScoreError kind, int tool, Vec3 at, double limit_n, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    if (f->mark_count < SCORE_MARKS_MOST)
+        f->mark[f->mark_count++] =
+            (ScoreMark){.kind = kind, .at = at, .time_s = now_s, .force_n = tool < 0 ? 0 : vec3_norm(score->tool[tool].wall.press), .limit_n = limit_n};
+}
+
+// They happen if the exercise says so, or if it does not say and the session is an examination.
+static bool has_consequences(const Score *score, const XrayControl *xray)
+{
+    const bool is_examination = score->exercise.is_examination || (xray && (int)xray->seen & SEEN_EXAMINATION);
+    return score->exercise.consequences.mode == CONSEQUENCES_ON || (score->exercise.consequences.mode == CONSEQUENCES_IN_EXAMINATION && is_examination);
+}
+
+static void watch_walls(Score *score, const Stepper *stepper, const XrayControl *xray, int led, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    const ConsequenceRules *rules = &score->exercise.consequences;
+    f->has_consequences = has_consequences(score, xray);
+    for (int k = 0; k < score->tool_count; k++) {
+        ScoreTool *tool = &score->tool[k];
+        const ConsequenceTip *tip = &tool->wall;
+        score_tool_press(tool, stepper, rules, wall_at(score, k), score->dt);
+        if (!f->has_consequences)
+            continue;
+        f->tool[k].narrowed = tip->narrowed;
+        f->narrowest = fmin(f->narrowest, 1 - tip->narrowed);
+        const bool eased = consequence_has_eased(tip);
+        if (judge(score, ERROR_PERFORATION, k, consequence_perforates(tip), eased, QUIET_MS, score->dt, now_s))
+            mark(score, ERROR_PERFORATION, k, tool->at, tip->limit, now_s);
+        if (judge(score, ERROR_DISSECTION, k, consequence_dissects(tip), eased, QUIET_MS, score->dt, now_s))
+            mark(score, ERROR_DISSECTION, k, tool->at, tip->dissection_limit, now_s);
+        if (judge(score, ERROR_SPASM, k, consequence_is_spasm(tip), consequence_has_relaxed(tip), QUIET_MS, score->dt, now_s))
+            mark(score, ERROR_SPASM, k, tool->at, tip->limit, now_s);
+    }
+    if (f->has_consequences && xray && judge(score, ERROR_CLOT, -1, f->dwell_s > rules->clot_s, f->dwell_s <= 0, 0, score->dt, now_s))
+        mark(score, ERROR_CLOT, -1, score->tool[led].at, 0, now_s);
+}
+
+// --- hints and steps ---
+
+static void note(HintSigns *signs, HintKind kind, double sign, double value)
+{
+    if (sign > signs->sign[kind]) {
+        signs->sign[kind] = sign;
+        signs->value[kind] = value;
+    }
+}
+
+// A sign that can keep a hint but not bring it.
+static double kept(bool is_now, double sign) { return is_now ? sign : fmin(sign, 0.99); }
+
+static void sign_tip(Score *score, const Stepper *stepper, const ToolCommands *commands, int k, HintSigns *signs)
+{
+    const ScoreTool *tool = &score->tool[k];
+    const ScoreToolFigures *own = &score->figures.tool[k];
+    const double press = vec3_norm(tool->wall.press), fed = tool->stall.fed;
+    const bool is_pushed = commands->tool[k].push_mm_s > 0, is_firm = press > fmin(FIRM * tool->wall.limit, FIRM_N);
+    score->slow_n[k] += (press - score->slow_n[k]) * -same_expm1(-score->dt / SLOW_MS);
+    if (wall_at(score, k).is_sac)
+        note(signs, HINT_SAC, kept(press > RISING * score->slow_n[k], press / (SAC_PRESS * tool->wall.limit)), press);
+    if (own->lost_limit_mm > 0)
+        note(signs, HINT_BUCKLES, kept(is_pushed, own->lost_mm / (EARLY * own->lost_limit_mm)), own->lost_mm);
+    if (stepper_tool_inserted(stepper, k) > 0 && is_firm)
+        note(signs, HINT_PRESSES, kept(is_pushed, fed / HELD_MM), fed);
+    else if (stepper_tool_inserted(stepper, k) > 0 && own->lost_mm < AGAIN * own->lost_limit_mm)
+        note(signs, HINT_COILS, kept(is_pushed, fed / COILED_MM), fed);
+    const double off = score->exercise.rules.wrong_branch_mm > 0 ? EARLY * score->exercise.rules.wrong_branch_mm : OFF_MM;
+    note(signs, HINT_WRONG_BRANCH, own->off_way_mm / off, own->off_way_mm);
+}
+
+static void watch_hints(Score *score, const Stepper *stepper, const ToolCommands *commands, const XrayControl *xray, const StepReport *report, bool moves)
+{
+    ScoreFigures *f = &score->figures;
+    const ExerciseRules *rules = &score->exercise.rules;
+    HintSigns signs = {0};
+    bool is_pushed = false;
+    for (int k = 0; k < score->tool_count; k++) {
+        sign_tip(score, stepper, commands, k, &signs);
+        is_pushed |= commands->tool[k].push_mm_s > 0;
+    }
+    if (report->self_contacts > 0)
+        note(&signs, HINT_COILS, kept(is_pushed, 1), 0);
+    note(&signs, HINT_WIRE_LOST, f->error[ERROR_WIRE_LOST].is_on, 0);
+    note(&signs, HINT_UNSEEN, kept(moves, f->blind_mm / (rules->blind_mm > 0 ? EARLY * rules->blind_mm : UNSEEN_MM)), f->blind_mm);
+    const bool may_inject = rules->contrast_ml <= 0 || f->contrast_ml < AGAIN * rules->contrast_ml;
+    if (xray && xray->pedal > 0.5F && xray->mode != XRAY_ROADMAP && score->path.tree && may_inject)
+        note(&signs, HINT_NO_CONTRAST, kept(is_pushed, f->dwell_s / NO_CONTRAST_S), f->dwell_s);
+    f->hint = hints_step(&score->hints, &signs, score->dt);
+    f->hint_value = signs.value[f->hint];
+}
+
+static void watch_guide(Score *score, const Stepper *stepper, int led, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    const GuideStep *step = guide_now(&score->exercise.guide, &f->guide);
+    if (!step)
+        return;
+    const int k = step->tool >= 0 ? step->tool : led;
+    const SceneTarget *target = step->target >= 0 ? &score->scene->target[step->target] : NULL;
+    GuideSigns signs = {.xray_s = f->fluoroscopy_s,
+                        .contrast_ml = f->contrast_ml,
+                        .held_s = f->held_s,
+                        .turned_deg = stepper_tool_turned(stepper, k) * 180 / PI,
+                        .inserted_mm = stepper_tool_inserted(stepper, k),
+                        .is_tip_in = target && vec3_distance(score->tool[k].at, target->point) <= target->radius};
+    guide_watch(&score->exercise.guide, &f->guide, &signs, now_s);
+}
+
 // --- points ---
 
 static void give_points(Score *score)
@@ -438,7 +578,7 @@ static void give_points(Score *score)
     double mean = score_parts_judge(f, exercise), covered = f->way_mm > 0 ? fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0;
     f->efficiency = f->path_mm > 0 ? fmin(f->way_mm * covered / f->path_mm, 1) : 0;
     if (f->has_exercise)
-        f->points = fmax(100 * score_share(f) * mean - exercise->error_points * f->error_total, 0);
+        f->points = fmax(100 * score_share(f) * mean - score_lost_to_errors(f, exercise), 0);
 }
 
 static bool is_moved(const Score *score, const ToolCommands *commands)
@@ -487,12 +627,17 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
     score->since_look += score->dt;
     if (score->since_look >= LOOK_MS * (1 - 1e-9))
         look(score, stepper, led, now_s);
+    watch_walls(score, stepper, xray, led, now_s);
+    watch_hints(score, stepper, commands, xray, simulator_last(simulator), moves);
+    watch_guide(score, stepper, led, now_s);
     if (f->has_exercise && score->held_steps > 0 && f->held_s >= score->exercise.hold_s - 1e-9) {
         f->state = SCORE_REACHED;
         f->reached_s = now_s;
     } else if (f->has_exercise && f->time_s >= score->exercise.time_limit_s - 1e-9) {
         f->state = SCORE_TIME_OUT;
     }
+    if (f->state != SCORE_RUNNING)
+        f->hint = HINT_NONE;
     give_points(score);
 }
 

@@ -1,6 +1,6 @@
 // Scores a trainee's run: figures, handling errors, points. One Score per simulator, stepped by the same thread right after each simulator_step(); the
 // figures are plain data to be copied into a pose. The same steps give the same figures, so a replay has the session's score. A step allocates
-// nothing, makes no vessel query and takes well under 1 us; the tip is located in the tree every 10 ms.
+// nothing, makes no vessel query and takes about 1 us; the tip is located in the tree every 10 ms.
 //
 // The clock starts with the first step in which the tool is moved, the pedal is down or contrast flows. Once the target has been held, or the time is
 // over, all figures are frozen. Without an exercise they continue without limit.
@@ -35,11 +35,14 @@
 //   kick          a tool's tip moves faster than kick_mm_s, mean of its velocity over 20 ms, while its own hand has rested for 0.1 s: energy that
 //                 another tool's friction or bending stiffness had stored in it was released
 //   tip moved     the tip of the tool that must stay has left its target, after it had been there for hold_s
+//   perforation, dissection, spasm, clot       consequences (sim/consequence.h), if the exercise wants them; each costs its own points instead of n
 //
 // What a trainee sees. A movement is seen while the pedal is down and a pulse of the last 0.2 s showed the tool's tip, or that of a tool that reaches further:
 // the tip lay in the open field, and the window showed the live image (XrayControl.seen). All other movements add up in blind_total_mm however short each
 // was, pulling with half its length. Time in which a tool is moved with the 3D view or angioscopy in sight, or within 2 s after a look at them, adds up in
 // guided_s. What the window shows is recorded step by step, so that a recording has one score. Without a window nothing is blind and nothing is guided.
+//
+// Beside that the score keeps the hint about what is happening (sim/hints.h) and the steps of a guided exercise (sim/guide.h).
 //
 // An exchange counts as no motion: length, tip and shape at the sheath are measured again for the new device.
 #ifndef SELDINGER_SIM_SCORE_H

@@ -3,6 +3,7 @@
 #define SELDINGER_SIM_SCORE_FIGURES_H
 
 #include "sim/exercise.h"
+#include "sim/hints.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -17,6 +18,10 @@ typedef enum {
     ERROR_WIRE_LOST,
     ERROR_KICK,
     ERROR_TIP_MOVED,
+    ERROR_PERFORATION,           // these four are consequences (sim/consequence.h), in their order
+    ERROR_DISSECTION,
+    ERROR_SPASM,
+    ERROR_CLOT,
     ERROR_COUNT
 } ScoreError;
 extern const char *const score_error_name[ERROR_COUNT + 1];    // in files: "wrong_branch", "tip_force", …; NULL at the end
@@ -42,6 +47,7 @@ typedef struct ScoreToolFigures {
     double spare_mm;             // distance of its proximal end behind that tool's hub, >= 0
     double strayed_mm;           // for the tool that must stay: largest distance of its tip from where it had reached its target
     int tip_node;                // node of the tree at which its tip is; -1 without tree
+    double narrowed;             // part of the vessel's radius at its tip that is lost to spasm
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the path
 } ScoreToolFigures;
 
@@ -50,6 +56,16 @@ typedef struct ScorePartFigures {
     double measured, par;        // in the part's unit; par 0: not judged
     double most, points;         // points that it gives at most, 100 times its share of the weights, and those reached
 } ScorePartFigures;
+
+// Where a consequence happened.
+typedef struct ScoreMark {
+    ScoreError kind;             // ERROR_PERFORATION or one of those after it
+    Vec3 at;                     // [mm] the tip
+    double time_s;               // simulated
+    double force_n, limit_n;     // force on the tip and the limit that it exceeded; 0 for a clot
+    double leaked_ml;            // contrast agent that has left through a perforation
+} ScoreMark;
+enum { SCORE_MARKS_MOST = 8 };   // further consequences are counted but not marked
 
 typedef struct ScoreFigures {
     ScoreState state;
@@ -79,6 +95,14 @@ typedef struct ScoreFigures {
     double target_distance_mm;   // from that tool's tip, straight
     double held_s;               // time within the target without interruption
     double reached_s;            // simulated time when the target had been held; 0 before
+    bool has_consequences;       // they happen in this session
+    double narrowest;            // smallest radius so far that spasm has left of a vessel, as a part; 1: no spasm
+    double dwell_s;              // since the last injection, or since the clock began
+    int mark_count;
+    ScoreMark mark[SCORE_MARKS_MOST];    // in the order of their times
+    GuideProgress guide;
+    HintKind hint;               // what is happening …
+    double hint_value;           // … and its value
     int error_total;
     ScoreErrorFigures error[ERROR_COUNT];
     int tool_count;

@@ -43,7 +43,8 @@ static const struct Figure {
 };
 enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
 // the keys after those of the table; "tools" with several tools only
-static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "points_of", "errors", "tools"};
+static const char *const other_key[] = {"state",     "has_exercise", "has_xray", "pulses",       "error_total", "parts",
+                                        "points_of", "errors",       "tools",    "consequences", "steps"};
 // Figures of a tool. An episode still in progress is not written.
 static const struct Figure tool_table[] = {
 #define FIGURE(name, most)                                                                                                                                     \
@@ -109,6 +110,40 @@ static bool add_part(cJSON *to, const ScoreFigures *f, ScorePart part)
            add(object, "par", judged->par) && cJSON_AddStringToObject(object, "why", why);
 }
 
+static bool add_mark(cJSON *list, const ScoreMark *mark)
+{
+    cJSON *object = cJSON_CreateObject();
+    const double at[3] = {mark->at.x, mark->at.y, mark->at.z};
+    if (!object || !cJSON_AddItemToArray(list, object))
+        return false;
+    cJSON *place = cJSON_CreateDoubleArray(at, 3);
+    return place && cJSON_AddStringToObject(object, "kind", score_error_name[mark->kind]) && add(object, "time_s", mark->time_s) &&
+           cJSON_AddItemToObject(object, "at_mm", place) && add(object, "force_n", mark->force_n) && add(object, "limit_n", mark->limit_n) &&
+           add(object, "leaked_ml", mark->leaked_ml);
+}
+
+// Only where consequences happen.
+static bool add_consequences(cJSON *object, const ScoreFigures *f)
+{
+    if (!f->has_consequences)
+        return true;
+    cJSON *to = cJSON_AddObjectToObject(object, "consequences");
+    bool good = to && add(to, "narrowest", f->narrowest);
+    cJSON *list = good ? cJSON_AddArrayToObject(to, "marks") : NULL;
+    for (int i = 0; list && good && i < f->mark_count; i++)
+        good = add_mark(list, &f->mark[i]);
+    return list && good;
+}
+
+// The times of the steps that were done, if there are any.
+static bool add_steps(cJSON *object, const ScoreFigures *f)
+{
+    if (f->guide.done == 0)
+        return true;
+    cJSON *list = cJSON_CreateDoubleArray(f->guide.done_s, f->guide.done);
+    return list && cJSON_AddItemToObject(object, "steps", list);
+}
+
 bool score_add_json(cJSON *object, const ScoreFigures *f)
 {
     bool good = cJSON_AddStringToObject(object, "state", score_state_name[f->state]) && cJSON_AddBoolToObject(object, "has_exercise", f->has_exercise) &&
@@ -123,7 +158,7 @@ bool score_add_json(cJSON *object, const ScoreFigures *f)
         cJSON *error = cJSON_AddObjectToObject(errors, score_error_name[i]);
         good = error && add(error, "count", f->error[i].count) && add(error, "last_s", f->error[i].last_s);
     }
-    return good && add_tools(object, f);
+    return good && add_tools(object, f) && add_consequences(object, f) && add_steps(object, f);
 }
 
 char *score_json(const ScoreFigures *figures, const Scene *scene)
@@ -257,6 +292,63 @@ static void read_points(const JsonReading *reading, const cJSON *points, ScoreFi
     }
 }
 
+static void read_place(const JsonReading *reading, const cJSON *list, Vec3 *at)
+{
+    double value[3] = {0};
+    bool good = cJSON_IsArray(list) && cJSON_GetArraySize(list) == 3;
+    for (int i = 0; good && i < 3; i++) {
+        const cJSON *item = cJSON_GetArrayItem(list, i);
+        good = cJSON_IsNumber(item) && fabs(item->valuedouble) <= 1e9;
+        value[i] = good ? item->valuedouble : 0;
+    }
+    if (!good)
+        faults_add(reading->faults, reading->file, 0, 0, "'score.consequences.at_mm' is not a list of three numbers within 1e9");
+    *at = vec3(value[0], value[1], value[2]);
+}
+
+static void read_consequences(const JsonReading *reading, const cJSON *object, ScoreFigures *f)
+{
+    static const char *const keys[] = {"narrowest", "marks", NULL}, *const mark_keys[] = {"kind", "time_s", "at_mm", "force_n", "limit_n", "leaked_ml", NULL};
+    const char *const where = "score.consequences";
+    f->narrowest = 1;
+    if (!object || !json_keys(reading, object, where, keys))
+        return;
+    f->has_consequences = true;
+    f->narrowest = json_number(reading, object, where, "narrowest", 0, 1);
+    const cJSON *list = cJSON_GetObjectItemCaseSensitive(object, "marks");
+    if (!cJSON_IsArray(list) || cJSON_GetArraySize(list) > SCORE_MARKS_MOST) {
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.marks' is not a list of at most %d entries", where, SCORE_MARKS_MOST);
+        return;
+    }
+    for (const cJSON *item = list->child; item; item = item->next) {
+        if (!json_keys(reading, item, where, mark_keys))
+            continue;
+        ScoreMark *mark = &f->mark[f->mark_count++];
+        mark->kind = (ScoreError)(ERROR_PERFORATION + json_choice(reading, item, where, "kind", score_error_name + ERROR_PERFORATION));
+        mark->time_s = json_number(reading, item, where, "time_s", 0, 1e7);
+        mark->force_n = json_number(reading, item, where, "force_n", 0, 1e12);
+        mark->limit_n = json_number(reading, item, where, "limit_n", 0, 1e12);
+        mark->leaked_ml = json_number(reading, item, where, "leaked_ml", 0, 1e9);
+        read_place(reading, cJSON_GetObjectItemCaseSensitive(item, "at_mm"), &mark->at);
+    }
+}
+
+static void read_steps(const JsonReading *reading, const cJSON *list, ScoreFigures *f)
+{
+    if (!list)
+        return;
+    const int count = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : -1;
+    bool good = count >= 1 && count <= GUIDE_STEPS;
+    for (int i = 0; good && i < count; i++) {
+        const cJSON *item = cJSON_GetArrayItem(list, i);
+        good = cJSON_IsNumber(item) && item->valuedouble >= 0 && item->valuedouble <= 1e7;
+        f->guide.done_s[i] = good ? item->valuedouble : 0;
+    }
+    f->guide.done = good ? count : 0;
+    if (!good)
+        faults_add(reading->faults, reading->file, 0, 0, "'score.steps' is not a list of 1 to %d times in s", GUIDE_STEPS);
+}
+
 void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *f)
 {
     static const char *const error_key[] = {"count", "last_s", NULL};
@@ -265,7 +357,7 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
         keys[i] = figure_table[i].name;
     for (int i = 0; i < OTHERS; i++)
         keys[FIGURES + i] = other_key[i];
-    *f = (ScoreFigures){.tip_node = -1};
+    *f = (ScoreFigures){.tip_node = -1, .narrowest = 1};
     if (!json_keys(reading, object, "score", keys))
         return;
     read_figures(reading, object, "score", FIGURES, figure_table, f);
@@ -282,6 +374,8 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
                              ? 1
                              : json_number(reading, parts, "score.parts", score_part_name[i], 0, 1);
     read_points(reading, cJSON_GetObjectItemCaseSensitive(object, "points_of"), f);
+    read_consequences(reading, cJSON_GetObjectItemCaseSensitive(object, "consequences"), f);
+    read_steps(reading, cJSON_GetObjectItemCaseSensitive(object, "steps"), f);
     int64_t sum = 0;
     if (!json_keys(reading, errors, "score.errors", score_error_name))
         return;

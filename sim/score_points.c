@@ -41,3 +41,16 @@ double score_share(const ScoreFigures *f)
     double covered = f->way_mm > 0 ? fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0;
     return f->state == SCORE_REACHED ? 1 : 0.5 * covered;
 }
+
+double score_error_points(const Exercise *exercise, ScoreError kind)
+{
+    return kind >= ERROR_PERFORATION ? exercise->consequences.points[kind - ERROR_PERFORATION] : exercise->error_points;
+}
+
+double score_lost_to_errors(const ScoreFigures *f, const Exercise *exercise)
+{
+    double lost = 0;
+    for (int i = 0; i < ERROR_COUNT; i++)
+        lost += f->error[i].count * score_error_points(exercise, (ScoreError)i);
+    return lost;
+}

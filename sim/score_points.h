@@ -12,5 +12,8 @@ double score_parts_judge(ScoreFigures *figures, const Exercise *exercise);
 void score_part_reason(const ScoreFigures *figures, ScorePart part, char *text, size_t capacity);
 // What multiplies the sum of the parts: 1 once the target was held, before that half of the fraction of the path to it that was covered.
 double score_share(const ScoreFigures *figures);
+// What an error of this kind costs: error_points, or what the consequence costs; and all errors together.
+double score_error_points(const Exercise *exercise, ScoreError kind);
+double score_lost_to_errors(const ScoreFigures *figures, const Exercise *exercise);
 
 #endif

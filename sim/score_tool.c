@@ -20,6 +20,8 @@ static void measure_ends(const ScoreTool *tool, const Stepper *stepper, ScoreToo
     f->spare_mm = fmax(tool->length - own - (stepper_tool_length(stepper, tool->index - 1) - around), 0);
 }
 
+static double tip_diameter(const WireOptions *wire) { return wire->section_count > 0 ? wire->section[wire->section_count - 1].diameter : 0; }
+
 // Finds its tip, and how close its proximal end may come to the hub.
 static void find_ends(ScoreTool *tool, const Stepper *stepper, ScoreToolFigures *figures)
 {
@@ -36,8 +38,10 @@ bool score_tool_create(ScoreTool *tool, Simulator *simulator, int index, double 
     *tool = (ScoreTool){.index = index, .length = stepper_tool_length(stepper, index), .tip_length = tip_length};
     *figures = (ScoreToolFigures){.tip_node = -1};
     memcpy(figures->name, scene->tool[index].name, sizeof figures->name);
+    tool->diameter = tip_diameter(&wire);
     score_sheath_start(&tool->sheath, &wire, lumen_radius, stepper_tool_inserted(stepper, index));
     find_ends(tool, stepper, figures);
+    tool->stall.from = tool->at;
     return score_tip_create(&tool->tip, stepper, index, &wire, tip_length);
 }
 
@@ -52,6 +56,8 @@ void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *f
         tool->length = stepper_tool_length(stepper, tool->index);
         tool->drift = vec3(0, 0, 0);
         tool->rested = 0;
+        tool->diameter = tip_diameter(&wire);
+        tool->wall = (ConsequenceTip){0};
         score_sheath_refit(&tool->sheath, &wire, inserted);
         score_tip_create(&tool->tip, stepper, tool->index, &wire, tool->tip_length);     // allocates nothing with several tools
     }
@@ -66,6 +72,7 @@ double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, Score
     tool->at = stepper_tool_place(stepper, tool->index, tool->length).position;
     Vec3 velocity = vec3_scale(vec3_sub(tool->at, before), 1 / dt);
     tool->drift = vec3(score_mean(tool->drift.x, velocity.x, dt), score_mean(tool->drift.y, velocity.y, dt), score_mean(tool->drift.z, velocity.z, dt));
+    tip_stall_step(&tool->stall, tool->at, fed);
     f->inserted_mm += fmax(fed, 0);
     f->withdrawn_mm += fmax(-fed, 0);
     f->lost_mm = tool->sheath.lost;
@@ -83,4 +90,10 @@ void score_tool_watch(ScoreTool *tool, const Stepper *stepper, const ToolCommand
     f->kick_peak_mm_s = fmax(f->kick_peak_mm_s, f->kick_mm_s);
     f->tip_force_n = score_mean(f->tip_force_n, score_tip_force(&tool->tip, stepper, tool->index), dt);
     f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
+}
+
+void score_tool_press(ScoreTool *tool, const Stepper *stepper, const ConsequenceRules *rules, ConsequenceWall wall, double dt)
+{
+    const ToolPlace end = stepper_tool_place(stepper, tool->index, tool->length);
+    consequence_tip_step(&tool->wall, rules, wall, tool->diameter, end, stepper_tool_wall_force(stepper, tool->index, tool->length - CONSEQUENCE_TIP_MM), dt);
 }

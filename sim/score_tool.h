@@ -22,6 +22,9 @@ typedef struct ScoreTool {
     Vec3 at;                     // its tip
     Vec3 drift;                  // [mm/ms] mean velocity of the tip
     double rested;               // [ms] since its hand last moved it
+    double diameter;             // [mm] of its tip
+    ConsequenceTip wall;         // what its tip does to the wall
+    TipStall stall;
     double hub_limit;            // [mm] spare_mm below which it counts as drawn in
     ScoreEpisode episode[ERROR_COUNT];
 } ScoreTool;
@@ -33,6 +36,8 @@ void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *f
 // After a step of `dt` [ms]: returns the length fed [mm]. Sheath and ends only: forces while a tool settles before the first action do not count.
 double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, ScoreToolFigures *figures);
 void score_tool_watch(ScoreTool *tool, const Stepper *stepper, const ToolCommands *commands, double dt, ScoreToolFigures *figures);
+// The force of its tip on a wall of this kind.
+void score_tool_press(ScoreTool *tool, const Stepper *stepper, const ConsequenceRules *rules, ConsequenceWall wall, double dt);
 // Updates a 20 ms mean with `value`, which held for `elapsed_ms`.
 double score_mean(double mean, double value, double elapsed_ms);
 

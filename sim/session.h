@@ -5,7 +5,9 @@
 //    "scene": {"path": "", "sha256": "", "title": "", "target": ""},
 //    "recording": {"path": "", "steps": 0, "step_ms": 1, "series_sha256": "", "state_hash": ""},
 //    "score": {figures of score.h, "parts": {"time": 1, …: fraction of each reached},
-//       "points_of": {"time": {"points": 0, "most": 0, "measured": 0, "par": 0, "why": ""}, …}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}, "tools": [{"name": "", …}] of several},
+//       "points_of": {"time": {"points": 0, "most": 0, "measured": 0, "par": 0, "why": ""}, …}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}, "tools": [{"name": "", …}] of several,
+//       "consequences": {"narrowest": 1, "marks": [{"kind": "perforation", "time_s": 0, "at_mm": [x, y, z], "force_n": 0, "limit_n": 0, "leaked_ml": 0}]} if they
+//       happen, "steps": [time of each step done] of a guided exercise},
 //   "events": [{"kind": "wrong_branch", "time_s": 0}]}       and, with several tools, "tool": the tool that caused it
 #ifndef SELDINGER_SIM_SESSION_H
 #define SELDINGER_SIM_SESSION_H

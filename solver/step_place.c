@@ -61,8 +61,10 @@ Vec3 stepper_tool_wall_force(const Stepper *s, int k, double from)
 {
     SEL_ASSERT(k >= 0 && k < s->tools.count, "the tool is one of the chain");
     Vec3 sum = {0, 0, 0};
-    int count = s->state.node_count;
-    for (int c = 0; c < count; c++) {
+    int count = s->state.node_count, first = count;
+    while (first > 0 && !(is_carrier(s, first - 1, k) && s->wire.s[first - 1] < from))     // nothing proximal to that node counts
+        first--;
+    for (int c = first; c < count; c++) {
         if (!is_carrier(s, c, k))
             continue;
         if (s->wire.s[c] >= from)

@@ -93,6 +93,14 @@ static void the_aneurysm_is_reached(void **state)
     errs("aneurysm", NULL, NULL);
 }
 
+// The first case has the same vessel, wire and hand.
+static void the_first_case_is_solved_too(void **state)
+{
+    (void)state;
+    is_solved("first-case", NULL, (AllowedDefects){0});
+    errs("first-case", NULL, NULL);
+}
+
 static void the_middle_cerebral_artery_is_selected(void **state)
 {
     (void)state;
@@ -188,6 +196,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_aneurysm_is_reached),
+        cmocka_unit_test(the_first_case_is_solved_too),
         cmocka_unit_test(the_middle_cerebral_artery_is_selected),
         cmocka_unit_test(the_left_carotid_is_selected),
         cmocka_unit_test(the_microcatheter_follows_its_wire),

@@ -26,7 +26,7 @@ static char folder[] = "/tmp/seldinger-session-report-XXXXXX";
     "vessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 15}, "                        \
     "{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 20}]}}\n"                                                                                                \
     "exercise: {title: 'Into the <bend>', target: 'the <end> & more', hold_s: 0.3, rules: {blind_mm: 5, wall_force_n: 0.001}, par: {time_s: 1, path_ratio: "   \
-    "1}, error_points: 3}\n"
+    "1}, error_points: 3, steps: [{text: 'Push <on> & on.', inserted_mm: 5}, {text: Wait., held_s: 60}]}\n"
 
 static void make_session(const char *name, const char *trainee, time_t when, double push_mm_s, double push_s)
 {
@@ -145,10 +145,49 @@ static void the_page_holds_the_session(void **state)
     assert_non_null(strstr(text, "target held"));
     assert_non_null(strstr(text, "yes, the checksum of its series matches"));
     assert_null(strstr(text, "Bob"));
+    assert_non_null(strstr(text, "<li>Push &lt;on&gt; &amp; on. (done at 0."));
+    assert_non_null(strstr(text, "<li>Wait. (not done)"));
+    assert_null(strstr(text, "Consequences"));
     char points[64];
     snprintf(points, sizeof points, "<div class=\"points\">%.0f <small>", session.figures.points);
     assert_non_null(strstr(text, points));
     free(text);
+}
+
+// A session with consequences lists them with place, force and limit; one without says so.
+static void the_page_holds_consequences(void **state)
+{
+    (void)state;
+    static Session session;
+    static Faults faults;
+    char arguments[400], *text;
+    assert_true(session_load(in_folder("second.json"), &session, &faults));
+    for (int i = 0; i < 2; i++) {
+        ScoreFigures *f = &session.figures;
+        f->has_consequences = true;
+        if (i == 1) {
+            f->mark[f->mark_count++] =
+                (ScoreMark){.kind = ERROR_PERFORATION, .at = {1, -2, 3.25}, .time_s = 1.5, .force_n = 0.3, .limit_n = 0.2, .leaked_ml = 0.25};
+            f->mark[f->mark_count++] = (ScoreMark){.kind = ERROR_CLOT, .at = {1, 2, 3}, .time_s = 2};
+            f->error[ERROR_PERFORATION].count = f->error[ERROR_CLOT].count = 1;
+            f->error_total += 2;
+            f->narrowest = 0.7;
+        }
+        char *json = session_json(&session);
+        put("hurt.json", json);
+        free(json);
+        snprintf(arguments, sizeof arguments, "'%s'", in_folder("hurt.json"));
+        assert_int_equal(report(arguments), 0);
+        look_at(in_folder("hurt.html"), &text);
+        const char *const words =
+            "1.50 s: vessel perforated at (1.0, -2.0, 3.2) mm; force on the tip 0.300 N, limit 0.200 N; 0.25 ml of contrast agent leaked.";
+        assert_int_equal(strstr(text, "the vessel was not hurt") != NULL, i == 0);
+        assert_int_equal(strstr(text, words) != NULL, i == 1);
+        assert_int_equal(strstr(text, "2.00 s: clot on the tools at (1.0, 2.0, 3.0) mm.") != NULL, i == 1);
+        assert_int_equal(strstr(text, "70 % of its radius") != NULL, i == 1);
+        free(text);
+        assert_int_equal(unlink(in_folder("hurt.json")), 0);
+    }
 }
 
 static void the_same_bytes_twice(void **state)
@@ -355,6 +394,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(wrong_use_is_refused),
         cmocka_unit_test(the_page_holds_the_session),
+        cmocka_unit_test(the_page_holds_consequences),
         cmocka_unit_test(the_same_bytes_twice),
         cmocka_unit_test(missing_parts_are_reported),
         cmocka_unit_test(a_trainees_page_has_all_their_sessions),

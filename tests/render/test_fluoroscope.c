@@ -606,6 +606,30 @@ static void odd_frames_are_survived(void **state)
     patient_close(&patient);
 }
 
+// Where marks are drawn: in the picture that is shown, also while it is held and the C-arm turns.
+static void a_point_is_located_in_the_picture(void **state)
+{
+    (void)state;
+    XrayRoom *s = room_open(NULL, 96);
+    if (!s)
+        skip();
+    double at[2];
+    assert_true(fluoroscope_locate(s->view, vec3(0, 0, 0), at) == 0);          // no picture yet
+    room_draw(s);
+    for (int held = 0; held < 2; held++) {
+        assert_true(fabs(fluoroscope_locate(s->view, vec3(0, 0, 0), at) - 1.0 / 60) < 1e-12);
+        assert_true(fabs(at[0]) < 1e-12 && fabs(at[1]) < 1e-12);
+        assert_true(fluoroscope_locate(s->view, vec3(6, 0, 12), at) > 0);      // the patient's left is on the right, the head is up
+        assert_true(fabs(at[0] - 0.1) < 1e-12 && fabs(at[1] - 0.2) < 1e-12);
+        assert_true(fluoroscope_locate(s->view, vec3(40, 0, 0), at) == 0);     // outside the field
+        s->frame.xray.pedal = 0;
+        s->frame.xray.lao_deg = 90;
+        s->frame.pulse++;
+        room_draw(s);
+    }
+    room_close(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -620,6 +644,7 @@ int main(void)
         cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
         cmocka_unit_test(unfit_vessels_are_reported),
         cmocka_unit_test(odd_frames_are_survived),
+        cmocka_unit_test(a_point_is_located_in_the_picture),
         cmocka_unit_test(whatever_state_gl_is_in),
         cmocka_unit_test(kept_layers_give_the_same_as_new_ones),
     };

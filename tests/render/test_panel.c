@@ -776,6 +776,76 @@ static void hints_lead_on_with_use(void **unused)
     }
 }
 
+// What is happening comes before a hint about the keys, also when those are used up; an examination tells nothing, but a guided one its step.
+static void what_happens_is_told(void **unused)
+{
+    (void)unused;
+    static const Guide guide = {.count = 3, .step = {{.text = "Push."}, {.text = "Turn."}, {.text = "Hold still."}}};
+    PanelState state = some_state();
+    char text[256], key[32];
+    assert_false(panel_happening_text(&state, text, sizeof text));
+    for (int kind = HINT_NONE + 1; kind < HINT_COUNT; kind++) {
+        state.hint = (HintKind)kind;
+        state.hint_value = 12.3;
+        assert_true(panel_happening_text(&state, text, sizeof text));
+        assert_in_range(strlen(text), 20, 120);
+        assert_null(strchr(text, '%'));
+    }
+    state.hint = HINT_WRONG_BRANCH;
+    assert_true(panel_happening_text(&state, text, sizeof text));
+    assert_true(strstr(text, "12 mm") && strstr(text, key_table_text(ACTION_PULL, key, sizeof key)));
+    state.guide = &guide;
+    state.steps_done = 1;
+    assert_true(panel_happening_text(&state, text, sizeof text) && strstr(text, "wrong branch"));
+    state.is_examination = true;
+    assert_true(panel_happening_text(&state, text, sizeof text));
+    assert_string_equal(text, "Step 2 of 3: Turn.");
+    state.steps_done = 3;
+    assert_false(panel_happening_text(&state, text, sizeof text));
+}
+
+// Marks of consequences change the picture at their places, the leaked agent darkens the X-ray image around; the list of steps needs its place.
+static void consequences_and_steps_are_drawn(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    static const Guide guide = {.count = 4,
+                                .step = {{.text = "Hold F, the X-ray pedal."},
+                                         {.text = "Hold the left arrow key to turn the wire by a quarter turn: its curved tip looks outwards."},
+                                         {.text = "Push."},
+                                         {.text = "Hold still."}}};
+    enum { WIDTH = 1280, HEIGHT = 800 };
+    GlCanvas canvas = new_canvas(WIDTH, HEIGHT);
+    Panel *panel = new_panel();
+    WindowInput input = still_input(WIDTH, HEIGHT, 1);
+    PanelState state = some_state();
+    state.guide = &guide;
+    state.steps_done = 1;
+    uint8_t *with = malloc((size_t)WIDTH * HEIGHT * 3), *without = malloc((size_t)WIDTH * HEIGHT * 3);
+    assert_true(with && without);
+    for (int i = 0; i < 3; i++)
+        draw(panel, &canvas, &input, &state);
+    gl_canvas_read(&canvas, without);
+    state.spot_count = 1;
+    state.spot[0] = (PanelSpot){.text = "vessel perforated", .is_in_xray = true, .xray = {0.1, 0.2}, .blot = 0.05};
+    draw(panel, &canvas, &input, &state);
+    gl_canvas_read(&canvas, with);
+    keep_picture(&canvas, "consequences");
+    const PanelLayout layout = panel_layout(WIDTH, HEIGHT, 1, state.view, true);
+    const GuiRect at = layout.view_rect[VIEW_FLUOROSCOPY];
+    const float side = fminf(at.width, at.height), x = at.x + at.width / 2 + 0.1F * side, y = at.y + at.height / 2 - 0.2F * side;
+    const size_t middle = 3 * ((size_t)y * WIDTH + (size_t)x), edge = 3 * ((size_t)y * WIDTH + (size_t)(x - 0.045F * side)),
+                 outside = 3 * ((size_t)y * WIDTH + (size_t)(x - 0.06F * side));
+    assert_true(with[middle] < without[middle] - 60);
+    assert_true(with[edge] < without[edge] - 10 && with[edge] > with[middle] + 20);    // denser in the middle
+    assert_int_equal(with[outside], without[outside]);
+    free(with);
+    free(without);
+    panel_destroy(panel);
+    gl_canvas_destroy(&canvas);
+}
+
 static void strange_states_draw(void **unused)
 {
     (void)unused;
@@ -956,6 +1026,8 @@ int main(void)
                                        cmocka_unit_test(instructions_are_shown_until_followed),
                                        cmocka_unit_test(the_result_is_shown_once),
                                        cmocka_unit_test(hints_lead_on_with_use),
+                                       cmocka_unit_test(what_happens_is_told),
+                                       cmocka_unit_test(consequences_and_steps_are_drawn),
                                        cmocka_unit_test(strange_states_draw),
                                        cmocka_unit_test(several_tools_are_listed),
                                        cmocka_unit_test(kept_windows_show_what_a_new_panel_shows),

@@ -1,6 +1,6 @@
 // Nothing rewards pushing without looking. In each exercise the hand that solves it is driven once, and scored as seen by trainees who look in different
 // ways: one watches the X-ray image of each movement, the others try to get away with less. The honest one must be ahead of each of them by 30 points.
-// Exercises whose model was not made are skipped by name.
+// Exercises whose model was not made are skipped by name. The hand that solves an exercise is also a careful one: it hurts no vessel.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -100,7 +100,8 @@ static const struct {
                {"all views", with_all_views, 5}};
 enum { TRAINEES = sizeof trainee / sizeof trainee[0] };
 
-static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, ScoreFigures figures[TRAINEES])
+// `hint_s`: for how long the honest one was shown each hint.
+static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, ScoreFigures figures[TRAINEES], double hint_s[HINT_COUNT])
 {
     Score *score[TRAINEES];
     double since_pulse[TRAINEES] = {0};
@@ -125,6 +126,7 @@ static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, Sc
             since_pulse[i] = xray.pedal > 0 ? 0 : since_pulse[i];
             score_step(score[i], simulator, &commands, &xray);
         }
+        hint_s[score_figures(score[0]).hint] += scene->dt / 1000;
     }
     for (int i = 0; i < TRAINEES; i++) {
         figures[i] = score_figures(score[i]);
@@ -163,20 +165,28 @@ static void looking_pays(const char *name, const char *model)
     Scene *scene = scene_load(path, &faults);
     if (!scene || !open_vessel(scene, &(OpenVesselOptions){0}, &open, &faults) || !open_vessel_inlet(scene, &open, &faults))
         fail_msg("%s", faults.text[0]);
-    drive(scene, &open, &faults, figures);
+    scene->exercise->consequences.mode = CONSEQUENCES_ON;
+    double hint_s[HINT_COUNT] = {0};
+    drive(scene, &open, &faults, figures, hint_s);
     if (scene->exercise->level)
         pars_follow(name, scene->exercise, &figures[0]);
     open_vessel_close(&open);
     scene_free(scene);
     int wrong = 0;
+    print_message("%-16s hints [s]: sac %.1f, buckles %.1f, presses %.1f, coils %.1f, branch %.1f, wire lost %.1f, unseen %.1f, no contrast %.1f\n", name,
+                  hint_s[HINT_SAC], hint_s[HINT_BUCKLES], hint_s[HINT_PRESSES], hint_s[HINT_COILS], hint_s[HINT_WRONG_BRANCH], hint_s[HINT_WIRE_LOST],
+                  hint_s[HINT_UNSEEN], hint_s[HINT_NO_CONTRAST]);
     for (int i = 0; i < TRAINEES; i++) {
         const ScoreFigures *f = &figures[i];
         print_message("%-16s %-30s %5.1f points, %6.1f mm blind, %4.1f s guided, %d errors\n", name, trainee[i].name, f->points, f->blind_total_mm, f->guided_s,
                       f->error_total);
         assert_int_equal(f->state, SCORE_REACHED);
+        assert_int_equal(f->mark_count, 0);
         wrong += !(f->points <= figures[0].points - trainee[i].lead);
     }
     assert_true(figures[0].points > 90);
+    assert_true(hint_s[HINT_SAC] == 0 && hint_s[HINT_BUCKLES] == 0 && hint_s[HINT_WIRE_LOST] == 0 && hint_s[HINT_UNSEEN] == 0);
+    assert_true(hint_s[HINT_PRESSES] + hint_s[HINT_COILS] + hint_s[HINT_WRONG_BRANCH] < 2.5);       // one at most, for as long as it is kept
     assert_int_equal(wrong, 0);
 }
 

@@ -254,7 +254,7 @@ static void each_wrong_value_is_reported(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const char *at = strstr(one_text, cases[i].from);
         assert_non_null(at);
-        char text[8192];
+        char text[16384];
         snprintf(text, sizeof text, "%.*s%s%s", (int)(at - one_text), one_text, cases[i].to, at + strlen(cases[i].from));
         faults_clear(&faults);
         bool good = session_parse(text, strlen(text), "x.json", &got, &faults), found = false;

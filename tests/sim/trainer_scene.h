@@ -67,6 +67,7 @@ static inline void assert_same_figures(const ScoreFigures *a, const ScoreFigures
     SAME(inserted_mm), SAME(withdrawn_mm), SAME(wall_force_peak_n), SAME(wall_impulse_n_s), SAME(tip_force_n), SAME(tip_force_peak_n), SAME(tool[0].lost_mm);
     SAME(tool[0].lost_limit_mm), SAME(tip_node), SAME(tool[0].off_way_mm), SAME(blind_mm), SAME(target_distance_mm), SAME(held_s), SAME(reached_s),
         SAME(error_total);
+    SAME(has_consequences), SAME(narrowest), SAME(dwell_s), SAME(mark_count), SAME(mark), SAME(guide), SAME(hint), SAME(hint_value);
     for (int i = 0; i < ERROR_COUNT; i++)
         SAME(error[i].count), SAME(error[i].is_on), SAME(error[i].last_s);
 #undef SAME
