@@ -2,6 +2,7 @@
 #include "cli/start.h"
 
 #include "base/base.h"
+#include "cli/file_kind.h"
 #include "render/render.h"
 #include "sim/sim.h"
 
@@ -119,9 +120,23 @@ static bool run_verb_of(const char *verb, const StartState *state, char message[
     return child < 0 || WIFEXITED(status);
 }
 
-int start_run(void)
+void start_steer(const char *path)
+{
+    static StartState state;
+    char message[MESSAGE];
+    snprintf(state.path, sizeof state.path, "%s", path);
+    run_verb_of("nav", &state, message);
+}
+
+// A volume becomes a case first.
+static const char *verb_for(StartChoice choice, const char *path)
 {
     static const char *const verb[] = {[START_STEER] = "nav", [START_REPLAY] = "replay", [START_REPORT] = "report"};
+    return choice == START_STEER && !case_is_there(path) && file_kind(path) == FILE_VOLUME ? "case" : verb[choice];
+}
+
+int start_run(void)
+{
     static Faults faults;
     static StartState state;
     char exercises[PATH_MAX], cache[PATH_MAX] = "", sessions[4096], message[MESSAGE] = "";
@@ -137,7 +152,7 @@ int start_run(void)
         StartChoice choice = faults.count == 0 ? start_window_run(&options, &state, &faults) : START_LEAVE;
         shelf_free(&shelf);
         keep_folder(&state);
-        goes_on = choice != START_LEAVE && run_verb_of(verb[choice], &state, message);
+        goes_on = choice != START_LEAVE && run_verb_of(verb_for(choice, state.path), &state, message);
     }
     free(cases);
     static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];
