@@ -87,7 +87,8 @@ static void show_choices(Gui *gui, CaseState *s)
     const CaseAct *behind = case_acts_last(&s->acts, CASE_BEHIND);
     char label[120];
     heading(gui, "TOOL AND BACKGROUND");
-    snprintf(label, sizeof label, "%.*s", (int)strcspn(s->tool_name[s->tool], "."), s->tool > 0 ? s->tool_name[s->tool] : "wire that suits the vessels");
+    const char *tool = s->tool > 0 ? s->tool_name[s->tool] : "wire that suits the vessels";
+    snprintf(label, sizeof label, "%.*s", (int)strcspn(tool, "."), tool);
     if (gui_button(gui, "tool", label, "T", 0, false).pressed)
         case_state_next_tool(s, 1);
     if (gui_button(gui, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", "B", 0, behind && behind->is_on).pressed)

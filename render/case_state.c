@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define ACTS "the acts"      // instead of a trace's path in messages
+
 static void say(CaseState *s, bool is_fault, const char *format, ...) __attribute__((format(printf, 3, 4)));
 static void say(CaseState *s, bool is_fault, const char *format, ...)
 {
@@ -18,6 +20,13 @@ static void say(CaseState *s, bool is_fault, const char *format, ...)
     vsnprintf(s->message, sizeof s->message, format, arguments);
     va_end(arguments);
     s->message_is_fault = is_fault;
+}
+
+// Without the line of a trace that the user has not written.
+static void say_fault(CaseState *s, const char *text)
+{
+    const char *colon = strncmp(text, ACTS, strlen(ACTS)) ? NULL : strstr(text, ": ");
+    say(s, true, "%s", colon ? colon + 2 : text);
 }
 
 static int by_name(const void *a, const void *b) { return strcmp(a, b); }
@@ -40,7 +49,7 @@ static void list_tools(CaseState *s)
 bool case_state_begin(CaseState *s, const CaseOptions *made)
 {
     *s = (CaseState){.made = *made, .mode = CASE_START, .forbid_radius = 3, .chosen_mark = -1, .view = CASE_PROJECTION, .turns = true};
-    s->made.trace_path = "the acts";
+    s->made.trace_path = ACTS;
     list_tools(s);
     s->builder = case_builder_create(&s->made);
     return s->builder != NULL;
@@ -105,7 +114,7 @@ bool case_state_frame(CaseState *s)
     }
     bool is_new = now->stage != before.stage;
     if (is_new && now->stage == BUILD_FAILED)
-        say(s, true, "%s", now->message);
+        say_fault(s, now->message);
     // a start that was refused is followed by another one
     if (is_new && now->stage == BUILD_FAILED && s->acts.count > 0 && s->acts.act[s->acts.count - 1].kind == CASE_START)
         s->mode = CASE_START;
@@ -371,6 +380,6 @@ bool case_state_save(CaseState *s, const char *folder, char *out, size_t capacit
         faults_add(faults, s->made.input, 0, 0, "no case of it can be kept in a cache: neither $XDG_CACHE_HOME nor $HOME names a writable folder");
     bool good = faults->count == 0 && case_builder_save(s->builder, out, faults);
     if (!good)
-        say(s, true, "%s", faults->text[0]);
+        say_fault(s, faults->text[0]);
     return good;
 }

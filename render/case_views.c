@@ -120,8 +120,12 @@ static bool update_picture(Picture *p, const CaseState *s, int view, GuiRect at,
     if (!fit_picture(p, width, height))
         return false;
     Camera camera = case_state_camera(s, view, width, height);
+    // all voxels in the time that a user does not notice, once the picture stands still
+    const size_t voxels_most = (size_t)1 << 25;
+    const int *size = s->volume->size;
+    bool is_whole = !is_coarse && (size_t)size[0] * (size_t)size[1] * (size_t)size[2] <= voxels_most;
     if (is_projection)
-        volume_projection(s->reduced, &camera, s->low, s->high, 2, p->grey);
+        volume_projection(is_whole ? s->volume : s->reduced, &camera, s->low, s->high, 2, p->grey);
     else
         volume_slice(s->volume, &camera, s->cursor, s->low, s->high, p->grey);
     for (int i = 0; i < width * height; i++) {
@@ -392,7 +396,8 @@ static void letter(const Over *o, Vec3 direction, float x, float y)
     float width, height;
     patient_letters(&o->s->axes, direction, text);
     gui_text_extent(o->gui, GUI_LARGE, text, &width, &height);
-    gui_draw_text(o->gui, x - width / 2, y - height / 2, GUI_LARGE, gui_colors.warning, text);
+    float left = fminf(fmaxf(x - width / 2, o->at.x + 4 * o->k), o->at.x + o->at.width - 4 * o->k - width);
+    gui_draw_text(o->gui, left, y - height / 2, GUI_LARGE, gui_colors.warning, text);
 }
 
 static void draw_frame(const Over *o)

@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OVER_PANEL = CASE_VIEWS, OVER_NOTHING };
+enum { OVER_PANEL = CASE_VIEWS, OVER_NOTHING, SETTLES = 6 };     // SETTLES: frames until lists and fine pictures are up to date
 static const double TRAVEL = 4;          // [pixel] a press that goes further is a drag
 
 typedef struct CaseWindow {
@@ -26,10 +26,12 @@ typedef struct CaseWindow {
     CaseState state;
     GuiRect at[CASE_VIEWS], panel_at;
     int held;                    // the view where the mouse was pressed
+    int width, height;           // of the window in the last frame
     unsigned buttons;            // pressed in the last frame
     double x, y, travel;         // of the mouse; [pixel] since it was pressed
     bool shift, control, shows_help, ends;
-    int still;                   // frames since something moved
+    int still;                   // frames since something moved …
+    int unchanged;               // … and since anything may look different
     char *steer;
     size_t steer_capacity;
     char message[512];
@@ -304,8 +306,11 @@ static bool run_frames(CaseWindow *w, Faults *faults)
     for (double begun = clock_s(CLOCK_MONOTONIC); !w->ends;) {
         bool visible = window_next_frame(w->window, &input);
         lay_out(w, input);
-        case_state_frame(&w->state);
+        bool is_new = case_state_frame(&w->state), has_input = input->event_count > 0 || input->mouse_buttons || w->buttons ||
+                                                              input->mouse_x != w->x || input->mouse_y != w->y || input->width != w->width ||
+                                                              input->height != w->height;
         w->still++;
+        w->width = input->width, w->height = input->height;
         take_input(w, input);
         if (w->state.turns && w->state.has_volume) {
             free_camera_orbit(&w->state.camera, turn, 0);
@@ -313,7 +318,8 @@ static bool run_frames(CaseWindow *w, Faults *faults)
             w->still = 0;
         }
         w->ends |= input->close != WINDOW_OPEN || (w->options->duration_s > 0 && clock_s(CLOCK_MONOTONIC) - begun > w->options->duration_s);
-        if (!visible)
+        w->unchanged = is_new || has_input || w->still < SETTLES ? 0 : w->unchanged + 1;
+        if (!visible || (w->unchanged > SETTLES && !w->ends))
             continue;
         if (!draw(w, input)) {
             faults_add(faults, w->options->made->input, 0, 0, "the window cannot be drawn: %s", w->message);

@@ -54,7 +54,7 @@ void volume_brightness(const Volume *v, float *low, float *high)
         sum += count[bin];
         if (2 * sum < total)
             *low = (float)(least + (bin + 1) * width);
-        if (1000 * sum < 999 * total)
+        if (2000 * sum < 1999 * total)
             *high = (float)(least + (bin + 1) * width);
     }
     if (!(*high > *low))

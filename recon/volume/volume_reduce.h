@@ -6,7 +6,7 @@
 
 // A copy with at most `most` voxels along each axis: the brightest voxel of each block, so that thin vessels stay. NULL if out of memory.
 Volume *volume_reduced(const Volume *volume, int most);
-// The brightness of most of the volume, and of its brightest thousandth.
+// The brightness of most of the volume, and of its brightest two-thousandth.
 void volume_brightness(const Volume *volume, float *low, float *high);
 
 #endif
