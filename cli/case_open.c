@@ -1,8 +1,10 @@
 #include "cli/case_open.h"
 
+#include "cli/child_verb.h"
 #include "cli/file_kind.h"
 #include "cli/start.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 bool case_can_open(const char *path) { return start_is_possible() && !case_is_there(path) && file_kind(path) == FILE_VOLUME; }
@@ -25,6 +27,9 @@ int case_open(const CaseWindowOptions *options, Faults *faults)
     if (!steer[0])
         return EXIT_DONE;
     printf("%s\n", steer);
-    start_steer(steer);
+    static StartState state;
+    char message[CHILD_MESSAGE];
+    snprintf(state.path, sizeof state.path, "%s", steer);
+    child_verb_run("nav", &state, message);
     return EXIT_DONE;
 }

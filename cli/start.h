@@ -7,7 +7,5 @@
 bool start_is_possible(void);        // there is a display
 // Shows the start window, runs the verb for each choice in a process of its own, and shows the window again, until the user leaves. Returns an exit code.
 int start_run(void);
-// Runs `nav` for a case, a scene or a model, in a process of its own, until it ends.
-void start_steer(const char *path);
 
 #endif

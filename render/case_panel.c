@@ -66,7 +66,8 @@ static void show_modes(Gui *gui, CaseState *s)
 {
     static const struct {
         const char *label, *key;
-    } mode[CASE_TARGET + 1] = {{"New start", "1"}, {"Add branch", "2"}, {"Forbid", "3"}, {"Cut", "4"}, {"End here", "5"}, {"Mark sac", "6"}, {"Entry", "7"}, {"Target", "8"}};
+    } mode[CASE_TARGET + 1] = {{"New start", "1"}, {"Add branch", "2"}, {"Forbid", "3"}, {"Cut", "4"},
+                               {"End here", "5"},  {"Mark sac", "6"},   {"Entry", "7"},  {"Target", "8"}};
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
     heading(gui, "A CLICK");
     for (int i = 0; i <= CASE_TARGET; i++) {

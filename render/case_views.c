@@ -410,7 +410,9 @@ static void draw_frame(const Over *o)
     letter(o, c->right, at.x + at.width - inset, at.y + at.height / 2);
     letter(o, c->up, at.x + at.width / 2, at.y + inset);
     letter(o, vec3_negate(c->up), at.x + at.width / 2, at.y + at.height - inset);
-    const char *title = !o->s->axes.is_known && o->view < CASE_PROJECTION ? "slice" : o->view == CASE_PROJECTION && o->s->shows_wall ? "wall, by error" : name[o->view];
+    const char *title = !o->s->axes.is_known && o->view < CASE_PROJECTION ? "slice"
+                        : o->view == CASE_PROJECTION && o->s->shows_wall  ? "wall, by error"
+                                                                          : name[o->view];
     gui_draw_text(o->gui, at.x + 8 * k, at.y + 6 * k, GUI_SMALL, gui_colors.dim, title);
     // a scale of 10 mm, or a tenth or ten times that
     double bar = 10;

@@ -306,9 +306,8 @@ static bool run_frames(CaseWindow *w, Faults *faults)
     for (double begun = clock_s(CLOCK_MONOTONIC); !w->ends;) {
         bool visible = window_next_frame(w->window, &input);
         lay_out(w, input);
-        bool is_new = case_state_frame(&w->state), has_input = input->event_count > 0 || input->mouse_buttons || w->buttons ||
-                                                              input->mouse_x != w->x || input->mouse_y != w->y || input->width != w->width ||
-                                                              input->height != w->height;
+        bool is_new = case_state_frame(&w->state), has_input = input->event_count > 0 || input->mouse_buttons || w->buttons || input->mouse_x != w->x ||
+                                                               input->mouse_y != w->y || input->width != w->width || input->height != w->height;
         w->still++;
         w->width = input->width, w->height = input->height;
         take_input(w, input);

@@ -117,7 +117,8 @@ static bool turn_to_entry(CaseWork *work, const CaseOptions *options, const Volu
     int root = is_given ? case_tree_end_near(tree, entry) : volume && !work->trace->branch[0].has_toward ? case_tree_widest_end(tree, volume) : 0;
     if (is_given && vec3_distance(entry, tree->center[root]) > 4 * tree->radius[root]) {
         Vec3 at = tree->center[root];
-        faults_add(faults, "entry", 0, 0, "lies %.1f mm from the nearest end of a vessel, which is at (%.2f, %.2f, %.2f); expected a point at the end of a vessel",
+        faults_add(faults, "entry", 0, 0,
+                   "lies %.1f mm from the nearest end of a vessel, which is at (%.2f, %.2f, %.2f); expected a point at the end of a vessel",
                    vec3_distance(entry, at), at.x, at.y, at.z);
         return false;
     }
@@ -154,7 +155,8 @@ bool case_work_track(CaseWork *work, const CaseOptions *options, const Volume *v
                                                    options->threads, options->progress, &work->report, options->trace_path, faults);
     if (!tree)
         return false;
-    work->file.info = (TreeFileInfo){.source = HEAP_TEXT(options->input), .parameters = segment_parameters_text(&trace->parameters, &work->report, volume, tree)};
+    work->file.info =
+        (TreeFileInfo){.source = HEAP_TEXT(options->input), .parameters = segment_parameters_text(&trace->parameters, &work->report, volume, tree)};
     return turn_to_entry(work, options, volume, faults);
 }
 

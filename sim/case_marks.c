@@ -59,7 +59,8 @@ static bool add_stops(Marks *marks, const ModelField *wall, double tool_radius)
         else if (s->capped)
             add(marks, MARK_NO_ENTRY, &s->place, "%s: the wall closes the vessel; %.0f mm beyond", where, s->lost);
         else
-            add(marks, MARK_NO_ENTRY, &s->place, "%s: %.2f mm wide, the tool %.2f mm; %.0f mm beyond", where, 2 * fmax(s->clearance, 0), 2 * tool_radius, s->lost);
+            add(marks, MARK_NO_ENTRY, &s->place, "%s: %.2f mm wide, the tool %.2f mm; %.0f mm beyond", where, 2 * fmax(s->clearance, 0), 2 * tool_radius,
+                s->lost);
     }
     bool good = reach != NULL;
     reach_free(reach);

@@ -300,7 +300,8 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         return;
     }
     FAULT(w, value,
-          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, case, parameters (default or paper), or a parameter that `segment "
+          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, case, parameters (default or paper), or a parameter that "
+          "`segment "
           "--help` lists",
           key);
 }

@@ -328,12 +328,9 @@ static void views_move_as_the_patient_lies(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(letters_are_the_patients),
-        cmocka_unit_test(a_click_in_a_projection_meets_the_vessel),
-        cmocka_unit_test(views_move_as_the_patient_lies),
-        cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
-        cmocka_unit_test(what_runs_is_stopped_at_once),
-        cmocka_unit_test(a_case_is_the_same_without_the_window),
+        cmocka_unit_test(letters_are_the_patients),       cmocka_unit_test(a_click_in_a_projection_meets_the_vessel),
+        cmocka_unit_test(views_move_as_the_patient_lies), cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
+        cmocka_unit_test(what_runs_is_stopped_at_once),   cmocka_unit_test(a_case_is_the_same_without_the_window),
     };
     return cmocka_run_group_tests(tests, make_volume, remove_folder);
 }
