@@ -5,11 +5,16 @@
 #ifndef SELDINGER_BASE_PARALLEL_H
 #define SELDINGER_BASE_PARALLEL_H
 
+#include <stdbool.h>
+#include <stddef.h>
+
 typedef void (*ProgressFunction)(void *context, long done, long total);
 typedef struct Progress {
     ProgressFunction call;
     void *context;
+    bool (*is_stopped)(void *context);   // NULL: never. Asked often, from several threads; after true the work ends soon, with a fault
 } Progress;
+static inline bool progress_is_stopped(const Progress *progress) { return progress && progress->is_stopped && progress->is_stopped(progress->context); }
 
 void parallel_for(int threads, long count, void (*job)(void *context, long index), void *context, const Progress *progress);
 

@@ -1,6 +1,7 @@
 // seldinger nav: the trainer.
 #include "cli/cli.h"
 
+#include "cli/case_open.h"
 #include "cli/output_plan.h"
 #include "cli/scene_input.h"
 #include "render/render.h"
@@ -63,7 +64,8 @@ static const OptionTable table = {
     .program = "seldinger nav",
     .does = "opens the trainer: steer the tools in a window; sessions are recorded and scored",
     .usage = "SCENE [options]",
-    .intro = "Opens the trainer's window in a scene, a case (`seldinger case`), a tree or a model: steer the tools by keyboard, gamepad, HID or USB device. "
+    .intro = "Opens the trainer's window in a scene, a case (`seldinger case`), a tree or a model (of a volume, the window of `seldinger case` first): steer "
+             "the tools by keyboard, gamepad, HID or USB device. "
              "`?` lists the keys. Each session is recorded, and its "
              "score written beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.",
     .exits = "0 done; 2 wrong usage, bad input or no display; 3 the simulation diverged or the recording is incomplete",
@@ -105,9 +107,24 @@ static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, cons
     return code;
 }
 
+// A volume becomes a case first, in a window; its child steers.
+static int open_volume(const NavOptions *nav, Faults *faults)
+{
+    char library[PATH_MAX];
+    const CaseOptions made = {.input = nav->scene,
+                              .threads = nav->trainer.threads,
+                              .library = nav->trainer.library    ? nav->trainer.library
+                                         : case_library(library) ? library
+                                                                 : NULL};
+    return case_open(&(CaseWindowOptions){.made = &made, .width = nav->trainer.width, .height = nav->trainer.height, .duration_s = nav->trainer.duration_s},
+                     faults);
+}
+
 static int call(void *structure, Faults *faults)
 {
     const NavOptions *nav = structure;
+    if (case_can_open(nav->scene))
+        return open_volume(nav, faults);
     OpenVessel open = {0};
     int code = EXIT_BAD_INPUT;
     recording_prepare_process();

@@ -2,21 +2,16 @@
 #include "cli/start.h"
 
 #include "base/base.h"
+#include "cli/child_verb.h"
+#include "cli/file_kind.h"
 #include "render/render.h"
 #include "sim/sim.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <limits.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <unistd.h>
-
-enum { MESSAGE = 600 };
 
 bool start_is_possible(void)
 {
@@ -62,69 +57,18 @@ static void keep_folder(const StartState *state)
     free(file);
 }
 
-// In the child: its messages go to `output` too; it ends with this program.
-static void become(char *const *arguments, int output)
+// A volume becomes a case first.
+static const char *verb_for(StartChoice choice, const char *path)
 {
-    char program[PATH_MAX];
-    if (process_code_file(program, sizeof program) && prctl(PR_SET_PDEATHSIG, SIGTERM) == 0 && dup2(output, STDERR_FILENO) >= 0)
-        execv(program, arguments);
-    _exit(127);
-}
-
-// Reads what the child says, passes it on, and keeps the end of it.
-static void listen(int input, char message[MESSAGE])
-{
-    char bytes[256];
-    size_t used = 0;
-    for (ssize_t count; (count = read(input, bytes, sizeof bytes)) > 0 || (count < 0 && errno == EINTR);) {
-        if (count < 0)
-            continue;
-        fwrite(bytes, 1, (size_t)count, stderr);
-        size_t kept = used + (size_t)count < MESSAGE ? used : MESSAGE - 1 - (size_t)count;
-        memmove(message, message + used - kept, kept);
-        memcpy(message + kept, bytes, (size_t)count);
-        used = kept + (size_t)count;
-    }
-    message[used] = 0;
-}
-
-// Runs a verb. Its last messages, or how it ended, go to `message`. Returns false if a signal ended it, as the user ends a program.
-static bool run_verb_of(const char *verb, const StartState *state, char message[MESSAGE])
-{
-    char *arguments[7] = {(char *)(size_t) "seldinger", (char *)(size_t)verb, (char *)(size_t)state->path};
-    int pipes[2], status = 0, count = 3;
-    const bool steers = !strcmp(verb, "nav");
-    message[0] = 0;
-    if (steers && state->trainee[0])
-        arguments[count++] = (char *)(size_t) "--trainee", arguments[count++] = (char *)(size_t)state->trainee;
-    if (steers && state->is_examination)
-        arguments[count++] = (char *)(size_t) "--examination";
-    if (pipe2(pipes, O_CLOEXEC) != 0)
-        return false;
-    fflush(NULL);
-    pid_t child = fork();
-    if (child == 0)
-        become(arguments, pipes[1]);
-    close(pipes[1]);
-    if (child > 0) {
-        listen(pipes[0], message);
-        while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-        }
-    }
-    close(pipes[0]);
-    if (child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 127))
-        snprintf(message, MESSAGE, "%s could not be started", verb);
-    else if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_DONE && !message[0] && !strcmp(verb, "report"))
-        snprintf(message, MESSAGE, "The report is the .html file beside %.400s", state->path);
-    return child < 0 || WIFEXITED(status);
+    static const char *const verb[] = {[START_STEER] = "nav", [START_REPLAY] = "replay", [START_REPORT] = "report"};
+    return choice == START_STEER && !case_is_there(path) && file_kind(path) == FILE_VOLUME ? "case" : verb[choice];
 }
 
 int start_run(void)
 {
-    static const char *const verb[] = {[START_STEER] = "nav", [START_REPLAY] = "replay", [START_REPORT] = "report"};
     static Faults faults;
     static StartState state;
-    char exercises[PATH_MAX], cache[PATH_MAX] = "", sessions[4096], message[MESSAGE] = "";
+    char exercises[PATH_MAX], cache[PATH_MAX] = "", sessions[4096], message[CHILD_MESSAGE] = "";
     char *cases = folders_cache(cache, sizeof cache) ? text_file_in(cache, "cases") : NULL;
     const char *folder[] = {exercises_folder(exercises) ? exercises : NULL, cases};
     bool goes_on = session_folder(NULL, sessions, sizeof sessions, &faults);
@@ -137,7 +81,7 @@ int start_run(void)
         StartChoice choice = faults.count == 0 ? start_window_run(&options, &state, &faults) : START_LEAVE;
         shelf_free(&shelf);
         keep_folder(&state);
-        goes_on = choice != START_LEAVE && run_verb_of(verb[choice], &state, message);
+        goes_on = choice != START_LEAVE && child_verb_run(verb_for(choice, state.path), &state, message);
     }
     free(cases);
     static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];

@@ -70,6 +70,8 @@ bool vessel_tree_link(VesselTree *tree);
 // Returns whether the root is an open end through which a tool enters: the tree does not continue upstream of it, and its own points do not close over it, as
 // those of a blind end do.
 bool vessel_tree_root_is_open(const VesselTree *tree);
+// A linked copy of a tree without a model whose root is `node`, an end of a vessel. The links on the way from the old root turn round. NULL if out of memory.
+VesselTree *vessel_tree_with_root(const VesselTree *tree, int node);
 // [mm] total length of the vessels' centrelines; links within and into sacs do not count.
 double vessel_tree_length(const VesselTree *tree);
 static inline bool vessel_tree_is_model(const VesselTree *tree) { return tree->blob_count > 0; }

@@ -7,8 +7,10 @@
 // images
 #include "recon/volume/volume.h"
 #include "recon/volume/volume_file.h"
+#include "recon/volume/volume_reduce.h"
 
 // RANSAC-based tracking
+#include "recon/track/rbt_watch.h"
 #include "recon/track/trace.h"
 #include "recon/track/rbt_parameters.h"
 #include "recon/track/segment_parameters.h"

@@ -16,6 +16,7 @@
 #include "render/run_chart.h"
 
 // the window
+#include "render/case_window.h"
 #include "render/edit_window.h"
 #include "render/replay_window.h"
 #include "render/start_window.h"

@@ -1,8 +1,7 @@
 #include "sim/case_make.h"
 
-#include "recon/recon.h"
-
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,91 +48,242 @@ static bool write_text(const char *folder, const char *name, const char *text, F
     return good;
 }
 
-// Tracks the volume. `file` gets the tree and what its file would say; `frame` the patient's orientation.
-static bool track(const CaseOptions *options, ModelFile *file, char frame[32], Faults *faults)
+// --- the entry ---
+
+bool case_tree_is_end(const VesselTree *tree, int node)
 {
-    RbtReport report = {0};
-    Trace *trace = trace_parse(options->trace, strlen(options->trace), options->trace_path, faults);
-    Volume *volume = trace ? volume_load(options->input, faults) : NULL;
-    *file = (ModelFile){.kind = -1};
-    if (volume) {
-        snprintf(frame, 32, "%s", volume->frame);
-        file->tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count, options->threads,
-                               options->progress, &report, options->trace_path, faults);
-    }
-    if (file->tree)
-        file->info =
-            (TreeFileInfo){.source = HEAP_TEXT(options->input), .parameters = segment_parameters_text(&trace->parameters, &report, volume, file->tree)};
-    rbt_report_free(&report);
-    volume_free(volume);
-    trace_free(trace);
-    return file->tree != NULL;
+    return tree->kind[node] == NODE_VESSEL && tree->neighbour_offset[node + 1] - tree->neighbour_offset[node] == 1;
 }
 
-// Fits the model unless the file has one of its kind, and saves it with the others.
-static bool fit(const char *folder, const CaseOptions *options, ModelFile *file, Faults *faults)
+int case_tree_end_near(const VesselTree *tree, Vec3 x)
 {
-    TreeFitOptions how = tree_fit_default_options();
-    TreeFit made = {0};
-    SweepModels swept = file->swept;
-    how.model = (FitModel)options->kind;
-    how.local.threads = options->threads;
-    tree_fit_complete_options(&how, file->tree, &file->info);
-    bool has_it = fit_model_is_swept(how.model) ? swept.of[fit_model_section(how.model)] != NULL : vessel_tree_is_model(file->tree);
-    if (!has_it && !tree_fit(file->tree, options->input, &how, options->progress, &made, faults))
+    int best = 0;
+    for (int i = 1; i < tree->node_count; i++)
+        if (case_tree_is_end(tree, i) && vec3_distance(x, tree->center[i]) < vec3_distance(x, tree->center[best]))
+            best = i;
+    return best;
+}
+
+// Mean radius of the last few nodes: the very last one is often cut by the border.
+static double radius_at_end(const VesselTree *tree, int end)
+{
+    enum { NODES = 4 };
+    double sum = 0;
+    int count = 0;
+    for (int node = end, from = -1; node >= 0 && count < NODES;) {
+        int next = -1;
+        sum += tree->radius[node];
+        count++;
+        for (int k = tree->neighbour_offset[node]; k < tree->neighbour_offset[node + 1]; k++)
+            if (tree->neighbour[k] != from && tree->kind[tree->neighbour[k]] == NODE_VESSEL && next < 0)
+                next = tree->neighbour[k];
+        from = node;
+        node = next;
+    }
+    return sum / count;
+}
+
+// Whether the end lies within two of its radii and two voxels of the border.
+static bool is_at_border(const VesselTree *tree, int end, const Volume *volume)
+{
+    Vec3 v = volume_voxel_of(volume, tree->center[end]);
+    double at[3] = {v.x, v.y, v.z};
+    for (int k = 0; k < 3; k++) {
+        double near = 2 + 2 * tree->radius[end] / vec3_norm(volume->axis[k]);
+        if (at[k] < near || at[k] > volume->size[k] - 1 - near)
+            return true;
+    }
+    return false;
+}
+
+int case_tree_widest_end(const VesselTree *tree, const Volume *volume)
+{
+    int best = -1;
+    double widest = 0;
+    for (int i = 0; i < tree->node_count; i++) {
+        double radius = case_tree_is_end(tree, i) && is_at_border(tree, i, volume) ? radius_at_end(tree, i) : 0;
+        if (radius > widest)
+            widest = radius, best = i;
+    }
+    return best;
+}
+
+// Makes the entry the root of the tree.
+static bool turn_to_entry(CaseWork *work, const CaseOptions *options, const Volume *volume, Faults *faults)
+{
+    VesselTree *tree = work->file.tree;
+    bool is_given = options->has_entry || (work->trace && work->trace->made.has_entry);
+    Vec3 entry = options->has_entry ? options->entry : work->trace ? work->trace->made.entry : vec3(0, 0, 0);
+    int root = is_given ? case_tree_end_near(tree, entry) : volume && !work->trace->branch[0].has_toward ? case_tree_widest_end(tree, volume) : 0;
+    if (is_given && vec3_distance(entry, tree->center[root]) > 4 * tree->radius[root]) {
+        Vec3 at = tree->center[root];
+        faults_add(faults, "entry", 0, 0,
+                   "lies %.1f mm from the nearest end of a vessel, which is at (%.2f, %.2f, %.2f); expected a point at the end of a vessel",
+                   vec3_distance(entry, at), at.x, at.y, at.z);
         return false;
-    if (made.sweep)
-        swept.of[fit_model_section(how.model)] = made.sweep;
+    }
+    if (root <= 0)
+        return true;
+    if (vessel_tree_is_model(tree)) {
+        faults_add(faults, "entry", 0, 0, "the file has a model, which was fitted from another root; expected a tree or a volume");
+        return false;
+    }
+    VesselTree *turned = vessel_tree_with_root(tree, root);
+    if (!turned) {
+        faults_add(faults, "entry", 0, 0, "out of memory");
+        return false;
+    }
+    vessel_tree_free(tree);
+    work->file.tree = turned;
+    return true;
+}
+
+// --- in steps ---
+
+bool case_work_track(CaseWork *work, const CaseOptions *options, const Volume *volume, const RbtWatch *watch, Faults *faults)
+{
+    *work = (CaseWork){.file.kind = -1};
+    if (!volume)
+        return model_file_load(options->input, -1, &work->file, faults) && turn_to_entry(work, options, NULL, faults);
+    work->trace = trace_parse(options->trace, strlen(options->trace), options->trace_path, faults);
+    if (!work->trace)
+        return false;
+    Trace *trace = work->trace;
+    trace->parameters.watch = watch;
+    snprintf(work->frame, sizeof work->frame, "%s", volume->frame);
+    VesselTree *tree = work->file.tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count,
+                                                   options->threads, options->progress, &work->report, options->trace_path, faults);
+    if (!tree)
+        return false;
+    work->file.info =
+        (TreeFileInfo){.source = HEAP_TEXT(options->input), .parameters = segment_parameters_text(&trace->parameters, &work->report, volume, tree)};
+    return turn_to_entry(work, options, volume, faults);
+}
+
+bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults)
+{
+    ModelFile *file = &work->file;
+    work->how = tree_fit_default_options();
+    work->how.model = (FitModel)options->kind;
+    work->how.local.threads = options->threads;
+    tree_fit_complete_options(&work->how, file->tree, &file->info);
+    work->has_it = fit_model_is_swept(work->how.model) ? file->swept.of[fit_model_section(work->how.model)] != NULL : vessel_tree_is_model(file->tree);
+    return work->has_it || tree_fit(file->tree, options->input, &work->how, options->progress, &work->made, faults);
+}
+
+const VesselTree *case_work_tree(const CaseWork *work) { return work->made.model ? work->made.model : work->file.tree; }
+
+bool case_work_wall(const CaseWork *work, ModelField *wall)
+{
+    const SweepModel *sweep = work->made.sweep;
+    if (!sweep && fit_model_is_swept(work->how.model))
+        sweep = work->file.swept.of[fit_model_section(work->how.model)];
+    *wall = model_field_of_blobs(case_work_tree(work));
+    return !sweep || model_field_of_sweep(work->file.tree, sweep, wall);
+}
+
+static bool write_model(const CaseWork *work, const char *folder, Faults *faults)
+{
+    SweepModels swept = work->file.swept;
+    if (work->made.sweep)
+        swept.of[fit_model_section(work->how.model)] = work->made.sweep;
     char created_by[] = "seldinger " SELDINGER_VERSION " case", *path = text_file_in(folder, MODEL);
-    TreeFileInfo info = {
-        .source = file->info.source, .parameters = has_it ? file->info.parameters : tree_fit_parameters(&how, &file->info), .created_by = created_by};
-    bool good = tree_file_save_with(made.model ? made.model : file->tree, &swept, &info, path, faults);
-    if (!has_it)
+    TreeFileInfo info = {.source = work->file.info.source,
+                         .parameters = work->has_it ? work->file.info.parameters : tree_fit_parameters(&work->how, &work->file.info),
+                         .created_by = created_by};
+    bool good = path && tree_file_save_with(case_work_tree(work), &swept, &info, path, faults);
+    if (!path)
+        faults_add(faults, folder, 0, 0, "out of memory");
+    if (!work->has_it)
         free(info.parameters);
     free(path);
-    sweep_model_free(made.sweep);
-    vessel_tree_free(made.model);
     return good;
 }
 
-static bool write_scene(const char *folder, const CaseOptions *options, const VesselTree *tree, const char *frame, Faults *faults)
+// The device stands in the folder, so that the case can be copied.
+static bool write_device(const char *folder, const char *library, const char *device, Faults *faults)
+{
+    char *from = library && trace_is_device_name(device) ? text_file_in(library, device) : NULL;
+    size_t length;
+    if (library && !from) {
+        faults_add(faults, device, 0, 0, "is not the name of a device file, without its folder, of letters, digits and . - _");
+        return false;
+    }
+    if (!from) {
+        faults_add(faults, device, 0, 0, "there is no folder of devices; name one: --tools FOLDER");
+        return false;
+    }
+    char *text = whole_file_read_most(from, 1 << 20, &length, faults);
+    bool good = text && write_text(folder, device, text, faults);
+    free(text);
+    free(from);
+    return good;
+}
+
+static bool write_scene(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
 {
     char behind[PATH_MAX];
+    const TraceCase *said = work->trace ? &work->trace->made : NULL;
+    const char *device = options->device ? options->device : said && said->device[0] ? said->device : NULL;
+    bool is_behind = options->is_behind || (said && said->is_behind);
     CaseScene scene = {.model = MODEL,
                        .contact = options->kind > 0 ? (ContactKind)(CONTACT_SWEEP + options->kind - 1) : CONTACT_LIM,
-                       .frame = frame,
-                       .behind = options->is_behind && path_resolve(options->input, behind) ? behind : NULL,
-                       .has_target = options->has_target,
-                       .target = options->target};
-    char *text = case_scene_text(tree, &scene, faults);
+                       .frame = work->frame,
+                       .behind = is_behind && path_resolve(options->input, behind) ? behind : NULL,
+                       .device = device,
+                       .has_target = options->has_target || (said && said->has_target),
+                       .target = options->has_target || !said ? options->target : said->target};
+    if (device && !write_device(folder, options->library, device, faults))
+        return false;
+    char *text = case_scene_text(work->file.tree, &scene, faults);
     bool good = text && write_text(folder, SCENE, text, faults);
     free(text);
     return good;
 }
 
-static void measure(const VesselTree *tree, CaseFigures *figures)
+bool case_work_write(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
 {
+    return create_folder(folder, faults) && (!options->trace || write_text(folder, TRACE, options->trace, faults)) && write_model(work, folder, faults) &&
+           write_scene(work, folder, options, faults);
+}
+
+void case_work_measure(const CaseWork *work, CaseFigures *figures)
+{
+    const VesselTree *tree = work->file.tree;
     figures->nodes = tree->node_count;
     figures->length = vessel_tree_length(tree);
+    figures->branches = 0;
     for (int i = 1; i < tree->node_count; i++)
-        figures->branches += tree->kind[i] == NODE_VESSEL && tree->neighbour_offset[i + 1] - tree->neighbour_offset[i] == 1;
+        figures->branches += case_tree_is_end(tree, i);
+}
+
+void case_work_free(CaseWork *work)
+{
+    sweep_model_free(work->made.sweep);
+    vessel_tree_free(work->made.model);
+    rbt_report_free(&work->report);
+    trace_free(work->trace);
+    model_file_free(&work->file);
+    *work = (CaseWork){0};
 }
 
 bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figures, Faults *faults)
 {
-    ModelFile file = {0};
-    char frame[32] = "";
+    CaseWork work = {0};
     *figures = (CaseFigures){0};
-    if (!create_folder(folder, faults) || (options->trace && !write_text(folder, TRACE, options->trace, faults)))
+    // before the work that would be lost
+    if (!create_folder(folder, faults))
         return false;
     double start = seconds();
-    if (options->trace ? !track(options, &file, frame, faults) : !model_file_load(options->input, -1, &file, faults))
-        return false;
+    Volume *volume = options->trace ? volume_load(options->input, faults) : NULL;
+    bool good = (volume || !options->trace) && case_work_track(&work, options, volume, NULL, faults);
+    volume_free(volume);
     figures->track_s = seconds() - start;
-    bool good = fit(folder, options, &file, faults);
+    good = good && case_work_fit(&work, options, faults);
     figures->fit_s = seconds() - start - figures->track_s;
-    good = good && write_scene(folder, options, file.tree, frame, faults);
-    measure(file.tree, figures);
-    model_file_free(&file);
+    good = good && case_work_write(&work, folder, options, faults);
+    if (work.file.tree)
+        case_work_measure(&work, figures);
+    case_work_free(&work);
     return good;
 }

@@ -25,6 +25,7 @@ static const CaseWire wires[] = {
 };
 static const double WIDE_MM = 2.5;      // mean radius of the vessels from which on the thicker wire is taken
 static const double SPARE_MM = 60;      // of wire, beyond the farthest place
+static const double DEVICE_SPARE_MM = 300;      // the same of a device, whose soft end alone may be 250 mm long
 static const double ELEMENT_MM = 1.5;
 enum { ELEMENTS_LEAST = 60, ELEMENTS_MOST = 400 };
 
@@ -55,6 +56,14 @@ static double mean_radius(const VesselTree *tree)
         length += step;
     }
     return length > 0 ? sum / length : tree->radius[0];
+}
+
+// A device keeps its own sections, damping and shape; only its shaft is cut to length.
+static void write_device(FILE *out, const char *device, double farthest)
+{
+    double length = 10 * ceil((farthest + DEVICE_SPARE_MM) / 10);
+    fprintf(out, "tools:\n  - {name: wire, device: %s, length_mm: %.0f, elements: %.0f}\n", device, length,
+            fmin(fmax(ceil(length / ELEMENT_MM), ELEMENTS_LEAST), ELEMENTS_MOST));
 }
 
 static void write_wire(FILE *out, const VesselTree *tree, double farthest)
@@ -122,7 +131,10 @@ static bool write_scene(OutputText *text, const VesselTree *tree, const CaseScen
             "# A case: `seldinger nav` opens its folder. Change what you like (docs/scene-format.md).\n"
             "seldinger: 1\nvessel:\n  model: %s\n  contact: %s\n  friction: 0.04\n",
             options->model, contact_name[options->contact]);
-    write_wire(text->stream, tree, farthest);
+    if (options->device)
+        write_device(text->stream, options->device, farthest);
+    else
+        write_wire(text->stream, tree, farthest);
     fprintf(text->stream, "sheath: {inlet: root, inserted_mm: 2}\n");
     write_patient(text->stream, options);
     if (options->has_target)

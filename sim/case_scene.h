@@ -10,6 +10,7 @@ typedef struct CaseScene {
     ContactKind contact;
     const char *frame;           // of the patient: "LPS", "RAS", …; "": not known
     const char *behind;          // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
+    const char *device;          // of the wire, relative to the scene's folder; NULL: one that suits the vessels
     bool has_target;
     Vec3 target;                 // [mm]
 } CaseScene;

@@ -107,13 +107,13 @@ typedef struct Schedule {
     FieldModel *model;
     const Progress *progress;
     int done, total;
-    bool failed;
+    bool failed;             // or stopped
 } Schedule;
 
 static void sweep(Schedule *s, int steps)
 {
     double gain = s->failed ? 0 : field_model_solve(s->model, steps, s->done % 2 == 1);
-    s->failed |= gain < 0;
+    s->failed |= gain < 0 || progress_is_stopped(s->progress);
     s->done++;
     if (s->progress && s->progress->call)
         s->progress->call(s->progress->context, s->done, s->total);
@@ -234,7 +234,7 @@ VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, co
         if (out)
             parallel_for(options->threads, out->node_count, measure_error, out, NULL);
     } else {
-        faults_add(faults, "fit", 0, 0, "not enough memory");
+        faults_add(faults, "fit", 0, 0, progress_is_stopped(progress) ? "stopped" : "not enough memory");
     }
     field_model_free(&model);
     field_rows_free(&rows);

@@ -670,7 +670,7 @@ static VesselTree *fit_pass(Job *job, const Progress *progress)
     const VesselTree *tree = job->tree;
     long nodes = tree->node_count;
     PassProgress pass = {progress, job->first ? nodes : 0, job->options->agree ? 2 * nodes : nodes};
-    Progress own = {pass_on, &pass};
+    Progress own = {.call = pass_on, .context = &pass};
     job->model = calloc((size_t)nodes, sizeof *job->model);
     if (!job->model)
         return NULL;

@@ -20,7 +20,7 @@
 #include <string.h>
 
 const char rbt_enters_forbidden[] = "enters a forbidden region";
-enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000 };
+enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000, SHOWN_EACH = 4 };
 
 // --- estimation, section 3.1 ---
 
@@ -383,6 +383,11 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         Vec3 here = t->estimate.node.cylinder.center;
         left = left || tracker_node_around(t, here, 1) < 0;
         length = branch_length(branch);
+        if (!t->is_guarded && branch->count % SHOWN_EACH == 0)   // the limbs of a wave are tracked in other threads, and shown when they are adopted
+            tracker_show(t, branch);
+        t->why = "stopped";
+        if (tracker_is_stopped_by_user(t))
+            return;
         t->why = "reached max_length_mm";
         if (length >= fmin(p->max_length_mm, t->longest) || branch->count >= MAX_NODES)
             return;

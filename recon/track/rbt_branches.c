@@ -382,8 +382,10 @@ static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double s
     bool good = count >= 0;
     if (count > 0)
         qsort(limb, (size_t)count, sizeof *limb, compare_limbs);
-    for (int i = 0; good && i < count; i += WAVE)
+    for (int i = 0; good && i < count && !tracker_is_stopped_by_user(t); i += WAVE) {
         good = grow_wave(t, paint, limb + i, count - i < WAVE ? count - i : WAVE, share, noise, threads, ends);
+        tracker_show(t, NULL);
+    }
     free(limb);
     return good;
 }

@@ -4,6 +4,7 @@
 #define SELDINGER_RECON_TRACK_RBT_PARAMETERS_H
 
 #include "geom/geom.h"
+#include "recon/track/rbt_watch.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -64,6 +65,7 @@ typedef struct RbtParameters {
     int until_count;
     const RbtRegion *rival;  // `not`: points in excluded vessels, which are tracked too, compete for the lumen and are then removed
     int rival_count;
+    const RbtWatch *watch;   // of the tracking; NULL: none. Owned by the caller
 } RbtParameters;
 
 RbtParameters rbt_default_parameters(void);

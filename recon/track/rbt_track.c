@@ -620,8 +620,10 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         faults_add(faults, path, 0, 0, "out of memory");
     if (good && faults->count == before) {
         Job job = {seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, path, faults};
-        if (track_all(t, &job, &own) && !(tree = finish_tree(&t->tree)))
+        if (track_all(t, &job, &own) && !tracker_is_stopped_by_user(t) && !(tree = finish_tree(&t->tree)))
             faults_add(faults, path, 0, 0, "out of memory for a tree of %d nodes", t->tree.count);
+        if (!tree && tracker_is_stopped_by_user(t))
+            faults_add(faults, path, 0, 0, "stopped");
         memcpy(own.start, t->start, sizeof own.start);
         own.check = t->check;
     }

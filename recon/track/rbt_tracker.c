@@ -127,3 +127,20 @@ double tracker_segment_distance(Vec3 x, Vec3 a, Vec3 b)
     double l2 = vec3_norm2(ab), s = l2 > 0 ? vec3_dot(vec3_sub(x, a), ab) / l2 : 0;
     return vec3_distance(x, vec3_add_scaled(a, fmax(0, fmin(1, s)), ab));
 }
+
+static RbtSeen seen(const TrackNode *node, int parent) { return (RbtSeen){node->cylinder.center, node->cylinder.radius, parent, node->kind}; }
+
+void tracker_show(const Tracker *t, const Track *branch)
+{
+    const RbtWatch *watch = t->parameters->watch;
+    int old = t->tree.count, count = old + (branch ? branch->count : 0);
+    if (!watch || !watch->show)
+        return;
+    RbtSeen *node = HEAP_ZEROED((size_t)count, sizeof *node);
+    for (int i = 0; i < old; i++)
+        node[i] = seen(&t->tree.node[i], t->tree.node[i].parent);
+    for (int i = old; i < count; i++)
+        node[i] = seen(&branch->node[i - old], i > old ? i - 1 : -1);
+    watch->show(watch->context, node, count);
+    free(node);
+}

@@ -79,6 +79,10 @@ void track_cut(Track *track, int count);
 void track_keep(Track *track, const bool *keep, int *place);
 void track_free(Track *track);
 
+// Shows the tree with `branch`, which is not yet part of it (may be NULL), to the watch of the tracking.
+void tracker_show(const Tracker *t, const Track *branch);
+static inline bool tracker_is_stopped_by_user(const Tracker *t) { return rbt_watch_is_stopped(t->parameters->watch); }
+
 double tracker_usual_radius(const Track *branch);   // median radius of its last nodes
 double tracker_segment_distance(Vec3 x, Vec3 a, Vec3 b);
 double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value

@@ -300,9 +300,50 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         return;
     }
     FAULT(w, value,
-          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, parameters (default or paper), or a parameter that `segment "
+          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, case, parameters (default or paper), or a parameter that "
+          "`segment "
           "--help` lists",
           key);
+}
+
+bool trace_is_device_name(const char *text)
+{
+    static const char signs[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-";
+    return text[0] && text[0] != '.' && text[strspn(text, signs)] == 0;
+}
+
+// The key `case`.
+static void read_case(const Walk *w, const yaml_node_t *map, TraceCase *out)
+{
+    if (map->type != YAML_MAPPING_NODE) {
+        FAULT(w, map, "the case is not valid; expected {entry_mm: [x, y, z], target_mm: [x, y, z], device: FILE.yaml, behind: true}");
+        return;
+    }
+    for (int i = 0; i < pair_count(map); i++) {
+        yaml_node_t *value;
+        const char *key = key_of(w, map, i, &value);
+        const char *text = key ? scalar_of(value) : NULL;
+        if (!key)
+            continue;
+        if (!strcmp(key, "entry_mm")) {
+            out->has_entry = true;
+            read_vector(w, value, key, &out->entry);
+        } else if (!strcmp(key, "target_mm")) {
+            out->has_target = true;
+            read_vector(w, value, key, &out->target);
+        } else if (!strcmp(key, "behind")) {
+            out->is_behind = text && !strcmp(text, "true");
+            if (!text || (!out->is_behind && strcmp(text, "false")))
+                FAULT(w, value, "behind is not valid; expected true or false");
+        } else if (!strcmp(key, "device")) {
+            if (!text || !trace_is_device_name(text) || strlen(text) >= sizeof out->device)
+                FAULT(w, value, "device is not valid; expected the name of a device file, of letters, digits and . - _, without its folder");
+            else
+                snprintf(out->device, sizeof out->device, "%s", text);
+        } else {
+            FAULT(w, value, "unknown key '%.40s' in a case; expected entry_mm, target_mm, device, behind", key);
+        }
+    }
 }
 
 static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
@@ -335,6 +376,8 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
             read_list(w, value, key[0] == 'b', trace);
         else if (place_kind_of(key) >= 0)
             read_regions(w, value, place_kind_of(key), trace);
+        else if (!strcmp(key, "case"))
+            read_case(w, value, &trace->made);
         else if (!strcmp(key, "retry_steps"))
             read_retry_steps(w, value, &trace->parameters);
         else

@@ -6,6 +6,13 @@
 
 #include "recon/track/rbt_track.h"
 
+typedef struct TraceCase {   // the key `case`: what `seldinger case` makes of the tree; `segment` ignores it
+    bool has_entry, has_target, is_behind;
+    Vec3 entry;              // [mm] the end of a vessel where the tools enter
+    Vec3 target;             // [mm] where the tip of the tool has to go
+    char device[80];         // a file of the device library, without its folder; "": a wire that suits the vessels
+} TraceCase;
+
 typedef struct Trace {
     RbtParameters parameters;
     int branch_count;
@@ -14,8 +21,11 @@ typedef struct Trace {
     RbtAneurysm *aneurysm;
     int forbid_count, cut_count, until_count, rival_count;   // `parameters` points into these arrays
     RbtRegion *forbid, *cut, *until, *rival;                 // `rival`: the key `not`
+    TraceCase made;
 } Trace;
 
+// Whether a text can be the name of a device file: letters, digits and . - _ only, so that it can be written into a scene and into a path.
+bool trace_is_device_name(const char *text);
 // Parses a trace file. `text` need not be NUL-terminated; `path` is used in messages. Returns NULL with faults.
 Trace *trace_parse(const char *text, size_t length, const char *path, Faults *faults);
 Trace *trace_load(const char *path, Faults *faults);

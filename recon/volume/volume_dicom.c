@@ -744,7 +744,7 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
     OpenFile open = {0};
     for (int i = 0; good && i < count; i++) {
         const DicomFile *file = slice[i].file;
-        if (!(good = file_open(&open, file, whole, faults)))
+        if (!(good = volume_goes_on(0.5 + 0.5 * i / count, file->path, faults) && file_open(&open, file, whole, faults)))
             break;
         size_t length = voxels * (size_t)(open.image.allocated / 8), start = open.image.pixel_place + (size_t)slice[i].frame * length;
         good = start <= open.from->length && open.from->length - start >= length;
@@ -822,7 +822,8 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
     int before = faults->count;
     if (count < 0)
         faults_add(faults, folder, 0, 0, "cannot be read; expected a folder with the files of a series");
-    for (int i = 0; i < count; i++) {
+    // the pixels are read after all headers
+    for (int i = 0; i < count && volume_goes_on(0.5 * i / count, folder, faults); i++) {
         char path[4096];
         int wrote = snprintf(path, sizeof path, "%s/%s", folder, name[i]);
         FileBytes file;

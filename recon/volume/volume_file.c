@@ -207,6 +207,14 @@ Volume *volume_load(const char *path, Faults *faults)
     return volume;
 }
 
+Volume *volume_load_with(const char *path, const Progress *progress, Faults *faults)
+{
+    volume_watch(progress);
+    Volume *volume = volume_load(path, faults);
+    volume_watch(NULL);
+    return volume;
+}
+
 // --- NRRD output ---
 
 static const struct SaveType {

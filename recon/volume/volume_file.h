@@ -9,6 +9,8 @@
 // Loads a volume; its format is detected by content, not by extension. A folder is read as a DICOM series; the other files of a series are found in the
 // folder of the given one. Returns NULL with faults.
 Volume *volume_load(const char *path, Faults *faults);
+// The same with progress; it can be stopped.
+Volume *volume_load_with(const char *path, const Progress *progress, Faults *faults);
 // The same from memory; `path` is used in messages, and detached data files are searched in its folder.
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
 // Returns true if volume_load accepts a file that begins with these bytes (4096 are enough); the samples of a NIfTI pair are recognised by `path`.

@@ -386,6 +386,21 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
     return volume;
 }
 
+// The readers share no state but their arguments; only the caller's view of the progress would have to pass through all of them.
+static _Thread_local const Progress *watching;
+
+void volume_watch(const Progress *progress) { watching = progress; }
+
+bool volume_goes_on(double part, const char *path, Faults *faults)
+{
+    if (watching && watching->call)
+        watching->call(watching->context, (long)(1000 * part), 1000);
+    if (!progress_is_stopped(watching))
+        return true;
+    faults_add(faults, path, 0, 0, "stopped");
+    return false;
+}
+
 // Skips, then converts piecewise, so a stream needs no memory except the voxels. One byte more than the header implies shows that header and data do not
 // belong together.
 static bool inflate_values(const VolumeHeader *header, const FileBytes *data, size_t skip, size_t count, Volume *volume, Faults *faults)
@@ -398,7 +413,8 @@ static bool inflate_values(const VolumeHeader *header, const FileBytes *data, si
         free(piece);
         return false;
     }
-    while (made < wanted) {
+    bool goes_on = true;
+    while (made < wanted && (goes_on = volume_goes_on((double)made / (double)wanted, data->path, faults))) {
         size_t left = made < skip ? skip - made : wanted - made, next = left < PIECE ? left : PIECE;
         got = inflater_read(&inflater, piece, next);
         if (got < next)
@@ -409,9 +425,9 @@ static bool inflate_values(const VolumeHeader *header, const FileBytes *data, si
         got = 0;
     }
     bool good = made == wanted;
-    if (!good) {
+    if (!good && goes_on) {
         report_short(&inflater, made + got, wanted, faults);
-    } else if (inflater_read(&inflater, &excess, 1) > 0) {
+    } else if (good && inflater_read(&inflater, &excess, 1) > 0) {
         faults_add_at_byte(faults, data->path, data->offset,
                            "the compressed data holds more than the %zu bytes that the header promises; expected a header and data "
                            "that belong together",

@@ -71,6 +71,9 @@ Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *f
 // Sets minimum and maximum. Returns false with a fault at the first voxel that is not finite. Samples of `sample_size` bytes begin at byte `start` of the
 // file; `sample_size` 0: the fault gives no byte.
 bool volume_finish_values(Volume *volume, const FileBytes *data, size_t start, size_t sample_size, Faults *faults);
+// Where the loader is, for volume_load_with(): `part` 0 to 1 of the file or series. Returns false, with a fault, if the load is to stop.
+bool volume_goes_on(double part, const char *path, Faults *faults);
+void volume_watch(const Progress *progress);   // of this thread's next load; NULL: none
 // Decompresses the first `wanted` bytes of a gzip or zlib stream. Returns false if there are fewer.
 bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Faults *faults);
 // Reads the first bytes of a regular file, at most `most`. The caller frees them (file_bytes_free).

@@ -1,0 +1,35 @@
+#include "cli/case_open.h"
+
+#include "cli/child_verb.h"
+#include "cli/file_kind.h"
+#include "cli/start.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+bool case_can_open(const char *path) { return start_is_possible() && !case_is_there(path) && file_kind(path) == FILE_VOLUME; }
+
+bool case_library(char out[PATH_MAX])
+{
+    static const char *const places[] = {"../../scenes/tools", "../share/seldinger/scenes/tools"};
+    char path[PATH_MAX];
+    for (int i = 0; i < 2; i++)
+        if (process_beside(places[i], path, sizeof path) && realpath(path, out))
+            return true;
+    return false;
+}
+
+int case_open(const CaseWindowOptions *options, Faults *faults)
+{
+    char steer[PATH_MAX];
+    if (!case_window_run(options, steer, sizeof steer, faults))
+        return EXIT_BAD_INPUT;
+    if (!steer[0])
+        return EXIT_DONE;
+    printf("%s\n", steer);
+    static StartState state;
+    char message[CHILD_MESSAGE];
+    snprintf(state.path, sizeof state.path, "%s", steer);
+    child_verb_run("nav", &state, message);
+    return EXIT_DONE;
+}

@@ -1,0 +1,385 @@
+#include "render/case_state.h"
+
+#include "base/base.h"
+
+#include <dirent.h>
+#include <limits.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ACTS "the acts"      // instead of a trace's path in messages
+
+static void say(CaseState *s, bool is_fault, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static void say(CaseState *s, bool is_fault, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(s->message, sizeof s->message, format, arguments);
+    va_end(arguments);
+    s->message_is_fault = is_fault;
+}
+
+// Without the line of a trace that the user has not written.
+static void say_fault(CaseState *s, const char *text)
+{
+    const char *colon = strncmp(text, ACTS, strlen(ACTS)) ? NULL : strstr(text, ": ");
+    say(s, true, "%s", colon ? colon + 2 : text);
+}
+
+static int by_name(const void *a, const void *b) { return strcmp(a, b); }
+
+// The wires of the device library: a first tool for one person's hand. A catheter needs a wire within it.
+static void list_tools(CaseState *s)
+{
+    DIR *folder = s->made.library ? opendir(s->made.library) : NULL;
+    s->tool_count = 1;
+    for (struct dirent *entry; folder && s->tool_count < CASE_TOOLS && (entry = readdir(folder));) {
+        size_t length = strlen(entry->d_name);
+        if (length < sizeof s->tool_name[0] && length > 5 && !strncmp(entry->d_name, "wire-", 5) && !strcmp(entry->d_name + length - 5, ".yaml"))
+            snprintf(s->tool_name[s->tool_count++], sizeof s->tool_name[0], "%s", entry->d_name);
+    }
+    if (folder)
+        closedir(folder);
+    qsort(s->tool_name[1], (size_t)(s->tool_count - 1), sizeof s->tool_name[0], by_name);
+}
+
+bool case_state_begin(CaseState *s, const CaseOptions *made)
+{
+    *s = (CaseState){.made = *made, .mode = CASE_START, .forbid_radius = 3, .chosen_mark = -1, .view = CASE_PROJECTION, .turns = true};
+    s->made.trace_path = ACTS;
+    list_tools(s);
+    s->builder = case_builder_create(&s->made);
+    return s->builder != NULL;
+}
+
+void case_state_end(CaseState *s)
+{
+    case_builder_free(s->builder);
+    case_acts_free(&s->acts);
+    free(s->seen);
+    *s = (CaseState){0};
+}
+
+// The place with the brightest surroundings: a vessel in most angiograms, where the slices begin.
+static Vec3 brightest_place(const Volume *v)
+{
+    size_t nx = (size_t)v->size[0], ny = (size_t)v->size[1];
+    double most = -HUGE_VAL;
+    Vec3 place = volume_middle(v);
+    for (int k = 1; k + 1 < v->size[2]; k++)
+        for (int j = 1; j + 1 < v->size[1]; j++)
+            for (int i = 1; i + 1 < v->size[0]; i++) {
+                const float *x = v->value + ((size_t)k * ny + (size_t)j) * nx + (size_t)i;
+                double sum = (double)x[0] + (double)x[1] + (double)x[-1] + (double)x[nx] + (double)*(x - nx) + (double)x[nx * ny] + (double)*(x - nx * ny);
+                if (sum > most)
+                    most = sum, place = volume_point_of(v, vec3(i, j, k));
+            }
+    return place;
+}
+
+static void take_volume(CaseState *s)
+{
+    float low, high;
+    Vec3 corner[8];
+    s->volume = case_builder_volume(s->builder);
+    s->reduced = case_builder_reduced(s->builder, &low, &high);
+    const Volume *v = s->volume;
+    s->axes = patient_axes(v->frame);
+    s->full_low = s->low = (double)low;
+    s->full_high = s->high = (double)high;
+    for (int i = 0; i < 8; i++)
+        corner[i] = volume_point_of(v, vec3(i & 1 ? v->size[0] - 1 : 0, i & 2 ? v->size[1] - 1 : 0, i & 4 ? v->size[2] - 1 : 0));
+    s->camera = free_camera_framing(8, corner);
+    free_camera_look_along(&s->camera, s->axes.posterior, s->axes.superior);
+    s->camera.home_turn = s->camera.turn;
+    s->cursor = brightest_place(s->reduced);
+    for (int i = 0; i < 3; i++)
+        s->middle[i] = volume_middle(v), s->zoom[i] = 1;
+    s->has_volume = true;
+}
+
+bool case_state_frame(CaseState *s)
+{
+    BuildProgress before = s->progress;
+    BuildProgress *now = &s->progress;
+    *now = case_builder_progress(s->builder);
+    if (!s->has_volume && case_builder_volume(s->builder))
+        take_volume(s);
+    if (now->seen != s->seen_number) {
+        s->seen_count = case_builder_seen(s->builder, &s->seen);
+        s->seen_number = now->seen;
+    }
+    bool is_new = now->stage != before.stage;
+    if (is_new && now->stage == BUILD_FAILED)
+        say_fault(s, now->message);
+    // a start that was refused is followed by another one
+    if (is_new && now->stage == BUILD_FAILED && s->acts.count > 0 && s->acts.act[s->acts.count - 1].kind == CASE_START)
+        s->mode = CASE_START;
+    if (is_new && now->stage == BUILD_LOOKING)
+        say(s, false, "the wall is fitted: choose a target, or steer");
+    s->pictures += is_new;
+    return is_new || now->seen != before.seen || fabs(now->part - before.part) > 0.004;
+}
+
+// --- acts ---
+
+static void follow(CaseState *s, bool changes_tree)
+{
+    char *trace = case_acts_trace(&s->acts);
+    bool has_failed = s->progress.stage == BUILD_FAILED || s->progress.stage == BUILD_IDLE;
+    s->chosen_mark = changes_tree ? -1 : s->chosen_mark;
+    if (changes_tree || has_failed || !trace)
+        case_builder_request(s->builder, trace);
+    else
+        case_builder_retitle(s->builder, trace);
+    free(trace);
+}
+
+// Points are rounded, so that the trace is easy to read and to type.
+static Vec3 rounded(Vec3 x)
+{
+    const double per_mm = 100;
+    return vec3(round(x.x * per_mm) / per_mm, round(x.y * per_mm) / per_mm, round(x.z * per_mm) / per_mm);
+}
+
+static void add(CaseState *s, const CaseAct *act)
+{
+    char text[160];
+    if (!s->has_volume || (act->kind != CASE_START && !case_acts_last(&s->acts, CASE_START))) {
+        say(s, true, s->has_volume ? "click a vessel first: the tree grows from there" : "the volume is still being loaded");
+        return;
+    }
+    if (!case_acts_add(&s->acts, act)) {
+        say(s, true, "out of memory");
+        return;
+    }
+    case_act_describe(act, text, sizeof text);
+    say(s, false, "%s", text);
+    follow(s, case_act_changes_tree(act->kind));
+    s->pictures++;
+}
+
+// The point where a vessel's end is nearest: that is where tools enter.
+static Vec3 end_near(const CaseState *s, Vec3 x)
+{
+    const CaseWork *work = case_builder_work(s->builder);
+    return work ? case_work_tree(work)->center[case_tree_end_near(case_work_tree(work), x)] : x;
+}
+
+void case_state_act(CaseState *s, CaseActKind kind, Vec3 place)
+{
+    CaseAct act = {.kind = kind, .place = rounded(kind == CASE_ENTRY ? end_near(s, place) : place), .radius = kind == CASE_FORBID ? s->forbid_radius : 0};
+    add(s, &act);
+}
+
+void case_state_click(CaseState *s, Vec3 place)
+{
+    int mode = s->mode;
+    s->cursor = place;
+    s->pictures++;
+    if (mode == CASE_LOOK)
+        return;
+    s->mode = CASE_LOOK;
+    s->turns = false;
+    case_state_act(s, (CaseActKind)mode, place);
+}
+
+void case_state_mode(CaseState *s, int mode) { s->mode = mode; }
+
+static void undo_or_redo(CaseState *s, bool is_undo)
+{
+    char text[160];
+    if (!(is_undo ? case_acts_undo(&s->acts) : case_acts_redo(&s->acts))) {
+        say(s, false, "nothing to %s", is_undo ? "undo" : "do again");
+        return;
+    }
+    const CaseAct *act = &s->acts.act[s->acts.count - !is_undo];
+    case_act_describe(act, text, sizeof text);
+    say(s, false, "%s: %s", is_undo ? "undone" : "done again", text);
+    if (act->kind == CASE_DEVICE) {
+        const CaseAct *last = case_acts_last(&s->acts, CASE_DEVICE);
+        s->tool = 0;
+        for (int i = 1; last && i < s->tool_count; i++)
+            if (!strcmp(s->tool_name[i], last->device))
+                s->tool = i;
+    }
+    follow(s, case_act_changes_tree(act->kind));
+    s->mode = case_acts_last(&s->acts, CASE_START) ? s->mode : CASE_START;
+    s->pictures++;
+}
+
+void case_state_undo(CaseState *s) { undo_or_redo(s, true); }
+void case_state_redo(CaseState *s) { undo_or_redo(s, false); }
+
+void case_state_cancel(CaseState *s)
+{
+    case_acts_undo(&s->acts);
+    case_builder_request(s->builder, NULL);
+    s->mode = case_acts_last(&s->acts, CASE_START) ? CASE_LOOK : CASE_START;
+    s->pictures++;
+    say(s, false, "stopped; Ctrl+Y begins it again");
+}
+
+void case_state_next_tool(CaseState *s, int by)
+{
+    CaseAct act = {.kind = CASE_DEVICE};
+    int next = (s->tool + by + s->tool_count) % s->tool_count, before = s->acts.count;
+    snprintf(act.device, sizeof act.device, "%s", s->tool_name[next]);
+    add(s, &act);
+    s->tool = s->acts.count > before ? next : s->tool;
+}
+
+void case_state_turn_background(CaseState *s)
+{
+    const CaseAct *last = case_acts_last(&s->acts, CASE_BEHIND);
+    CaseAct act = {.kind = CASE_BEHIND, .is_on = !(last && last->is_on)};
+    add(s, &act);
+}
+
+void case_state_choose_mark(CaseState *s, int mark)
+{
+    const CaseMark *marks;
+    int count = case_builder_marks(s->builder, &marks);
+    if (count == 0)
+        return;
+    s->chosen_mark = (mark % count + count) % count;
+    if (marks[s->chosen_mark].has_place)
+        s->cursor = marks[s->chosen_mark].place;
+    s->turns = false;
+    s->pictures++;
+}
+
+// --- views ---
+
+Camera case_state_camera(const CaseState *s, int view, int width, int height)
+{
+    if (view == CASE_PROJECTION)
+        return free_camera_projection(&s->camera, width, height, vec3_distance(s->camera.low, s->camera.high) + 10);
+    return slice_camera(&s->axes, (SliceView)view, s->volume, s->middle[view], s->zoom[view], width, height);
+}
+
+// The edge of a voxel along a direction [mm].
+static double voxel_along(const Volume *v, Vec3 direction)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += vec3_norm(v->axis[k]) * fabs(vec3_dot(vec3_unit(v->axis[k]), direction));
+    return sum;
+}
+
+// Keeps the cross-hair in the volume.
+static void move_cursor(CaseState *s, Vec3 direction, double voxels)
+{
+    Vec3 next = vec3_add_scaled(s->cursor, voxels * voxel_along(s->volume, direction), direction), v = volume_voxel_of(s->volume, next);
+    v.x = fmin(fmax(v.x, 0), s->volume->size[0] - 1);
+    v.y = fmin(fmax(v.y, 0), s->volume->size[1] - 1);
+    v.z = fmin(fmax(v.z, 0), s->volume->size[2] - 1);
+    s->cursor = volume_point_of(s->volume, v);
+    s->pictures++;
+}
+
+void case_state_scroll(CaseState *s, int view, double voxels)
+{
+    if (s->has_volume && view < CASE_PROJECTION)
+        move_cursor(s, case_state_camera(s, view, 100, 100).back, voxels);
+}
+
+void case_state_move(CaseState *s, int view, double right, double up)
+{
+    if (!s->has_volume)
+        return;
+    if (view == CASE_PROJECTION) {
+        const double pixels = 12;    // of the mouse's way for a key
+        s->turns = false;
+        free_camera_orbit(&s->camera, pixels * right, -pixels * up);
+        s->turned++;
+        return;
+    }
+    Camera c = case_state_camera(s, view, 100, 100);
+    move_cursor(s, c.right, right);
+    move_cursor(s, c.up, up);
+}
+
+void case_state_zoom(CaseState *s, int view, double notches)
+{
+    const double notch = 1.15, most = 20;
+    if (!s->has_volume)
+        return;
+    if (view == CASE_PROJECTION) {
+        free_camera_zoom(&s->camera, notches, 50, 50, 100, 100);
+    } else {
+        s->zoom[view] = fmin(fmax(s->zoom[view] * pow(notch, notches), 1), most);
+        // the cross-hair comes towards the middle
+        Vec3 whole = volume_middle(s->volume);
+        s->middle[view] = vec3_mix(s->cursor, whole, 1 / s->zoom[view]);
+    }
+    s->pictures++;
+}
+
+void case_state_window(CaseState *s, double wider, double higher)
+{
+    double width = (s->high - s->low) * wider, level = 0.5 * (s->low + s->high) + higher * (s->full_high - s->full_low), whole = s->full_high - s->full_low;
+    width = fmin(fmax(width, 0.01 * whole), 10 * whole);
+    s->low = level - 0.5 * width, s->high = level + 0.5 * width;
+    s->pictures++;
+}
+
+const char *case_state_hint(const CaseState *s)
+{
+    static const char *const clicks[CASE_ACTS + 1] = {"Click a vessel: the whole tree grows from there",
+                                                      "Click a vessel that is missing",
+                                                      "Click where nothing is to be tracked",
+                                                      "Click where a branch is to be cut off",
+                                                      "Click where the vessel is to end",
+                                                      "Click into the sac",
+                                                      "Click the end where the tools enter",
+                                                      "Click where the tip has to go",
+                                                      "",
+                                                      "",
+                                                      "Click to look there; 1 to 8 choose what a click does; S steers"};
+    switch (s->progress.stage) {
+    case BUILD_LOADING: return "The volume is being loaded; Esc leaves";
+    case BUILD_TRACKING: return "The tree grows; Esc stops it";
+    case BUILD_FITTING: return "The wall is fitted to the image; Esc stops it";
+    default: return s->has_volume ? clicks[s->mode] : "The volume cannot be read; Esc leaves";
+    }
+}
+
+// A folder in the cache that holds no case yet, named after the volume.
+static bool new_folder(const char *volume, char *out, size_t capacity)
+{
+    char cache[PATH_MAX], name[80] = "";
+    size_t length = strlen(volume);
+    while (length > 1 && volume[length - 1] == '/')
+        length--;
+    size_t first = length;
+    while (first > 0 && volume[first - 1] != '/')
+        first--;
+    for (size_t i = first; i < length && volume[i] != '.' && i - first + 1 < sizeof name; i++)
+        name[i - first] = volume[i];
+    if (!folders_cache(cache, sizeof cache))
+        return false;
+    for (int i = 1; i < 10000; i++) {
+        int wrote = i == 1 ? snprintf(out, capacity, "%s/cases/%s", cache, name[0] ? name : "case") : snprintf(out, capacity, "%s/cases/%s-%d", cache, name, i);
+        if (wrote <= 0 || (size_t)wrote >= capacity)
+            return false;
+        if (!case_is_there(out))
+            return folders_create(out);
+    }
+    return false;
+}
+
+bool case_state_save(CaseState *s, const char *folder, char *out, size_t capacity, Faults *faults)
+{
+    if (folder)
+        snprintf(out, capacity, "%s", folder);
+    else if (!new_folder(s->made.input, out, capacity))
+        faults_add(faults, s->made.input, 0, 0, "no case of it can be kept in a cache: neither $XDG_CACHE_HOME nor $HOME names a writable folder");
+    bool good = faults->count == 0 && case_builder_save(s->builder, out, faults);
+    if (!good)
+        say_fault(s, faults->text[0]);
+    return good;
+}

@@ -1,0 +1,177 @@
+#include "sim/case_acts.h"
+
+#include "base/base.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+void case_acts_free(CaseActs *acts)
+{
+    free(acts->act);
+    *acts = (CaseActs){0};
+}
+
+bool case_acts_add(CaseActs *acts, const CaseAct *act)
+{
+    if (acts->count == acts->capacity) {
+        int capacity = 2 * acts->capacity + 16;
+        CaseAct *grown = realloc(acts->act, (size_t)capacity * sizeof *grown);
+        if (!grown)
+            return false;
+        acts->act = grown;
+        acts->capacity = capacity;
+    }
+    acts->act[acts->count++] = *act;
+    acts->undone = 0;
+    return true;
+}
+
+bool case_acts_undo(CaseActs *acts)
+{
+    bool can = acts->count > 0;
+    acts->count -= can;
+    acts->undone += can;
+    return can;
+}
+
+bool case_acts_redo(CaseActs *acts)
+{
+    bool can = acts->undone > 0;
+    acts->count += can;
+    acts->undone -= can;
+    return can;
+}
+
+static int first_that_counts(const CaseActs *acts)
+{
+    int first = acts->count;
+    while (first > 0 && acts->act[first - 1].kind != CASE_START)
+        first--;
+    return first > 0 ? first - 1 : acts->count;
+}
+
+const CaseAct *case_acts_last(const CaseActs *acts, CaseActKind kind)
+{
+    for (int i = acts->count; i-- > first_that_counts(acts);)
+        if (acts->act[i].kind == kind)
+            return &acts->act[i];
+    return NULL;
+}
+
+bool case_act_changes_tree(CaseActKind kind) { return kind <= CASE_ENTRY; }
+
+void case_act_describe(const CaseAct *act, char *out, size_t capacity)
+{
+    static const char *const name[CASE_ACTS] = {"start", "branch", "forbid", "cut", "end here", "sac", "entry", "target", "tool", "background"};
+    Vec3 x = act->place;
+    if (act->kind == CASE_DEVICE)
+        snprintf(out, capacity, "tool: %s", act->device[0] ? act->device : "a wire that suits the vessels");
+    else if (act->kind == CASE_BEHIND)
+        snprintf(out, capacity, "background: %s", act->is_on ? "the volume" : "a plain patient");
+    else if (act->kind == CASE_FORBID)
+        snprintf(out, capacity, "forbid %.1f mm around %.1f, %.1f, %.1f", act->radius, x.x, x.y, x.z);
+    else
+        snprintf(out, capacity, "%s at %.1f, %.1f, %.1f", name[act->kind], x.x, x.y, x.z);
+}
+
+// With as few digits as give the same number again.
+static void write_number(FILE *out, double x)
+{
+    char text[32];
+    for (int digits = 1; digits <= 17; digits++) {
+        snprintf(text, sizeof text, "%.*g", digits, x);
+        if (strtod(text, NULL) == x)
+            break;
+    }
+    fputs(text, out);
+}
+
+static void write_place(FILE *out, const char *key, Vec3 x)
+{
+    fprintf(out, "%s: [", key);
+    write_number(out, x.x);
+    fputs(", ", out);
+    write_number(out, x.y);
+    fputs(", ", out);
+    write_number(out, x.z);
+    fputc(']', out);
+}
+
+// A list of the trace with all acts of one kind; the start is the first of the branches.
+static int write_list(FILE *out, const CaseActs *acts, const char *list, CaseActKind kind, const char *key)
+{
+    int count = 0;
+    for (int i = first_that_counts(acts); i < acts->count; i++) {
+        const CaseAct *act = &acts->act[i];
+        if (act->kind != kind && !(kind == CASE_BRANCH && act->kind == CASE_START))
+            continue;
+        if (count++ == 0)
+            fprintf(out, "%s:\n", list);
+        fputs("  - {", out);
+        if (kind == CASE_SAC) {
+            fputs("centers_mm: [[", out);
+            write_number(out, act->place.x);
+            fputs(", ", out);
+            write_number(out, act->place.y);
+            fputs(", ", out);
+            write_number(out, act->place.z);
+            fputs("]]", out);
+        } else {
+            write_place(out, key, act->place);
+        }
+        if (kind == CASE_FORBID) {
+            fputs(", radius_mm: ", out);
+            write_number(out, act->radius);
+        }
+        fputs("}\n", out);
+    }
+    return count;
+}
+
+static void write_choices(FILE *out, const CaseActs *acts)
+{
+    const CaseAct *entry = case_acts_last(acts, CASE_ENTRY), *target = case_acts_last(acts, CASE_TARGET), *device = case_acts_last(acts, CASE_DEVICE),
+                  *behind = case_acts_last(acts, CASE_BEHIND);
+    const char *comma = "";
+    device = device && device->device[0] ? device : NULL;
+    behind = behind && behind->is_on ? behind : NULL;
+    if (!entry && !target && !device && !behind)
+        return;
+    fputs("case: {", out);
+    if (entry) {
+        write_place(out, "entry_mm", entry->place);
+        comma = ", ";
+    }
+    if (target) {
+        fputs(comma, out);
+        write_place(out, "target_mm", target->place);
+        comma = ", ";
+    }
+    if (device) {
+        fprintf(out, "%sdevice: %s", comma, device->device);
+        comma = ", ";
+    }
+    if (behind)
+        fprintf(out, "%sbehind: true", comma);
+    fputs("}\n", out);
+}
+
+char *case_acts_trace(const CaseActs *acts)
+{
+    OutputText text;
+    if (first_that_counts(acts) == acts->count || !output_text_open(&text))
+        return NULL;
+    FILE *out = text.stream;
+    int branches = write_list(out, acts, "branches", CASE_BRANCH, "start_mm");
+    write_list(out, acts, "forbid", CASE_FORBID, "center_mm");
+    write_list(out, acts, "cut", CASE_CUT, "point_mm");
+    write_list(out, acts, "until", CASE_END, "point_mm");
+    write_list(out, acts, "aneurysms", CASE_SAC, "");
+    if (branches > 1)        // a trace of several branches is tracked by hand otherwise
+        fputs("automatic: 1\n", out);
+    write_choices(out, acts);
+    if (!ferror(out) && fclose(out) == 0)
+        return text.bytes;
+    free(text.bytes);
+    return NULL;
+}

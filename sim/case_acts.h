@@ -1,0 +1,51 @@
+// What a user did to make a case, in order; and the trace that says the same (recon/track/trace.h), from which the case comes out again without a window.
+#ifndef SELDINGER_SIM_CASE_ACTS_H
+#define SELDINGER_SIM_CASE_ACTS_H
+
+#include "geom/geom.h"
+
+#include <stdbool.h>
+
+typedef enum {
+    CASE_START,              // a vessel was clicked: all acts before it count no longer
+    CASE_BRANCH,             // a further vessel
+    CASE_FORBID,             // nothing is tracked in this ball
+    CASE_CUT,                // the branch here is cut, with what hangs on it
+    CASE_END,                // the tree ends here
+    CASE_SAC,                // an aneurysm, from a point within
+    CASE_ENTRY,              // tools enter at the end of a vessel near this point
+    CASE_TARGET,             // where the tip has to go
+    CASE_DEVICE,             // the tool
+    CASE_BEHIND,             // the volume lies behind the vessels in fluoroscopy, or no longer
+    CASE_ACTS
+} CaseActKind;
+
+typedef struct CaseAct {
+    CaseActKind kind;
+    Vec3 place;              // [mm]
+    double radius;           // [mm] of CASE_FORBID
+    bool is_on;              // of CASE_BEHIND
+    char device[80];         // of CASE_DEVICE: a file of the device library; "": a wire that suits the vessels
+} CaseAct;
+
+typedef struct CaseActs {
+    int count, capacity;
+    int undone;              // acts after `count` that can be done again
+    CaseAct *act;
+} CaseActs;
+
+void case_acts_free(CaseActs *acts);
+// Forgets the acts that were undone. Returns false if out of memory.
+bool case_acts_add(CaseActs *acts, const CaseAct *act);
+bool case_acts_undo(CaseActs *acts);     // false: nothing to undo
+bool case_acts_redo(CaseActs *acts);
+// The last act of the kind that counts; NULL if there is none.
+const CaseAct *case_acts_last(const CaseActs *acts, CaseActKind kind);
+// Whether an act changes the tree or its wall, so that it has to be made again.
+bool case_act_changes_tree(CaseActKind kind);
+// One line for people.
+void case_act_describe(const CaseAct *act, char *out, size_t capacity);
+// The trace as YAML; the caller frees it. NULL if no start is given, or out of memory.
+char *case_acts_trace(const CaseActs *acts);
+
+#endif

@@ -1,0 +1,336 @@
+// The case window's state as its mouse and keys drive it, without a window: orientation, slices and projections of volumes whose content is known, and a case from
+// clicks, which comes out byte for byte the same without the window.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "render/case_state.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static char folder[] = "/tmp/seldinger-case-state-XXXXXX";
+#include "tests/folder.h"
+
+static Faults faults;
+
+// --- pictures ---
+
+// A volume of 40 x 50 x 60 voxels of 1 x 0.8 x 0.7 mm with a bright ball of 3 mm to the patient's left, front and head.
+static Volume *ball_in(const char *frame, Vec3 *center)
+{
+    const int size[3] = {40, 50, 60};
+    Vec3 axis[3] = {{1, 0, 0}, {0, 0.8, 0}, {0, 0, 0.7}};
+    Volume *v = volume_create(size, vec3(-20, 7, 100), axis);
+    PatientAxes a = patient_axes(frame);
+    assert_non_null(v);
+    snprintf(v->frame, sizeof v->frame, "%s", frame);
+    *center = vec3_add(volume_middle(v), vec3_add(vec3_scale(a.left, 8), vec3_add(vec3_scale(a.posterior, -10), vec3_scale(a.superior, 12))));
+    size_t n = 0;
+    for (int k = 0; k < size[2]; k++)
+        for (int j = 0; j < size[1]; j++)
+            for (int i = 0; i < size[0]; i++)
+                v->value[n++] = vec3_distance(volume_point_of(v, vec3(i, j, k)), *center) < 3 ? 100 : 10;
+    v->minimum = 10, v->maximum = 100;
+    return v;
+}
+
+// Where the bright pixels of a picture lie, relative to its middle and half its size: x to the right, y up.
+static void bright_middle(const Camera *c, const uint8_t *grey, double *x, double *y)
+{
+    double sum = 0;
+    *x = *y = 0;
+    for (int j = 0; j < c->height; j++)
+        for (int i = 0; i < c->width; i++)
+            if (grey[j * c->width + i] > 200)
+                sum++, *x += 2.0 * (i + 0.5) / c->width - 1, *y += 1 - 2.0 * (j + 0.5) / c->height;
+    assert_true(sum > 0);
+    *x /= sum, *y /= sum;
+}
+
+static void letters_are_the_patients(void **state)
+{
+    (void)state;
+    static const char *const frame[] = {"LPS", "RAS", "LAS", "RPI"};
+    static const char right[3][4] = {"L", "L", "P"}, up[3][4] = {"A", "S", "S"};
+    enum { SIDE = 120 };
+    static uint8_t grey[SIDE * SIDE];
+    for (int f = 0; f < 4; f++) {
+        Vec3 center;
+        Volume *v = ball_in(frame[f], &center);
+        PatientAxes a = patient_axes(v->frame);
+        assert_true(a.is_known);
+        for (int view = 0; view < 3; view++) {
+            char text[4];
+            double x, y;
+            Camera c = slice_camera(&a, (SliceView)view, v, volume_middle(v), 1, SIDE, SIDE);
+            patient_letters(&a, c.right, text);
+            assert_string_equal(text, right[view]);
+            patient_letters(&a, c.up, text);
+            assert_string_equal(text, up[view]);
+            // the ball lies to the left and front and head: right and up in the axial and coronal views, left (front) in the sagittal one
+            volume_slice(v, &c, center, 10, 100, grey);
+            bright_middle(&c, grey, &x, &y);
+            assert_true(view == SLICE_SAGITTAL ? x < -0.1 : x > 0.1);
+            assert_true(y > 0.1);
+            volume_projection(v, &c, 10, 100, 1, grey);
+            double px, py;
+            bright_middle(&c, grey, &px, &py);
+            Vec3 p = camera_project(&c, center);
+            assert_true(fabs(px - (2 * p.x / SIDE - 1)) < 0.03 && fabs(py - (1 - 2 * p.y / SIDE)) < 0.03);
+        }
+        volume_free(v);
+    }
+    char text[4];
+    PatientAxes none = patient_axes("scanner-xyz");
+    assert_false(none.is_known);
+    patient_letters(&none, vec3(0, -1, 0), text);
+    assert_string_equal(text, "-y");
+    PatientAxes lps = patient_axes("LPS");
+    patient_letters(&lps, vec3_unit(vec3(-1, -0.8, 0.1)), text);
+    assert_string_equal(text, "RA");
+}
+
+static void a_click_in_a_projection_meets_the_vessel(void **state)
+{
+    (void)state;
+    Vec3 center, place;
+    Volume *v = ball_in("RAS", &center);
+    PatientAxes a = patient_axes(v->frame);
+    for (int view = 0; view < 3; view++) {
+        Camera c = slice_camera(&a, (SliceView)view, v, volume_middle(v), 1, 200, 150);
+        Vec3 p = camera_project(&c, center);
+        assert_true(volume_pick(v, &c, p.x, p.y, &place));
+        assert_true(vec3_distance(place, center) < 1);
+        assert_false(volume_pick(v, &c, -500, p.y, &place));
+    }
+    // what is reduced keeps the ball's place
+    Volume *small = volume_reduced(v, 20);
+    assert_true(small->size[0] == 20 && small->size[1] == 17 && small->size[2] == 20);
+    assert_true(volume_value_at(small, center) > 99);
+    volume_free(small);
+    volume_free(v);
+}
+
+// --- a case ---
+
+static double outside(Vec3 x, Vec3 a, Vec3 b, double radius)
+{
+    Vec3 ab = vec3_sub(b, a);
+    double t = fmin(fmax(vec3_dot(vec3_sub(x, a), ab) / vec3_norm2(ab), 0), 1);
+    return vec3_distance(x, vec3_add_scaled(a, t, ab)) - radius;
+}
+
+// A trunk along x from border to border, of 1.6 mm, and a branch of 1.1 mm that leaves it to the right.
+static int make_volume(void **state)
+{
+    const int size[3] = {76, 56, 40};
+    Vec3 axis[3] = {{0.4, 0, 0}, {0, 0.4, 0}, {0, 0, 0.4}};
+    Volume *v = make_folder(state) == 0 && setenv("SELDINGER_CACHE", in_folder("cache"), 1) == 0 ? volume_create(size, vec3(0, 0, 0), axis) : NULL;
+    if (!v)
+        return 1;
+    snprintf(v->frame, sizeof v->frame, "LPS");
+    size_t n = 0;
+    for (int k = 0; k < size[2]; k++)
+        for (int j = 0; j < size[1]; j++)
+            for (int i = 0; i < size[0]; i++) {
+                Vec3 x = volume_point_of(v, vec3(i, j, k));
+                double d = fmin(outside(x, vec3(-5, 7, 8), vec3(40, 7, 8), 1.6), outside(x, vec3(12, 7, 8), vec3(24, 18, 8), 1.1));
+                v->value[n++] = (float)round(200 * fmin(fmax(0.5 - d / 0.8, 0), 1));
+            }
+    v->maximum = 200;
+    bool good = volume_save_nrrd(v, in_folder("vessel.nrrd"), "uint8", &faults);
+    volume_free(v);
+    return good ? 0 : 1;
+}
+
+static const char *input(void) { return in_folder("vessel.nrrd"); }
+
+static void wait_and_look(CaseState *s)
+{
+    case_builder_wait(s->builder, 300);
+    case_state_frame(s);
+}
+
+static CaseState *begin(void)
+{
+    CaseState *s = calloc(1, sizeof *s);
+    CaseOptions made = {.input = strdup(input())};
+    assert_true(s && case_state_begin(s, &made));
+    wait_and_look(s);
+    assert_true(s->has_volume);
+    assert_int_equal(s->progress.stage, BUILD_IDLE);
+    return s;
+}
+
+static void end(CaseState *s)
+{
+    char *path = (char *)(uintptr_t)s->made.input;
+    case_state_end(s);
+    free(path);
+    free(s);
+}
+
+static double length_of(const CaseState *s)
+{
+    CaseFigures figures;
+    assert_non_null(case_builder_work(s->builder));
+    case_work_measure(case_builder_work(s->builder), &figures);
+    return figures.length;
+}
+
+static void a_click_grows_the_tree_and_acts_change_it(void **state)
+{
+    (void)state;
+    CaseState *s = begin();
+    assert_int_equal(s->mode, CASE_START);
+    assert_true(volume_value_at(s->volume, s->cursor) > 190);    // the cross-hair begins in a vessel
+    // acts that need a tree are refused before it
+    case_state_act(s, CASE_CUT, vec3(20, 7, 8));
+    assert_true(s->message_is_fault && s->acts.count == 0);
+    // background is no start
+    case_state_click(s, vec3(5, 20, 3));
+    wait_and_look(s);
+    assert_int_equal(s->progress.stage, BUILD_FAILED);
+    assert_non_null(strstr(s->message, "background"));
+    assert_null(case_builder_work(s->builder));
+    case_state_undo(s);
+    assert_int_equal(s->mode, CASE_START);
+    case_state_click(s, vec3(6, 7, 8));
+    assert_int_equal(s->mode, CASE_LOOK);
+    wait_and_look(s);
+    assert_int_equal(s->progress.stage, BUILD_DONE);
+    assert_true(s->seen_count > 10);
+    const double whole = length_of(s);
+    assert_true(whole > 35);     // 30 mm of the trunk and most of the branch
+    // the widest end at the border is the entry: one of the trunk's
+    const VesselTree *tree = case_work_tree(case_builder_work(s->builder));
+    assert_true(fabs(tree->center[0].y - 7) < 1 && tree->radius[0] > 1.3);
+    // a click that only looks
+    int acts = s->acts.count;
+    case_state_click(s, vec3(20, 7, 8));
+    assert_int_equal(s->acts.count, acts);
+    // the branch is cut, and comes back
+    case_state_mode(s, CASE_CUT);
+    case_state_click(s, vec3(18, 12.5, 8));
+    wait_and_look(s);
+    assert_int_equal(s->progress.stage, BUILD_DONE);
+    assert_true(length_of(s) < whole - 4);
+    case_state_undo(s);
+    wait_and_look(s);
+    assert_true(length_of(s) == whole);
+    case_state_redo(s);
+    wait_and_look(s);
+    assert_true(length_of(s) < whole - 4);
+    end(s);
+}
+
+static void what_runs_is_stopped_at_once(void **state)
+{
+    (void)state;
+    CaseState *s = begin();
+    for (int i = 0; i < 5; i++) {
+        case_state_act(s, CASE_START, vec3(6 + i, 7, 8));
+        case_state_frame(s);
+    }
+    case_state_cancel(s);
+    case_state_frame(s);
+    assert_int_equal(s->progress.stage, BUILD_IDLE);
+    assert_null(case_builder_work(s->builder));
+    assert_int_equal(s->acts.count, 4);
+    case_state_redo(s);
+    wait_and_look(s);
+    assert_int_equal(s->progress.stage, BUILD_DONE);
+    end(s);          // and with a tree that grows
+    s = begin();
+    case_state_click(s, vec3(6, 7, 8));
+    end(s);
+}
+
+static int same_folders(const char *a, const char *b)
+{
+    char command[600];
+    snprintf(command, sizeof command, "cd '%s' && diff -r '%s' '%s'", folder, a, b);
+    return system(command);
+}
+
+static void a_case_is_the_same_without_the_window(void **state)
+{
+    (void)state;
+    CaseState *s = begin();
+    char out[4096];
+    case_state_click(s, vec3(6.004, 7, 8));
+    case_state_act(s, CASE_END, vec3(26, 7, 8));
+    case_state_act(s, CASE_FORBID, vec3(23, 17, 8));
+    case_state_act(s, CASE_BRANCH, vec3(18, 12.5, 8));
+    wait_and_look(s);
+    if (s->progress.stage != BUILD_DONE)
+        fail_msg("%s", s->message);
+    case_state_act(s, CASE_ENTRY, vec3(25, 7.5, 8));
+    wait_and_look(s);
+    if (s->progress.stage != BUILD_DONE)
+        fail_msg("%s", s->message);
+    // choices of the scene alone need no new tree
+    const CaseWork *work = case_builder_work(s->builder);
+    case_state_act(s, CASE_TARGET, vec3(17, 11.5, 8));
+    case_state_turn_background(s);
+    case_state_frame(s);
+    assert_ptr_equal(case_builder_work(s->builder), work);
+    if (!case_state_save(s, in_folder("window"), out, sizeof out, &faults))
+        fail_msg("%s", s->message);
+    assert_string_equal(out, in_folder("window"));
+    // nothing is written over
+    faults_clear(&faults);
+    assert_false(case_state_save(s, in_folder("window"), out, sizeof out, &faults));
+    faults_clear(&faults);
+    assert_true(case_state_save(s, NULL, out, sizeof out, &faults));
+    assert_string_equal(out, in_folder("cache/cases/vessel"));
+    // from its trace, without the window
+    size_t length;
+    char *trace = whole_file_read(in_folder("window/trace.yaml"), &length, &faults);
+    assert_non_null(trace);
+    assert_non_null(strstr(trace, "start_mm: [6, 7, 8]"));
+    for (int threads = 1; threads <= 2; threads++) {
+        CaseOptions options = {.input = s->made.input, .trace = trace, .trace_path = "trace.yaml", .threads = threads};
+        CaseFigures figures;
+        char name[20];
+        snprintf(name, sizeof name, "plain%d", threads);
+        if (!case_make(in_folder(name), &options, &figures, &faults))
+            fail_msg("%s", faults.text[0]);
+        assert_int_equal(same_folders("window", name), 0);
+    }
+    assert_int_equal(same_folders("window", "cache/cases/vessel"), 0);
+    free(trace);
+    end(s);
+}
+
+static void views_move_as_the_patient_lies(void **state)
+{
+    (void)state;
+    CaseState *s = begin();
+    s->cursor = vec3(12, 8, 8);
+    case_state_scroll(s, SLICE_AXIAL, 1);        // towards the feet, in LPS -z, by a voxel
+    assert_true(fabs(s->cursor.z - 7.6) < 1e-9);
+    case_state_move(s, SLICE_CORONAL, 2, 1);     // to the patient's left and head
+    assert_true(fabs(s->cursor.x - 12.8) < 1e-9 && fabs(s->cursor.z - 8) < 1e-9);
+    for (int i = 0; i < 500; i++)
+        case_state_move(s, SLICE_SAGITTAL, 1, 0);
+    assert_true(fabs(s->cursor.y - 22) < 1e-9);  // the last voxel
+    double width = s->high - s->low, level = s->high + s->low;
+    case_state_window(s, 2, 0);
+    assert_true(fabs(s->high - s->low - 2 * width) < 1e-9 && fabs(s->high + s->low - level) < 1e-9);
+    end(s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(letters_are_the_patients),       cmocka_unit_test(a_click_in_a_projection_meets_the_vessel),
+        cmocka_unit_test(views_move_as_the_patient_lies), cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
+        cmocka_unit_test(what_runs_is_stopped_at_once),   cmocka_unit_test(a_case_is_the_same_without_the_window),
+    };
+    return cmocka_run_group_tests(tests, make_volume, remove_folder);
+}
