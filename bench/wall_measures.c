@@ -101,10 +101,10 @@ bool wall_points(const VesselTree *model, PointFigures *out)
 // The parent's axis may differ slightly from the true one: only the line outside the parent's ball is judged.
 static bool is_false_link(const VesselTree *tree, const ReachJunction *junction, const Shape *truth, double slack)
 {
-    enum { PLACES = 40 };
+    enum { SAMPLES = 40 };
     Vec3 from = tree->center[junction->parent], to = tree->center[junction->node];
-    for (int k = 0; k <= PLACES; k++)
-        if (shape_distance(truth, vec3_mix(from, to, (double)k / PLACES), NULL) < -slack)
+    for (int k = 0; k <= SAMPLES; k++)
+        if (shape_distance(truth, vec3_mix(from, to, (double)k / SAMPLES), NULL) < -slack)
             return true;
     return false;
 }
