@@ -102,7 +102,7 @@ static void add_suture(Body *body, int count, const Vec3 *key, double amplitude)
             if (k < teeth)
                 at = vec3_add_scaled(at, k % 2 ? amplitude : -amplitude, aside);
             const Vec3 piece[2] = {last, at};
-            BodyTube seam = plain_tube(outward, 0.8 * (ATTENUATION_SOFT - ATTENUATION_BONE));
+            BodyTube seam = plain_tube(outward, 0.6 * (ATTENUATION_SOFT - ATTENUATION_BONE));
             even_tube(body, &seam, 2, piece, 2.6, 0.6);
             last = at;
         }
@@ -111,15 +111,15 @@ static void add_suture(Body *body, int count, const Vec3 *key, double amplitude)
 
 void body_add_sagittal_suture(Body *body)
 {
-    const Vec3 key[] = {{0, 16, 97}, {0, -10, 99}, {0, -40, 96}, {0, -70, 84}, {0, -94, 64}};
+    const Vec3 key[] = {{0, 13, 97}, {0, -10, 99}, {0, -40, 96}, {0, -70, 84}, {0, -94, 64}};
     add_suture(body, COUNT(key), key, 1.3);
 }
 
 static void add_seams_and_grooves(Body *body)
 {
     int first = body->count;
-    const Vec3 coronal[] = {{0.6, 16, 97}, {20, 18, 92}, {40, 20, 76}, {58, 22, 46}, {66, 26, 10}};
-    const Vec3 lambdoid[] = {{0.6, -94, 64}, {22, -93, 48}, {42, -84, 22}, {56, -70, -6}};
+    const Vec3 coronal[] = {{1.5, 16, 97}, {20, 18, 92}, {40, 20, 76}, {58, 22, 46}, {66, 26, 10}};
+    const Vec3 lambdoid[] = {{1.5, -94, 64}, {22, -93, 48}, {42, -84, 22}, {56, -70, -6}};
     const Vec3 squamous[] = {{68, 24, 8}, {72, 8, 24}, {72, -14, 26}, {70, -34, 14}, {66, -46, -4}};
     add_suture(body, COUNT(coronal), coronal, 1.1);
     add_suture(body, COUNT(lambdoid), lambdoid, 1.5);
@@ -185,7 +185,7 @@ static void add_temporal_bone(Body *body)
     BodyTube crest = plain_tube(vec3(0, 0, 0), ADDED_BONE);
     even_tube(body, &crest, COUNT(ridge), ridge, 1.5, 1.5);
     // labyrinth and cochlea: the densest bone of the body; the internal and external canals
-    solid(body, vec3(36, -28, -15), vec3(5, 5, 5), 0.8 * ADDED_BONE);
+    solid(body, vec3(36, -28, -15), vec3(5, 5, 5), ADDED_BONE);
     solid(body, vec3(29, -20, -18), vec3(4, 4, 4), 0.8 * ADDED_BONE);
     rod(body, vec3(19, -21, -14), vec3(31, -23, -14), 2.6, -1.1 * ADDED_BONE);
     rod(body, vec3(40, -18, -21), vec3(66, -18, -22), 3.4, ADDED_AIR);
@@ -193,11 +193,16 @@ static void add_temporal_bone(Body *body)
     // the mastoid and its cells
     solid(body, vec3(55, -40, -32), vec3(9, 13, 19), 0.2 * ADDED_BONE);
     Random random = {815};
-    for (int i = 0; i < 70; i++) {
+    int cells = body->count;
+    for (int i = 0; i < 160; i++) {
         Vec3 u = vec3(random_within(&random, -1, 1), random_within(&random, -1, 1), random_within(&random, -1, 1));
-        double size_mm = random_within(&random, 1.2, 3);
-        if (vec3_norm(u) < 1)
-            solid(body, vec3(55 + 6.5 * u.x, -40 + 10.5 * u.y, -30 + 15 * u.z), vec3(size_mm, size_mm, size_mm), 0.8 * ADDED_AIR);
+        Vec3 at = vec3(55 + 6.5 * u.x, -40 + 10.5 * u.y, -30 + 15 * u.z);
+        double radius = random_within(&random, 1.2, 3);
+        bool is_free = vec3_norm(u) < 1;
+        for (int k = cells; k < body->count; k++)
+            is_free &= vec3_distance(at, body->shape[k].center) > radius + body->shape[k].reach[0].x;
+        if (is_free)
+            solid(body, at, vec3(radius, radius, radius), 0.9 * ADDED_AIR);
     }
 }
 

@@ -104,6 +104,35 @@ static void landmarks_place_the_vessel_in_the_patient(void **state)
     scene_free(scene);
 }
 
+// A point of the vessel in the body's frame.
+static Vec3 in_body(const Similarity *place, Vec3 x)
+{
+    Mat3 back = mat3_transpose(&place->turn);
+    return vec3_scale(mat3_mul_vec(&back, vec3_sub(x, place->shift)), 1 / place->scale);
+}
+
+// The clinical carotid's siphon lies beside the sella, the arch before the spine.
+static void the_scenes_vessels_lie_where_they_belong(void **state)
+{
+    (void)state;
+    faults_clear(&faults);
+    Scene *carotid = scene_load(SOURCE_DIR "/scenes/aneurism/mca.yaml", &faults), *arch = scene_load(SOURCE_DIR "/scenes/arch/lcca.yaml", &faults);
+    if (!carotid || !arch)
+        fail_msg("refused: %s", faults.text[0]);
+    assert_true(carotid->has_anatomy_fit && arch->has_anatomy_fit);
+    Vec3 siphon = in_body(&carotid->anatomy_fit, vec3(50.3, 35.2, 70.4)), inlet = in_body(&carotid->anatomy_fit, vec3(74.7, 12.7, 61.2));
+    Vec3 top = in_body(&arch->anatomy_fit, vec3(-392, 38, -25));
+    print_message("siphon %.1f %.1f %.1f, inlet %.1f %.1f %.1f, patient's size %.2f; top of the arch %.1f %.1f %.1f, size %.2f\n", siphon.x, siphon.y, siphon.z,
+                  inlet.x, inlet.y, inlet.z, carotid->anatomy_fit.scale, top.x, top.y, top.z, arch->anatomy_fit.scale);
+    assert_true(siphon.x < -4 && siphon.x > -20 && fabs(siphon.y) < 15 && fabs(siphon.z) < 12);
+    assert_true(inlet.z < -15 && inlet.y < siphon.y && inlet.x < siphon.x);          // from below and behind, not through the forehead
+    // the arch rises before the spine's right half and bends over it to the left
+    Vec3 rise = in_body(&arch->anatomy_fit, vec3(-368, 4, -10));
+    assert_true(rise.x > 0 && rise.x < 25 && top.x < 0 && top.x > -30 && top.y > -60 && top.y < -10 && fabs(top.z + 236) < 25);
+    scene_free(carotid);
+    scene_free(arch);
+}
+
 static void what_is_not_said_has_its_default(void **state)
 {
     (void)state;
@@ -463,6 +492,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(units_are_converted_once),
         cmocka_unit_test(landmarks_place_the_vessel_in_the_patient),
+        cmocka_unit_test(the_scenes_vessels_lie_where_they_belong),
         cmocka_unit_test(what_is_not_said_has_its_default),
         cmocka_unit_test(a_rest_shape_becomes_sections),
         cmocka_unit_test(a_verify_plan_is_read),
