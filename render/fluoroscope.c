@@ -18,7 +18,7 @@ static const double median_transmission = 0.27;  // target of the automatic expo
 
 FluoroscopeOptions fluoroscope_default_options(void)
 {
-    return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2, .dsa_dose = 16};
+    return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2, .dsa_dose = XRAY_DSA_DOSE};
 }
 
 // --- create ---

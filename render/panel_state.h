@@ -110,6 +110,8 @@ typedef struct PanelState {
     PanelMode mode;
     bool is_pedal_latched, is_roadmap_ready, is_recording_cine;
     double fluoro_s, contrast_ml;
+    double tube_kv, tube_ma, kerma_rate_mgy_min;   // of the last pulse (kv 0: none yet); the rate is 0 while the pedal is up
+    double kerma_mgy, kerma_area_gy_cm2;
     int cine_frame, cine_frames;
     // views
     PanelView view;
@@ -124,6 +126,7 @@ typedef struct PanelState {
     double force_full_scale_n;     // top of its colours; 0: no legend
     // machine
     double step_median_us, step_p999_us, real_time_factor, frame_ms;
+    int drawn_side, shown_side;    // [pixel] of the X-ray image; 0: not known
     int64_t missed_deadlines;
     unsigned warnings;             // WARN_ bits
     const char *warning;           // one more warning line, or NULL

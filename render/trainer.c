@@ -453,6 +453,7 @@ static void show_new_scene(Trainer *trainer, Faults *faults)
     if (views) {
         views_destroy(trainer->views);
         trainer->views = views;
+        views_set_budget(views, DRAWING_BUDGET_MS);
     }
 }
 
@@ -733,6 +734,8 @@ static double resident_mb(void)
 static void measure_frame(Trainer *trainer)
 {
     double cpu = clock_s(CLOCK_PROCESS_CPUTIME_ID) - realtime_cpu_s(trainer->session.realtime);
+    if (trainer->figures->frames > 0)
+        views_spend(trainer->views, 1000 * (cpu - trainer->frame_cpu_s));
     if (trainer->figures->frames++ > 0)
         histogram_add(&trainer->frame_cpu_ns, (int64_t)((cpu - trainer->frame_cpu_s) * 1e9));
     else
@@ -811,6 +814,8 @@ static bool open_views(Trainer *trainer, Faults *faults)
     trainer->xray_at_start = trainer->controls.xray;
     if (*note)
         show_message(trainer, MARK_WARNING, "%s", note);
+    if (trainer->views)
+        views_set_budget(trainer->views, DRAWING_BUDGET_MS);
     return trainer->views != NULL;
 }
 

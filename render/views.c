@@ -3,6 +3,7 @@
 #include "geom/geom.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
+#include "render/time_budget.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -16,7 +17,10 @@ struct Views {
     Fluoroscope *fluoroscope;
     VesselScene *scene;
     Angioscope *angioscope;
-    GlCanvas inset[VIEW_COUNT];      // zeroed: not yet made
+    GlCanvas kept[VIEW_COUNT];       // of views that are not drawn straight into the port; zeroed: not yet made
+    ViewPort port[VIEW_COUNT];       // as shown last
+    int drawn_side[VIEW_COUNT];      // shorter side as drawn last
+    TimeBudget budget;
     long frames;
 };
 
@@ -82,7 +86,7 @@ void views_destroy(Views *views)
     angioscope_destroy(views->angioscope);
     tool_looks_free(&views->tools);
     for (int i = 0; i < VIEW_COUNT; i++)
-        gl_canvas_destroy(&views->inset[i]);
+        gl_canvas_destroy(&views->kept[i]);
     free(views);
 }
 
@@ -106,45 +110,75 @@ static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, Vie
     }
 }
 
-// A secondary view is cached as a picture; the two are redrawn alternately, each in every second frame, because users do not look at both at once.
-static void draw_inset(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
+static int scaled(int pixels, double share) { return (int)fmax(1, round(pixels * share)); }
+
+// Draws into a picture of its own, which is then copied or enlarged into the port. A secondary view is redrawn in every second frame, the two alternately,
+// because users do not look at both at once.
+static void draw_kept(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port, bool is_main, double share)
 {
-    GlCanvas *inset = &views->inset[view];
-    bool fits = inset->width == port.width && inset->height == port.height;
+    GlCanvas *kept = &views->kept[view];
+    int width = scaled(port.width, share), height = scaled(port.height, share);
+    bool fits = kept->width == width && kept->height == height;
     if (!fits) {
-        gl_canvas_destroy(inset);
-        if (!gl_canvas_create(inset, port.width, port.height, 1, NULL, 0)) {
-            *inset = (GlCanvas){0};
+        gl_canvas_destroy(kept);
+        if (!gl_canvas_create(kept, width, height, 1, NULL, 0)) {
+            *kept = (GlCanvas){0};
             draw_view(views, view, frame, port, true);
             return;
         }
     }
-    if (!fits || frame->is_still || (views->frames + (int)view) % 2 == 0)
-        draw_view(views, view, frame, (ViewPort){inset->framebuffer, 0, 0, port.width, port.height}, false);
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, inset->framebuffer);
+    if (!fits || is_main || frame->is_still || (views->frames + (int)view) % 2 == 0)
+        draw_view(views, view, frame, (ViewPort){kept->framebuffer, 0, 0, width, height}, false);
+    views->drawn_side[view] = width < height ? width : height;
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, kept->framebuffer);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);
-    glBlitFramebuffer(0, 0, port.width, port.height, port.x, port.y, port.x + port.width, port.y + port.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    bool is_same = width == port.width && height == port.height;
+    glBlitFramebuffer(0, 0, width, height, port.x, port.y, port.x + port.width, port.y + port.height, GL_COLOR_BUFFER_BIT, is_same ? GL_NEAREST : GL_LINEAR);
 }
 
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer)
 {
+    double share = frame->is_still || frame->past ? 1 : time_budget_share(&views->budget);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
     glDisable(GL_SCISSOR_TEST);
     glClearColor(0.03F, 0.035F, 0.045F, 1);
     if (!frame->leaves_surroundings)
-        glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+        glClear(GL_COLOR_BUFFER_BIT);        // the views use no depth of this framebuffer
     for (int i = 0; i < VIEW_COUNT; i++) {
         ViewPort port = layout->view[i];
         port.framebuffer = framebuffer;
         if (port.width <= 0 || port.height <= 0)
             continue;
-        if (i == (int)layout->main || layout->main == VIEW_ALL)
+        bool is_main = i == (int)layout->main || layout->main == VIEW_ALL;
+        views->port[i] = port;
+        views->drawn_side[i] = port.width < port.height ? port.width : port.height;
+        if (is_main && share >= 1)
             draw_view(views, (PanelView)i, frame, port, true);
         else
-            draw_inset(views, (PanelView)i, frame, port);
+            draw_kept(views, (PanelView)i, frame, port, is_main, share);
     }
     views->frames++;
+}
+
+void views_set_budget(Views *views, double most_ms) { views->budget = (TimeBudget){.most_ms = most_ms}; }
+void views_spend(Views *views, double ms) { time_budget_spend(&views->budget, ms); }
+
+static int shown_side(const Views *views, PanelView view)
+{
+    const ViewPort *port = &views->port[view];
+    return port->width < port->height ? port->width : port->height;
+}
+
+void views_xray_sides(const Views *views, int *drawn, int *shown)
+{
+    *drawn = views->drawn_side[VIEW_FLUOROSCOPY];
+    *shown = shown_side(views, VIEW_FLUOROSCOPY);
+}
+
+double views_enlargement(const Views *views, PanelView view)
+{
+    return views->drawn_side[view] > 0 ? (double)shown_side(views, view) / views->drawn_side[view] : 1;
 }
 
 const VesselScene *views_scene(const Views *views) { return views->scene; }
