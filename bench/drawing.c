@@ -15,6 +15,7 @@ enum { MOMENTS = 60, PICTURES = 90, WARM_UP = 10, SETTLING = 60, TURNS = 4 };   
 
 typedef struct Studio {
     const BenchOptions *options;
+    const char *size;                // of the pictures measured; NULL: all
     BenchScene scene;
     GlContext *context;
     GlCanvas canvas;
@@ -149,6 +150,10 @@ static bool measure_pictures(Studio *studio, FILE *text, cJSON *root, Faults *fa
     for (int i = 0; i < CASES; i++) {
         const Case *what = &cases[i];
         static TimeHistogram cpu;
+        char size[32], must[16] = "";
+        snprintf(size, sizeof size, "%dx%d", what->width, what->height);
+        if (studio->size && strcmp(size, studio->size) != 0)
+            continue;
         memset(&cpu, 0, sizeof cpu);
         if (!make_canvas(studio, what->width, what->height, faults))
             return false;
@@ -165,8 +170,6 @@ static bool measure_pictures(Studio *studio, FILE *text, cJSON *root, Faults *fa
         int drawn, shown;
         views_xray_sides(studio->views, &drawn, &shown);
         Spread ms = bench_spread(&cpu, 1e6);
-        char size[32], must[16] = "";
-        snprintf(size, sizeof size, "%dx%d", what->width, what->height);
         if (what->must_ms > 0)
             snprintf(must, sizeof must, "%.0f", what->must_ms);
         fprintf(text, "%-28s %-11s %8.1f %8.1f %8.1f %8s %5d/%-5d%s\n", what->name, size, ms.median, ms.p99, ms.max, must, drawn, shown,
@@ -278,14 +281,14 @@ static bool set_studio(Studio *studio, const char *path, Faults *faults)
 
 typedef struct DrawingBench {
     BenchOptions common;
-    const char *scene;
+    const char *scene, *size;
     double seconds;
 } DrawingBench;
 
 static int call(void *options, Faults *faults)
 {
     const DrawingBench *bench = options;
-    Studio studio = {.options = &bench->common};
+    Studio studio = {.options = &bench->common, .size = bench->size};
     cJSON *root = cJSON_CreateObject();
     FILE *text = bench_text(&bench->common);
     const char *path = bench->scene ? bench->scene : "scenes/phantom/scene.yaml";
@@ -294,12 +297,8 @@ static int call(void *options, Faults *faults)
         fprintf(text, "%s, %s, %s\n", path, bench_processor(), gl_context_renderer(studio.context));
         cJSON_AddStringToObject(root, "scene", path);
         cJSON_AddStringToObject(root, "renderer", gl_context_renderer(studio.context));
-        good = measure_pictures(&studio, text, root, faults) &&
-               measure_disturbance(&studio,
-                                   bench->seconds > 0    ? bench->seconds
-                                   : bench->common.quick ? 3
-                                                         : 10,
-                                   text, root, faults) &&
+        const double seconds = bench->seconds > 0 ? bench->seconds : bench->common.quick ? 3 : 10;
+        good = measure_pictures(&studio, text, root, faults) && (studio.size || measure_disturbance(&studio, seconds, text, root, faults)) &&
                bench_write_json(&bench->common, root, faults);
     }
     cJSON_Delete(root);
@@ -318,6 +317,7 @@ static int call(void *options, Faults *faults)
 
 static const Option rows[] = {
     {"seconds", "S", OPTION_NUMBER, OPTION_AT(DrawingBench, seconds), "duration of each part of the second table", .least = 1, .most = 3600, .otherwise = "10"},
+    {"size", "WxH", OPTION_TEXT, OPTION_AT(DrawingBench, size), "only images of this size, and no second table"},
     BENCH_OPTIONS(DrawingBench, common, "a third of the images, parts of 3 s"),
 };
 

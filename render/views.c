@@ -2,6 +2,7 @@
 
 #include "geom/geom.h"
 #include "render/gl_canvas.h"
+#include "render/gl_enlarger.h"
 #include "render/message.h"
 #include "render/time_budget.h"
 
@@ -18,6 +19,7 @@ struct Views {
     VesselScene *scene;
     Angioscope *angioscope;
     GlCanvas kept[VIEW_COUNT];       // of views that are not drawn straight into the port; zeroed: not yet made
+    GlEnlarger enlarger[VIEW_COUNT];
     ViewPort port[VIEW_COUNT];       // as shown last
     int drawn_side[VIEW_COUNT];      // shorter side as drawn last
     TimeBudget budget;
@@ -85,22 +87,23 @@ void views_destroy(Views *views)
     vessel_scene_destroy(views->scene);
     angioscope_destroy(views->angioscope);
     tool_looks_free(&views->tools);
-    for (int i = 0; i < VIEW_COUNT; i++)
+    for (int i = 0; i < VIEW_COUNT; i++) {
         gl_canvas_destroy(&views->kept[i]);
+        gl_enlarger_destroy(&views->enlarger[i]);
+    }
     free(views);
 }
 
-static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port, bool is_cleared)
+static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
 {
     if (view == VIEW_FLUOROSCOPY && frame->past) {
-        fluoroscope_recall(views->fluoroscope, frame->past, port, is_cleared);
+        fluoroscope_recall(views->fluoroscope, frame->past, port, false);
     } else if (view == VIEW_FLUOROSCOPY) {
         FluoroscopeFrame xray = {.pose = frame->pose,
                                  .xray = *frame->xray,
                                  .contrast = frame->contrast,
                                  .filling = frame->filling,
-                                 .pulse = frame->pulse,
-                                 .leaves_surroundings = is_cleared};
+                                 .pulse = frame->pulse};
         fluoroscope_draw(views->fluoroscope, &xray, port);
     } else if (view == VIEW_3D) {
         vessel_scene_draw(views->scene, frame->pose, frame->look, port);
@@ -123,17 +126,48 @@ static void draw_kept(Views *views, PanelView view, const ViewsFrame *frame, Vie
         gl_canvas_destroy(kept);
         if (!gl_canvas_create(kept, width, height, 1, NULL, 0)) {
             *kept = (GlCanvas){0};
-            draw_view(views, view, frame, port, true);
+            draw_view(views, view, frame, port);
             return;
         }
     }
     if (!fits || is_main || frame->is_still || (views->frames + (int)view) % 2 == 0)
-        draw_view(views, view, frame, (ViewPort){kept->framebuffer, 0, 0, width, height}, false);
+        draw_view(views, view, frame, (ViewPort){kept->framebuffer, 0, 0, width, height});
     views->drawn_side[view] = width < height ? width : height;
+    bool is_same = width == port.width && height == port.height;
+    if (!is_same && gl_enlarge(&views->enlarger[view], kept->framebuffer, width, height, port))
+        return;
     glBindFramebuffer(GL_READ_FRAMEBUFFER, kept->framebuffer);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);
-    bool is_same = width == port.width && height == port.height;
     glBlitFramebuffer(0, 0, width, height, port.x, port.y, port.x + port.width, port.y + port.height, GL_COLOR_BUFFER_BIT, is_same ? GL_NEAREST : GL_LINEAR);
+}
+
+static void clear_box(int x, int y, int width, int height)
+{
+    glScissor(x, y, width, height);
+    glClear(GL_COLOR_BUFFER_BIT);
+}
+
+// Clears what neither views nor panels cover: the gaps beside the views. On a software renderer, clearing a large window takes as long as drawing a view.
+static void clear_around(const PanelLayout *layout, int width, int height)
+{
+    const int gap = 2 * (int)ceil(2 * layout->scale);
+    bool has_view = false;
+    glViewport(0, 0, width, height);
+    glClearColor(0.03F, 0.035F, 0.045F, 1);
+    glEnable(GL_SCISSOR_TEST);
+    for (int i = 0; i < VIEW_COUNT; i++) {
+        const ViewPort *at = &layout->view[i];
+        if (at->width <= 0 || at->height <= 0)
+            continue;
+        has_view = true;
+        clear_box(at->x - gap, at->y - gap, at->width + 2 * gap, gap);
+        clear_box(at->x - gap, at->y + at->height, at->width + 2 * gap, gap);
+        clear_box(at->x - gap, at->y, gap, at->height);
+        clear_box(at->x + at->width, at->y, gap, at->height);
+    }
+    if (!has_view)
+        clear_box(0, 0, width, height);
+    glDisable(GL_SCISSOR_TEST);
 }
 
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer)
@@ -141,10 +175,8 @@ void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout
     double share = frame->is_still || frame->past ? 1 : time_budget_share(&views->budget);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
-    glDisable(GL_SCISSOR_TEST);
-    glClearColor(0.03F, 0.035F, 0.045F, 1);
     if (!frame->leaves_surroundings)
-        glClear(GL_COLOR_BUFFER_BIT);        // the views use no depth of this framebuffer
+        clear_around(layout, width, height);
     for (int i = 0; i < VIEW_COUNT; i++) {
         ViewPort port = layout->view[i];
         port.framebuffer = framebuffer;
@@ -154,7 +186,7 @@ void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout
         views->port[i] = port;
         views->drawn_side[i] = port.width < port.height ? port.width : port.height;
         if (is_main && share >= 1)
-            draw_view(views, (PanelView)i, frame, port, true);
+            draw_view(views, (PanelView)i, frame, port);
         else
             draw_kept(views, (PanelView)i, frame, port, is_main, share);
     }
