@@ -699,7 +699,8 @@ static bool is_picture_due(Trainer *trainer, const WindowInput *input, const Mom
 {
     const double refresh_s = 0.5;
     const OperatorControls *controls = &trainer->controls;
-    const int64_t shown[] = {trainer->pulses.count, controls->view, trainer->is_paused, trainer->has_tray, trainer->is_tray_due, panel_is_asking(trainer->panel)};
+    const int64_t shown[] = {trainer->pulses.count, controls->view,       trainer->is_paused,
+                             trainer->has_tray,     trainer->is_tray_due, panel_is_asking(trainer->panel)};
     const TrackerView *tracked = moment->extra;
     xray.seen = xray.looks = 0;
     uint64_t settings = redraw_hash(0, shown, sizeof shown);

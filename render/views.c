@@ -99,11 +99,7 @@ static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, Vie
     if (view == VIEW_FLUOROSCOPY && frame->past) {
         fluoroscope_recall(views->fluoroscope, frame->past, port, false);
     } else if (view == VIEW_FLUOROSCOPY) {
-        FluoroscopeFrame xray = {.pose = frame->pose,
-                                 .xray = *frame->xray,
-                                 .contrast = frame->contrast,
-                                 .filling = frame->filling,
-                                 .pulse = frame->pulse};
+        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .filling = frame->filling, .pulse = frame->pulse};
         fluoroscope_draw(views->fluoroscope, &xray, port);
     } else if (view == VIEW_3D) {
         vessel_scene_draw(views->scene, frame->pose, frame->look, port);
