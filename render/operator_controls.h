@@ -8,6 +8,11 @@
 #include "render/vessel_scene.h"
 #include "sim/sim.h"
 
+enum { STORED_POSITIONS = 4 };
+typedef struct StoredPosition {  // of the X-ray system
+    float lao_deg, cra_deg, field_mm, table_mm[3];
+} StoredPosition;
+
 typedef struct OperatorControls {
     XrayControl xray;            // pedal and contrast from keys and panel; controls_xray adds the buttons of input devices
     PatientAxes patient;         // in the model's frame
@@ -15,6 +20,9 @@ typedef struct OperatorControls {
     PanelView view;
     bool is_examination;         // only the X-ray image is shown
     VesselSceneLook look;        // settings of the 3D view
+    bool follows_arm;            // its camera turns with the C-arm
+    int stored_count, stored_next, recalled; // number stored so far; the place of the next one; the last place stored or returned to
+    StoredPosition stored[STORED_POSITIONS];
     double contrast_ml_s;        // during injection, default 3
     double push_mm_s, twist_deg_s;   // of the keys at normal speed, default 10 and 120
     int tool_count;
@@ -23,6 +31,8 @@ typedef struct OperatorControls {
 
 // Sets the isocentre to the middle of `points`, and the field so that they are visible.
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
+// Turns the camera of the 3D view as the C-arm stands, and makes that its home.
+void controls_look_from_arm(OperatorControls *controls);
 
 // In an examination, takes the actions for hidden views out of `actions`. Returns whether there was one.
 bool controls_refuse_hidden(const OperatorControls *controls, PanelActions *actions);

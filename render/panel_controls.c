@@ -26,12 +26,13 @@ static const ButtonRow panel_button_row[] = {
     {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}, false},
     {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}, false},
     {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}, false},
+    {TAB_C_ARM, 3, {ACTION_LATERAL, ACTION_STORE, ACTION_RECALL}, false},
     {TAB_C_ARM, 2, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT}, false},
     {TAB_C_ARM, 2, {ACTION_TABLE_UP, ACTION_TABLE_DOWN}, false},
     {TAB_C_ARM, 4, {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN}, false},
     {TAB_VIEWS, 2, {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D}, false},
     {TAB_VIEWS, 2, {ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL}, false},
-    {TAB_VIEWS, 2, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW}, false},
+    {TAB_VIEWS, 3, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW, ACTION_CAMERA_C_ARM}, false},
     {TAB_VIEWS, 2, {ACTION_MODEL, ACTION_ARROWS}, false},
     {TAB_VIEWS, 3, {ACTION_SECTION, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER}, false},
     {TAB_VIEWS, 2, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT}, false},
@@ -61,6 +62,7 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_VIEW_ANGIOSCOPY: return state->view == VIEW_ANGIOSCOPY;
     case ACTION_VIEW_ALL: return state->view == VIEW_ALL;
     case ACTION_CAMERA_FOLLOW: return state->is_following;
+    case ACTION_CAMERA_C_ARM: return state->is_following_arm;
     case ACTION_SECTION: return state->has_section;
     case ACTION_MODEL: return state->has_model;
     case ACTION_ARROWS: return state->has_arrows;

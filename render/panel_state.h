@@ -115,7 +115,7 @@ typedef struct PanelState {
     int cine_frame, cine_frames;
     // views
     PanelView view;
-    bool is_following, has_section, has_model, has_arrows;
+    bool is_following, is_following_arm, has_section, has_model, has_arrows;
     int label_count;
     const PanelLabel *label;       // (label_count) of the 3D view
     bool has_way;                  // the tip and the target to reach are in that view, at these pixels from its upper left corner

@@ -382,6 +382,19 @@ static void show_grip(Trainer *trainer, const HandGrip *before, const PanelActio
             show_message(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is held again", tool[k].name);
 }
 
+static void show_position(Trainer *trainer, const PanelActions *actions)
+{
+    const OperatorControls *controls = &trainer->controls;
+    char angles[32];
+    c_arm_label(&controls->xray, angles);
+    if (actions->pressed[ACTION_STORE])
+        show_message(trainer, MARK_GOOD, "position %d of %d stored: %s", controls->recalled + 1, STORED_POSITIONS, angles);
+    else if (actions->pressed[ACTION_RECALL] && controls->stored_count > 0)
+        show_message(trainer, MARK_NONE, "position %d of %d: %s", controls->recalled + 1, controls->stored_count, angles);
+    else if (actions->pressed[ACTION_RECALL])
+        show_message(trainer, MARK_NONE, "no position of the C-arm is stored");
+}
+
 // --- the tray ---
 
 // scenes/tools relative to the program in its build folder, build/PRESET/seldinger.
@@ -809,6 +822,7 @@ static void run_window(Trainer *trainer, Faults *faults)
             trainer->buttons = buttons;
         hand_grip_obey(&trainer->controls.grip, trainer->controls.tool_count, buttons, &trainer->buttons);
         show_grip(trainer, &grip, &actions);
+        show_position(trainer, &actions);
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);

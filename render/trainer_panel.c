@@ -308,6 +308,7 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
     state->view = controls->view;
     state->is_examination = controls->is_examination;
     state->is_following = controls->look.follow_tip;
+    state->is_following_arm = controls->follows_arm;
     state->has_section = controls->look.section;
     state->has_model = controls->look.show_model;
     state->has_arrows = controls->look.show_arrows;
