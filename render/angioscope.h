@@ -1,4 +1,4 @@
-// Angioscopy: the view from the tip of a tool forward inside the lumen. Perspective projection; the lamp is at the eye, so the light falls off with distance
+// Angioscopy: the view from the tip of a tool forward inside the lumen, in a vessel with a tree along the centreline ahead. Perspective projection; the lamp is at the eye, so the light falls off with distance
 // and the
 // far lumen is dark; the normals of the wall are those of the vessel's own field. The eye is fixed to the tool, slightly behind its tip and beside its axis,
 // so that the end of the tool is visible at the lower rim of the picture, and it rotates with the tool. If it would come too close to a wall it is moved away

@@ -30,12 +30,18 @@ static void the_resolution_falls_until_the_budget_is_kept(void **state)
     TimeBudget budget = {.most_ms = 26};
     draw_pictures(&budget, 300, 5, 20);
     assert_true(time_budget_share(&budget) >= 1);
-    draw_pictures(&budget, 100, 5, 80);      // 85, 50, then 25 ms
+    draw_pictures(&budget, 100, 5, 60);      // 65, 39, then 20 ms
     assert_true(time_budget_share(&budget) == 0.5);
-    assert_true(cost(&budget, 5, 80) < 26);
-    draw_pictures(&budget, 1000, 5, 80);     // 50 ms at the next: it stays
+    assert_true(cost(&budget, 5, 60) < 26);
+    int finer = 0;
+    for (int i = 0; i < 20000; i++) {        // 39 ms at the next: it is tried seldom, and more and more so
+        draw_pictures(&budget, 1, 5, 60);
+        finer += time_budget_share(&budget) > 0.5;
+    }
+    assert_in_range(finer, 12, 120);
+    draw_pictures(&budget, 20, 5, 60);
     assert_true(time_budget_share(&budget) == 0.5);
-    draw_pictures(&budget, 1000, 5, 8);      // cheap again
+    draw_pictures(&budget, 200, 1, 8);       // cheap again
     assert_true(time_budget_share(&budget) >= 1);
     draw_pictures(&budget, 500, 300, 0);     // no resolution is cheap enough
     assert_true(time_budget_share(&budget) == 0.25);
