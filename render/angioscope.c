@@ -512,13 +512,14 @@ static bool centreline_ahead(const Angioscope *scope, Vec3 tip, int node, Vec3 h
     if (!is_tree_usable(tree) || node < 0 || node >= tree->node_count)
         return false;
     const double wanted = 3 * radius;
+    const Vec3 pointing = heading;       // of the tool, which chooses at a fork near its tip
     double walked = -vec3_dot(vec3_sub(tip, tree->center[node]), heading);
     for (int before = -1, next; walked < wanted && (next = node_towards(scope, node, before, heading)) >= 0; before = node, node = next) {
         Vec3 on = vec3_sub(tree->center[next], tree->center[node]);
         double length = vec3_norm(on);
         *point = vec3_add_scaled(tree->center[node], length > 0 ? fmin(fmax((wanted - walked) / length, 0), 1) : 0, on);
         walked += length;
-        heading = vec3_unit_or(on, heading);
+        heading = walked < 1.5 * radius ? pointing : vec3_unit_or(on, heading);
         if (!(length > 0))
             return false;
     }

@@ -188,8 +188,8 @@ static void obey_views(OperatorControls *controls, const VesselScene *scene, con
         controls->follows_arm = false;
     }
     controls->follows_arm ^= actions->pressed[ACTION_CAMERA_C_ARM] & 1;
-    obey_section(look, scene, actions, seconds);
     look->follow_tip ^= actions->pressed[ACTION_CAMERA_FOLLOW] & 1;
+    obey_section(look, scene, actions, seconds);
     look->show_model ^= actions->pressed[ACTION_MODEL] & 1;
     look->show_arrows ^= actions->pressed[ACTION_ARROWS] & 1;
     double across = held(actions, ACTION_ORBIT_RIGHT, ACTION_ORBIT_LEFT), along = held(actions, ACTION_ORBIT_DOWN, ACTION_ORBIT_UP), orbit = orbit_px_s * seconds;
