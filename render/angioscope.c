@@ -63,6 +63,7 @@ struct Angioscope {
     GLsizei *draw_count;
     const void **draw_offset;
     const ToolLooks *tools;
+    SheathLook sheath;
     Primitives primitives;             // the tools in the view
     unsigned program;
     unsigned wall_array, wall_vertices, wall_indices;
@@ -81,7 +82,8 @@ static const char *const VERTEX =
     "#version 330 core\n"
     "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
     "layout(location = 3) in vec2 look; uniform mat4 clip; uniform vec3 eye; uniform vec4 tint; out vec3 ray; out vec3 n; out vec3 k; out float glow;\n"
-    "void main() { gl_Position = clip * vec4(position, 1.0); ray = eye - position; n = normal; k = look.x * mix(tint.rgb, color.rgb, tint.a); glow = look.y; }\n";
+    "void main() { gl_Position = clip * vec4(position, 1.0); ray = eye - position; n = normal; k = look.x * mix(tint.rgb, color.rgb, tint.a); glow = look.y; "
+    "}\n";
 
 static const char *const FRAGMENT =
     "#version 330 core\n"
@@ -230,7 +232,8 @@ static int main_child(const Angioscope *scope, int node)
     double most = -HUGE_VAL;
     for (int c = scope->first_child[node]; c >= 0; c = scope->next_child[c]) {
         Vec3 on = vec3_sub(tree->center[c], tree->center[node]);
-        double value = parent < 0 ? tree->radius[c] : vec3_dot(vec3_unit_or(on, vec3(0, 0, 0)), vec3_unit_or(vec3_sub(tree->center[node], tree->center[parent]), vec3(0, 0, 0)));
+        double value = parent < 0 ? tree->radius[c]
+                                  : vec3_dot(vec3_unit_or(on, vec3(0, 0, 0)), vec3_unit_or(vec3_sub(tree->center[node], tree->center[parent]), vec3(0, 0, 0)));
         best = value > most ? c : best;
         most = fmax(most, value);
     }
@@ -565,6 +568,7 @@ bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, Angios
 }
 
 void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools) { scope->tools = tools; }
+void angioscope_set_sheath(Angioscope *scope, SheathLook sheath) { scope->sheath = sheath; }
 void angioscope_set_full_detail(Angioscope *scope, bool on) { scope->full_detail = on; }
 
 // --- drawing ---
@@ -693,12 +697,26 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
         primitives_tube(&scope->primitives, count, point, radius, color);
 }
 
+// The sheath, if it is near enough to be visible.
+static void add_sheath(Angioscope *scope, Vec3 eye, double reach)
+{
+    const SheathLook *sheath = &scope->sheath;
+    if (!sheath->is_there || vec3_distance(eye, sheath->mouth) > reach)
+        return;
+    const Vec3 point[2] = {vec3_add_scaled(sheath->mouth, -SHEATH_SHOWN_MM, sheath->direction), sheath->mouth};
+    const double radius[2] = {sheath->radius, sheath->radius}, lumen[2] = {sheath->lumen, sheath->lumen};
+    const Color color[2] = {color_rgb(150, 156, 166), color_rgb(150, 156, 166)};
+    scope->primitives.sides = 32;
+    primitives_pipe(&scope->primitives, 2, point, radius, lumen, color, color_rgb(44, 48, 56), NULL);
+}
+
 static void draw_tools(Angioscope *scope, const Pose *pose, int own, Vec3 eye, double reach)
 {
     primitives_clear(&scope->primitives);
     scope->primitives.origin = scope->origin;
     for (int k = 0; k < pose->tool_count; k++)
         add_tool(scope, pose, k, k == own, eye, reach);
+    add_sheath(scope, eye, reach);
     const Primitives *tool = &scope->primitives;
     if (tool->index_count == 0)
         return;

@@ -30,6 +30,8 @@ void angioscope_destroy(Angioscope *scope);
 void angioscope_set_full_detail(Angioscope *scope, bool on);
 // `tools` is borrowed and gives the lumens of the tools. NULL (default): all tools are solid.
 void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools);
+// Default: none.
+void angioscope_set_sheath(Angioscope *scope, SheathLook sheath);
 // Draws the view from the tip of `tool` (-1: the tool that reaches furthest) into the whole rectangle of the port. In the sheath, outside the vessel, or
 // without a
 // finite pose, the picture is dark or empty.

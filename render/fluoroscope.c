@@ -142,6 +142,13 @@ static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
                 pulse_memory_make(&f->memory, lumen_nodes(f));
     for (int k = 0; good && k < f->tool_count; k++)
         good = path_of(f, k, &options->pose->tool[k]) != NULL;
+    const SheathLook *sheath = &options->sheath;
+    if (good && sheath->is_there) {
+        const TubeStretch stretch = {SHEATH_SHOWN_MM, sheath->radius, sheath->lumen, sheath->attenuation};
+        f->sheath_node[0] = vec3_add_scaled(sheath->mouth, -SHEATH_SHOWN_MM, sheath->direction);
+        f->sheath_node[1] = sheath->mouth;
+        good = ribbon_path_make(&f->sheath, 2, (const double[]){0, SHEATH_SHOWN_MM}, 1, &stretch);
+    }
     return good;
 }
 
@@ -202,6 +209,7 @@ void fluoroscope_destroy(Fluoroscope *f)
     for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
+    ribbon_path_free(&f->sheath);
     for (int k = 0; k < f->tool_count; k++)
         for (int i = 0; i <= EXCHANGES_MOST; i++)
             ribbon_path_free(&f->tool[k][i]);
@@ -374,6 +382,8 @@ static void lay_tools(Fluoroscope *f, const Exposure *exposure, int side)
     const Vec3 *position = exposure->position;
     const float *filling = exposure->filling;
     ribbon_begin(&f->ribbon);
+    if (f->sheath.count > 0)
+        ribbon_add(&f->ribbon, &f->c_arm, side, &f->sheath, f->sheath_node, NULL, f->tone.contrast);
     for (int k = 0; exposure->has_tools && k < f->tool_count; k++) {
         ribbon_add(&f->ribbon, &f->c_arm, side, exposure->tool[k], position, filling, f->tone.contrast);
         position += exposure->tool[k]->node_count;

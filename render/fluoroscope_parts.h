@@ -36,6 +36,8 @@ struct Fluoroscope {
     int anatomy_rows;            // rows drawn of anatomy_next, which replaces the coarse one when complete
     PictureLayers still, turning, *now;   // at full and at half resolution; the one that is shown
     Ribbon ribbon;
+    RibbonPath sheath;           // count 0: none
+    Vec3 sheath_node[2];
     int drawn_low[2], drawn_high[2];   // box of the tools in `picture`
     Exposure shown, masked;      // the picture's and the mask's
     bool has_picture;

@@ -192,7 +192,8 @@ static void obey_views(OperatorControls *controls, const VesselScene *scene, con
     obey_section(look, scene, actions, seconds);
     look->show_model ^= actions->pressed[ACTION_MODEL] & 1;
     look->show_arrows ^= actions->pressed[ACTION_ARROWS] & 1;
-    double across = held(actions, ACTION_ORBIT_RIGHT, ACTION_ORBIT_LEFT), along = held(actions, ACTION_ORBIT_DOWN, ACTION_ORBIT_UP), orbit = orbit_px_s * seconds;
+    double across = held(actions, ACTION_ORBIT_RIGHT, ACTION_ORBIT_LEFT), along = held(actions, ACTION_ORBIT_DOWN, ACTION_ORBIT_UP),
+           orbit = orbit_px_s * seconds;
     controls->follows_arm &= across == 0 && along == 0;
     free_camera_orbit(&look->camera, orbit * across, orbit * along);
     free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);

@@ -142,7 +142,8 @@ void vessel_scene_destroy(VesselScene *scene)
 
 VesselSceneLook vessel_scene_default_look(const VesselScene *scene)
 {
-    return (VesselSceneLook){.camera = scene->home, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5, .font_scale = 1, .section_through = {NAN, NAN, NAN}};
+    return (VesselSceneLook){
+        .camera = scene->home, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5, .font_scale = 1, .section_through = {NAN, NAN, NAN}};
 }
 
 // --- camera ---

@@ -33,6 +33,7 @@ static Fluoroscope *create_fluoroscope(const Views *views, const ViewsOptions *o
     fluoroscope.tree = options->tree;
     fluoroscope.tools = &views->tools;
     fluoroscope.pose = options->pose;
+    fluoroscope.sheath = sheath_look_make(options->scene, &views->tools);
     fluoroscope.anatomy_value = options->anatomy_value;
     memcpy(fluoroscope.anatomy_size, options->anatomy_size, sizeof fluoroscope.anatomy_size);
     memcpy(fluoroscope.anatomy_axis, options->anatomy_axis, sizeof fluoroscope.anatomy_axis);
@@ -73,6 +74,7 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
     triangle_mesh_free(coarse);
     if (good) {
         angioscope_set_tools(views->angioscope, &views->tools);
+        angioscope_set_sheath(views->angioscope, sheath_look_make(scene, &views->tools));
         return views;
     }
     views_destroy(views);

@@ -506,10 +506,14 @@ static void nothing_breaks_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_straight_tube_is_evenly_round),           cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
-        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture), cmocka_unit_test(normals_are_the_vessel_s_own),
-        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),     cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
-        cmocka_unit_test(tools_are_seen_from_in_each_other),         cmocka_unit_test(nothing_breaks_it),
+        cmocka_unit_test(a_straight_tube_is_evenly_round),
+        cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
+        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture),
+        cmocka_unit_test(normals_are_the_vessel_s_own),
+        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),
+        cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
+        cmocka_unit_test(tools_are_seen_from_in_each_other),
+        cmocka_unit_test(nothing_breaks_it),
         cmocka_unit_test(the_eye_looks_along_the_lumen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

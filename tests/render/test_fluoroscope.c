@@ -107,6 +107,24 @@ static void known_thickness_gives_known_grey(void **state)
     mesh_clear(&ball);
 }
 
+// A pipe that ends at its mouth, with or without a tool; of the thickness of its wall on both sides.
+static void the_sheath_is_seen_up_to_its_mouth(void **state)
+{
+    (void)state;
+    FluoroscopeOptions options = quiet_room(NULL);
+    options.sheath = (SheathLook){.is_there = true, .mouth = {0, 0, -3}, .direction = {1, 0, 0}, .radius = 6, .lumen = 3, .attenuation = 0.05};
+    XrayRoom *s = room_open(&options, 240);
+    if (!s)
+        skip();
+    room_draw(s);
+    assert_near(room_grey(s, 120 - 40, 120 - 12), live_grey(0.05 * 6), 1.5);
+    const double beside = 18.5 / 4;           // [mm] of that pixel's centre: beside the lumen the ray has the whole wall
+    assert_near(room_grey(s, 120 - 40, 120 - 12 + 18), live_grey(0.05 * 2 * sqrt(36 - beside * beside)), 1.5);
+    assert_near(room_grey(s, 120 + 20, 120 - 12), live_grey(0), 1);
+    assert_near(room_grey(s, 120 - 40, 120 + 20), live_grey(0), 1);
+    room_close(s);
+}
+
 // A thicker device replaces the tool, with fewer nodes at other places: the picture is as if it had been there from the start; then the first one again.
 static void an_exchanged_tool_is_seen_as_it_is(void **state)
 {
@@ -634,6 +652,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(known_thickness_gives_known_grey),
+        cmocka_unit_test(the_sheath_is_seen_up_to_its_mouth),
         cmocka_unit_test(an_exchanged_tool_is_seen_as_it_is),
         cmocka_unit_test(noise_is_that_of_the_quanta),
         cmocka_unit_test(the_same_pulse_gives_the_same_picture),
