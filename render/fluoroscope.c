@@ -200,10 +200,12 @@ void fluoroscope_destroy(Fluoroscope *f)
 {
     if (!f)
         return;
-    anatomy_free(&f->anatomy);
     shape_shadows_free(&f->shadows);
-    lumen_layer_destroy(&f->lumen);
-    layers_destroy(&f->programs);
+    if (!f->is_beside) {
+        anatomy_free(&f->anatomy);
+        lumen_layer_destroy(&f->lumen);
+        layers_destroy(&f->programs);
+    }
     Layer *layer[11] = {&f->anatomy_layer, &f->anatomy_next,  &f->lumen_layer,  &f->roadmap_layer, &f->mask,           &f->still.bare,
                         &f->still.base,    &f->still.picture, &f->turning.bare, &f->turning.base,  &f->turning.picture};
     for (int i = 0; i < 11; i++)
@@ -219,6 +221,55 @@ void fluoroscope_destroy(Fluoroscope *f)
     free(f->lumen_contrast);
     free(f->roadmap_contrast);
     free(f);
+}
+
+Fluoroscope *fluoroscope_create_beside(const Fluoroscope *first, const Pose *pose)
+{
+    Fluoroscope *f = calloc(1, sizeof *f);
+    FluoroscopeOptions options = first->options;
+    if (!f)
+        return NULL;
+    options.tools = pose ? first->looks : NULL;
+    options.pose = pose;
+    f->is_beside = true;
+    f->options = first->options;
+    f->anatomy = first->anatomy;
+    f->lumen = first->lumen;
+    f->programs = first->programs;
+    f->tone.contrast = options.contrast_attenuation;
+    f->tone.gain = options.dsa_gain;
+    if (!take_memory(f, &options)) {
+        fluoroscope_destroy(f);
+        return NULL;
+    }
+    fluoroscope_forget(f);
+    return f;
+}
+
+static void copy_exposure(Exposure *to, const Exposure *from, int tool_nodes, int nodes)
+{
+    Exposure memory = *to;
+    *to = *from;
+    to->position = memory.position;
+    to->filling = memory.filling;
+    to->contrast = memory.contrast;
+    memcpy(to->position, from->position, (size_t)tool_nodes * sizeof *to->position);
+    memcpy(to->filling, from->filling, (size_t)tool_nodes * sizeof *to->filling);
+    memcpy(to->contrast, from->contrast, (size_t)nodes * sizeof *to->contrast);
+}
+
+void fluoroscope_take_picture(Fluoroscope *f, const Fluoroscope *from)
+{
+    int tool_nodes = 0;
+    for (int k = 0; k < f->tool_count; k++)
+        tool_nodes += f->tool_capacity[k];
+    copy_exposure(&f->shown, &from->shown, tool_nodes, lumen_nodes(f));
+    copy_exposure(&f->masked, &from->masked, tool_nodes, lumen_nodes(f));
+    pulse_memory_copy(&f->memory, &from->memory);
+    f->has_picture = from->has_picture;
+    f->has_mask = from->has_mask;
+    f->mask_is_due = from->has_mask;
+    f->layers_are_stale = true;
 }
 
 void fluoroscope_forget(Fluoroscope *f)

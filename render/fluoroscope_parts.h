@@ -24,6 +24,7 @@ typedef struct PictureLayers {
 typedef struct Fluoroscope Fluoroscope;
 struct Fluoroscope {
     FluoroscopeOptions options;  // its pointers are invalid
+    bool is_beside;              // vessel, anatomy and programs belong to another one
     int tool_count;
     const ToolLooks *looks;
     int tool_capacity[TOOLS_MOST]; // upper limit of nodes

@@ -41,6 +41,8 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('I'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 per second"},
     {ACTION_MAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_ADD, 0, '+', "Magnify", "smaller field, larger picture"},
     {ACTION_DEMAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_SUBTRACT, 0, '-', "Demagnify", "larger field, smaller picture"},
+    {ACTION_REFERENCE, GROUP_XRAY, ACTION_PRESS, F(2), "Reference", "keep the X-ray image beside the live one; again: remove it"},
+    {ACTION_BIPLANE, GROUP_XRAY, ACTION_PRESS, F(10), "Biplane", "image of a second detector, 90 degrees from the first; again: off"},
     {ACTION_CINE_RECORD, GROUP_XRAY, ACTION_PRESS, F(6), "Record cine", "record the X-ray images as a cine loop; again: stop"},
     {ACTION_CINE_REPLAY, GROUP_XRAY, ACTION_PRESS, F(7), "Replay cine", "show the recorded loop; again: live image"},
     {ACTION_CINE_SAVE, GROUP_XRAY, ACTION_PRESS, F(8), "Save cine", "save the recorded loop as a video"},

@@ -120,6 +120,10 @@ static void obey_xray(OperatorControls *controls, const PanelActions *actions)
     }
     if (actions->pressed[ACTION_PEDAL_LATCH] & 1)
         controls->pedal_latched = !controls->pedal_latched;
+    if (actions->pressed[ACTION_REFERENCE] & 1)
+        controls->second = controls->second == SECOND_REFERENCE ? SECOND_NONE : SECOND_REFERENCE;
+    if (actions->pressed[ACTION_BIPLANE] & 1)
+        controls->second = controls->second == SECOND_PLANE ? SECOND_NONE : SECOND_PLANE;
     if (actions->pressed[ACTION_DSA] & 1) {
         xray->mode = xray->mode == XRAY_DSA ? XRAY_LIVE : XRAY_DSA;
         xray->mask += xray->mode == XRAY_DSA;   // subtraction starts with a new mask
@@ -285,6 +289,14 @@ Command controls_partner_command(const OperatorControls *controls, const PanelAc
 {
     return controls->tool_count < 2 ? (Command){0, 0}
                                     : command_by(controls, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
+}
+
+XrayControl controls_second_plane(const XrayControl *xray)
+{
+    XrayControl second = *xray;
+    second.lao_deg += second.lao_deg > 0 ? -90.0F : 90.0F;
+    second.cra_deg = 0;
+    return second;
 }
 
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons)

@@ -23,6 +23,7 @@ static const ButtonRow panel_button_row[] = {
     {TAB_XRAY, 2, {ACTION_PEDAL, ACTION_PEDAL_LATCH}, false},
     {TAB_XRAY, 1, {ACTION_CONTRAST}, false},
     {TAB_XRAY, 3, {ACTION_DSA, ACTION_ROADMAP, ACTION_MASK}, false},
+    {TAB_XRAY, 2, {ACTION_REFERENCE, ACTION_BIPLANE}, false},
     {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}, false},
     {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}, false},
     {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}, false},
@@ -55,6 +56,8 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_CONTRAST: return state->xray.contrast_ml_s > 0;
     case ACTION_DSA: return (int)state->xray.mode == XRAY_DSA;
     case ACTION_ROADMAP: return (int)state->xray.mode == XRAY_ROADMAP;
+    case ACTION_REFERENCE: return state->second == SECOND_REFERENCE;
+    case ACTION_BIPLANE: return state->second == SECOND_PLANE;
     case ACTION_CINE_RECORD: return state->is_recording_cine;
     case ACTION_CINE_REPLAY: return state->mode == PANEL_CINE;
     case ACTION_VIEW_FLUOROSCOPY: return state->view == VIEW_FLUOROSCOPY;

@@ -14,6 +14,8 @@
 typedef enum { PANEL_LIVE, PANEL_LIH, PANEL_DSA, PANEL_ROADMAP, PANEL_CINE } PanelMode;   // LIH: last image hold
 typedef enum { MARK_NONE, MARK_GOOD, MARK_WARNING, MARK_BAD } PanelMark;                  // shown by a sign and a colour
 
+typedef enum { SECOND_NONE, SECOND_REFERENCE, SECOND_PLANE } SecondImage;                 // a second X-ray image: a held one, or that of a second detector
+
 enum { PANEL_TOOLS = 4 };
 enum { WARN_OUTSIDE = 1, WARN_NOT_CONVERGED = 2, WARN_SLOW = 4, WARN_NO_FIFO = 8, WARN_DEVICE_LOST = 16, WARN_STALLED = 32 }; // bits of `warnings`
 
@@ -107,6 +109,8 @@ typedef struct PanelState {
     double wall_max_n, wall_sum_n; // over all tools
     // X-ray
     XrayControl xray;
+    SecondImage second;
+    XrayControl second_xray;       // with which it was taken
     PanelMode mode;
     bool is_pedal_latched, is_roadmap_ready, is_recording_cine;
     double fluoro_s, contrast_ml;

@@ -285,4 +285,12 @@ void panel_draw_over_views(Panel *panel, const PanelState *state)
             draw_banners(panel, state, at, below);
         gui_window_end(gui);
     }
+    if (panel->layout.second.width > 0 && state->second != SECOND_NONE) {
+        char text[64], at[48];
+        GuiRect rect = panel->layout.second_rect;
+        gui_window_begin(gui, "second", rect, GUI_NO_BACKGROUND | GUI_NO_INPUT);
+        snprintf(text, sizeof text, "%s  %s", state->second == SECOND_PLANE ? "Plane B" : "Reference", angles(at, sizeof at, &state->second_xray));
+        label(panel, rect.x + pad, rect.y + pad / 2, GUI_SMALL, gui_colors.text, text);
+        gui_window_end(gui);
+    }
 }

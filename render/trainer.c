@@ -395,6 +395,13 @@ static void show_position(Trainer *trainer, const PanelActions *actions)
         show_message(trainer, MARK_NONE, "no position of the C-arm is stored");
 }
 
+static void take_reference(Trainer *trainer, const PanelActions *actions)
+{
+    const Moment *moment = realtime_moment(trainer->session.realtime);
+    if (actions->pressed[ACTION_REFERENCE] && trainer->controls.second == SECOND_REFERENCE && moment)
+        views_take_reference(trainer->views, moment->pose);
+}
+
 // --- the tray ---
 
 // scenes/tools relative to the program in its build folder, build/PRESET/seldinger.
@@ -712,8 +719,8 @@ static bool is_picture_due(Trainer *trainer, const WindowInput *input, const Mom
 {
     const double refresh_s = 0.5;
     const OperatorControls *controls = &trainer->controls;
-    const int64_t shown[] = {trainer->pulses.count, controls->view,       trainer->is_paused,
-                             trainer->has_tray,     trainer->is_tray_due, panel_is_asking(trainer->panel)};
+    const int64_t shown[] = {trainer->pulses.count,          controls->view, trainer->is_paused, trainer->has_tray, trainer->is_tray_due, controls->second,
+                             panel_is_asking(trainer->panel)};
     const TrackerView *tracked = moment->extra;
     xray.seen = xray.looks = 0;
     uint64_t settings = redraw_hash(0, shown, sizeof shown);
@@ -735,6 +742,8 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     ViewsFrame frame = {
         .pose = pose, .xray = xray, .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
     trainer_cine_frame(&trainer->cine, passed_s, tracked->concentration, &frame);
+    const XrayControl plane = controls_second_plane(xray);
+    frame.second = trainer->controls.second == SECOND_PLANE ? &plane : NULL;
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &tracked->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
@@ -787,8 +796,11 @@ static void measure_frame(Trainer *trainer)
 static PanelLayout layout_of(const Trainer *trainer, const WindowInput *input)
 {
     const bool has_panels = panel_has_panels(trainer->panel);
-    return trainer->controls.is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, has_panels)
-                                            : panel_layout(input->width, input->height, input->scale, trainer->controls.view, has_panels);
+    PanelLayout layout = trainer->controls.is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, has_panels)
+                                                          : panel_layout(input->width, input->height, input->scale, trainer->controls.view, has_panels);
+    if (trainer->controls.second != SECOND_NONE)
+        panel_layout_add_second(&layout, input->height);
+    return layout;
 }
 
 // The controls of the next steps, with what the window shows during them.
@@ -823,6 +835,7 @@ static void run_window(Trainer *trainer, Faults *faults)
         hand_grip_obey(&trainer->controls.grip, trainer->controls.tool_count, buttons, &trainer->buttons);
         show_grip(trainer, &grip, &actions);
         show_position(trainer, &actions);
+        take_reference(trainer, &actions);
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);

@@ -304,6 +304,8 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
     label_scene(panel, controls, views);
     place_spots(panel, views, views_fluoroscope(views));
     views_xray_sides(views, &state->drawn_side, &state->shown_side);
+    state->second = controls->second;
+    state->second_xray = controls->second == SECOND_PLANE ? controls_second_plane(xray) : views_reference(views);
     state->chosen_tool = controls->grip.chosen;
     state->view = controls->view;
     state->is_examination = controls->is_examination;

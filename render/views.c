@@ -15,7 +15,9 @@ enum { FINE_TRIANGLES = 90000, COARSE_TRIANGLES = 25000 };
 
 struct Views {
     ToolLooks tools;
-    Fluoroscope *fluoroscope;
+    Fluoroscope *fluoroscope, *second;       // second: NULL until it is needed
+    XrayControl second_xray;         // of the reference
+    bool second_is_plane;            // it last showed the second plane
     VesselScene *scene;
     Angioscope *angioscope;
     GlCanvas kept[VIEW_COUNT];       // of views that are not drawn straight into the port; zeroed: not yet made
@@ -85,6 +87,7 @@ void views_destroy(Views *views)
 {
     if (!views)
         return;
+    fluoroscope_destroy(views->second);
     fluoroscope_destroy(views->fluoroscope);
     vessel_scene_destroy(views->scene);
     angioscope_destroy(views->angioscope);
@@ -168,9 +171,44 @@ static void clear_around(const PanelLayout *layout, int width, int height)
     glDisable(GL_SCISSOR_TEST);
 }
 
+static bool has_second(Views *views, const Pose *pose)
+{
+    if (!views->second)
+        views->second = fluoroscope_create_beside(views->fluoroscope, pose);
+    return views->second != NULL;
+}
+
+void views_take_reference(Views *views, const Pose *pose)
+{
+    if (!has_second(views, pose))
+        return;
+    fluoroscope_take_picture(views->second, views->fluoroscope);
+    views->second_xray = fluoroscope_state(views->fluoroscope).shown;
+    views->second_xray.pedal = 0;
+}
+
+// In fluoroscopy of a recording there is no second image.
+static void draw_second(Views *views, const ViewsFrame *frame, ViewPort port)
+{
+    if (frame->past || !has_second(views, frame->pose))
+        return;
+    if (frame->second && !views->second_is_plane)
+        fluoroscope_forget(views->second);
+    views->second_is_plane = frame->second != NULL;
+    FluoroscopeFrame xray = {.pose = frame->pose,
+                             .xray = frame->second ? *frame->second : views->second_xray,
+                             .contrast = frame->contrast,
+                             .filling = frame->filling,
+                             .pulse = frame->pulse};
+    fluoroscope_draw(views->second, &xray, port);
+}
+
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer)
 {
+    const double least_side = 480;           // [pixel] below which a coarser image saves little
+    const ViewPort *main = &layout->view[layout->main];
     double share = frame->is_still || frame->past ? 1 : time_budget_share(&views->budget);
+    share = fmin(1, fmax(share, least_side / fmax(1, main->width < main->height ? main->width : main->height)));
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
     if (!frame->leaves_surroundings)
@@ -188,8 +226,14 @@ void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout
         else
             draw_kept(views, (PanelView)i, frame, port, is_main, share);
     }
+    ViewPort second = layout->second;
+    second.framebuffer = framebuffer;
+    if (second.width > 0)
+        draw_second(views, frame, second);
     views->frames++;
 }
+
+XrayControl views_reference(const Views *views) { return views->second_xray; }
 
 void views_set_budget(Views *views, double most_ms) { views->budget = (TimeBudget){.most_ms = most_ms}; }
 void views_spend(Views *views, double ms) { time_budget_spend(&views->budget, ms); }

@@ -471,6 +471,39 @@ static void positions_are_stored_and_found_again(void **state)
         assert_true(found[i]);
 }
 
+static void a_second_image_has_its_place(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    press(&controls, ACTION_BIPLANE, 1);
+    assert_int_equal(controls.second, SECOND_PLANE);
+    press(&controls, ACTION_REFERENCE, 1);
+    assert_int_equal(controls.second, SECOND_REFERENCE);
+    press(&controls, ACTION_REFERENCE, 1);
+    assert_int_equal(controls.second, SECOND_NONE);
+    for (int lao = -90; lao <= 90; lao += 15) {      // perpendicular to the first plane, within the C-arm's range
+        controls.xray.lao_deg = (float)lao;
+        XrayControl second = controls_second_plane(&controls.xray);
+        CArm a = c_arm_place(&controls.xray, &controls.patient), b = c_arm_place(&second, &controls.patient);
+        assert_near(vec3_dot(a.towards, b.towards), 0, 1e-6);
+        assert_true(second.lao_deg >= -90 && second.lao_deg <= 90);
+    }
+    for (int k = 0; k < 4; k++) {
+        PanelLayout beside = k == 3 ? panel_layout_xray_alone(1280, 720, 1, true) : panel_layout(1280, 720, 1, k == 1 ? VIEW_ALL : VIEW_FLUOROSCOPY, k < 2);
+        panel_layout_add_second(&beside, 720);
+        const PanelRect *first = &beside.view_rect[VIEW_FLUOROSCOPY], *at = &beside.second_rect;
+        assert_true(at->width > 250 && at->height > 250);
+        assert_true(at->x >= first->x + first->width || at->y >= first->y + first->height);
+        assert_true(at->x + at->width <= 1280 && at->y + at->height <= 720);
+        assert_true(beside.right.width <= 0 || at->y + at->height <= beside.right.y || at->x + at->width <= beside.right.x);
+        assert_int_equal(beside.second.y, 720 - (int)(at->y + at->height));
+        assert_true(beside.view[VIEW_3D].width == 0 && beside.view[VIEW_ANGIOSCOPY].width == 0);
+    }
+    PanelLayout other = panel_layout(1280, 720, 1, VIEW_3D, true);
+    panel_layout_add_second(&other, 720);
+    assert_int_equal(other.second.width, 0);
+}
+
 // The axes of the 3D view, right, up and towards the eye, are those of the X-ray image.
 static void expect_view_of_arm(const OperatorControls *controls)
 {
@@ -577,6 +610,7 @@ int main(void)
                                        cmocka_unit_test(keys_choose_what_is_seen),
                                        cmocka_unit_test(the_wheel_magnifies_towards_the_pointer),
                                        cmocka_unit_test(positions_are_stored_and_found_again),
+                                       cmocka_unit_test(a_second_image_has_its_place),
                                        cmocka_unit_test(the_3d_view_starts_and_turns_with_the_c_arm),
                                        cmocka_unit_test(what_a_window_shows_is_noted),
                                        cmocka_unit_test(an_examination_refuses_the_keys_of_hidden_views)};
