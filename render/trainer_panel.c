@@ -282,6 +282,7 @@ static void label_scene(TrainerPanel *panel, const OperatorControls *controls, c
 static void place_spots(TrainerPanel *panel, const Views *views, const Fluoroscope *fluoroscope)
 {
     const Camera *camera = vessel_scene_projection(views_scene(views));
+    const double enlargement = views_enlargement(views, VIEW_3D);
     panel->state.spot_count = panel->mark_count;
     for (int i = 0; i < panel->mark_count; i++) {
         PanelSpot *spot = &panel->state.spot[i];
@@ -291,8 +292,8 @@ static void place_spots(TrainerPanel *panel, const Views *views, const Fluorosco
         spot->text = panel->spot_text[i];
         spot->is_in_xray = scale > 0;
         spot->blot = scale * cbrt(3 * volume / (4 * PI));
-        spot->space[0] = p.x;
-        spot->space[1] = p.y;
+        spot->space[0] = p.x * enlargement;
+        spot->space[1] = p.y * enlargement;
         spot->is_in_3d = p.x > 0 && p.y > 0 && p.x < camera->width && p.y < camera->height;
     }
 }
