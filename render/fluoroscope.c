@@ -238,6 +238,7 @@ Fluoroscope *fluoroscope_create_beside(const Fluoroscope *first, const Pose *pos
     f->programs = first->programs;
     f->tone.contrast = options.contrast_attenuation;
     f->tone.gain = options.dsa_gain;
+    f->tone.exposure = first->tone.exposure;
     if (!take_memory(f, &options)) {
         fluoroscope_destroy(f);
         return NULL;
