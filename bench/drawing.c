@@ -11,10 +11,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOMENTS = 60, PICTURES = 90, WARM_UP = 10, TURNS = 4 };
+enum { MOMENTS = 60, PICTURES = 90, WARM_UP = 10, SETTLING = 60, TURNS = 4 };   // SETTLING: until the resolution follows the budget
 
 typedef struct Studio {
     const BenchOptions *options;
+    const char *size;                // of the pictures measured; NULL: all
     BenchScene scene;
     GlContext *context;
     GlCanvas canvas;
@@ -69,25 +70,34 @@ typedef struct Case {
     bool flows, arm_turns, camera_turns;
     double must_ms;                  // limit [ms]; 0: none
     int only;                        // 0: everything; else 1 + the one view that is drawn, or ONLY_PANELS
+    double budget_ms;                // of the resolution; 0: that of the screen
 } Case;
 
 enum { ONLY_PANELS = 1 + VIEW_COUNT };
 
 static const Case cases[] = {
-    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 12, 0},
-    {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, false, 20, 0},
-    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1280, 720, true, false, false, 12, 0},
-    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1920, 1080, true, false, false, 20, 0},
-    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, true, false, 40, 0},
-    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, true, false, 40, 0},
-    {"3D", VIEW_3D, 1280, 720, true, false, false, 0, 0},
-    {"3D, camera turns", VIEW_3D, 1280, 720, true, false, true, 0, 0},
-    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, true, false, false, 33, 0},
-    {"all three", VIEW_ALL, 1280, 720, true, false, false, 33, 0},
-    {"- of the first: panels", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, ONLY_PANELS},
-    {"- fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_FLUOROSCOPY},
-    {"- 3D, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_3D},
-    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_ANGIOSCOPY},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 12, 0, 0},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, false, 20, 0, 0},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1280, 720, true, false, false, 12, 0, 0},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1920, 1080, true, false, false, 20, 0, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, true, false, 40, 0, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, true, false, 40, 0, 0},
+    {"fluoroscopy, unlimited", VIEW_FLUOROSCOPY, 3840, 2160, false, false, false, 0, 0, 0},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 3840, 2160, false, false, false, 33, 0, DRAWING_BUDGET_MS},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 3840, 2160, true, false, false, 33, 0, DRAWING_BUDGET_MS},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 3840, 2160, true, true, false, 33, 0, DRAWING_BUDGET_MS},
+    {"- of 4K: panels", VIEW_FLUOROSCOPY, 3840, 2160, false, false, false, 0, ONLY_PANELS, 0},
+    {"- fluoroscopy", VIEW_FLUOROSCOPY, 3840, 2160, false, false, false, 0, 1 + VIEW_FLUOROSCOPY, 0},
+    {"- 3D, inset", VIEW_FLUOROSCOPY, 3840, 2160, false, false, false, 0, 1 + VIEW_3D, 0},
+    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 3840, 2160, false, false, false, 0, 1 + VIEW_ANGIOSCOPY, 0},
+    {"3D", VIEW_3D, 1280, 720, true, false, false, 0, 0, 0},
+    {"3D, camera turns", VIEW_3D, 1280, 720, true, false, true, 0, 0, 0},
+    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, true, false, false, 33, 0, 0},
+    {"all three", VIEW_ALL, 1280, 720, true, false, false, 33, 0, 0},
+    {"- of the first: panels", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, ONLY_PANELS, 0},
+    {"- fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_FLUOROSCOPY, 0},
+    {"- 3D, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_3D, 0},
+    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_ANGIOSCOPY, 0},
 };
 enum { CASES = sizeof cases / sizeof cases[0] };
 
@@ -136,31 +146,41 @@ static bool measure_pictures(Studio *studio, FILE *text, cJSON *root, Faults *fa
     cJSON *rows = cJSON_AddArrayToObject(root, "pictures");
     int pictures = studio->options->quick ? PICTURES / 3 : PICTURES;
     fprintf(text, "\nCPU time of a picture, all drawing threads [ms]; at 30 pictures a second there are 33.3\n");
-    fprintf(text, "%-28s %-11s %8s %8s %8s %8s\n", "view with panels", "size", "median", "p99", "max", "must");
+    fprintf(text, "%-28s %-11s %8s %8s %8s %8s %11s\n", "view with panels", "size", "median", "p99", "max", "must", "X-ray side");
     for (int i = 0; i < CASES; i++) {
         const Case *what = &cases[i];
         static TimeHistogram cpu;
+        char size[32], must[16] = "";
+        snprintf(size, sizeof size, "%dx%d", what->width, what->height);
+        if (studio->size && strcmp(size, studio->size) != 0)
+            continue;
         memset(&cpu, 0, sizeof cpu);
         if (!make_canvas(studio, what->width, what->height, faults))
             return false;
-        for (int k = 0; k < pictures + WARM_UP; k++) {
+        views_set_budget(studio->views, what->budget_ms);
+        const int before = what->budget_ms > 0 ? SETTLING : WARM_UP;
+        for (int k = 0; k < pictures + before; k++) {
             double begin = clock_s(CLOCK_PROCESS_CPUTIME_ID);
             draw(studio, what, k);
-            if (k >= WARM_UP)
-                histogram_add(&cpu, (int64_t)((clock_s(CLOCK_PROCESS_CPUTIME_ID) - begin) * 1e9));
+            double spent = clock_s(CLOCK_PROCESS_CPUTIME_ID) - begin;
+            views_spend(studio->views, 1000 * spent);
+            if (k >= before)
+                histogram_add(&cpu, (int64_t)(spent * 1e9));
         }
+        int drawn, shown;
+        views_xray_sides(studio->views, &drawn, &shown);
         Spread ms = bench_spread(&cpu, 1e6);
-        char size[32], must[16] = "";
-        snprintf(size, sizeof size, "%dx%d", what->width, what->height);
         if (what->must_ms > 0)
             snprintf(must, sizeof must, "%.0f", what->must_ms);
-        fprintf(text, "%-28s %-11s %8.1f %8.1f %8.1f %8s%s\n", what->name, size, ms.median, ms.p99, ms.max, must,
+        fprintf(text, "%-28s %-11s %8.1f %8.1f %8.1f %8s %5d/%-5d%s\n", what->name, size, ms.median, ms.p99, ms.max, must, drawn, shown,
                 what->must_ms > 0 && ms.median > what->must_ms ? "  MISSED" : "");
         cJSON *row = cJSON_CreateObject();
         cJSON_AddStringToObject(row, "view", what->name);
         cJSON_AddStringToObject(row, "size", size);
         cJSON_AddNumberToObject(row, "median_ms", ms.median);
         cJSON_AddNumberToObject(row, "p99_ms", ms.p99);
+        cJSON_AddNumberToObject(row, "xray_drawn", drawn);
+        cJSON_AddNumberToObject(row, "xray_shown", shown);
         cJSON_AddItemToArray(rows, row);
     }
     return true;
@@ -261,14 +281,14 @@ static bool set_studio(Studio *studio, const char *path, Faults *faults)
 
 typedef struct DrawingBench {
     BenchOptions common;
-    const char *scene;
+    const char *scene, *size;
     double seconds;
 } DrawingBench;
 
 static int call(void *options, Faults *faults)
 {
     const DrawingBench *bench = options;
-    Studio studio = {.options = &bench->common};
+    Studio studio = {.options = &bench->common, .size = bench->size};
     cJSON *root = cJSON_CreateObject();
     FILE *text = bench_text(&bench->common);
     const char *path = bench->scene ? bench->scene : "scenes/phantom/scene.yaml";
@@ -277,12 +297,8 @@ static int call(void *options, Faults *faults)
         fprintf(text, "%s, %s, %s\n", path, bench_processor(), gl_context_renderer(studio.context));
         cJSON_AddStringToObject(root, "scene", path);
         cJSON_AddStringToObject(root, "renderer", gl_context_renderer(studio.context));
-        good = measure_pictures(&studio, text, root, faults) &&
-               measure_disturbance(&studio,
-                                   bench->seconds > 0    ? bench->seconds
-                                   : bench->common.quick ? 3
-                                                         : 10,
-                                   text, root, faults) &&
+        const double seconds = bench->seconds > 0 ? bench->seconds : bench->common.quick ? 3 : 10;
+        good = measure_pictures(&studio, text, root, faults) && (studio.size || measure_disturbance(&studio, seconds, text, root, faults)) &&
                bench_write_json(&bench->common, root, faults);
     }
     cJSON_Delete(root);
@@ -301,6 +317,7 @@ static int call(void *options, Faults *faults)
 
 static const Option rows[] = {
     {"seconds", "S", OPTION_NUMBER, OPTION_AT(DrawingBench, seconds), "duration of each part of the second table", .least = 1, .most = 3600, .otherwise = "10"},
+    {"size", "WxH", OPTION_TEXT, OPTION_AT(DrawingBench, size), "only images of this size, and no second table"},
     BENCH_OPTIONS(DrawingBench, common, "a third of the images, parts of 3 s"),
 };
 

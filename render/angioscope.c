@@ -5,7 +5,8 @@
 //
 // Light: with d the distance from lamp and eye, and c the cosine between wall normal and ray: (ambient + c) / (1 + (d / 3 R)^2), R the radius of the lumen at
 // the tip,
-// and a fog exp(-(d / 8 R)^1.5) that fades to dark.
+// and a fog exp(-(d / 8 R)^1.5) that fades to dark. Texture of the wall and the light at mouths of branches are computed once, for each vertex: a pixel costs
+// nothing more.
 #include "render/angioscope.h"
 
 #include "render/drawable_mesh.h"
@@ -23,7 +24,14 @@ enum { PATCH_TRIANGLES = 256, FINE_SAMPLES = 4 };
 typedef struct WallVertex {
     float position[3];         // [mm] relative to origin
     float normal[3];           // into the lumen
+    float look[2];             // brightness of the wall's texture around 1; glow of a branch's mouth, 0 to 1
 } WallVertex;
+
+// Of a branch that leaves its parent's vessel.
+typedef struct Mouth {
+    Vec3 center, direction;    // in the parent's wall; unit, into the branch
+    double radius;             // of the branch
+} Mouth;
 
 typedef struct Patch {
     int first_index, index_count;
@@ -45,6 +53,9 @@ struct Angioscope {
     double mean_radius;        // [mm] of the whole lumen: 2 volume / area
     int patch_count;
     Patch *patch;
+    int *first_child, *next_child;     // (N of the tree) -1: none
+    int mouth_count;
+    Mouth *mouth;
     int vertex_count;
     WallVertex *vertex;        // as uploaded to the GPU
     int *node;                 // (vertex_count) node of the vessel, -1 if unknown
@@ -52,6 +63,7 @@ struct Angioscope {
     GLsizei *draw_count;
     const void **draw_offset;
     const ToolLooks *tools;
+    SheathLook sheath;
     Primitives primitives;             // the tools in the view
     unsigned program;
     unsigned wall_array, wall_vertices, wall_indices;
@@ -63,17 +75,19 @@ struct Angioscope {
 
 static const float dark[3] = {0.030f, 0.012f, 0.012f};
 static const double half_angle = 50 * PI / 180;   // of the shorter side
+static const double along_lumen = 0.75;           // how far the eye turns from the tool's direction to the centreline ahead
 static const double lamp_reach = 3, fog_reach = 8, fog_end = 2.3;   // in radii of the lumen; in fog reaches, the distance at which it is black
 
 static const char *const VERTEX =
     "#version 330 core\n"
     "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
-    "uniform mat4 clip; uniform vec3 eye; uniform vec4 tint; out vec3 ray; out vec3 n; out vec3 k;\n"
-    "void main() { gl_Position = clip * vec4(position, 1.0); ray = eye - position; n = normal; k = mix(tint.rgb, color.rgb, tint.a); }\n";
+    "layout(location = 3) in vec2 look; uniform mat4 clip; uniform vec3 eye; uniform vec4 tint; out vec3 ray; out vec3 n; out vec3 k; out float glow;\n"
+    "void main() { gl_Position = clip * vec4(position, 1.0); ray = eye - position; n = normal; k = look.x * mix(tint.rgb, color.rgb, tint.a); glow = look.y; "
+    "}\n";
 
 static const char *const FRAGMENT =
     "#version 330 core\n"
-    "in vec3 ray; in vec3 n; in vec3 k; out vec4 result;\n"
+    "in vec3 ray; in vec3 n; in vec3 k; in float glow; out vec4 result;\n"
     "uniform vec4 lamp; uniform vec3 dark, shine; uniform float edge;\n"   // lamp: 1 / reach^2, 1 / fog reach, brightness, ambient; shine: amount, power, glow
     "void main() {\n"
     "  float d2 = dot(ray, ray), d = sqrt(d2); vec3 m = normalize(n); float c = max(dot(m, ray) / max(d, 1e-6), 0.0);\n"
@@ -82,6 +96,8 @@ static const char *const FRAGMENT =
     "  vec3 lit = k * (lamp.w + (1.0 - lamp.w) * c) * light;\n"
     // thin tissue glows where the lamp grazes it
     "  lit += shine.z * k * k * (1.0 - c) * (1.0 - c) * light + vec3(1.0, 0.93, 0.88) * (shine.x * s * light);\n"
+    // a mouth is lit from within its branch, so that it is seen from farther away
+    "  lit += glow * vec3(1.0, 0.72, 0.42) * (0.45 * lamp.z / (1.0 + 0.2 * d2 * lamp.x));\n"
     "  float f = d * lamp.y; lit = mix(dark * lamp.z, lit, exp(-f * sqrt(f)));\n"
     // the edge of the tool: c^2 falls linearly towards the outline, so this is the distance from the outline in pixels
     "  float e = c * c; result = vec4(1.0 - exp(-1.25 * lit), edge > 0.0 ? clamp(e / max(fwidth(e), 1e-9), 0.0, 1.0) : 1.0);\n"
@@ -152,6 +168,115 @@ static void enclose(Angioscope *scope, Patch *patch)
     }
 }
 
+// --- texture and mouths ---
+
+static bool is_tree_usable(const VesselTree *tree) { return tree && tree->node_count > 0; }
+
+// A number from -1 to 1 for a corner of a lattice.
+static double corner_noise(int x, int y, int z)
+{
+    uint32_t h = (uint32_t)x * 73856093u ^ (uint32_t)y * 19349663u ^ (uint32_t)z * 83492791u;
+    h = (h ^ h >> 13) * 1274126177u;
+    return (double)((h ^ h >> 16) & 0xffff) / 32767.5 - 1;
+}
+
+// Smooth between the corners of a lattice of unit cells.
+static double smooth_noise(Vec3 p)
+{
+    const double cell[3] = {floor(p.x), floor(p.y), floor(p.z)};
+    double t[3] = {p.x - cell[0], p.y - cell[1], p.z - cell[2]}, sum = 0;
+    for (int k = 0; k < 3; k++)
+        t[k] = t[k] * t[k] * (3 - 2 * t[k]);
+    for (int corner = 0; corner < 8; corner++) {
+        int at[3];
+        double weight = 1;
+        for (int k = 0; k < 3; k++) {
+            at[k] = (int)cell[k] + (corner >> k & 1);
+            weight *= corner >> k & 1 ? t[k] : 1 - t[k];
+        }
+        sum += weight * corner_noise(at[0], at[1], at[2]);
+    }
+    return sum;
+}
+
+// A wall without a tree is plain: the measure of a texture is the lumen.
+static double texture_at(const Angioscope *scope, Vec3 p)
+{
+    if (!is_tree_usable(scope->tree))
+        return 1;
+    double coarse = 1 / (0.9 * scope->mean_radius), fine = 1 / (0.3 * scope->mean_radius);
+    return 1 + 0.16 * smooth_noise(vec3_scale(p, coarse)) + 0.16 * smooth_noise(vec3_scale(p, fine));
+}
+
+// Brightest on the ring where the branch begins. `p`: in the model's frame.
+static double glow_at(const Angioscope *scope, Vec3 p)
+{
+    double most = 0;
+    for (int i = 0; i < scope->mouth_count; i++) {
+        const Mouth *mouth = &scope->mouth[i];
+        Vec3 d = vec3_sub(p, mouth->center);
+        if (vec3_norm2(d) > 6.25 * mouth->radius * mouth->radius)
+            continue;
+        double along = vec3_dot(d, mouth->direction) / mouth->radius, off = vec3_norm(vec3_add_scaled(d, -along * mouth->radius, mouth->direction));
+        double ring = off / mouth->radius - 1;
+        most = fmax(most, exp(-along * along / 0.16 - ring * ring / 0.16));
+    }
+    return most;
+}
+
+// The straightest continuation of the vessel at a node whose parent is known; -1: none.
+static int main_child(const Angioscope *scope, int node)
+{
+    const VesselTree *tree = scope->tree;
+    int best = -1, parent = tree->parent[node];
+    double most = -HUGE_VAL;
+    for (int c = scope->first_child[node]; c >= 0; c = scope->next_child[c]) {
+        Vec3 on = vec3_sub(tree->center[c], tree->center[node]);
+        double value = parent < 0 ? tree->radius[c]
+                                  : vec3_dot(vec3_unit_or(on, vec3(0, 0, 0)), vec3_unit_or(vec3_sub(tree->center[node], tree->center[parent]), vec3(0, 0, 0)));
+        best = value > most ? c : best;
+        most = fmax(most, value);
+    }
+    return best;
+}
+
+// The branch that begins with `child`: its mouth is where its centreline leaves the ball of its parent node.
+static Mouth find_mouth(const Angioscope *scope, int node, int child)
+{
+    const VesselTree *tree = scope->tree;
+    int at = child;
+    while (vec3_distance(tree->center[at], tree->center[node]) < tree->radius[node] && scope->first_child[at] >= 0)
+        at = main_child(scope, at);
+    return (Mouth){tree->center[at], vec3_unit_or(vec3_sub(tree->center[at], tree->center[node]), vec3(0, 0, 1)), tree->radius[at]};
+}
+
+// Lists children and mouths. Returns false if out of memory.
+static bool read_tree(Angioscope *scope)
+{
+    const VesselTree *tree = scope->tree;
+    if (!is_tree_usable(tree))
+        return true;
+    scope->first_child = malloc((size_t)tree->node_count * sizeof *scope->first_child);
+    scope->next_child = malloc((size_t)tree->node_count * sizeof *scope->next_child);
+    scope->mouth = malloc((size_t)tree->node_count * sizeof *scope->mouth);
+    if (!scope->first_child || !scope->next_child || !scope->mouth)
+        return false;
+    for (int i = 0; i < tree->node_count; i++)
+        scope->first_child[i] = scope->next_child[i] = -1;
+    for (int i = tree->node_count - 1; i >= 0; i--)
+        if (tree->parent[i] >= 0) {
+            scope->next_child[i] = scope->first_child[tree->parent[i]];
+            scope->first_child[tree->parent[i]] = i;
+        }
+    for (int i = 0; i < tree->node_count; i++) {
+        int on = main_child(scope, i);
+        for (int c = scope->first_child[i]; c >= 0; c = scope->next_child[c])
+            if (c != on)
+                scope->mouth[scope->mouth_count++] = find_mouth(scope, i, c);
+    }
+    return true;
+}
+
 // Each patch has its own copy of its vertices.
 static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const TriangleKey *key, int *copy_of, uint32_t *index)
 {
@@ -167,7 +292,9 @@ static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const Tria
                 Vec3 p = vec3_sub(mesh->vertex[v], scope->origin), n = vec3_negate(mesh->normal[v]);
                 copy_of[v] = scope->vertex_count;
                 scope->node[scope->vertex_count] = mesh->node ? mesh->node[v] : -1;
-                scope->vertex[scope->vertex_count++] = (WallVertex){{(float)p.x, (float)p.y, (float)p.z}, {(float)n.x, (float)n.y, (float)n.z}};
+                scope->vertex[scope->vertex_count++] = (WallVertex){{(float)p.x, (float)p.y, (float)p.z},
+                                                                    {(float)n.x, (float)n.y, (float)n.z},
+                                                                    {(float)texture_at(scope, p), (float)glow_at(scope, mesh->vertex[v])}};
                 patch->vertex_count++;
             }
             index[patch->first_index + patch->index_count++] = (uint32_t)copy_of[v];
@@ -224,6 +351,8 @@ static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message,
             glEnableVertexAttribArray(k);
             glVertexAttribPointer(k, 3, GL_FLOAT, GL_FALSE, sizeof(WallVertex), at_byte(3 * k * sizeof(float)));
         }
+        glEnableVertexAttribArray(3);
+        glVertexAttribPointer(3, 2, GL_FLOAT, GL_FALSE, sizeof(WallVertex), at_byte(offsetof(WallVertex, look)));
         glBindVertexArray(0);
     }
     free(key);
@@ -247,6 +376,11 @@ Angioscope *angioscope_create(const TriangleMesh *mesh, const Vessel *vessel, co
     unsigned *const buffer[4] = {&scope->wall_vertices, &scope->wall_indices, &scope->tool_vertices, &scope->tool_indices};
     for (int k = 0; k < 4; k++)
         glGenBuffers(1, buffer[k]);
+    if (scope->program && !read_tree(scope)) {
+        message_fail(message, capacity, "not enough memory for angioscopy");
+        angioscope_destroy(scope);
+        return NULL;
+    }
     if (!scope->program || !set_wall(scope, mesh, message, capacity)) {
         angioscope_destroy(scope);
         return NULL;
@@ -266,6 +400,9 @@ void angioscope_destroy(Angioscope *scope)
     glDeleteBuffers(4, buffer);
     gl_canvas_destroy(&scope->canvas);
     primitives_free(&scope->primitives);
+    free(scope->first_child);
+    free(scope->next_child);
+    free(scope->mouth);
     free(scope->patch);
     free(scope->vertex);
     free(scope->node);
@@ -348,13 +485,59 @@ static const PoseTool *looks_from(const Pose *pose, int *tool)
 
 static int vessel_node_at_tip(const Pose *pose, int tool) { return pose->node[(int)lround(pose_tool_end(pose, tool))].vessel_node; }
 
+static double lumen_radius(const Angioscope *scope, const Pose *pose, int tool)
+{
+    int node = vessel_node_at_tip(pose, tool);
+    return scope->tree && node >= 0 && node < scope->tree->node_count ? scope->tree->radius[node] : scope->mean_radius;
+}
+
+// The neighbour of a node, except `before`, that lies most nearly in the direction `heading`; -1 if all lie backwards.
+static int node_towards(const Angioscope *scope, int node, int before, Vec3 heading)
+{
+    const VesselTree *tree = scope->tree;
+    int best = -1, parent = tree->parent[node];
+    double most = -0.2;
+    for (int i = parent >= 0 ? parent : scope->first_child[node]; i >= 0; i = i == parent ? scope->first_child[node] : scope->next_child[i]) {
+        double along = vec3_dot(vec3_unit_or(vec3_sub(tree->center[i], tree->center[node]), vec3(0, 0, 0)), heading);
+        if (i != before && along > most) {
+            best = i;
+            most = along;
+        }
+    }
+    return best;
+}
+
+// The point of the centreline three radii ahead of a tip that lies at `node` and points to `heading`; false if the vessel ends before one radius.
+static bool centreline_ahead(const Angioscope *scope, Vec3 tip, int node, Vec3 heading, double radius, Vec3 *point)
+{
+    const VesselTree *tree = scope->tree;
+    *point = tip;
+    if (!is_tree_usable(tree) || node < 0 || node >= tree->node_count)
+        return false;
+    const double wanted = 3 * radius;
+    const Vec3 pointing = heading;       // of the tool, which chooses at a fork near its tip
+    double walked = -vec3_dot(vec3_sub(tip, tree->center[node]), heading);
+    for (int before = -1, next; walked < wanted && (next = node_towards(scope, node, before, heading)) >= 0; before = node, node = next) {
+        Vec3 on = vec3_sub(tree->center[next], tree->center[node]);
+        double length = vec3_norm(on);
+        *point = vec3_add_scaled(tree->center[node], length > 0 ? fmin(fmax((wanted - walked) / length, 0), 1) : 0, on);
+        walked += length;
+        heading = walked < 1.5 * radius ? pointing : vec3_unit_or(on, heading);
+        if (!(length > 0))
+            return false;
+    }
+    return walked > radius;
+}
+
 bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, AngioscopeView *view)
 {
     const PoseTool *own = looks_from(pose, &tool);
     if (!own)
         return false;
     const ToolNode *last = &own->node[own->node_count - 1];
-    double radius = fmax(last->radius, 1e-3), back = 7.5 * radius, beside = 2.8 * radius, margin = 0.8 * radius;
+    // in a vessel whose radius is known the eye is so far from the tool that its tip is small
+    double wide = is_tree_usable(scope->tree) ? lumen_radius(scope, pose, tool) : 0;
+    double radius = fmax(last->radius, 1e-3), back = fmax(7.5 * radius, 0.9 * wide), beside = fmax(2.8 * radius, 0.6 * wide), margin = 0.8 * radius;
     Vec3 tip = last->position, behind = axis_behind_tip(own, back), forward = quat_rotate(last->orientation, vec3(1, 0, 0));
     Vec3 upright = quat_rotate(last->orientation, vec3(0, 1, 0));
     if (!isfinite(radius) || !vec3_is_finite(tip) || !vec3_is_finite(behind) || !vec3_is_finite(forward) || !vec3_is_finite(upright))
@@ -375,20 +558,20 @@ bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, Angios
     // a tool inside the vessel puts the eye outside by less than `room`; the eye of a tool that has left the vessel is not moved back
     for (int k = 0; k < 4 && around < 0 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin && gap > -room; k++)
         eye = vec3_add_scaled(eye, out * (margin - gap), normal);
+    Vec3 point;
+    if (around < 0 && centreline_ahead(scope, tip, node, forward, wide, &point)) {
+        forward = vec3_unit(vec3_mix(forward, vec3_unit_or(vec3_sub(point, eye), forward), along_lumen * out));
+        up = across(up, forward, vec3_normal_to(forward));
+    }
     *view = (AngioscopeView){.eye = eye, .right = vec3_cross(forward, up), .up = up, .forward = forward, .half_angle_tan = tan(half_angle)};
     return vec3_is_finite(eye);
 }
 
 void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools) { scope->tools = tools; }
+void angioscope_set_sheath(Angioscope *scope, SheathLook sheath) { scope->sheath = sheath; }
 void angioscope_set_full_detail(Angioscope *scope, bool on) { scope->full_detail = on; }
 
 // --- drawing ---
-
-static double lumen_radius(const Angioscope *scope, const Pose *pose, int tool)
-{
-    int node = vessel_node_at_tip(pose, tool);
-    return scope->tree && node >= 0 && node < scope->tree->node_count ? scope->tree->radius[node] : scope->mean_radius;
-}
 
 // Perspective from space relative to `origin` to clip space, column-major.
 static void view_matrix(const AngioscopeView *view, Vec3 origin, double aspect, double near, double far, float matrix[16])
@@ -514,12 +697,26 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
         primitives_tube(&scope->primitives, count, point, radius, color);
 }
 
+// The sheath, if it is near enough to be visible.
+static void add_sheath(Angioscope *scope, Vec3 eye, double reach)
+{
+    const SheathLook *sheath = &scope->sheath;
+    if (!sheath->is_there || vec3_distance(eye, sheath->mouth) > reach)
+        return;
+    const Vec3 point[2] = {vec3_add_scaled(sheath->mouth, -SHEATH_SHOWN_MM, sheath->direction), sheath->mouth};
+    const double radius[2] = {sheath->radius, sheath->radius}, lumen[2] = {sheath->lumen, sheath->lumen};
+    const Color color[2] = {color_rgb(150, 156, 166), color_rgb(150, 156, 166)};
+    scope->primitives.sides = 32;
+    primitives_pipe(&scope->primitives, 2, point, radius, lumen, color, color_rgb(44, 48, 56), NULL);
+}
+
 static void draw_tools(Angioscope *scope, const Pose *pose, int own, Vec3 eye, double reach)
 {
     primitives_clear(&scope->primitives);
     scope->primitives.origin = scope->origin;
     for (int k = 0; k < pose->tool_count; k++)
         add_tool(scope, pose, k, k == own, eye, reach);
+    add_sheath(scope, eye, reach);
     const Primitives *tool = &scope->primitives;
     if (tool->index_count == 0)
         return;
@@ -537,6 +734,7 @@ static void draw_tools(Angioscope *scope, const Pose *pose, int own, Vec3 eye, d
     glUniform4f(glGetUniformLocation(scope->program, "tint"), 0, 0, 0, 1);
     glUniform3f(glGetUniformLocation(scope->program, "shine"), 0.5f, 1, 0);
     glUniform1f(glGetUniformLocation(scope->program, "edge"), 1);
+    glVertexAttrib2f(3, 1, 0);
     glEnable(GL_BLEND);
     glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
     glCullFace(GL_BACK);

@@ -1,4 +1,4 @@
-// Angioscopy: the view from the tip of a tool forward inside the lumen. Perspective projection; the lamp is at the eye, so the light falls off with distance
+// Angioscopy: the view from the tip of a tool forward inside the lumen, in a vessel with a tree along the centreline ahead. Perspective projection; the lamp is at the eye, so the light falls off with distance
 // and the
 // far lumen is dark; the normals of the wall are those of the vessel's own field. The eye is fixed to the tool, slightly behind its tip and beside its axis,
 // so that the end of the tool is visible at the lower rim of the picture, and it rotates with the tool. If it would come too close to a wall it is moved away
@@ -30,6 +30,8 @@ void angioscope_destroy(Angioscope *scope);
 void angioscope_set_full_detail(Angioscope *scope, bool on);
 // `tools` is borrowed and gives the lumens of the tools. NULL (default): all tools are solid.
 void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools);
+// Default: none.
+void angioscope_set_sheath(Angioscope *scope, SheathLook sheath);
 // Draws the view from the tip of `tool` (-1: the tool that reaches furthest) into the whole rectangle of the port. In the sheath, outside the vessel, or
 // without a
 // finite pose, the picture is dark or empty.

@@ -12,7 +12,7 @@
 #include "geom/geom.h"
 #include "sim/sim.h"
 
-#define C_ARM_SOURCE_MM 785.0          // source to isocentre, as in common angiography systems
+#define C_ARM_SOURCE_MM XRAY_SOURCE_MM // source to isocentre
 #define C_ARM_NEAREST_MM 20.0          // visible points must be further than this from the plane of the source
 
 typedef struct PatientAxes {           // unit vectors in the model's frame, mutually perpendicular; left-handed for a mirrored patient

@@ -18,7 +18,7 @@ static const double median_transmission = 0.27;  // target of the automatic expo
 
 FluoroscopeOptions fluoroscope_default_options(void)
 {
-    return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2, .dsa_dose = 16};
+    return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2, .dsa_dose = XRAY_DSA_DOSE};
 }
 
 // --- create ---
@@ -142,6 +142,13 @@ static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
                 pulse_memory_make(&f->memory, lumen_nodes(f));
     for (int k = 0; good && k < f->tool_count; k++)
         good = path_of(f, k, &options->pose->tool[k]) != NULL;
+    const SheathLook *sheath = &options->sheath;
+    if (good && sheath->is_there) {
+        const TubeStretch stretch = {SHEATH_SHOWN_MM, sheath->radius, sheath->lumen, sheath->attenuation};
+        f->sheath_node[0] = vec3_add_scaled(sheath->mouth, -SHEATH_SHOWN_MM, sheath->direction);
+        f->sheath_node[1] = sheath->mouth;
+        good = ribbon_path_make(&f->sheath, 2, (const double[]){0, SHEATH_SHOWN_MM}, 1, &stretch);
+    }
     return good;
 }
 
@@ -193,15 +200,18 @@ void fluoroscope_destroy(Fluoroscope *f)
 {
     if (!f)
         return;
-    anatomy_free(&f->anatomy);
     shape_shadows_free(&f->shadows);
-    lumen_layer_destroy(&f->lumen);
-    layers_destroy(&f->programs);
+    if (!f->is_beside) {
+        anatomy_free(&f->anatomy);
+        lumen_layer_destroy(&f->lumen);
+        layers_destroy(&f->programs);
+    }
     Layer *layer[11] = {&f->anatomy_layer, &f->anatomy_next,  &f->lumen_layer,  &f->roadmap_layer, &f->mask,           &f->still.bare,
                         &f->still.base,    &f->still.picture, &f->turning.bare, &f->turning.base,  &f->turning.picture};
     for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
+    ribbon_path_free(&f->sheath);
     for (int k = 0; k < f->tool_count; k++)
         for (int i = 0; i <= EXCHANGES_MOST; i++)
             ribbon_path_free(&f->tool[k][i]);
@@ -211,6 +221,56 @@ void fluoroscope_destroy(Fluoroscope *f)
     free(f->lumen_contrast);
     free(f->roadmap_contrast);
     free(f);
+}
+
+Fluoroscope *fluoroscope_create_beside(const Fluoroscope *first, const Pose *pose)
+{
+    Fluoroscope *f = calloc(1, sizeof *f);
+    FluoroscopeOptions options = first->options;
+    if (!f)
+        return NULL;
+    options.tools = pose ? first->looks : NULL;
+    options.pose = pose;
+    f->is_beside = true;
+    f->options = first->options;
+    f->anatomy = first->anatomy;
+    f->lumen = first->lumen;
+    f->programs = first->programs;
+    f->tone.contrast = options.contrast_attenuation;
+    f->tone.gain = options.dsa_gain;
+    f->tone.exposure = first->tone.exposure;
+    if (!take_memory(f, &options)) {
+        fluoroscope_destroy(f);
+        return NULL;
+    }
+    fluoroscope_forget(f);
+    return f;
+}
+
+static void copy_exposure(Exposure *to, const Exposure *from, int tool_nodes, int nodes)
+{
+    Exposure memory = *to;
+    *to = *from;
+    to->position = memory.position;
+    to->filling = memory.filling;
+    to->contrast = memory.contrast;
+    memcpy(to->position, from->position, (size_t)tool_nodes * sizeof *to->position);
+    memcpy(to->filling, from->filling, (size_t)tool_nodes * sizeof *to->filling);
+    memcpy(to->contrast, from->contrast, (size_t)nodes * sizeof *to->contrast);
+}
+
+void fluoroscope_take_picture(Fluoroscope *f, const Fluoroscope *from)
+{
+    int tool_nodes = 0;
+    for (int k = 0; k < f->tool_count; k++)
+        tool_nodes += f->tool_capacity[k];
+    copy_exposure(&f->shown, &from->shown, tool_nodes, lumen_nodes(f));
+    copy_exposure(&f->masked, &from->masked, tool_nodes, lumen_nodes(f));
+    pulse_memory_copy(&f->memory, &from->memory);
+    f->has_picture = from->has_picture;
+    f->has_mask = from->has_mask;
+    f->mask_is_due = from->has_mask;
+    f->layers_are_stale = true;
 }
 
 void fluoroscope_forget(Fluoroscope *f)
@@ -374,6 +434,8 @@ static void lay_tools(Fluoroscope *f, const Exposure *exposure, int side)
     const Vec3 *position = exposure->position;
     const float *filling = exposure->filling;
     ribbon_begin(&f->ribbon);
+    if (f->sheath.count > 0)
+        ribbon_add(&f->ribbon, &f->c_arm, side, &f->sheath, f->sheath_node, NULL, f->tone.contrast);
     for (int k = 0; exposure->has_tools && k < f->tool_count; k++) {
         ribbon_add(&f->ribbon, &f->c_arm, side, exposure->tool[k], position, filling, f->tone.contrast);
         position += exposure->tool[k]->node_count;

@@ -21,6 +21,11 @@ FluoroscopeOptions fluoroscope_default_options(void);
 
 // Returns NULL with the reason in `message`. Otherwise `message` is empty or says what is missing in the picture (for example because a mesh is not closed).
 Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity);
+// A second one of the same patient and tools, with its own pictures: a second plane, or a reference image. `first` must outlive it. `pose`: any of the tools, NULL
+// without tools. NULL if out of memory.
+Fluoroscope *fluoroscope_create_beside(const Fluoroscope *first, const Pose *pose);
+// Takes over the picture that `from`, of the same patient, shows; fluoroscope_draw() without pedal then shows it.
+void fluoroscope_take_picture(Fluoroscope *f, const Fluoroscope *from);
 void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeFrame {

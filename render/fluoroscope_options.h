@@ -17,6 +17,7 @@ typedef struct FluoroscopeOptions {
     const VesselTree *tree;        // NULL: the whole lumen is one node, 0
     const ToolLooks *tools;        // borrowed; NULL: none
     const Pose *pose;              // any pose of these tools; gives their largest numbers of nodes. Borrowed during create only
+    SheathLook sheath;             // default: none
     // anatomy: a volume (recon/volume/volume.h); value NULL: a patient made of solids (render/patient_body.h)
     int anatomy_size[3];
     Vec3 anatomy_origin;           // [mm] centre of voxel (0,0,0)

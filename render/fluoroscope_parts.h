@@ -24,6 +24,7 @@ typedef struct PictureLayers {
 typedef struct Fluoroscope Fluoroscope;
 struct Fluoroscope {
     FluoroscopeOptions options;  // its pointers are invalid
+    bool is_beside;              // vessel, anatomy and programs belong to another one
     int tool_count;
     const ToolLooks *looks;
     int tool_capacity[TOOLS_MOST]; // upper limit of nodes
@@ -36,6 +37,8 @@ struct Fluoroscope {
     int anatomy_rows;            // rows drawn of anatomy_next, which replaces the coarse one when complete
     PictureLayers still, turning, *now;   // at full and at half resolution; the one that is shown
     Ribbon ribbon;
+    RibbonPath sheath;           // count 0: none
+    Vec3 sheath_node[2];
     int drawn_low[2], drawn_high[2];   // box of the tools in `picture`
     Exposure shown, masked;      // the picture's and the mask's
     bool has_picture;

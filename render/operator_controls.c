@@ -31,6 +31,13 @@ OperatorControls controls_create(const VesselScene *scene, int tool_count, int c
     return controls;
 }
 
+void controls_look_from_arm(OperatorControls *controls)
+{
+    const CArm arm = c_arm_place(&controls->xray, &controls->patient);
+    free_camera_look_along(&controls->look.camera, vec3_negate(arm.towards), arm.up);
+    free_camera_set_home(&controls->look.camera);
+}
+
 static double held(const PanelActions *actions, ActionId more, ActionId less) { return (double)actions->held[more] - (double)actions->held[less]; }
 
 static void obey_sliders(XrayControl *xray, const PanelActions *actions)
@@ -48,6 +55,10 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
     xray->cra_deg = clamped((double)xray->cra_deg + turn * held(actions, ACTION_CRA, ACTION_CAU), -45, 45);
     if (actions->pressed[ACTION_AP])
         xray->lao_deg = xray->cra_deg = 0;
+    if (actions->pressed[ACTION_LATERAL]) {
+        xray->lao_deg = 90;
+        xray->cra_deg = 0;
+    }
     // the patient moves in the direction of the key, so the isocentre moves in the opposite direction
     CArm arm = c_arm_place(xray, patient);
     double distance = table_fields_s * (double)xray->field_mm * seconds;
@@ -59,6 +70,39 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
     double ends = blade_s * seconds * held(actions, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN);
     for (int i = 0; i < 4; i++)
         xray->collimator[i] = clamped((double)xray->collimator[i] + (i < 2 ? sides : ends), 0, 0.95);
+}
+
+static void obey_stored(OperatorControls *controls, const PanelActions *actions)
+{
+    XrayControl *xray = &controls->xray;
+    for (int i = 0; i < actions->pressed[ACTION_STORE]; i++) {
+        controls->recalled = controls->stored_next;
+        controls->stored[controls->recalled] =
+            (StoredPosition){xray->lao_deg, xray->cra_deg, xray->field_mm, {xray->table_mm[0], xray->table_mm[1], xray->table_mm[2]}};
+        controls->stored_next = (controls->stored_next + 1) % STORED_POSITIONS;
+        controls->stored_count += controls->stored_count < STORED_POSITIONS;
+    }
+    for (int i = 0; i < actions->pressed[ACTION_RECALL] && controls->stored_count > 0; i++) {
+        controls->recalled = (controls->recalled + 1) % controls->stored_count;
+        const StoredPosition *position = &controls->stored[controls->recalled];
+        xray->lao_deg = position->lao_deg;
+        xray->cra_deg = position->cra_deg;
+        xray->field_mm = position->field_mm;
+        for (int k = 0; k < 3; k++)
+            xray->table_mm[k] = position->table_mm[k];
+    }
+}
+
+// The point of the isocentre's plane under the mouse stays there; x, y: from the middle of the square, in its sides.
+static void zoom_field(XrayControl *xray, const PatientAxes *patient, double notch, double x, double y)
+{
+    double before = (double)xray->field_mm;
+    xray->field_mm = clamped(before * pow(field_step, -notch / 2), 40, 400);
+    CArm arm = c_arm_place(xray, patient);
+    double shrunk = before - (double)xray->field_mm;
+    Vec3 moved = vec3_add(vec3_scale(arm.right, x * shrunk), vec3_scale(arm.up, y * shrunk));
+    for (int k = 0; k < 3; k++)
+        xray->table_mm[k] += (float)(&moved.x)[k];
 }
 
 static void obey_xray(OperatorControls *controls, const PanelActions *actions)
@@ -76,6 +120,10 @@ static void obey_xray(OperatorControls *controls, const PanelActions *actions)
     }
     if (actions->pressed[ACTION_PEDAL_LATCH] & 1)
         controls->pedal_latched = !controls->pedal_latched;
+    if (actions->pressed[ACTION_REFERENCE] & 1)
+        controls->second = controls->second == SECOND_REFERENCE ? SECOND_NONE : SECOND_REFERENCE;
+    if (actions->pressed[ACTION_BIPLANE] & 1)
+        controls->second = controls->second == SECOND_PLANE ? SECOND_NONE : SECOND_PLANE;
     if (actions->pressed[ACTION_DSA] & 1) {
         xray->mode = xray->mode == XRAY_DSA ? XRAY_LIVE : XRAY_DSA;
         xray->mask += xray->mode == XRAY_DSA;   // subtraction starts with a new mask
@@ -96,6 +144,7 @@ static void obey_mouse(OperatorControls *controls, const VesselScene *scene, con
     double dx = mouse->drag_x * port->height, dy = -mouse->drag_y * port->height;
     if (mouse->view == VIEW_3D) {
         FreeCamera *camera = &controls->look.camera;
+        controls->follows_arm &= !(mouse->buttons & WINDOW_MOUSE_LEFT) || (mouse->drag_x == 0 && mouse->drag_y == 0);
         if (mouse->buttons & WINDOW_MOUSE_LEFT)
             free_camera_orbit(camera, dx, dy);
         else if (mouse->buttons && (mouse->drag_x != 0 || mouse->drag_y != 0)) {
@@ -112,28 +161,45 @@ static void obey_mouse(OperatorControls *controls, const VesselScene *scene, con
             controls->xray.lao_deg = clamped((double)controls->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
             controls->xray.cra_deg = clamped((double)controls->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
         }
-        if (mouse->scroll != 0)
-            controls->xray.field_mm = clamped((double)controls->xray.field_mm * pow(field_step, -mouse->scroll / 2), 40, 400);
+        double side = port->width < port->height ? port->width : port->height;
+        if (mouse->scroll != 0 && side > 0)
+            zoom_field(&controls->xray, &controls->patient, mouse->scroll, (mouse->x - 0.5) * port->width / side, (mouse->y - 0.5) * port->height / side);
     }
 }
 
-static void obey_views(OperatorControls *controls, const PanelActions *actions, double seconds)
+// The plane starts at the tool, and stays there until it is moved or switched on again.
+static void obey_section(VesselSceneLook *look, const VesselScene *scene, const PanelActions *actions, double seconds)
+{
+    Vec3 tip;
+    if (actions->pressed[ACTION_SECTION] & 1) {
+        look->section = !look->section;
+        look->section_offset_mm = 0;
+        look->section_through = scene && vessel_scene_tip(scene, &tip) ? tip : vec3(NAN, NAN, NAN);
+    }
+    look->section_at_tip = look->follow_tip;
+    look->section_offset_mm += section_mm_s * seconds * held(actions, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER);
+}
+
+static void obey_views(OperatorControls *controls, const VesselScene *scene, const PanelActions *actions, double seconds)
 {
     static const ActionId view[] = {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL};
     VesselSceneLook *look = &controls->look;
     for (int i = 0; i < 4; i++)
         if (actions->pressed[view[i]])
             controls->view = (PanelView)i;
-    if (actions->pressed[ACTION_CAMERA_RESET])
+    if (actions->pressed[ACTION_CAMERA_RESET]) {
         free_camera_reset(&look->camera);
+        controls->follows_arm = false;
+    }
+    controls->follows_arm ^= actions->pressed[ACTION_CAMERA_C_ARM] & 1;
     look->follow_tip ^= actions->pressed[ACTION_CAMERA_FOLLOW] & 1;
-    look->section ^= actions->pressed[ACTION_SECTION] & 1;
-    look->section_at_tip = look->follow_tip;
+    obey_section(look, scene, actions, seconds);
     look->show_model ^= actions->pressed[ACTION_MODEL] & 1;
     look->show_arrows ^= actions->pressed[ACTION_ARROWS] & 1;
-    look->section_offset_mm += section_mm_s * seconds * held(actions, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER);
-    double orbit = orbit_px_s * seconds;
-    free_camera_orbit(&look->camera, orbit * held(actions, ACTION_ORBIT_RIGHT, ACTION_ORBIT_LEFT), orbit * held(actions, ACTION_ORBIT_DOWN, ACTION_ORBIT_UP));
+    double across = held(actions, ACTION_ORBIT_RIGHT, ACTION_ORBIT_LEFT), along = held(actions, ACTION_ORBIT_DOWN, ACTION_ORBIT_UP),
+           orbit = orbit_px_s * seconds;
+    controls->follows_arm &= across == 0 && along == 0;
+    free_camera_orbit(&look->camera, orbit * across, orbit * along);
     free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);
 }
 
@@ -155,10 +221,15 @@ void controls_obey(OperatorControls *controls, const VesselScene *scene, const P
     if (actions->xray_set)
         obey_sliders(&controls->xray, actions);
     obey_arm(&controls->xray, &controls->patient, actions, seconds);
+    obey_stored(controls, actions);
     obey_xray(controls, actions);
     obey_grip(controls, actions);
-    obey_views(controls, actions, seconds);
+    obey_views(controls, scene, actions, seconds);
     obey_mouse(controls, scene, actions, layout);
+    if (controls->follows_arm) {
+        const CArm arm = c_arm_place(&controls->xray, &controls->patient);
+        free_camera_turn_along(&controls->look.camera, vec3_negate(arm.towards), arm.up);
+    }
 }
 
 bool controls_refuse_hidden(const OperatorControls *controls, PanelActions *actions)
@@ -218,6 +289,14 @@ Command controls_partner_command(const OperatorControls *controls, const PanelAc
 {
     return controls->tool_count < 2 ? (Command){0, 0}
                                     : command_by(controls, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
+}
+
+XrayControl controls_second_plane(const XrayControl *xray)
+{
+    XrayControl second = *xray;
+    second.lao_deg += second.lao_deg > 0 ? -90.0F : 90.0F;
+    second.cra_deg = 0;
+    return second;
 }
 
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons)

@@ -8,13 +8,22 @@
 #include "render/vessel_scene.h"
 #include "sim/sim.h"
 
+enum { STORED_POSITIONS = 4 };
+typedef struct StoredPosition {  // of the X-ray system
+    float lao_deg, cra_deg, field_mm, table_mm[3];
+} StoredPosition;
+
 typedef struct OperatorControls {
     XrayControl xray;            // pedal and contrast from keys and panel; controls_xray adds the buttons of input devices
     PatientAxes patient;         // in the model's frame
+    SecondImage second;
     bool pedal_latched;
     PanelView view;
     bool is_examination;         // only the X-ray image is shown
     VesselSceneLook look;        // settings of the 3D view
+    bool follows_arm;            // its camera turns with the C-arm
+    int stored_count, stored_next, recalled; // number stored so far; the place of the next one; the last place stored or returned to
+    StoredPosition stored[STORED_POSITIONS];
     double contrast_ml_s;        // during injection, default 3
     double push_mm_s, twist_deg_s;   // of the keys at normal speed, default 10 and 120
     int tool_count;
@@ -23,6 +32,8 @@ typedef struct OperatorControls {
 
 // Sets the isocentre to the middle of `points`, and the field so that they are visible.
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
+// Turns the camera of the 3D view as the C-arm stands, and makes that its home.
+void controls_look_from_arm(OperatorControls *controls);
 
 // In an examination, takes the actions for hidden views out of `actions`. Returns whether there was one.
 bool controls_refuse_hidden(const OperatorControls *controls, PanelActions *actions);
@@ -31,6 +42,8 @@ void controls_obey(OperatorControls *controls, const VesselScene *scene, const P
 // The speeds that held keys request for the selected tool and its partner (0 if there is none): fast is three times and slow a fifth of the normal speed.
 Command controls_command(const OperatorControls *controls, const PanelActions *actions);
 Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions);
+// Those of the second plane: 90 degrees from the first in LAO or RAO, level.
+XrayControl controls_second_plane(const XrayControl *xray);
 // The X-ray controls including input devices (HAND_ bits) and held keys: pedal, contrast through the selected tool.
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons);
 // Records in `xray` what a window shows (XrayControl.seen) and counts looks at the 3D view and angioscopy; `before`: the controls of the last frame. `pose` NULL:

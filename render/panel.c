@@ -323,6 +323,8 @@ void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state,
         panel_sample(panel, k, state->time_s, state->tool[k].force_n, state->tool[k].torque_n_mm, state->wall_max_n);
     PanelLayout layout = state->is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, panel->has_panels)
                                                : panel_layout(input->width, input->height, input->scale, state->view, panel->has_panels);
+    if (state->second != SECOND_NONE)
+        panel_layout_add_second(&layout, input->height);
     // the result opens once; it can be closed and opened again like the text of the exercise, and goes with a new session
     if (state->is_finished != panel->was_finished)
         panel->briefing = state->is_finished ? BRIEFING_OPEN : BRIEFING_CLOSED;

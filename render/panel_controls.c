@@ -23,15 +23,17 @@ static const ButtonRow panel_button_row[] = {
     {TAB_XRAY, 2, {ACTION_PEDAL, ACTION_PEDAL_LATCH}, false},
     {TAB_XRAY, 1, {ACTION_CONTRAST}, false},
     {TAB_XRAY, 3, {ACTION_DSA, ACTION_ROADMAP, ACTION_MASK}, false},
+    {TAB_XRAY, 2, {ACTION_REFERENCE, ACTION_BIPLANE}, false},
     {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}, false},
     {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}, false},
     {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}, false},
+    {TAB_C_ARM, 3, {ACTION_LATERAL, ACTION_STORE, ACTION_RECALL}, false},
     {TAB_C_ARM, 2, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT}, false},
     {TAB_C_ARM, 2, {ACTION_TABLE_UP, ACTION_TABLE_DOWN}, false},
     {TAB_C_ARM, 4, {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN}, false},
     {TAB_VIEWS, 2, {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D}, false},
     {TAB_VIEWS, 2, {ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL}, false},
-    {TAB_VIEWS, 2, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW}, false},
+    {TAB_VIEWS, 3, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW, ACTION_CAMERA_C_ARM}, false},
     {TAB_VIEWS, 2, {ACTION_MODEL, ACTION_ARROWS}, false},
     {TAB_VIEWS, 3, {ACTION_SECTION, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER}, false},
     {TAB_VIEWS, 2, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT}, false},
@@ -54,6 +56,8 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_CONTRAST: return state->xray.contrast_ml_s > 0;
     case ACTION_DSA: return (int)state->xray.mode == XRAY_DSA;
     case ACTION_ROADMAP: return (int)state->xray.mode == XRAY_ROADMAP;
+    case ACTION_REFERENCE: return state->second == SECOND_REFERENCE;
+    case ACTION_BIPLANE: return state->second == SECOND_PLANE;
     case ACTION_CINE_RECORD: return state->is_recording_cine;
     case ACTION_CINE_REPLAY: return state->mode == PANEL_CINE;
     case ACTION_VIEW_FLUOROSCOPY: return state->view == VIEW_FLUOROSCOPY;
@@ -61,6 +65,7 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_VIEW_ANGIOSCOPY: return state->view == VIEW_ANGIOSCOPY;
     case ACTION_VIEW_ALL: return state->view == VIEW_ALL;
     case ACTION_CAMERA_FOLLOW: return state->is_following;
+    case ACTION_CAMERA_C_ARM: return state->is_following_arm;
     case ACTION_SECTION: return state->has_section;
     case ACTION_MODEL: return state->has_model;
     case ACTION_ARROWS: return state->has_arrows;

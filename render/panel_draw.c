@@ -208,7 +208,9 @@ static void draw_machine(Panel *panel, const PanelState *state, GuiRect at)
     small_row(panel, "Step, median / p99.9", MARK_NONE, text);
     snprintf(text, sizeof text, "\u00d7%s, %lld missed", panel_figure(one, sizeof one, state->real_time_factor, 2, ""), (long long)state->missed_deadlines);
     small_row(panel, "Real time, deadlines", state->warnings & (WARN_SLOW | WARN_STALLED) ? MARK_WARNING : MARK_NONE, text);
-    small_row(panel, "Drawing", MARK_NONE, panel_figure(one, sizeof one, state->frame_ms, 1, "ms per frame"));
+    panel_figure(one, sizeof one, state->frame_ms, 1, "ms");
+    snprintf(text, sizeof text, state->shown_side > state->drawn_side ? "%s, image %d of %d px" : "%s per frame", one, state->drawn_side, state->shown_side);
+    small_row(panel, "Drawing", MARK_NONE, text);
     gui_window_end(panel->gui);
 }
 

@@ -71,6 +71,38 @@ PanelLayout panel_layout(int width, int height, double scale, PanelView view, bo
     return layout;
 }
 
+static void hide(PanelLayout *layout, PanelView view)
+{
+    layout->view[view] = (ViewPort){0};
+    layout->view_rect[view] = (PanelRect){0};
+}
+
+void panel_layout_add_second(PanelLayout *layout, int window_height)
+{
+    PanelRect *xray = &layout->view_rect[VIEW_FLUOROSCOPY], *top = &layout->view_rect[VIEW_3D], *low = &layout->view_rect[VIEW_ANGIOSCOPY], at;
+    const float gap = ceilf(2 * (float)layout->scale);
+    if (layout->main != VIEW_FLUOROSCOPY || xray->width <= 0)
+        return;
+    if (top->width > 0) {
+        at = (PanelRect){top->x, top->y, top->width, low->y + low->height - top->y};
+        hide(layout, VIEW_3D);
+        hide(layout, VIEW_ANGIOSCOPY);
+    } else if (layout->right.width > 0) {
+        at = layout->right;
+        at.height = floorf(fminf(at.width, at.height / 2));
+        layout->right.y += at.height + gap;
+        layout->right.height -= at.height + gap;
+    } else {
+        at = *xray;
+        float half = floorf((at.width - gap) / 2);
+        at.x += half + gap;
+        at.width -= half + gap;
+        place_view(layout, VIEW_FLUOROSCOPY, (PanelRect){xray->x, xray->y, half, xray->height}, window_height);
+    }
+    layout->second_rect = at;
+    layout->second = (ViewPort){0, (int)at.x, window_height - (int)(at.y + at.height), (int)at.width, (int)at.height};
+}
+
 PanelLayout panel_layout_xray_alone(int width, int height, double scale, bool has_panels)
 {
     PanelLayout layout = panel_layout(width, height, scale, VIEW_FLUOROSCOPY, has_panels);

@@ -17,11 +17,15 @@ typedef struct PanelLayout {
     ViewPort view[VIEW_COUNT];     // framebuffer 0, y from the lower left corner as in OpenGL
     PanelRect view_rect[VIEW_COUNT]; // the same, y down
     PanelView main;                // the largest
+    ViewPort second;               // a second X-ray image, zero width: none
+    PanelRect second_rect;
     PanelRect top, left, right, bottom;
 } PanelLayout;
 
 // `has_panels` false: the views fill the window.
 PanelLayout panel_layout(int width, int height, double scale, PanelView view, bool has_panels);
+// Makes room for a second X-ray image: in place of the other views, or, where there are none, beside the X-ray image.
+void panel_layout_add_second(PanelLayout *layout, int window_height);
 // Only the X-ray image, for examinations; the place of the other views goes to the controls.
 PanelLayout panel_layout_xray_alone(int width, int height, double scale, bool has_panels);
 

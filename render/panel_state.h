@@ -14,6 +14,8 @@
 typedef enum { PANEL_LIVE, PANEL_LIH, PANEL_DSA, PANEL_ROADMAP, PANEL_CINE } PanelMode;   // LIH: last image hold
 typedef enum { MARK_NONE, MARK_GOOD, MARK_WARNING, MARK_BAD } PanelMark;                  // shown by a sign and a colour
 
+typedef enum { SECOND_NONE, SECOND_REFERENCE, SECOND_PLANE } SecondImage;                 // a second X-ray image: a held one, or that of a second detector
+
 enum { PANEL_TOOLS = 4 };
 enum { WARN_OUTSIDE = 1, WARN_NOT_CONVERGED = 2, WARN_SLOW = 4, WARN_NO_FIFO = 8, WARN_DEVICE_LOST = 16, WARN_STALLED = 32 }; // bits of `warnings`
 
@@ -107,13 +109,17 @@ typedef struct PanelState {
     double wall_max_n, wall_sum_n; // over all tools
     // X-ray
     XrayControl xray;
+    SecondImage second;
+    XrayControl second_xray;       // with which it was taken
     PanelMode mode;
     bool is_pedal_latched, is_roadmap_ready, is_recording_cine;
     double fluoro_s, contrast_ml;
+    double tube_kv, tube_ma, kerma_rate_mgy_min;   // of the last pulse (kv 0: none yet); the rate is 0 while the pedal is up
+    double kerma_mgy, kerma_area_gy_cm2;
     int cine_frame, cine_frames;
     // views
     PanelView view;
-    bool is_following, has_section, has_model, has_arrows;
+    bool is_following, is_following_arm, has_section, has_model, has_arrows;
     int label_count;
     const PanelLabel *label;       // (label_count) of the 3D view
     bool has_way;                  // the tip and the target to reach are in that view, at these pixels from its upper left corner
@@ -124,6 +130,7 @@ typedef struct PanelState {
     double force_full_scale_n;     // top of its colours; 0: no legend
     // machine
     double step_median_us, step_p999_us, real_time_factor, frame_ms;
+    int drawn_side, shown_side;    // [pixel] of the X-ray image; 0: not known
     int64_t missed_deadlines;
     unsigned warnings;             // WARN_ bits
     const char *warning;           // one more warning line, or NULL

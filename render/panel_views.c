@@ -36,6 +36,22 @@ static void label_right(Panel *panel, float right, float y, GuiFont font, Color 
     label(panel, right - width, y, font, color, text);
 }
 
+// Above `y`, from below: what a dose display shows (IEC 60601-2-43).
+static void draw_dose(Panel *panel, const PanelState *state, float right, float y, float line)
+{
+    char text[64];
+    if (!(state->tube_kv > 0))
+        return;
+    snprintf(text, sizeof text, "DAP %.2f Gy cm\u00b2", state->kerma_area_gy_cm2);
+    label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
+    snprintf(text, sizeof text, "air kerma %.1f mGy", state->kerma_mgy);
+    label_right(panel, right, y - line, GUI_NORMAL, gui_colors.text, text);
+    snprintf(text, sizeof text, "%.1f mGy/min", state->kerma_rate_mgy_min);
+    label_right(panel, right, y - 2 * line, GUI_NORMAL, gui_colors.text, text);
+    snprintf(text, sizeof text, "%.0f kV  %.0f mA", state->tube_kv, state->tube_ma);
+    label_right(panel, right, y - 3 * line, GUI_NORMAL, gui_colors.text, text);
+}
+
 // Returns the y below the labels at the upper left.
 static float draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRect at, bool is_main)
 {
@@ -55,6 +71,7 @@ static float draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiR
     label_right(panel, right, y - 2 * normal, GUI_NORMAL, gui_colors.text, text);
     snprintf(text, sizeof text, "field %.0f mm", (double)state->xray.field_mm);
     label_right(panel, right, y - 3 * normal, GUI_NORMAL, gui_colors.text, text);
+    draw_dose(panel, state, right, y - 4 * normal, normal);
     label(panel, at.x + pad, at.y + pad / 2, GUI_LARGE, gui_colors.text, panel_mode_name[state->mode]);
     y = at.y + pad / 2 + gui_line_height(gui, GUI_LARGE) + floorf(6 * s);
     if (state->mode == PANEL_CINE) {
@@ -266,6 +283,14 @@ void panel_draw_over_views(Panel *panel, const PanelState *state)
             draw_3d_labels(panel, state, at);
         if (is_main)
             draw_banners(panel, state, at, below);
+        gui_window_end(gui);
+    }
+    if (panel->layout.second.width > 0 && state->second != SECOND_NONE) {
+        char text[64], at[48];
+        GuiRect rect = panel->layout.second_rect;
+        gui_window_begin(gui, "second", rect, GUI_NO_BACKGROUND | GUI_NO_INPUT);
+        snprintf(text, sizeof text, "%s  %s", state->second == SECOND_PLANE ? "Plane B" : "Reference", angles(at, sizeof at, &state->second_xray));
+        label(panel, rect.x + pad, rect.y + pad / 2, GUI_SMALL, gui_colors.text, text);
         gui_window_end(gui);
     }
 }

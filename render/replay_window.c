@@ -2,6 +2,7 @@
 
 #include "base/base.h"
 #include "render/playback.h"
+#include "render/redraw.h"
 #include "render/replay_side.h"
 #include "render/scene_views.h"
 #include "render/timeline.h"
@@ -219,6 +220,7 @@ static void run_window(ReplayWindow *replay)
 {
     const WindowInput *input;
     PanelActions actions = {0};
+    Redraw redraw = {0};
     double last = clock_s(CLOCK_MONOTONIC);
     for (bool is_running = true; is_running;) {
         bool visible = window_next_frame(replay->window, &input);
@@ -237,9 +239,15 @@ static void run_window(ReplayWindow *replay)
         if (!is_running || !visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
+        // the jump of a click changes the moment; the score may still be computed
+        const double time_s = playback_time_s(replay->playback);
+        const uint64_t settings = redraw_hash(redraw_hash(0, &time_s, sizeof time_s), &replay->controls, sizeof replay->controls);
+        if (!redraw_is_due(&redraw, input, playback_pose(replay->playback), settings, now, 0.25))
+            continue;
         draw(replay, input, &layout);
         window_swap(replay->window);
     }
+    redraw_free(&redraw);
 }
 
 bool replay_window_run(const ReplayWindowOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, bool *resumes, double *resume_s,

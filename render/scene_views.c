@@ -70,6 +70,7 @@ static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const
     controls->patient = options.patient;
     controls->xray.lao_deg = (float)scene->lao;
     controls->xray.cra_deg = (float)scene->cra;
+    controls_look_from_arm(controls);
     if (open->tree)
         controls->contrast_ml_s = contrast_rate(open->tree);
     return views;

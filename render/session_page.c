@@ -106,11 +106,15 @@ static void print_figures(const SessionPage *page)
             f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n,
             f->wall_impulse_n_s, f->tip_force_peak_n);
     if (f->has_xray)
-        fprintf(out,
-                "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n"
-                "<dt>Sight</dt><dd>tools were moved by %.1f mm without a fresh X-ray image (pulling counts half), and for %.1f s with the 3D view or "
-                "angioscopy in sight</dd>\n",
-                f->fluoroscopy_s, (long long)f->pulses, f->dose_area_cm2, f->contrast_ml, f->blind_total_mm, f->guided_s);
+        fprintf(
+            out,
+            "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n"
+            "<dt>Dose</dt><dd>air kerma at the patient entrance reference point %.2f mGy, dose-area product %.3f Gy cm²; tube at %.0f kV and %.0f mA in the "
+            "mean of the pulses (a model, not a measurement)</dd>\n"
+            "<dt>Sight</dt><dd>tools were moved by %.1f mm without a fresh X-ray image (pulling counts half), and for %.1f s with the 3D view or "
+            "angioscopy in sight</dd>\n",
+            f->fluoroscopy_s, (long long)f->pulses, f->dose_area_cm2, f->contrast_ml, f->air_kerma_mgy, f->kerma_area_gy_cm2, f->mean_kv, f->mean_ma,
+            f->blind_total_mm, f->guided_s);
     else
         fprintf(out, "<dt>X-rays</dt><dd>none: a headless run</dd>\n");
     fprintf(out, "</dl></section>\n");

@@ -1,6 +1,7 @@
 #include "render/start_window.h"
 
 #include "render/gui.h"
+#include "render/redraw.h"
 #include "render/window.h"
 
 #include <dirent.h>
@@ -287,6 +288,7 @@ static void draw(StartWindow *w, const WindowInput *input)
 static void run_frames(StartWindow *w)
 {
     const WindowInput *input;
+    Redraw redraw = {0};
     for (double begun = clock_s(CLOCK_MONOTONIC); !w->ends;) {
         bool visible = window_next_frame(w->window, &input);
         for (int i = 0; i < input->event_count && !w->ends; i++) {
@@ -297,7 +299,7 @@ static void run_frames(StartWindow *w)
                 choose(w, START_STEER, window_dropped(w->window));
         }
         w->ends |= input->close != WINDOW_OPEN || (w->options->duration_s > 0 && clock_s(CLOCK_MONOTONIC) - begun > w->options->duration_s);
-        if (!visible || w->ends)
+        if (!visible || w->ends || !redraw_is_due(&redraw, input, NULL, 0, clock_s(CLOCK_MONOTONIC), 0.5))
             continue;
         draw(w, input);
         window_swap(w->window);

@@ -102,3 +102,20 @@ const TubeStretch *tool_look_at(const ToolLook *look, double s)
         i++;
     return &look->stretch[i];
 }
+
+SheathLook sheath_look_make(const Scene *scene, const ToolLooks *tools)
+{
+    const double play = 0.1, wall = 0.3;
+    SheathLook sheath = {.is_there = scene->wire.has_sheath && vec3_is_finite(scene->wire.start) && vec3_norm(scene->wire.direction) > 0,
+                         .mouth = scene->wire.start,
+                         .direction = vec3_unit_or(scene->wire.direction, vec3(1, 0, 0)),
+                         .attenuation = 0.15};
+    for (int k = 0; k < tools->count; k++)
+        for (int which = 0; which <= EXCHANGES_MOST; which++) {
+            const ToolLook *look = tool_looks_of(tools, k, which);
+            for (int i = 0; i < look->stretch_count; i++)
+                sheath.lumen = fmax(sheath.lumen, look->stretch[i].radius + play);
+        }
+    sheath.radius = sheath.lumen + wall;
+    return sheath;
+}

@@ -31,6 +31,16 @@ void tool_looks_free(ToolLooks *looks);
 const ToolLook *tool_looks_of(const ToolLooks *looks, int tool, int fitted);
 // The stretch at the arc length `s`; at a border the one before it.
 const TubeStretch *tool_look_at(const ToolLook *look, double s);
+// The sheath through which the tools enter, as drawn in every view: a pipe that ends at its mouth.
+#define SHEATH_SHOWN_MM 25.0
+typedef struct SheathLook {
+    bool is_there;
+    Vec3 mouth, direction;       // unit, into the vessel
+    double radius, lumen;        // [mm]: its lumen lets the widest tool through
+    double attenuation;          // [1/mm] of its wall
+} SheathLook;
+SheathLook sheath_look_make(const Scene *scene, const ToolLooks *tools);
+
 // Colours for tools of these kinds, distinguishable with colour-vision deficiency, on a dark background or on paper: one per kind, and an unused colour for a
 // repeated kind.
 void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color);

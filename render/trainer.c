@@ -5,6 +5,7 @@
 #include "render/instructor_view.h"
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
+#include "render/redraw.h"
 #include "render/scene_views.h"
 #include "render/trainer_cine.h"
 #include "render/trainer_panel.h"
@@ -43,7 +44,8 @@ typedef struct Trainer {
     PulseClock pulses;
     TrainerCine cine;
     double begun_s;                  // wall clock at the start
-    double swapped_s;                // time of the last frame
+    double swapped_s;                // when the window last answered: with a frame, or by finding that none was due
+    Redraw redraw;
     double frame_cpu_s;              // process CPU time at the last frame
     XrayControl xray_at_start;       // C-arm, table and mode with which a session begins
     TrainerTray tray;
@@ -74,12 +76,17 @@ __attribute__((format(printf, 3, 4))) static void show_message(Trainer *trainer,
 
 // --- start and end of a session ---
 
-static void swap(Trainer *trainer)
+static void answer(Trainer *trainer)
 {
-    window_swap(trainer->window);
     const double now = since_begin(trainer);
     trainer->figures->longest_gap_s = fmax(trainer->figures->longest_gap_s, trainer->swapped_s > 0 ? now - trainer->swapped_s : 0);
     trainer->swapped_s = now;
+}
+
+static void swap(Trainer *trainer)
+{
+    window_swap(trainer->window);
+    answer(trainer);
 }
 
 // Draws the panel with a line of text and no views, for use without a session.
@@ -375,6 +382,26 @@ static void show_grip(Trainer *trainer, const HandGrip *before, const PanelActio
             show_message(trainer, MARK_NONE, now->released >> k & 1 ? "%s is released: only its valve holds it" : "%s is held again", tool[k].name);
 }
 
+static void show_position(Trainer *trainer, const PanelActions *actions)
+{
+    const OperatorControls *controls = &trainer->controls;
+    char angles[32];
+    c_arm_label(&controls->xray, angles);
+    if (actions->pressed[ACTION_STORE])
+        show_message(trainer, MARK_GOOD, "position %d of %d stored: %s", controls->recalled + 1, STORED_POSITIONS, angles);
+    else if (actions->pressed[ACTION_RECALL] && controls->stored_count > 0)
+        show_message(trainer, MARK_NONE, "position %d of %d: %s", controls->recalled + 1, controls->stored_count, angles);
+    else if (actions->pressed[ACTION_RECALL])
+        show_message(trainer, MARK_NONE, "no position of the C-arm is stored");
+}
+
+static void take_reference(Trainer *trainer, const PanelActions *actions)
+{
+    const Moment *moment = realtime_moment(trainer->session.realtime);
+    if (actions->pressed[ACTION_REFERENCE] && trainer->controls.second == SECOND_REFERENCE && moment)
+        views_take_reference(trainer->views, moment->pose);
+}
+
 // --- the tray ---
 
 // scenes/tools relative to the program in its build folder, build/PRESET/seldinger.
@@ -453,6 +480,7 @@ static void show_new_scene(Trainer *trainer, Faults *faults)
     if (views) {
         views_destroy(trainer->views);
         trainer->views = views;
+        views_set_budget(views, DRAWING_BUDGET_MS);
     }
 }
 
@@ -686,17 +714,36 @@ static void show_to_instructor(Trainer *trainer, const WindowInput *input, doubl
     instructor_view_show(trainer->instructor, &(InstructorFigures){trainer->trainee, time_s, trainer->is_paused, score, trainer->scene});
 }
 
-static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *layout, const XrayControl *xray, double passed_s)
+// Whether anything has changed that the window shows. Figures that change without a movement are shown twice a second.
+static bool is_picture_due(Trainer *trainer, const WindowInput *input, const Moment *moment, XrayControl xray)
 {
-    const Moment *moment = realtime_moment(trainer->session.realtime);
-    if (!moment)
-        return;
+    const double refresh_s = 0.5;
+    const OperatorControls *controls = &trainer->controls;
+    const int64_t shown[] = {trainer->pulses.count,          controls->view, trainer->is_paused, trainer->has_tray, trainer->is_tray_due, controls->second,
+                             panel_is_asking(trainer->panel)};
+    const TrackerView *tracked = moment->extra;
+    xray.seen = xray.looks = 0;
+    uint64_t settings = redraw_hash(0, shown, sizeof shown);
+    settings = redraw_hash(settings, &xray, sizeof xray);
+    settings = redraw_hash(settings, &controls->look, sizeof controls->look);
+    settings = redraw_hash(settings, &controls->grip, sizeof controls->grip);
+    settings = redraw_hash(settings, &tracked->score.state, sizeof tracked->score.state);
+    settings = redraw_hash(settings, &tracked->score.error_total, sizeof tracked->score.error_total);
+    // a loop that plays changes by itself
+    if (trainer->cine.is_shown || cine_is_recording(trainer->cine.cine))
+        trainer->redraw.trail = 1;
+    return redraw_is_due(&trainer->redraw, input, moment->pose, settings, since_begin(trainer), refresh_s);
+}
+
+static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *layout, const XrayControl *xray, double passed_s, const Moment *moment)
+{
     const TrackerView *tracked = moment->extra;
     const Pose *pose = moment->pose;
-    pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
     ViewsFrame frame = {
         .pose = pose, .xray = xray, .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
     trainer_cine_frame(&trainer->cine, passed_s, tracked->concentration, &frame);
+    const XrayControl plane = controls_second_plane(xray);
+    frame.second = trainer->controls.second == SECOND_PLANE ? &plane : NULL;
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &tracked->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
@@ -730,9 +777,13 @@ static double resident_mb(void)
     return read == 2 ? (double)pages * (double)sysconf(_SC_PAGESIZE) / 1e6 : 0;
 }
 
+static double drawing_cpu_s(const Trainer *trainer) { return clock_s(CLOCK_PROCESS_CPUTIME_ID) - realtime_cpu_s(trainer->session.realtime); }
+
 static void measure_frame(Trainer *trainer)
 {
-    double cpu = clock_s(CLOCK_PROCESS_CPUTIME_ID) - realtime_cpu_s(trainer->session.realtime);
+    double cpu = drawing_cpu_s(trainer);
+    if (trainer->figures->frames > 0)
+        views_spend(trainer->views, 1000 * (cpu - trainer->frame_cpu_s));
     if (trainer->figures->frames++ > 0)
         histogram_add(&trainer->frame_cpu_ns, (int64_t)((cpu - trainer->frame_cpu_s) * 1e9));
     else
@@ -745,8 +796,11 @@ static void measure_frame(Trainer *trainer)
 static PanelLayout layout_of(const Trainer *trainer, const WindowInput *input)
 {
     const bool has_panels = panel_has_panels(trainer->panel);
-    return trainer->controls.is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, has_panels)
-                                            : panel_layout(input->width, input->height, input->scale, trainer->controls.view, has_panels);
+    PanelLayout layout = trainer->controls.is_examination ? panel_layout_xray_alone(input->width, input->height, input->scale, has_panels)
+                                                          : panel_layout(input->width, input->height, input->scale, trainer->controls.view, has_panels);
+    if (trainer->controls.second != SECOND_NONE)
+        panel_layout_add_second(&layout, input->height);
+    return layout;
 }
 
 // The controls of the next steps, with what the window shows during them.
@@ -780,6 +834,8 @@ static void run_window(Trainer *trainer, Faults *faults)
             trainer->buttons = buttons;
         hand_grip_obey(&trainer->controls.grip, trainer->controls.tool_count, buttons, &trainer->buttons);
         show_grip(trainer, &grip, &actions);
+        show_position(trainer, &actions);
+        take_reference(trainer, &actions);
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);
@@ -792,7 +848,15 @@ static void run_window(Trainer *trainer, Faults *faults)
             continue;
         layout = layout_of(trainer, input);
         xray = controls_xray(&trainer->controls, &actions, buttons_of_hands(trainer));   // a new session has begun with others
-        draw(trainer, input, &layout, &xray, now - drawn);
+        const Moment *moment = realtime_moment(trainer->session.realtime);
+        if (moment)
+            pulse_clock_advance(&trainer->pulses, moment->pose->time_s, &moment->pose->xray);
+        if (!moment || !is_picture_due(trainer, input, moment, xray)) {
+            answer(trainer);
+            trainer->frame_cpu_s = drawing_cpu_s(trainer);
+            continue;
+        }
+        draw(trainer, input, &layout, &xray, now - drawn, moment);
         drawn = now;
         swap(trainer);
         measure_frame(trainer);
@@ -811,6 +875,8 @@ static bool open_views(Trainer *trainer, Faults *faults)
     trainer->xray_at_start = trainer->controls.xray;
     if (*note)
         show_message(trainer, MARK_WARNING, "%s", note);
+    if (trainer->views)
+        views_set_budget(trainer->views, DRAWING_BUDGET_MS);
     return trainer->views != NULL;
 }
 
@@ -912,6 +978,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
         views_destroy(trainer->views);
     trainer_cine_close(&trainer->cine);
     trainer_tray_close(&trainer->tray);
+    redraw_free(&trainer->redraw);
     scene_free(trainer->own_scene);
     panel_destroy(trainer->panel);
     instructor_view_close(trainer->instructor);

@@ -153,6 +153,10 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     }
     state->fluoro_s = score->fluoroscopy_s;
     state->contrast_ml = score->contrast_ml;
+    state->tube_kv = score->pulse.kv;
+    state->tube_ma = score->pulse.ma;
+    state->kerma_mgy = score->air_kerma_mgy;
+    state->kerma_area_gy_cm2 = score->kerma_area_gy_cm2;
 }
 
 // A consequence is announced for some seconds.
@@ -229,15 +233,20 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         state->missed_deadlines = figures->deadline_misses;
     }
     show_score(panel, scene, score);
+    state->kerma_rate_mgy_min = xray->pedal > 0 ? score->pulse.rate_mgy_min : 0;
     warn(panel, pose, score, figures);
 }
 
 // Labels of the 3D view: targets with their distance from the tip, and the mouth of the sheath.
-static void label_scene(TrainerPanel *panel, const OperatorControls *controls, const VesselScene *scene)
+static void label_scene(TrainerPanel *panel, const OperatorControls *controls, const Views *views)
 {
+    const VesselScene *scene = views_scene(views);
+    const double enlargement = views_enlargement(views, VIEW_3D);
     PanelState *state = &panel->state;
     VesselSceneLabel found[PANEL_LABELS];
     int count = vessel_scene_labels(scene, found, PANEL_LABELS);
+    for (int i = 0; i < count; i++)
+        found[i].x *= enlargement, found[i].y *= enlargement, found[i].radius *= enlargement;
     state->label_count = 0;
     state->label = panel->label;
     state->has_way = false;
@@ -263,9 +272,9 @@ static void label_scene(TrainerPanel *panel, const OperatorControls *controls, c
             snprintf(text, sizeof panel->label_text[0], "%.63s", it->name);
         panel->label[state->label_count++] = (PanelLabel){it->x, it->y, it->radius, text};
     }
-    ScaleBar bar = vessel_scene_scale_bar(scene, 140);
+    ScaleBar bar = vessel_scene_scale_bar(scene, 140 / enlargement);
     state->bar_mm = bar.length_mm;
-    state->bar_pixels = bar.pixels;
+    state->bar_pixels = bar.pixels * enlargement;
     state->force_full_scale_n = controls->look.force_full_scale_n;
 }
 
@@ -273,6 +282,7 @@ static void label_scene(TrainerPanel *panel, const OperatorControls *controls, c
 static void place_spots(TrainerPanel *panel, const Views *views, const Fluoroscope *fluoroscope)
 {
     const Camera *camera = vessel_scene_projection(views_scene(views));
+    const double enlargement = views_enlargement(views, VIEW_3D);
     panel->state.spot_count = panel->mark_count;
     for (int i = 0; i < panel->mark_count; i++) {
         PanelSpot *spot = &panel->state.spot[i];
@@ -282,8 +292,8 @@ static void place_spots(TrainerPanel *panel, const Views *views, const Fluorosco
         spot->text = panel->spot_text[i];
         spot->is_in_xray = scale > 0;
         spot->blot = scale * cbrt(3 * volume / (4 * PI));
-        spot->space[0] = p.x;
-        spot->space[1] = p.y;
+        spot->space[0] = p.x * enlargement;
+        spot->space[1] = p.y * enlargement;
         spot->is_in_3d = p.x > 0 && p.y > 0 && p.x < camera->width && p.y < camera->height;
     }
 }
@@ -292,12 +302,16 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
 {
     PanelState *state = &panel->state;
     FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
-    label_scene(panel, controls, views_scene(views));
+    label_scene(panel, controls, views);
     place_spots(panel, views, views_fluoroscope(views));
+    views_xray_sides(views, &state->drawn_side, &state->shown_side);
+    state->second = controls->second;
+    state->second_xray = controls->second == SECOND_PLANE ? controls_second_plane(xray) : views_reference(views);
     state->chosen_tool = controls->grip.chosen;
     state->view = controls->view;
     state->is_examination = controls->is_examination;
     state->is_following = controls->look.follow_tip;
+    state->is_following_arm = controls->follows_arm;
     state->has_section = controls->look.section;
     state->has_model = controls->look.show_model;
     state->has_arrows = controls->look.show_arrows;

@@ -142,7 +142,8 @@ void vessel_scene_destroy(VesselScene *scene)
 
 VesselSceneLook vessel_scene_default_look(const VesselScene *scene)
 {
-    return (VesselSceneLook){.camera = scene->home, .show_model = true, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5, .font_scale = 1};
+    return (VesselSceneLook){
+        .camera = scene->home, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5, .font_scale = 1, .section_through = {NAN, NAN, NAN}};
 }
 
 // --- camera ---
@@ -174,7 +175,8 @@ static LayersKey key_for(VesselScene *scene, const VesselSceneLook *look, ViewPo
     double depth = 1.05 * scene->reach + vec3_distance(camera.focus, scene->center);
     LayersKey key = {.camera = free_camera_projection(&camera, port.width, port.height, depth), .has_section = look->section};
     key.section_normal = vec3_unit_or(look->section_normal, key.camera.back);
-    Vec3 through = look->section_at_tip && scene->has_tip ? scene->tip : scene->center;
+    Vec3 fixed = vec3_is_finite(look->section_through) ? look->section_through : scene->center;
+    Vec3 through = look->section_at_tip && scene->has_tip ? scene->tip : fixed;
     key.section_offset = vec3_dot(key.section_normal, through) + look->section_offset_mm;
     return key;
 }
@@ -477,6 +479,12 @@ ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels)
         return (ScaleBar){0};
     double length = round_length(most);
     return (ScaleBar){length, length / scene->projection.mm_per_pixel};
+}
+
+bool vessel_scene_tip(const VesselScene *scene, Vec3 *tip)
+{
+    *tip = scene->tip;
+    return scene->has_tip;
 }
 
 const Camera *vessel_scene_projection(const VesselScene *scene) { return &scene->projection; }

@@ -39,7 +39,8 @@ typedef struct VesselSceneLook {
     bool show_arrows;                  // wall forces
     bool show_targets;
     bool section;                      // a clipping plane removes the part of the vessel on the side of its normal
-    bool section_at_tip;               // the plane passes through the tip, else through the middle of the scene …
+    bool section_at_tip;               // the plane passes through the tip, else through a fixed point, …
+    Vec3 section_through;              // … this one if it is finite (default: NAN), else the middle of the scene, …
     double section_offset_mm;          // … moved this far along its normal
     Vec3 section_normal;               // zero: towards the eye, as the camera turns
     bool follow_tip;                   // keeps the tip in the middle third of the view, overriding camera.focus
@@ -47,7 +48,7 @@ typedef struct VesselSceneLook {
     double force_full_scale_n;         // top of the colour map, and the force of an arrow of full length
     double font_scale;                 // for line widths, 1 for 96 dpi
 } VesselSceneLook;
-// Defaults: the camera shows the whole scene, face on; model, arrows and targets shown; 0.5 N; no section.
+// Defaults: the camera shows the whole scene, face on; arrows and targets shown; 0.5 N; no section.
 VesselSceneLook vessel_scene_default_look(const VesselScene *scene);
 
 // Returns NULL with a reason: mesh with indices out of range or numbers that are not finite, out of memory, or shaders that do not compile.
@@ -76,6 +77,8 @@ ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels);
 // Colour of a wall force: the tool's own colour at zero force, then the sequential map from purple to yellow; yellow at full scale and above.
 Color vessel_scene_force_color(double force_n, double full_scale_n, Color without);
 // The projection and the camera that were used (with follow_tip, the focus that was found): for projecting points, and for continuing when following ends.
+// The most distal tip; false if none was drawn.
+bool vessel_scene_tip(const VesselScene *scene, Vec3 *tip);
 const Camera *vessel_scene_projection(const VesselScene *scene);
 FreeCamera vessel_scene_camera(const VesselScene *scene);
 // Number of draws so far that had to redraw the layers.

@@ -46,10 +46,7 @@ FreeCamera free_camera_framing(int count, const Vec3 *point)
         camera.high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
     }
     frame_points(&camera, count, point);
-    camera.home_focus = camera.focus;
-    camera.home_turn = camera.turn;
-    camera.home_width_mm = camera.width_mm;
-    camera.home_height_mm = camera.height_mm;
+    free_camera_set_home(&camera);
     return camera;
 }
 
@@ -91,11 +88,24 @@ void free_camera_reset(FreeCamera *camera)
     camera->height_mm = camera->home_height_mm;
 }
 
-void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
+void free_camera_set_home(FreeCamera *camera)
+{
+    camera->home_focus = camera->focus;
+    camera->home_turn = camera->turn;
+    camera->home_width_mm = camera->width_mm;
+    camera->home_height_mm = camera->height_mm;
+}
+
+void free_camera_turn_along(FreeCamera *camera, Vec3 view, Vec3 up)
 {
     Camera axes = {0};
     camera_orient(&axes, view, up, 0, NULL);
     camera->turn = turn_of(axes.right, axes.up, axes.back);
+}
+
+void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
+{
+    free_camera_turn_along(camera, view, up);
     Vec3 corner[8];
     for (int k = 0; k < 8; k++)
         corner[k] = vec3(k & 1 ? camera->high.x : camera->low.x, k & 2 ? camera->high.y : camera->low.y, k & 4 ? camera->high.z : camera->low.z);

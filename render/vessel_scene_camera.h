@@ -28,6 +28,10 @@ void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int 
 void free_camera_reset(FreeCamera *camera);
 // Frames the whole scene, seen along `view` (from the eye into the scene), with `up`, made perpendicular to it, upwards.
 void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up);
+// Only turns the camera, as above; focus and zoom stay.
+void free_camera_turn_along(FreeCamera *camera, Vec3 view, Vec3 up);
+// The present view becomes the one that free_camera_reset restores.
+void free_camera_set_home(FreeCamera *camera);
 // The projection for a view of width x height; the depths drawn extend `depth` mm in front of and behind the focus.
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth);
 

@@ -36,11 +36,23 @@ typedef struct ViewsFrame {
     const VesselSceneLook *look;
     int scope_tool;                  // tool from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
     bool leaves_surroundings;        // of the views: does not clear what lies outside them
+    const XrayControl *second;       // controls of the second plane; NULL: the second image of the layout, if any, is the reference
     bool is_still;                   // an independent picture: nothing is reused from the previous frame
 } ViewsFrame;
 
 // Draws each view of the layout (secondary views in turn) into `framebuffer`, with a dark background between them.
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
+// The X-ray image as shown now becomes the reference image.
+void views_take_reference(Views *views, const Pose *pose);
+XrayControl views_reference(const Views *views);     // the controls with which it was taken
+// Keeps the views within a time budget: they are drawn at a share of the screen's resolution and enlarged. `most_ms` [CPU ms] of a picture with its panels; 0
+// (default): the screen's resolution. Independent pictures (is_still) and those of a recording (past) always have it.
+#define DRAWING_BUDGET_MS 26.0       // of a window with 30 pictures a second
+void views_set_budget(Views *views, double most_ms);
+void views_spend(Views *views, double ms);       // the cost of the last picture, for the next ones
+// Side of the X-ray image as drawn last, and on the screen [pixel]; screen pixels per drawn pixel of a view.
+void views_xray_sides(const Views *views, int *drawn, int *shown);
+double views_enlargement(const Views *views, PanelView view);
 const VesselScene *views_scene(const Views *views);
 Fluoroscope *views_fluoroscope(Views *views);
 

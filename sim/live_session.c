@@ -54,6 +54,8 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
         RecordingOptions record = recording_session_options();
         record.trainee = options->trainee;
         record.date = options->date;
+        const XrayPatient patient = xray_patient_around(open->tree, scene->patient_anterior, scene->patient_superior);
+        record.patient = &patient;
         snprintf(session->record_path, sizeof session->record_path, "%s", options->record_path);
         session->recording = recording_create(options->record_path, session->simulator, &record, faults);
     }

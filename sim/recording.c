@@ -369,6 +369,13 @@ static bool write_session(hid_t place, const RecordingOptions *options)
     return !options->trainee || (write_text(place, "trainee", NULL, options->trainee) && write_text(place, "date", NULL, options->date));
 }
 
+// The patient of the tube model: with /xray they give tube voltage, current and dose of each step (sim/xray_tube.h).
+static bool write_patient(hid_t file, const XrayPatient *patient)
+{
+    return !patient || (write_number(file, "patient_half_side_mm", patient->half_mm[0]) && write_number(file, "patient_half_front_mm", patient->half_mm[1]) &&
+                        write_number(file, "patient_half_head_mm", patient->half_mm[2]) && write_number(file, "patient_water", patient->water));
+}
+
 // /scene: the text, and path and sha256 of every input file of the run, one per line.
 static bool write_scene(Recording *recording, const Scene *scene)
 {
@@ -508,7 +515,7 @@ static bool build_file(Recording *recording, const Scene *scene)
     hid_t file = recording->file;
     bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 2) &&
                 write_text(file, "created_by", NULL, "seldinger " SELDINGER_VERSION) && write_number(file, "step_ms", scene->dt) &&
-                write_number(file, "frame_ms", recording->options.frame_ms);
+                write_number(file, "frame_ms", recording->options.frame_ms) && write_patient(file, recording->options.patient);
     return good && create_groups(recording, "") && create_motion(recording) && create_datasets(recording) && write_tools(recording, scene) &&
            write_scene(recording, scene);
 }

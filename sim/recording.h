@@ -41,6 +41,7 @@
 
 #include "sim/simulator.h"
 #include "sim/xray.h"
+#include "sim/xray_tube.h"
 
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
@@ -48,6 +49,7 @@ typedef struct RecordingOptions {
                              // Default 0: everything is exact
     double flush_s;          // simulated time per chunk; flushes wait for whole chunks, and for at least half that time in wall time. Default 0.2
     const char *trainee, *date;      // of a session (session_date()), else NULL
+    const XrayPatient *patient;      // for the dose of a session, else NULL
     int64_t expected_steps;  // determines the size of the chunks and of their index; 0 or 1: unknown, at most 14 hours
     int file_count;          // number of further files that the run depends on, in addition to those of the scene
     const char *const *file;

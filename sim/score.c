@@ -4,6 +4,7 @@
 #include "sim/score_points.h"
 #include "sim/score_path.h"
 #include "sim/score_tool.h"
+#include "sim/xray_tube.h"
 
 #include <stdlib.h>
 
@@ -51,8 +52,8 @@ struct Score {
     Vec3 path_from;              // end of the last chord of the tip's path
     double wall_force;           // [N] mean
     ScoreEpisode episode[ERROR_COUNT];       // of errors that belong to no single tool
-    double pulse_phase;          // phase of the next X-ray pulse; 1: due now
-    bool had_pedal;
+    XrayPatient patient;
+    DoseMeter dose;
     double fed[TOOLS_MOST];      // [mm] in this step
     double since_shown[TOOLS_MOST];      // [ms] since a pulse showed the tool's tip
     double since_glance;         // [ms] since the 3D view or angioscopy was in sight
@@ -155,6 +156,7 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     score->scene = scene;
     score->exercise = scene->exercise ? *scene->exercise : exercise_default();
     score->dt = scene->dt;
+    score->patient = xray_patient_around(tree, scene->patient_anterior, scene->patient_superior);
     int at = score->exercise.target, led = leader(score, simulator_stepper(simulator));
     Vec3 tip = stepper_tool_place(simulator_stepper(simulator), led, stepper_tool_length(simulator_stepper(simulator), led)).position;
     Vec3 target = at >= 0 ? scene->target[at].point : tip;
@@ -218,29 +220,19 @@ static void judge_limit(Score *score, ScoreError kind, int tool, double measure,
 
 // --- X-rays and contrast ---
 
-static double open_area_cm2(const XrayControl *xray)
-{
-    const float *blade = xray->collimator;
-    double wide = fmax(1 - 0.5 * ((double)blade[0] + blade[1]), 0), high = fmax(1 - 0.5 * ((double)blade[2] + blade[3]), 0);
-    return (double)xray->field_mm * xray->field_mm * wide * high / 100;
-}
-
 // Returns the number of pulses in this step.
 static int64_t count_pulses(Score *score, const XrayControl *xray, double seconds)
 {
     ScoreFigures *f = &score->figures;
-    bool pedal = xray->pedal > 0.5F;
-    int64_t pulses = 0;
-    if (pedal) {
-        double rate = fmin(fmax((double)xray->pulses_s, 0), 1000);
-        f->fluoroscopy_s += seconds;
-        score->pulse_phase = score->had_pedal ? score->pulse_phase + rate * seconds : 1;
-        pulses = (int64_t)(score->pulse_phase + 1e-9);
-        score->pulse_phase -= (double)pulses;
-        f->pulses += pulses;
-        f->dose_area_cm2 += (double)pulses * open_area_cm2(xray);
-    }
-    score->had_pedal = pedal;
+    int64_t pulses = dose_meter_step(&score->dose, &score->patient, xray, seconds);
+    f->fluoroscopy_s = score->dose.fluoroscopy_s;
+    f->pulses = score->dose.pulses;
+    f->dose_area_cm2 = score->dose.area_cm2;
+    f->air_kerma_mgy = score->dose.kerma_mgy;
+    f->kerma_area_gy_cm2 = score->dose.kerma_area_gy_cm2;
+    f->mean_kv = f->pulses > 0 ? score->dose.kv_sum / (double)f->pulses : 0;
+    f->mean_ma = f->pulses > 0 ? score->dose.ma_sum / (double)f->pulses : 0;
+    f->pulse = score->dose.last;
     return pulses;
 }
 
@@ -258,7 +250,7 @@ static void see_pulses(Score *score, const XrayControl *xray, int64_t pulses)
 static bool is_seen(const Score *score, const Stepper *stepper, int tool)
 {
     double inserted = stepper_tool_inserted(stepper, tool) - 1e-9;
-    for (int k = 0; k < score->tool_count && score->had_pedal; k++)
+    for (int k = 0; k < score->tool_count && score->dose.had_pedal; k++)
         if (stepper_tool_inserted(stepper, k) >= inserted && score->since_shown[k] <= FRESH_MS)
             return true;
     return false;

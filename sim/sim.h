@@ -51,5 +51,6 @@
 #include "sim/session_files.h"
 #include "sim/shelf.h"
 #include "sim/xray.h"
+#include "sim/xray_tube.h"
 
 #endif

@@ -274,6 +274,52 @@ static void the_eye_stays_inside_and_sees_the_tip(void **state)
     stage_close(&stage);
 }
 
+// With a tree the eye looks along the centreline ahead, into the branch to which the tool points, and sees a small tip; without one it looks along the tool.
+static void the_eye_looks_along_the_lumen(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    enum { STEM = 21, BRANCH = 20, NODES = STEM + 2 * BRANCH };
+    Vec3 center[NODES];
+    double radius[NODES];
+    int parent[NODES];
+    char message[256] = "";
+    for (int i = 0; i < NODES; i++) {        // a stem along x to (20, 0, 0), then one branch straight on and one at 60 degrees towards y
+        double along = i < STEM ? i : (i - STEM) % BRANCH + 1;
+        Vec3 towards = i < STEM + BRANCH ? vec3(1, 0, 0) : vec3(0.5, sqrt(0.75), 0);
+        center[i] = vec3_add_scaled(vec3(i < STEM ? 0 : 20, 0, 0), along, towards);
+        radius[i] = 2;
+        parent[i] = i == STEM + BRANCH ? STEM - 1 : i - 1;
+    }
+    VesselTree tree = {.node_count = NODES, .center = center, .radius = radius, .parent = parent};
+    Angioscope *plain = angioscope_create(NULL, NULL, NULL, message, sizeof message), *scope = angioscope_create(NULL, NULL, &tree, message, sizeof message);
+    assert_non_null(plain);
+    assert_non_null(scope);
+    for (int side = 0; side < 2; side++) {
+        // the tip at (19, 0, 0), bent by 40 degrees to either side
+        Vec3 look = vec3(cos(0.7), side ? -sin(0.7) : sin(0.7), 0);
+        Pose *pose = straight_pose(20, vec3_add_scaled(vec3(19, 0, 0), -19, look), look, vec3(0, 0, 1), 1, tool_radius);
+        for (int i = 0; i < 20; i++)
+            pose->node[i].vessel_node = 19;
+        AngioscopeView view, before;
+        assert_true(angioscope_view(scope, pose, 0, &view) && angioscope_view(plain, pose, 0, &before));
+        assert_near(vec3_distance(before.forward, look), 0, 1e-9);
+        // six millimetres ahead: in the branch at 60 degrees, or straight on
+        Vec3 ahead = side ? vec3(25, 0, 0) : vec3_add_scaled(vec3(20, 0, 0), 5, vec3(0.5, sqrt(0.75), 0));
+        Vec3 wanted = vec3_unit(vec3_sub(ahead, view.eye));
+        assert_true(vec3_dot(view.forward, wanted) > vec3_dot(before.forward, wanted) + 0.01);
+        assert_true(vec3_dot(view.forward, wanted) > 0.97);
+        Vec3 tip = vec3(19, 0, 0);
+        assert_true(vec3_distance(view.eye, tip) > 1.2 * vec3_distance(before.eye, tip));        // farther, so smaller
+        pose_free(pose);
+    }
+    angioscope_destroy(plain);
+    angioscope_destroy(scope);
+    stage_close(&stage);
+}
+
 // A catheter of R 0.5 and lumen 0.3 mm with a wire of 0.18 mm in a vessel of radius 2.5 along x.
 static Pose *wire_in_catheter(double catheter, double wire) { return coaxial_pose(catheter, wire, 0.5, 0.5, tool_radius); }
 
@@ -460,10 +506,15 @@ static void nothing_breaks_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_straight_tube_is_evenly_round),           cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
-        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture), cmocka_unit_test(normals_are_the_vessel_s_own),
-        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),     cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
-        cmocka_unit_test(tools_are_seen_from_in_each_other),         cmocka_unit_test(nothing_breaks_it),
+        cmocka_unit_test(a_straight_tube_is_evenly_round),
+        cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
+        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture),
+        cmocka_unit_test(normals_are_the_vessel_s_own),
+        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),
+        cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
+        cmocka_unit_test(tools_are_seen_from_in_each_other),
+        cmocka_unit_test(nothing_breaks_it),
+        cmocka_unit_test(the_eye_looks_along_the_lumen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -107,6 +107,78 @@ static void known_thickness_gives_known_grey(void **state)
     mesh_clear(&ball);
 }
 
+// A pipe that ends at its mouth, with or without a tool; of the thickness of its wall on both sides.
+static void the_sheath_is_seen_up_to_its_mouth(void **state)
+{
+    (void)state;
+    FluoroscopeOptions options = quiet_room(NULL);
+    options.sheath = (SheathLook){.is_there = true, .mouth = {0, 0, -3}, .direction = {1, 0, 0}, .radius = 6, .lumen = 3, .attenuation = 0.05};
+    XrayRoom *s = room_open(&options, 240);
+    if (!s)
+        skip();
+    room_draw(s);
+    assert_near(room_grey(s, 120 - 40, 120 - 12), live_grey(0.05 * 6), 1.5);
+    const double beside = 18.5 / 4;           // [mm] of that pixel's centre: beside the lumen the ray has the whole wall
+    assert_near(room_grey(s, 120 - 40, 120 - 12 + 18), live_grey(0.05 * 2 * sqrt(36 - beside * beside)), 1.5);
+    assert_near(room_grey(s, 120 + 20, 120 - 12), live_grey(0), 1);
+    assert_near(room_grey(s, 120 - 40, 120 + 20), live_grey(0), 1);
+    room_close(s);
+}
+
+// The reference is the image that was shown when it was taken, pixel by pixel, whatever the live one shows later; it has no memory of its own.
+static void a_reference_image_stays(void **state)
+{
+    (void)state;
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, quiet_room(NULL), vec3(-30, 0, -3), vec3(30, 0, -3), 200);
+    if (!s)
+        skip();
+    const size_t bytes = (size_t)200 * 200 * 3;
+    uint8_t *before = malloc(bytes);
+    float half = 0.5F;
+    assert_non_null(before);
+    s->frame.contrast = &half;
+    room_draw(s);
+    memcpy(before, s->rgb, bytes);
+    Fluoroscope *live = s->view, *reference = fluoroscope_create_beside(live, patient.wire.pose);
+    assert_non_null(reference);
+    fluoroscope_take_picture(reference, live);
+    s->frame.contrast = NULL;
+    s->frame.xray.lao_deg = 40;
+    s->frame.pulse = 9;
+    room_draw(s);
+    assert_true(memcmp(before, s->rgb, bytes) != 0);
+    s->view = reference;
+    s->frame.xray.pedal = 0;
+    room_draw(s);
+    int differ = 0;
+    for (int y = 0; y < 200; y++)            // except the sign of a held image in the corner
+        for (int x = 0; x < 200; x++)
+            differ += (y >= 40 || x < 160) && before[3 * (200 * y + x)] != s->rgb[3 * (200 * y + x)];
+    assert_int_equal(differ, 0);
+    // as a second plane it takes pulses of its own, and the first one is not disturbed
+    s->view = live;
+    s->frame.xray.pedal = 1;
+    s->frame.pulse = 10;
+    room_draw(s);
+    memcpy(before, s->rgb, bytes);
+    s->view = reference;
+    s->frame.xray.lao_deg = -50;
+    room_draw(s);
+    assert_true(memcmp(before, s->rgb, bytes) != 0);
+    s->view = live;
+    s->frame.xray.pedal = 0;
+    room_draw(s);
+    differ = 0;
+    for (int y = 40; y < 200; y++)
+        for (int x = 0; x < 200; x++)
+            differ += before[3 * (200 * y + x)] != s->rgb[3 * (200 * y + x)];
+    assert_int_equal(differ, 0);
+    fluoroscope_destroy(reference);
+    free(before);
+    patient_close(&patient);
+}
+
 // A thicker device replaces the tool, with fewer nodes at other places: the picture is as if it had been there from the start; then the first one again.
 static void an_exchanged_tool_is_seen_as_it_is(void **state)
 {
@@ -634,6 +706,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(known_thickness_gives_known_grey),
+        cmocka_unit_test(the_sheath_is_seen_up_to_its_mouth),
+        cmocka_unit_test(a_reference_image_stays),
         cmocka_unit_test(an_exchanged_tool_is_seen_as_it_is),
         cmocka_unit_test(noise_is_that_of_the_quanta),
         cmocka_unit_test(the_same_pulse_gives_the_same_picture),

@@ -419,6 +419,123 @@ static void keys_choose_what_is_seen(void **state)
     assert_true(controls.look.camera.width_mm < width);
 }
 
+static void the_wheel_magnifies_towards_the_pointer(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    controls.xray.lao_deg = 30;
+    controls.xray.cra_deg = 20;
+    // the view is 600 x 400: the pointer is at a quarter of the square's side to the right of its middle and an eighth above
+    PanelActions actions = {.mouse = {.view = VIEW_FLUOROSCOPY, .x = 0.5 + 100 / 600.0, .y = 0.625, .scroll = 2}};
+    CArm arm = c_arm_place(&controls.xray, &controls.patient);
+    Vec3 under = vec3_add_scaled(vec3_add_scaled(arm.isocentre, 0.25 * arm.field_mm, arm.right), 0.125 * arm.field_mm, arm.up);
+    obey(&controls, &actions, 0.02);
+    CArm after = c_arm_place(&controls.xray, &controls.patient);
+    assert_near(after.field_mm, arm.field_mm / 1.25, 1e-4);
+    Vec3 at = c_arm_project(&after, under);
+    assert_near(at.x, 0.25, 1e-5);
+    assert_near(at.y, 0.125, 1e-5);
+    actions.mouse.scroll = -2;               // and back
+    obey(&controls, &actions, 0.02);
+    assert_near(vec3_distance(c_arm_place(&controls.xray, &controls.patient).isocentre, arm.isocentre), 0, 1e-4);
+}
+
+static void positions_are_stored_and_found_again(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    press(&controls, ACTION_RECALL, 1);      // nothing is stored
+    assert_true(controls.xray.lao_deg == 0);
+    press(&controls, ACTION_LATERAL, 1);
+    assert_true(controls.xray.lao_deg == 90 && controls.xray.cra_deg == 0);
+    press(&controls, ACTION_STORE, 1);
+    press(&controls, ACTION_AP, 1);
+    controls.xray.field_mm = 100;
+    controls.xray.table_mm[1] = 7;
+    press(&controls, ACTION_STORE, 1);
+    press(&controls, ACTION_RECALL, 1);
+    assert_true(controls.xray.lao_deg == 90 && controls.xray.field_mm == 160 && controls.xray.table_mm[1] == 0);
+    press(&controls, ACTION_RECALL, 1);
+    assert_true(controls.xray.lao_deg == 0 && controls.xray.field_mm == 100 && controls.xray.table_mm[1] == 7);
+    for (int i = 0; i < STORED_POSITIONS; i++) {     // the oldest are replaced
+        controls.xray.lao_deg = (float)i;
+        press(&controls, ACTION_STORE, 1);
+    }
+    assert_int_equal(controls.stored_count, STORED_POSITIONS);
+    bool found[STORED_POSITIONS] = {false};
+    for (int i = 0; i < STORED_POSITIONS; i++) {
+        press(&controls, ACTION_RECALL, 1);
+        found[(int)controls.xray.lao_deg] = true;
+    }
+    for (int i = 0; i < STORED_POSITIONS; i++)
+        assert_true(found[i]);
+}
+
+static void a_second_image_has_its_place(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    press(&controls, ACTION_BIPLANE, 1);
+    assert_int_equal(controls.second, SECOND_PLANE);
+    press(&controls, ACTION_REFERENCE, 1);
+    assert_int_equal(controls.second, SECOND_REFERENCE);
+    press(&controls, ACTION_REFERENCE, 1);
+    assert_int_equal(controls.second, SECOND_NONE);
+    for (int lao = -90; lao <= 90; lao += 15) {      // perpendicular to the first plane, within the C-arm's range
+        controls.xray.lao_deg = (float)lao;
+        XrayControl second = controls_second_plane(&controls.xray);
+        CArm a = c_arm_place(&controls.xray, &controls.patient), b = c_arm_place(&second, &controls.patient);
+        assert_near(vec3_dot(a.towards, b.towards), 0, 1e-6);
+        assert_true(second.lao_deg >= -90 && second.lao_deg <= 90);
+    }
+    for (int k = 0; k < 4; k++) {
+        PanelLayout beside = k == 3 ? panel_layout_xray_alone(1280, 720, 1, true) : panel_layout(1280, 720, 1, k == 1 ? VIEW_ALL : VIEW_FLUOROSCOPY, k < 2);
+        panel_layout_add_second(&beside, 720);
+        const PanelRect *first = &beside.view_rect[VIEW_FLUOROSCOPY], *at = &beside.second_rect;
+        assert_true(at->width > 250 && at->height > 250);
+        assert_true(at->x >= first->x + first->width || at->y >= first->y + first->height);
+        assert_true(at->x + at->width <= 1280 && at->y + at->height <= 720);
+        assert_true(beside.right.width <= 0 || at->y + at->height <= beside.right.y || at->x + at->width <= beside.right.x);
+        assert_int_equal(beside.second.y, 720 - (int)(at->y + at->height));
+        assert_true(beside.view[VIEW_3D].width == 0 && beside.view[VIEW_ANGIOSCOPY].width == 0);
+    }
+    PanelLayout other = panel_layout(1280, 720, 1, VIEW_3D, true);
+    panel_layout_add_second(&other, 720);
+    assert_int_equal(other.second.width, 0);
+}
+
+// The axes of the 3D view, right, up and towards the eye, are those of the X-ray image.
+static void expect_view_of_arm(const OperatorControls *controls)
+{
+    CArm arm = c_arm_place(&controls->xray, &controls->patient);
+    Camera view = free_camera_projection(&controls->look.camera, 100, 100, 1);
+    assert_near(vec3_distance(view.right, arm.right), 0, 1e-9);
+    assert_near(vec3_distance(view.up, arm.up), 0, 1e-9);
+    assert_near(vec3_distance(view.back, arm.towards), 0, 1e-9);
+}
+
+static void the_3d_view_starts_and_turns_with_the_c_arm(void **state)
+{
+    (void)state;
+    OperatorControls controls = controls_in_front();
+    controls.xray.lao_deg = -25;
+    controls.look.camera.high = vec3(10, 20, 30);
+    controls_look_from_arm(&controls);
+    expect_view_of_arm(&controls);
+    hold(&controls, ACTION_LAO, 1, 10);
+    Camera still = free_camera_projection(&controls.look.camera, 100, 100, 1);
+    press(&controls, ACTION_CAMERA_C_ARM, 1);
+    hold(&controls, ACTION_CRA, 1, 10);
+    expect_view_of_arm(&controls);
+    assert_true(vec3_distance(free_camera_projection(&controls.look.camera, 100, 100, 1).back, still.back) > 0.1);
+    hold(&controls, ACTION_ORBIT_LEFT, 0.1, 1);      // the hand on the camera ends it
+    assert_false(controls.follows_arm);
+    press(&controls, ACTION_CAMERA_RESET, 1);
+    controls.xray.lao_deg = -25;
+    controls.xray.cra_deg = 0;
+    expect_view_of_arm(&controls);           // front is as the C-arm stood at the start
+}
+
 // A tip is in the open field until a blade, the table or the magnification takes it out; views count only if they have a place.
 static void what_a_window_shows_is_noted(void **state)
 {
@@ -491,6 +608,10 @@ int main(void)
                                        cmocka_unit_test(the_mouse_turns_the_c_arm_and_magnifies),
                                        cmocka_unit_test(the_mouse_moves_the_free_camera),
                                        cmocka_unit_test(keys_choose_what_is_seen),
+                                       cmocka_unit_test(the_wheel_magnifies_towards_the_pointer),
+                                       cmocka_unit_test(positions_are_stored_and_found_again),
+                                       cmocka_unit_test(a_second_image_has_its_place),
+                                       cmocka_unit_test(the_3d_view_starts_and_turns_with_the_c_arm),
                                        cmocka_unit_test(what_a_window_shows_is_noted),
                                        cmocka_unit_test(an_examination_refuses_the_keys_of_hidden_views)};
     return cmocka_run_group_tests(tests, NULL, NULL);
