@@ -103,8 +103,8 @@ static void read_rules(YamlValue value, ExerciseRules *rules)
 
 void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
 {
-    static const char *const keys[] = {"title",        "instructions", "level", "target", "tool",    "exchange",     "stays", "hold_s",
-                                       "time_limit_s", "rules",        "par",   "weights", "error_points", "mode", "consequences", "steps", NULL};
+    static const char *const keys[] = {"title", "instructions", "level",   "target",       "tool", "exchange",     "stays", "hold_s", "time_limit_s",
+                                       "rules", "par",          "weights", "error_points", "mode", "consequences", "steps", NULL};
     static const char *const mode[] = {"practice", "examination", NULL};
     *exercise = exercise_default();
     YamlMap map = yaml_map(value, keys);

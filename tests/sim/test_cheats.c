@@ -144,7 +144,8 @@ static void pars_follow(const char *name, const Exercise *exercise, const ScoreF
     for (int i = 0; i <= PART_WALL_IMPULSE; i++) {
         const double par = ceil(times[i] * solved->judged[i].measured / step[i] - 1e-6) * step[i];
         if (fabs(par - exercise->par[i]) > 1e-9)
-            wrong++, print_error("%s: %s is %g, the solving hand's %g gives %g\n", name, score_part_par_name[i], exercise->par[i], solved->judged[i].measured, par);
+            wrong++,
+                print_error("%s: %s is %g, the solving hand's %g gives %g\n", name, score_part_par_name[i], exercise->par[i], solved->judged[i].measured, par);
     }
     assert_int_equal(wrong, 0);
 }
@@ -271,10 +272,10 @@ static void with_another_wire(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(in_the_aneurysm),     cmocka_unit_test(with_a_microcatheter),          cmocka_unit_test(over_the_wire),
-        cmocka_unit_test(in_the_left_carotid), cmocka_unit_test(in_the_middle_cerebral_artery), cmocka_unit_test(with_a_simmons_catheter),
-        cmocka_unit_test(with_a_stiff_wire),   cmocka_unit_test(round_a_gentle_bend),           cmocka_unit_test(into_a_branch),
-        cmocka_unit_test(into_a_sac_off_its_wall), cmocka_unit_test(through_a_winding_vessel),  cmocka_unit_test(over_the_fork_into_the_other_leg),
+        cmocka_unit_test(in_the_aneurysm),         cmocka_unit_test(with_a_microcatheter),          cmocka_unit_test(over_the_wire),
+        cmocka_unit_test(in_the_left_carotid),     cmocka_unit_test(in_the_middle_cerebral_artery), cmocka_unit_test(with_a_simmons_catheter),
+        cmocka_unit_test(with_a_stiff_wire),       cmocka_unit_test(round_a_gentle_bend),           cmocka_unit_test(into_a_branch),
+        cmocka_unit_test(into_a_sac_off_its_wall), cmocka_unit_test(through_a_winding_vessel),      cmocka_unit_test(over_the_fork_into_the_other_leg),
         cmocka_unit_test(with_another_wire),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -21,9 +21,10 @@
 static void an_exercise_is_read(void **state)
 {
     (void)state;
-    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, "
-                                                      "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7, level: 4, mode: examination"),
-                                 NULL);
+    Practice *p =
+        practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, "
+                                            "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7, level: 4, mode: examination"),
+                       NULL);
     const Exercise *e = p->scene->exercise;
     assert_string_equal(e->title, "Go there");
     assert_string_equal(e->instructions, "Push.");
