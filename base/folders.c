@@ -32,3 +32,10 @@ bool folders_cache(char *out, size_t capacity)
                                  : -1;
     return length > 0 && (size_t)length < capacity;
 }
+
+bool folders_config(char *out, size_t capacity)
+{
+    const char *xdg = getenv("XDG_CONFIG_HOME"), *home = getenv("HOME");
+    int length = xdg && *xdg ? snprintf(out, capacity, "%s/seldinger", xdg) : home && *home ? snprintf(out, capacity, "%s/.config/seldinger", home) : -1;
+    return length > 0 && (size_t)length < capacity;
+}

@@ -1,4 +1,4 @@
-// Folders: creation with all parents, and the user's cache.
+// Folders: creation with all parents, the user's cache and settings.
 #ifndef SELDINGER_BASE_FOLDERS_H
 #define SELDINGER_BASE_FOLDERS_H
 
@@ -9,5 +9,7 @@
 bool folders_create(char *path);
 // The folder of the user's cache: $SELDINGER_CACHE, else $XDG_CACHE_HOME/seldinger, else ~/.cache/seldinger. Returns false if none is known or it does not fit.
 bool folders_cache(char *out, size_t capacity);
+// The folder of the user's settings: $XDG_CONFIG_HOME/seldinger, else ~/.config/seldinger. Returns false as above.
+bool folders_config(char *out, size_t capacity);
 
 #endif

@@ -1,6 +1,7 @@
 #include "cli/case_open.h"
 
 #include "cli/child_verb.h"
+#include "cli/user_settings.h"
 #include "cli/file_kind.h"
 #include "cli/start.h"
 
@@ -22,6 +23,7 @@ bool case_library(char out[PATH_MAX])
 int case_open(const CaseWindowOptions *options, Faults *faults)
 {
     char steer[PATH_MAX];
+    cli_use_settings();
     if (!case_window_run(options, steer, sizeof steer, faults))
         return EXIT_BAD_INPUT;
     if (!steer[0])

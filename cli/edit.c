@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output_plan.h"
+#include "cli/user_settings.h"
 #include "recon/recon.h"
 #include "render/render.h"
 
@@ -69,6 +70,7 @@ static void open_window(const EditCommand *command, const EditFile *file, SweepE
 {
     const EditWindowOptions window = {command->model, command->output, command->picture, command->width, command->height, command->duration_s};
     Volume *volume = command->volume ? volume_load(command->volume, faults) : NULL;
+    cli_use_settings();
     if (faults->count == 0)
         edit_window_run(&window, file, editor, volume, faults);
     volume_free(volume);

@@ -4,6 +4,7 @@
 #include "cli/case_open.h"
 #include "cli/output_plan.h"
 #include "cli/scene_input.h"
+#include "cli/user_settings.h"
 #include "render/render.h"
 #include "sim/sim.h"
 
@@ -21,7 +22,7 @@ typedef struct NavOptions {
 static const Option rows[] = {
     {"device", "F.yaml", OPTION_FILE, AT(map),
      "device map (examples: scenes/devices; `seldinger devices` lists the connected devices); up to 8. Joysticks, gamepads and haptic devices have built-in "
-     "maps",
+     "maps, and maps made in the start window are used too",
      .count = offsetof(NavOptions, map_count), .times = TRAINER_MAPS},
     {"only-mapped", NULL, OPTION_CLEARED, AT(trainer.has_built_in_maps), "uses only devices whose map is given with --device"},
     {"trainee", "NAME", OPTION_TEXT, AT(trainer.trainee), "name of the trainee, for the report"},
@@ -89,6 +90,8 @@ static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, cons
     for (int i = 0; i < options->map_count; i++)
         if ((map[i] = device_map_load(options->map[i], faults)) && device_map_find_tools(map[i], &tools, faults))
             trainer.map_count++;
+    if (trainer.has_built_in_maps && faults->count == 0)
+        trainer.map_count += cli_own_maps(map + trainer.map_count, TRAINER_MAPS - trainer.map_count);
     if (trainer.is_recorded)
         session_folder(options->sessions, folder, sizeof folder, faults);
     trainer.folder = folder;
@@ -128,6 +131,7 @@ static int call(void *structure, Faults *faults)
     OpenVessel open = {0};
     int code = EXIT_BAD_INPUT;
     recording_prepare_process();
+    cli_use_settings();
     Scene *scene = cli_scene_input(nav->scene, nav->trainer.threads, nav->quiet, faults);
     OutputPlan plan = {.faults = faults};
     output_plan_write(&plan, "--figures", nav->figures);

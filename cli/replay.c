@@ -4,7 +4,7 @@
 #include "cli/replay_beside.h"
 #include "cli/replay_options.h"
 #include "cli/output_plan.h"
-#include "sim/sim.h"
+#include "cli/user_settings.h"
 #include "render/render.h"
 
 #include <inttypes.h>
@@ -77,6 +77,7 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
                                   .cra_deg = options->cra_deg};
     bool resumes = false;
     double resume_s = 0;
+    cli_use_settings();
     bool is_shown = replay_window_run(&window, run, scene, open, &resumes, &resume_s, faults);
     replay_beside_close(&beside);
     if (!is_shown)

@@ -2,8 +2,10 @@
 #include "cli/start.h"
 
 #include "base/base.h"
+#include "cli/case_pictures.h"
 #include "cli/child_verb.h"
 #include "cli/file_kind.h"
+#include "cli/user_settings.h"
 #include "render/render.h"
 #include "sim/sim.h"
 
@@ -72,17 +74,24 @@ int start_run(void)
     char *cases = folders_cache(cache, sizeof cache) ? text_file_in(cache, "cases") : NULL;
     const char *folder[] = {exercises_folder(exercises) ? exercises : NULL, cases};
     bool goes_on = session_folder(NULL, sessions, sizeof sessions, &faults);
+    pid_t pictures = -1;
     recall_folder(&state);
+    cli_use_settings();
     while (goes_on) {
         Shelf shelf;
         StartOptions options = {.shelf = &shelf, .message = message, .width = 1280, .height = 720};
         if (!shelf_read(&shelf, folder, 2, sessions))
             faults_add(&faults, "seldinger", 0, 0, "out of memory for the list of cases");
+        if (pictures < 0)
+            pictures = case_pictures_begin(&shelf);
         StartChoice choice = faults.count == 0 ? start_window_run(&options, &state, &faults) : START_LEAVE;
         shelf_free(&shelf);
         keep_folder(&state);
+        case_pictures_pause(pictures, true);
         goes_on = choice != START_LEAVE && child_verb_run(verb_for(choice, state.path), &state, message);
+        case_pictures_pause(pictures, false);
     }
+    case_pictures_end(pictures);
     free(cases);
     static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];
     faults_print(&faults, text, sizeof text);

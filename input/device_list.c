@@ -3,6 +3,7 @@
 #include "input/force_feedback.h"
 #include "input/hand.h"
 #include "input/map_state.h"
+#include "input/own_maps.h"
 
 #include <dirent.h>
 #include <stdio.h>
@@ -17,6 +18,7 @@ bool device_list_load_maps(DeviceList *list, int map_count, const char *const *p
         if (map)
             list->map[list->map_count++] = map;
     }
+    list->map_count += own_maps_load(list->map + list->map_count, LIST_MAPS - list->map_count, faults);
     list->own_map_count = list->map_count;
     for (int i = 0; i < BUILT_IN_COUNT; i++)
         if (!(list->map[list->map_count++] = device_map_built_in((BuiltInMap)i)))

@@ -32,7 +32,7 @@ typedef struct DeviceList {
     int map_count, own_map_count;
 } DeviceList;
 
-// Loads the user's maps (at most LIST_MAPS files) and adds the built-in ones after them: the first map that fits a device is used. False with faults.
+// Loads the user's maps (at most LIST_MAPS files), then those made in the start window (input/own_maps.h), and adds the built-in ones after them: the first map that fits a device is used. False with faults.
 bool device_list_load_maps(DeviceList *list, int map_count, const char *const *path, Faults *faults);
 // Fills the rest of a list that was zero except for its maps. `transport` NULL: no HID devices. Each device that has a map is opened once.
 void device_list_look(DeviceList *list, const HidTransport *transport);

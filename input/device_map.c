@@ -432,3 +432,12 @@ DeviceMap *device_map_load(const char *path, Faults *faults)
     free(text);
     return map;
 }
+
+void device_map_scale(DeviceMap *map, double push, double twist)
+{
+    for (int i = 0; i < map->axis_count; i++) {
+        double factor = map->axis[i].is_twist ? twist : push;
+        map->axis[i].scale *= fabs(factor);
+        map->axis[i].invert ^= factor < 0;
+    }
+}

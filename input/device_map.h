@@ -124,6 +124,8 @@ typedef struct DeviceMap {
 // Returns NULL with all faults (FILE:LINE:COL). Free with free().
 DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults);
 DeviceMap *device_map_load(const char *path, Faults *faults);
+// Multiplies the scales of push and twist by factors that are not 0; a negative one inverts the axes, also for the force.
+void device_map_scale(DeviceMap *map, double push, double twist);
 // Finds the tools of a map in a scene. Returns false with faults if a name is missing or a kind is ambiguous.
 bool device_map_find_tools(DeviceMap *map, const ToolNames *tools, Faults *faults);
 // Returns true and "roller.yaml and stick.yaml both move wire …" if several of these maps move one tool. Call after device_map_find_tools().

@@ -307,7 +307,7 @@ static void *run_scanner(void *argument)
 
 // --- the session ---
 
-HandsOptions hands_default_options(void) { return (HandsOptions){.use_built_in = true, .use_usb = true, .rescan_ms = 500}; }
+HandsOptions hands_default_options(void) { return (HandsOptions){.use_built_in = true, .push = 1, .twist = 1, .use_usb = true, .rescan_ms = 500}; }
 
 static bool copy_maps(Hands *hands, const HandsOptions *options)
 {
@@ -319,7 +319,9 @@ static bool copy_maps(Hands *hands, const HandsOptions *options)
         hands->map_count = i + 1;
     }
     for (int i = 0; i < BUILT_IN_COUNT; i++)
-        if (!(hands->built_in[i] = device_map_built_in((BuiltInMap)i)))
+        if ((hands->built_in[i] = device_map_built_in((BuiltInMap)i)))
+            device_map_scale(hands->built_in[i], options->push, options->twist);
+        else
             return false;
     return true;
 }

@@ -26,6 +26,7 @@ typedef struct HandsOptions {
     const DeviceMap *const *map;     // the user's maps, copied; the first match is used, before the built-in ones
     int map_count;
     bool use_built_in;               // default true: joysticks, gamepads, multi-axis controllers and haptic devices without a user map
+    double push, twist;              // default 1: factors of the scales of the built-in maps; negative: inverted
     bool use_usb;                    // default true: look for USB serial encoders if a map selects one
     int rescan_ms;                   // interval between scans, default 500
     const HidTransport *transport;   // NULL: hidapi; otherwise the caller's, which must outlive the Hands

@@ -5,6 +5,8 @@
 #define SELDINGER_INPUT_INPUT_H
 
 #include "input/command.h"
+#include "input/learned_map.h"
+#include "input/own_maps.h"
 #include "input/script.h"
 #include "input/device_map.h"
 #include "input/device_report.h"
@@ -12,5 +14,6 @@
 #include "input/gamepad.h"
 #include "input/hand.h"
 #include "input/hand_port.h"
+#include "input/watched.h"
 
 #endif

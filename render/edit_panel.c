@@ -1,5 +1,6 @@
 // See edit_panel.h.
 #include "render/edit_panel.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -16,10 +17,10 @@ static const char *const key_help[][2] = {{"click on the wall", "goes there"},
                                           {"drag a handle", "moves the contour"},
                                           {"Tab, then Up, Down", "chooses a handle, moves it by 0.02 mm; Enter keeps it"},
                                           {"Shift and drag", "draws a new contour around the vessel"},
-                                          {"+ and -", "makes the section 2 % larger, smaller"},
+                                          {"+ and -", N_("makes the section 2 % larger, smaller")},
                                           {"Delete", "deletes the section"},
                                           {"E, O", "extent and shape of the smoothing"},
-                                          {", and .", "weaker, stronger; A applies it"},
+                                          {N_(", and ."), "weaker, stronger; A applies it"},
                                           {"J, K", "narrower, wider blend at the fork"},
                                           {"B", "draws a new branch from the point clicked"},
                                           {"X", "cuts the branch here"},
@@ -52,13 +53,13 @@ static void show_place(Gui *gui, const EditState *s)
     char title[80];
     snprintf(title, sizeof title, "Branch %d at %.2f mm", s->branch, s->t);
     gui_text(gui, GUI_LARGE, gui_colors.text, title);
-    row(gui, edit_state_at_station(s) ? "a section of the model" : "between two sections", "%d branches", m->branch_count);
+    row(gui, edit_state_at_station(s) ? "a section of the model" : "between two sections", tr("%d branches"), m->branch_count);
     SweepSection section;
     if (sweep_section_of(&s->outline, &section))
         row(gui, "mean radius, area", "%.3f mm, %.2f mm²", section.mean, section.area);
     if (s->outline.kind != SECTION_POLAR)
         row(gui, "stored as", "%s", section_kind_name[s->outline.kind]);
-    row(gui, "surface follows in", "%.1f ms, at most %.1f", s->update_ms, s->worst_ms);
+    row(gui, "surface follows in", tr("%.1f ms, at most %.1f"), s->update_ms, s->worst_ms);
 }
 
 static void show_smoothing(Gui *gui, EditState *s)

@@ -10,6 +10,7 @@
 #include "render/section_view.h"
 #include "render/window.h"
 #include "sim/sim.h"
+#include "render/translation.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -57,7 +58,7 @@ static void save(EditWindow *w)
     sweep_editor_try(s->editor, NULL, NULL, NULL);
     if (edit_file_save(w->file, s->editor, w->options->output, &faults)) {
         s->saved_count = sweep_editor_list(s->editor)->count;
-        edit_state_say(s, false, "saved as %s", w->options->output);
+        edit_state_say(s, false, tr("saved as %s"), w->options->output);
     } else {
         edit_state_say(s, true, "%s", faults.text[0]);
     }
@@ -221,7 +222,7 @@ static void click(EditWindow *w, double x, double y)
     double within, station = sweep_edit_station(sweep_editor_model(s->editor), branch, t, &within);
     edit_state_go(s, branch, s->snaps && fabs(t - station) <= 2 * within ? station : t);
     s->wall = wall;
-    edit_state_say(s, false, "branch %d at %.2f mm", branch, s->t);
+    edit_state_say(s, false, tr("branch %d at %.2f mm"), branch, s->t);
 }
 
 static void mouse_move(EditWindow *w, const WindowInput *input, double x, double y)

@@ -6,6 +6,7 @@
 
 #include "render/font.h"
 #include "render/imgui_heap.h"
+#include "render/translation.h"
 
 #include <cmath>
 #include <cstring>
@@ -40,12 +41,52 @@ struct Gui {
     GLuint keep_texture, keep_framebuffer;
     int keep_width, keep_height;
     bool is_turned;                  // stored upside down, for a window
+    int cut_count;                   // texts cut off in this frame
+    char first_cut[200];
 };
 
 static constexpr Color rgb(int r, int g, int b) { return Color{(uint8_t)r, (uint8_t)g, (uint8_t)b, 255}; }
 // marks: sky blue, bluish green, orange and vermilion of Okabe and Ito, lightened for a dark background
-extern "C" const GuiColors gui_colors = {rgb(12, 14, 18),    rgb(23, 26, 32),    rgb(40, 45, 55),   rgb(56, 63, 77),   rgb(32, 84, 128),  rgb(52, 58, 70),
-                                         rgb(222, 226, 233), rgb(146, 154, 168), rgb(86, 180, 233), rgb(40, 190, 145), rgb(240, 172, 30), rgb(255, 112, 64)};
+extern "C" const GuiColors gui_colors = {rgb(12, 14, 18),   rgb(23, 26, 32),    rgb(40, 45, 55),    rgb(56, 63, 77),   rgb(32, 84, 128),
+                                         rgb(52, 58, 70),   rgb(222, 226, 233), rgb(146, 154, 168), rgb(86, 180, 233), rgb(40, 190, 145),
+                                         rgb(240, 172, 30), rgb(255, 112, 64),  rgb(52, 102, 148),  rgb(60, 104, 140)};
+
+// Of the key on a button; `is_bright`: the button is chosen or under the mouse.
+static Color key_color(bool is_bright) { return is_bright ? gui_colors.text : gui_colors.dim; }
+
+extern "C" int gui_contrasts(const GuiContrast **out)
+{
+    static const double text = 4.5, mark = 3;
+    static const GuiColors &c = gui_colors;
+    static const GuiContrast all[] = {
+        {"text on windows", c.text, c.window, text},
+        {"text on panels", c.text, c.panel, text},
+        {"text on buttons", c.text, c.frame, text},
+        {"text under the mouse", c.text, c.frame_hot, text},
+        {"text on chosen buttons", c.text, c.frame_on, text},
+        {"dim text on windows", c.dim, c.window, text},
+        {"dim text on panels", c.dim, c.panel, text},
+        {"keys on buttons", key_color(false), c.frame, text},
+        {"keys under the mouse", key_color(true), c.frame_hot, text},
+        {"keys on chosen buttons", key_color(true), c.frame_on, text},
+        {"headings on panels", c.accent, c.panel, text},
+        {"headings on windows", c.accent, c.window, text},
+        {"good on panels", c.good, c.panel, text},
+        {"warnings on panels", c.warning, c.panel, text},
+        {"bad on panels", c.bad, c.panel, text},
+        {"good on buttons", c.good, c.frame, text},
+        {"warnings on buttons", c.warning, c.frame, text},
+        {"bad on buttons", c.bad, c.frame, text},
+        {"mark of chosen buttons", c.accent, c.frame_on, mark},
+        {"sliders", c.grab, c.window, mark},
+        {"moved sliders", c.grab_on, c.window, mark},
+        {"text on sliders", c.text, c.grab, text},
+        {"text on moved sliders", c.text, c.grab_on, text},
+        {"scroll bars", c.dim, c.panel, mark},
+    };
+    *out = all;
+    return (int)(sizeof all / sizeof *all);
+}
 
 static ImU32 packed(Color c) { return IM_COL32(c.r, c.g, c.b, c.a); }
 static ImVec4 as_vector(Color c) { return ImVec4(c.r / 255.0f, c.g / 255.0f, c.b / 255.0f, c.a / 255.0f); }
@@ -79,12 +120,12 @@ static void set_style(float scale)
                   {ImGuiCol_FrameBg, gui_colors.frame},
                   {ImGuiCol_FrameBgHovered, gui_colors.frame_hot},
                   {ImGuiCol_FrameBgActive, gui_colors.frame_hot},
-                  {ImGuiCol_SliderGrab, rgb(58, 108, 152)},
-                  {ImGuiCol_SliderGrabActive, rgb(70, 130, 180)},
+                  {ImGuiCol_SliderGrab, gui_colors.grab},
+                  {ImGuiCol_SliderGrabActive, gui_colors.grab_on},
                   {ImGuiCol_ScrollbarBg, gui_colors.panel},
-                  {ImGuiCol_ScrollbarGrab, gui_colors.frame_hot},
-                  {ImGuiCol_ScrollbarGrabHovered, gui_colors.dim},
-                  {ImGuiCol_ScrollbarGrabActive, gui_colors.dim},
+                  {ImGuiCol_ScrollbarGrab, gui_colors.dim},
+                  {ImGuiCol_ScrollbarGrabHovered, gui_colors.text},
+                  {ImGuiCol_ScrollbarGrabActive, gui_colors.text},
                   {ImGuiCol_Tab, gui_colors.frame},
                   {ImGuiCol_TabHovered, gui_colors.frame_hot},
                   {ImGuiCol_TabActive, gui_colors.frame_on},
@@ -191,6 +232,7 @@ static void feed_keys(Gui *gui, ImGuiIO &io, const WindowInput *input)
 extern "C" void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent)
 {
     gui->takes_text = false;
+    gui->cut_count = 0;
     gui->previous = ImGui::GetCurrentContext();
     ImGui::SetCurrentContext(gui->context);
     gui->is_silent = is_silent;
@@ -380,6 +422,19 @@ extern "C" void gui_end(Gui *gui, unsigned framebuffer)
 
 extern "C" float gui_scale(const Gui *gui) { return gui->scale; }
 
+extern "C" int gui_cut_texts(const Gui *gui, const char **first)
+{
+    if (first)
+        *first = gui->cut_count > 0 ? gui->first_cut : "";
+    return gui->cut_count;
+}
+
+static void note_cut(Gui *gui, const char *text)
+{
+    if (gui->cut_count++ == 0)
+        std::snprintf(gui->first_cut, sizeof gui->first_cut, "%s", text);
+}
+
 extern "C" bool gui_takes_text(const Gui *gui) { return gui->takes_text; }
 
 // ---- windows and flow
@@ -420,6 +475,28 @@ extern "C" float gui_window_end(Gui *gui)
     return over;
 }
 
+extern "C" GuiTexture gui_texture_create(int width, int height, const uint8_t *rgb)
+{
+    GLint before, alignment;
+    GLuint texture;
+    glGetIntegerv(GL_TEXTURE_BINDING_2D, &before);
+    glGetIntegerv(GL_UNPACK_ALIGNMENT, &alignment);
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, rgb);
+    glGenerateMipmap(GL_TEXTURE_2D);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, alignment);
+    glBindTexture(GL_TEXTURE_2D, (GLuint)before);
+    return texture;
+}
+
+extern "C" void gui_texture_destroy(GuiTexture texture) { glDeleteTextures(1, &texture); }
+
 extern "C" GuiRect gui_place(Gui *, float width, float height)
 {
     ImVec2 at = ImGui::GetCursorScreenPos();
@@ -440,7 +517,10 @@ extern "C" void gui_text(Gui *gui, GuiFont font, Color color, const char *text)
 {
     ImGui::PushFont(gui->font[font]);
     ImGui::PushStyleColor(ImGuiCol_Text, packed(color));
-    ImGui::TextUnformatted(text);
+    float room = ImGui::GetContentRegionAvail().x + ImGui::GetStyle().WindowPadding.x;
+    if (ImGui::GetCurrentWindow()->DC.TextWrapPos < 0 && ImGui::CalcTextSize(tr(text)).x > room)
+        note_cut(gui, text);
+    ImGui::TextUnformatted(tr(text));
     ImGui::PopStyleColor();
     ImGui::PopFont();
 }
@@ -454,13 +534,17 @@ extern "C" void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char
 
 extern "C" void gui_row(Gui *gui, GuiFont size, const char *label, Color color, const char *value)
 {
-    float width, height;
+    float width, height, label_width, label_height;
     gui_text_extent(gui, size, value, &width, &height);
+    gui_text_extent(gui, size, label, &label_width, &label_height);
     GuiRect at = gui_place(gui, 0, height);
     float room = at.width - width - 4 * gui->scale;
-    ImVec4 clip(at.x, at.y, at.x + std::fmax(0, room), at.y + height);
-    ImFont *font = gui->font[size];
-    list()->AddText(font, font->FontSize, ImVec2(at.x, at.y), packed(gui_colors.dim), label, nullptr, 0, &clip);
+    if (label_width > at.width || width > at.width)
+        note_cut(gui, label_width > at.width ? label : value);
+    gui_draw_text(gui, at.x, at.y, size, gui_colors.dim, label);
+    // the value goes below a long label
+    if (label_width > room)
+        at = gui_place(gui, 0, height);
     gui_draw_text(gui, at.x + at.width - width, at.y, size, color, value);
 }
 
@@ -470,20 +554,12 @@ extern "C" GuiPress gui_button(Gui *gui, const char *id, const char *label, cons
 {
     float height = whole(gui->font[GUI_NORMAL]->FontSize + 8 * gui->scale), pad = whole(6 * gui->scale);
     ImVec2 at = ImGui::GetCursorScreenPos();
-    if (width <= 0)
+    const bool is_row = width <= 0;
+    if (is_row)
         width = std::fmax(1, ImGui::GetContentRegionAvail().x);
-    GuiPress press;
-    press.pressed = ImGui::InvisibleButton(id, ImVec2(width, height));
-    press.held = ImGui::IsItemActive() && ImGui::IsMouseDown(0);
-    bool is_hot = ImGui::IsItemHovered();
-    GuiRect rect = {at.x, at.y, width, height};
-    gui_draw_fill(gui, rect, is_on || press.held ? gui_colors.frame_on : is_hot ? gui_colors.frame_hot : gui_colors.frame);
-    if (is_on || press.held)
-        gui_draw_fill(gui, {at.x, at.y, whole(3 * gui->scale), height}, gui_colors.accent);
-
-    char text[64];
-    std::snprintf(text, sizeof text, is_on ? "\u2713 %s" : "%s", label);
-    // long labels on narrow buttons: small letters, then truncated at the edge
+    char text[400];
+    std::snprintf(text, sizeof text, is_on ? "\u2713 %s" : "%s", tr(label));
+    // long labels on narrow buttons: small letters, then truncated at the edge; a button as wide as its window gets more lines instead
     GuiFont font = GUI_NORMAL;
     float text_width, text_height, key_width = 0, key_height = 0;
     gui_text_extent(gui, font, text, &text_width, &text_height);
@@ -493,12 +569,32 @@ extern "C" GuiPress gui_button(Gui *gui, const char *id, const char *label, cons
     }
     if (key)
         gui_text_extent(gui, GUI_SMALL, key, &key_width, &key_height);
-    bool has_key = key && text_width + key_width + 3 * pad <= width;
-    float x = has_key ? at.x + pad : at.x + std::fmax(2, (width - text_width) / 2);
+    bool is_wrapped = is_row && text_width > width - 2 * pad, has_key = key && text_width + key_width + 3 * pad <= width,
+         key_is_below = is_row && key && *key && !has_key;
+    if (is_wrapped)
+        text_height = gui_wrapped_height(gui, font, text, width - 2 * pad);
+    else if (text_width > width)
+        note_cut(gui, label);
+    if (is_wrapped || key_is_below)
+        height = text_height + 2 * pad + (key_is_below ? key_height : 0);
+
+    GuiPress press;
+    press.pressed = ImGui::InvisibleButton(id, ImVec2(width, height));
+    press.held = ImGui::IsItemActive() && ImGui::IsMouseDown(0);
+    bool is_hot = ImGui::IsItemHovered(), is_bright = is_on || press.held || is_hot;
+    GuiRect rect = {at.x, at.y, width, height};
+    gui_draw_fill(gui, rect, is_on || press.held ? gui_colors.frame_on : is_hot ? gui_colors.frame_hot : gui_colors.frame);
+    if (is_on || press.held)
+        gui_draw_fill(gui, {at.x, at.y, whole(3 * gui->scale), height}, gui_colors.accent);
+    float x = has_key || key_is_below || is_wrapped ? at.x + pad : at.x + std::fmax(2, (width - text_width) / 2);
+    float y = at.y + (height - text_height - (key_is_below ? key_height : 0)) / 2;
     list()->PushClipRect(at, ImVec2(at.x + width, at.y + height), true);
-    gui_draw_text(gui, x, at.y + (height - text_height) / 2, font, gui_colors.text, text);
-    if (has_key)
-        gui_draw_text(gui, at.x + width - pad - key_width, at.y + (height - key_height) / 2, GUI_SMALL, gui_colors.dim, key);
+    if (is_wrapped)
+        gui_draw_wrapped(gui, x, y, font, gui_colors.text, text, width - 2 * pad);
+    else
+        gui_draw_text(gui, x, y, font, gui_colors.text, text);
+    if (has_key || key_is_below)
+        gui_draw_text(gui, at.x + width - pad - key_width, has_key ? at.y + (height - key_height) / 2 : y + text_height, GUI_SMALL, key_color(is_bright), key);
     list()->PopClipRect();
     return press;
 }
@@ -507,11 +603,47 @@ extern "C" bool gui_slider(Gui *gui, const char *id, float *value, float least, 
 {
     ImGui::PushID(id);
     ImGui::SetNextItemWidth(width > 0 ? width : ImGui::GetContentRegionAvail().x);
+    // a dark groove: both the grab in it and the text on the grab are then seen
+    for (int which : {ImGuiCol_FrameBg, ImGuiCol_FrameBgHovered, ImGuiCol_FrameBgActive})
+        ImGui::PushStyleColor(which, packed(gui_colors.window));
     // no text input by Ctrl+click: the keys control the trainer
-    bool is_moved = ImGui::SliderFloat("##value", value, least, most, format, ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput);
+    bool is_moved = ImGui::SliderFloat("##value", value, least, most, tr(format), ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput);
+    ImGui::PopStyleColor(3);
     ImGui::PopID();
     (void)gui;
     return is_moved;
+}
+
+extern "C" bool gui_card(Gui *gui, const char *id, GuiTexture texture, const char *title, const char *line, const char *right, bool is_on)
+{
+    float pad = whole(6 * gui->scale), height = whole(64 * gui->scale), picture = whole(1.6f * (height - 2 * pad)), right_width, right_height, title_width,
+          title_height;
+    ImVec2 at = ImGui::GetCursorScreenPos();
+    float width = std::fmax(1, ImGui::GetContentRegionAvail().x);
+    bool is_pressed = ImGui::InvisibleButton(id, ImVec2(width, height)), is_hot = ImGui::IsItemHovered();
+    if (!ImGui::IsItemVisible())
+        return is_pressed;
+    gui_draw_fill(gui, {at.x, at.y, width, height}, is_on ? gui_colors.frame_on : is_hot ? gui_colors.frame_hot : gui_colors.frame);
+    if (is_on)
+        gui_draw_fill(gui, {at.x, at.y, whole(3 * gui->scale), height}, gui_colors.accent);
+    GuiRect place = {at.x + pad, at.y + pad, picture, height - 2 * pad};
+    gui_draw_fill(gui, place, gui_colors.window);
+    if (texture)
+        list()->AddImage((ImTextureID)(uintptr_t)texture, ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y + place.height));
+    gui_text_extent(gui, GUI_SMALL, right, &right_width, &right_height);
+    gui_text_extent(gui, GUI_NORMAL, title, &title_width, &title_height);
+    float x = place.x + picture + 2 * pad, end = at.x + width - pad;
+    // the right part goes below if there is no room for both
+    bool is_beside = x + title_width + 2 * pad + right_width <= end;
+    if (x + title_width > end)
+        note_cut(gui, title);
+    list()->PushClipRect(at, ImVec2(end, at.y + height), true);
+    gui_draw_text(gui, x, at.y + pad, GUI_NORMAL, gui_colors.text, title);
+    gui_draw_text(gui, x, at.y + pad + title_height + pad / 2, GUI_SMALL, key_color(is_on || is_hot), line);
+    gui_draw_text(gui, is_beside ? end - right_width : x, is_beside ? at.y + pad : at.y + height - pad / 2 - right_height, GUI_SMALL,
+                  key_color(is_on || is_hot), right);
+    list()->PopClipRect();
+    return is_pressed;
 }
 
 extern "C" void gui_progress(Gui *gui, double part, const char *text)
@@ -566,7 +698,9 @@ extern "C" bool gui_tabs_begin(Gui *gui, const char *id)
 
 extern "C" bool gui_tab_begin(Gui *gui, const char *name)
 {
-    bool is_open = ImGui::BeginTabItem(name);
+    char label[120];
+    std::snprintf(label, sizeof label, "%s###%s", tr(name), name);
+    bool is_open = ImGui::BeginTabItem(label);
     if (is_open)
         ImGui::PushFont(gui->font[GUI_NORMAL]);
     return is_open;
@@ -610,22 +744,22 @@ extern "C" void gui_draw_line(Gui *, float x0, float y0, float x1, float y1, Col
 
 extern "C" void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color color, const char *text)
 {
-    list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), text);   // whole pixels keep letters sharp
+    list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), tr(text));   // whole pixels keep letters sharp
 }
 
 extern "C" void gui_draw_wrapped(Gui *gui, float x, float y, GuiFont font, Color color, const char *text, float width)
 {
-    list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), text, nullptr, width);
+    list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), tr(text), nullptr, width);
 }
 
 extern "C" void gui_text_extent(Gui *gui, GuiFont font, const char *text, float *width, float *height)
 {
-    ImVec2 extent = gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, 0, text);
+    ImVec2 extent = gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, 0, tr(text));
     *width = extent.x;
     *height = extent.y;
 }
 
 extern "C" float gui_wrapped_height(Gui *gui, GuiFont font, const char *text, float width)
 {
-    return gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, width, text).y;
+    return gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, width, tr(text)).y;
 }

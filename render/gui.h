@@ -1,5 +1,6 @@
 // A thin C interface to Dear ImGui and its OpenGL 3 back end: windows at fixed places, text, buttons, sliders, tabs, a text field, and drawing. Its input is
-// WindowInput, so that it works the same in a window, off screen and in tests; independent of GLFW. Units are pixels, y down. Needs a current GL
+// WindowInput, so that it works the same in a window, off screen and in tests; independent of GLFW. Texts are translated where they are shown
+// (render/translation.h). Units are pixels, y down. Needs a current GL
 // context. Other ImGui contexts (render/overlay.h) are not affected: the context of a Gui is current only from gui_begin to gui_end.
 #ifndef SELDINGER_RENDER_GUI_H
 #define SELDINGER_RENDER_GUI_H
@@ -13,6 +14,7 @@ extern "C" {
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 typedef struct Gui Gui;
 typedef struct GuiRect {
@@ -21,9 +23,17 @@ typedef struct GuiRect {
 typedef enum { GUI_SMALL, GUI_NORMAL, GUI_LARGE, GUI_HUGE, GUI_FONTS } GuiFont;   // 13, 15, 19 and 28 pixels times the scale
 
 typedef struct GuiColors {     // colours of all elements; the marks are distinguishable with colour-vision deficiency, and never shown by colour alone
-    Color window, panel, frame, frame_hot, frame_on, line, text, dim, accent, good, warning, bad;
+    Color window, panel, frame, frame_hot, frame_on, line, text, dim, accent, good, warning, bad, grab, grab_on;
 } GuiColors;
 extern const GuiColors gui_colors;
+
+// Every pair of colours that lie on each other, with the least ratio of WCAG 2.1 AA: 4.5 for text, 3 for large text and for marks.
+typedef struct GuiContrast {
+    const char *what;
+    Color front, back;
+    double least;
+} GuiContrast;
+int gui_contrasts(const GuiContrast **out);              // their number
 
 Gui *gui_create(char *message, size_t capacity);
 void gui_destroy(Gui *gui);
@@ -35,6 +45,8 @@ void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent)
 // scissor test off.
 void gui_end(Gui *gui, unsigned framebuffer);
 float gui_scale(const Gui *gui);        // scale of the current fonts
+// The number of texts in the last frame that their place cut off; `first` (may be NULL): the first of them, valid until the next frame.
+int gui_cut_texts(const Gui *gui, const char **first);
 
 // Windows at a fixed place. Overflowing contents scroll. NO_INPUT lets the mouse through; ON_TOP lies over the previous windows and takes their clicks.
 // KEPT: opaque, overlapping only windows on top; its pixels are cached and redrawn only when its contents change. SELDOM: a cached window
@@ -43,6 +55,11 @@ enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_EN
 void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned flags);
 // Missing height of the contents [pixel]; negative: free height.
 float gui_window_end(Gui *gui);
+
+// A picture to show: `rgb` (height, width, 3), rows from the top.
+typedef unsigned GuiTexture;             // 0: none
+GuiTexture gui_texture_create(int width, int height, const uint8_t *rgb);
+void gui_texture_destroy(GuiTexture texture);
 
 // Flow layout: each item goes below the last one, or next to it.
 GuiRect gui_place(Gui *gui, float width, float height);   // reserves space (width 0: all available) and returns its rectangle, for drawing
@@ -63,6 +80,8 @@ typedef struct GuiPress {
 GuiPress gui_button(Gui *gui, const char *id, const char *label, const char *key, float width, bool is_on);
 // Returns true while it is being moved. `format`: printf format for one double.
 bool gui_slider(Gui *gui, const char *id, float *value, float least, float most, const char *format, float width);
+// A large button with a picture at its left (texture 0: a dark place for it), a title, and a line below; `right` in small letters at the right end.
+bool gui_card(Gui *gui, const char *id, GuiTexture texture, const char *title, const char *line, const char *right, bool is_on);
 void gui_progress(Gui *gui, double part, const char *text);
 // A tooltip for the last item. NULL texts are left out.
 void gui_tooltip(Gui *gui, const char *title, const char *text, const char *last);

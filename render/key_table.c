@@ -99,40 +99,22 @@ const KeyAction key_table[ACTION_COUNT] = {
 
 const char *const action_group_name[ACTION_GROUPS] = {"Tool", "X-ray", "C-arm and table", "Views", "Session"};
 
-static const char *key_name(int key, char *text, size_t capacity)
+// Set before the first window opens and by the page of settings, which runs in the same thread as the windows.
+static KeyBinding in_force[ACTION_COUNT];
+static bool is_bound;
+
+KeyBinding key_table_default(ActionId id) { return (KeyBinding){key_table[id].key, key_table[id].modifiers, key_table[id].character}; }
+
+KeyBinding key_table_binding(ActionId id) { return is_bound ? in_force[id] : key_table_default(id); }
+
+void key_table_bind(const KeyBinding *binding)
 {
-    static const struct {
-        int key;
-        const char *name;
-    } named[] = {{WINDOW_KEY_SPACE, "Space"}, {WINDOW_KEY_UP, "Up"},           {WINDOW_KEY_DOWN, "Down"},           {WINDOW_KEY_LEFT, "Left"},
-                 {WINDOW_KEY_RIGHT, "Right"}, {WINDOW_KEY_PAGE_UP, "Page up"}, {WINDOW_KEY_PAGE_DOWN, "Page down"}, {WINDOW_KEY_HOME, "Home"},
-                 {WINDOW_KEY_END, "End"},     {WINDOW_KEY_INSERT, "Insert"},   {WINDOW_KEY_DELETE, "Delete"},       {WINDOW_KEY_BACKSPACE, "Backspace"},
-                 {WINDOW_KEY_ENTER, "Enter"}, {WINDOW_KEY_TAB, "Tab"},         {WINDOW_KEY_ESCAPE, "Esc"},          {WINDOW_KEY_SHIFT, "Shift"},
-                 {WINDOW_KEY_CTRL, "Ctrl"},   {WINDOW_KEY_ALT, "Alt"},         {WINDOW_KEY_KEYPAD_ADD, "Keypad +"}, {WINDOW_KEY_KEYPAD_SUBTRACT, "Keypad -"}};
-    for (size_t i = 0; i < sizeof named / sizeof named[0]; i++)
-        if (named[i].key == key)
-            return named[i].name;
-    if (key >= WINDOW_KEY_F1 && key <= WINDOW_KEY_F12)
-        snprintf(text, capacity, "F%d", key - WINDOW_KEY_F1 + 1);
-    else
-        snprintf(text, capacity, "%c", key);
-    return text;
+    is_bound = binding != NULL;
+    if (binding)
+        memcpy(in_force, binding, sizeof in_force);
 }
 
-const char *key_table_text(ActionId id, char *text, size_t capacity)
-{
-    const KeyAction *action = &key_table[id];
-    char one[8];
-    const char *key = key_name(action->key, one, sizeof one), *alt = action->modifiers & WINDOW_ALT ? "Alt+" : "";
-    // a keypad key whose sign is also the character is shown once
-    if (action->character && (action->key == WINDOW_KEY_KEYPAD_ADD || action->key == WINDOW_KEY_KEYPAD_SUBTRACT))
-        snprintf(text, capacity, "%c", action->character);
-    else if (action->character)
-        snprintf(text, capacity, "%s%s or %c", alt, key, action->character);
-    else
-        snprintf(text, capacity, "%s%s", alt, key);
-    return text;
-}
+const char *key_table_text(ActionId id, char *text, size_t capacity) { return key_binding_text(key_table_binding(id), text, capacity); }
 
 // Related keys share a line in the list.
 static const struct {
@@ -166,7 +148,7 @@ int key_table_line(ActionId first, char *keys, size_t capacity, const char **hel
     for (int id = (int)first; id <= last && used < capacity; id++) {
         char text[32];
         const char *key = key_table_text((ActionId)id, text, sizeof text);
-        if (id > (int)first && key_table[id].modifiers & WINDOW_ALT)
+        if (id > (int)first && key_table_binding(first).modifiers & key_table_binding((ActionId)id).modifiers & WINDOW_ALT)
             key += strlen("Alt+");       // shown once, with the first key
         used += (size_t)snprintf(keys + used, capacity - used, "%s%s", id > (int)first ? " " : "", key);
     }
@@ -182,10 +164,10 @@ static bool passes_capture(int key) { return key == WINDOW_KEY_ESCAPE || (key >=
 static void key_down(KeyState *state, const WindowEvent *event)
 {
     for (int i = 0; i < ACTION_COUNT; i++) {
-        const KeyAction *action = &key_table[i];
-        if (action->key != event->key || action->modifiers != (event->modifiers & WINDOW_ALT))
+        const KeyBinding binding = key_table_binding((ActionId)i);
+        if (binding.key != event->key || binding.modifiers != (event->modifiers & WINDOW_ALT))
             continue;
-        if (action->kind == ACTION_HOLD)
+        if (key_table[i].kind == ACTION_HOLD)
             state->held[i] = true;
         else
             state->pressed[i]++;
@@ -195,16 +177,16 @@ static void key_down(KeyState *state, const WindowEvent *event)
 static void key_up(KeyState *state, int key)
 {
     for (int i = 0; i < ACTION_COUNT; i++)
-        if (key_table[i].key == key)
+        if (key_table_binding((ActionId)i).key == key)
             state->held[i] = false;
 }
 
 static void character_typed(KeyState *state, unsigned character)
 {
     for (int i = 0; i < ACTION_COUNT; i++) {
-        const KeyAction *action = &key_table[i];
+        const KeyBinding binding = key_table_binding((ActionId)i);
         // the keypad key of this sign has already come as a key event
-        if (action->character && (unsigned)action->character == character && action->kind == ACTION_PRESS)
+        if (binding.character && (unsigned)binding.character == character && key_table[i].kind == ACTION_PRESS)
             state->pressed[i]++;
     }
 }

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_RENDER_KEY_TABLE_H
 #define SELDINGER_RENDER_KEY_TABLE_H
 
-#include "render/window.h"
+#include "render/key_binding.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -103,9 +103,9 @@ typedef struct KeyAction {
     ActionId id;             // its index in the table
     ActionGroup group;
     ActionKind kind;
-    int key;                 // WindowKey
-    unsigned modifiers;      // WINDOW_ALT or 0. Shift and Ctrl only change the speed of the tool and are not part of a key
-    char character;          // alternative typed character, independent of the layout; 0: none
+    int key;                 // as in KeyBinding: the key by default
+    unsigned modifiers;
+    char character;
     const char *name;        // the text on the button, at most 18 bytes
     const char *help;        // one line
 } KeyAction;
@@ -113,7 +113,12 @@ typedef struct KeyAction {
 extern const KeyAction key_table[ACTION_COUNT];
 extern const char *const action_group_name[ACTION_GROUPS];
 
-// Writes the keys as shown to the user, "Alt+Up", "F1 or ?"; returns text.
+KeyBinding key_table_default(ActionId id);
+// The key in force: the user's choice, else the default.
+KeyBinding key_table_binding(ActionId id);
+// Puts keys (ACTION_COUNT) in force for all windows of the process; NULL: the defaults. Call before a window opens, or from the thread of the windows.
+void key_table_bind(const KeyBinding *binding);
+// Writes the keys in force as shown to the user, "Alt+Up", "F1 or ?"; returns text.
 const char *key_table_text(ActionId id, char *text, size_t capacity);
 // Writes a line of the list of keys, starting at this action: "Alt+Up Down" and its description. Returns the number of actions covered, 1 or more.
 int key_table_line(ActionId first, char *keys, size_t capacity, const char **help);

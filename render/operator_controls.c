@@ -5,18 +5,31 @@ static const double arm_deg_s = 25, table_fields_s = 0.4, blade_s = 0.5, orbit_p
 static const float pulse_rates[] = {7.5F, 10, 15, 30};
 static const double field_step = 1.25;
 
+static OperatorSpeeds speeds_in_force = {1, 1, 1, 1};
+
+void controls_use_speeds(const OperatorSpeeds *speeds) { speeds_in_force = *speeds; }
+
+OperatorSpeeds controls_speeds(void) { return speeds_in_force; }
+
+void controls_take_speeds(OperatorControls *controls)
+{
+    controls->push_mm_s = 10 * speeds_in_force.push;
+    controls->twist_deg_s = 120 * speeds_in_force.twist;
+    controls->sideways_deg_s = arm_deg_s * speeds_in_force.sideways;
+    controls->tilt_deg_s = arm_deg_s * speeds_in_force.tilt;
+}
+
 static float clamped(double value, double least, double most) { return (float)fmax(least, fmin(most, value)); }
 
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point)
 {
     OperatorControls controls = {.xray = xray_default_control(),
-                                 .push_mm_s = 10,
-                                 .twist_deg_s = 120,
                                  .contrast_ml_s = 3,
                                  .view = VIEW_FLUOROSCOPY,
                                  .look = vessel_scene_default_look(scene),
                                  .patient = patient_axes_lps(),
                                  .tool_count = tool_count};
+    controls_take_speeds(&controls);
     Vec3 low = vec3(0, 0, 0), high = low;
     for (int i = 0; i < count; i++)
         for (int k = 0; k < 3; k++) {
@@ -48,11 +61,12 @@ static void obey_sliders(XrayControl *xray, const PanelActions *actions)
     xray->contrast_ml_s = contrast;
 }
 
-static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelActions *actions, double seconds)
+static void obey_arm(OperatorControls *controls, const PanelActions *actions, double seconds)
 {
-    double turn = arm_deg_s * seconds * (actions->held[ACTION_SLOW] ? 0.2 : actions->held[ACTION_FAST] ? 3 : 1);
-    xray->lao_deg = clamped((double)xray->lao_deg + turn * held(actions, ACTION_LAO, ACTION_RAO), -90, 90);
-    xray->cra_deg = clamped((double)xray->cra_deg + turn * held(actions, ACTION_CRA, ACTION_CAU), -45, 45);
+    XrayControl *xray = &controls->xray;
+    double time = seconds * (actions->held[ACTION_SLOW] ? 0.2 : actions->held[ACTION_FAST] ? 3 : 1);
+    xray->lao_deg = clamped((double)xray->lao_deg + controls->sideways_deg_s * time * held(actions, ACTION_LAO, ACTION_RAO), -90, 90);
+    xray->cra_deg = clamped((double)xray->cra_deg + controls->tilt_deg_s * time * held(actions, ACTION_CRA, ACTION_CAU), -45, 45);
     if (actions->pressed[ACTION_AP])
         xray->lao_deg = xray->cra_deg = 0;
     if (actions->pressed[ACTION_LATERAL]) {
@@ -60,7 +74,7 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
         xray->cra_deg = 0;
     }
     // the patient moves in the direction of the key, so the isocentre moves in the opposite direction
-    CArm arm = c_arm_place(xray, patient);
+    CArm arm = c_arm_place(xray, &controls->patient);
     double distance = table_fields_s * (double)xray->field_mm * seconds;
     Vec3 moved = vec3_add(vec3_scale(arm.right, distance * held(actions, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT)),
                           vec3_scale(arm.up, distance * held(actions, ACTION_TABLE_DOWN, ACTION_TABLE_UP)));
@@ -158,8 +172,8 @@ static void obey_mouse(OperatorControls *controls, const VesselScene *scene, con
     } else if (mouse->view == VIEW_FLUOROSCOPY) {
         // dragging rotates the C-arm as if the mouse held the detector
         if (mouse->buttons & WINDOW_MOUSE_LEFT) {
-            controls->xray.lao_deg = clamped((double)controls->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
-            controls->xray.cra_deg = clamped((double)controls->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
+            controls->xray.lao_deg = clamped((double)controls->xray.lao_deg + copysign(90, controls->sideways_deg_s) * mouse->drag_x, -90, 90);
+            controls->xray.cra_deg = clamped((double)controls->xray.cra_deg + copysign(90, controls->tilt_deg_s) * mouse->drag_y, -45, 45);
         }
         double side = port->width < port->height ? port->width : port->height;
         if (mouse->scroll != 0 && side > 0)
@@ -220,8 +234,12 @@ void controls_obey(OperatorControls *controls, const VesselScene *scene, const P
     // first, because sliders contain all controls as shown; keys are applied on top
     if (actions->xray_set)
         obey_sliders(&controls->xray, actions);
+<<<<<<< HEAD
     obey_arm(&controls->xray, &controls->patient, actions, seconds);
     obey_stored(controls, actions);
+=======
+    obey_arm(controls, actions, seconds);
+>>>>>>> h-settings
     obey_xray(controls, actions);
     obey_grip(controls, actions);
     obey_views(controls, scene, actions, seconds);

@@ -25,10 +25,20 @@ typedef struct OperatorControls {
     int stored_count, stored_next, recalled; // number stored so far; the place of the next one; the last place stored or returned to
     StoredPosition stored[STORED_POSITIONS];
     double contrast_ml_s;        // during injection, default 3
-    double push_mm_s, twist_deg_s;   // of the keys at normal speed, default 10 and 120
+    double push_mm_s, twist_deg_s;   // of the keys at normal speed, 10 and 120 times OperatorSpeeds
+    double sideways_deg_s, tilt_deg_s;   // of the C-arm, 25 times OperatorSpeeds
     int tool_count;
     HandGrip grip;               // the selected tool, and the locked and released ones
 } OperatorControls;
+
+// Factors of the usual speeds; a negative one inverts the axis.
+typedef struct OperatorSpeeds {
+    double push, twist, sideways, tilt;
+} OperatorSpeeds;
+// Of all controls created afterwards in this process; default 1. Call before a window opens, or from the thread of the windows.
+void controls_use_speeds(const OperatorSpeeds *speeds);
+OperatorSpeeds controls_speeds(void);
+void controls_take_speeds(OperatorControls *controls);   // sets its four speeds; controls_create does
 
 // Sets the isocentre to the middle of `points`, and the field so that they are visible.
 OperatorControls controls_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);

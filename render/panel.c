@@ -94,7 +94,7 @@ static bool has_key(const WindowInput *input, int key) { return presses(input, k
 // X closes the box that X opened.
 static void take_tray(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
-    bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table[ACTION_EXCHANGE].key);
+    bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table_binding(ACTION_EXCHANGE).key);
     bool is_taken = panel->answer > 0 || has_key(input, WINDOW_KEY_ENTER);
     panel_move_in_tray(panel, presses(input, WINDOW_KEY_DOWN) - presses(input, WINDOW_KEY_UP));
     panel->tray.is_shaped ^= presses(input, 'S') % 2;

@@ -1,5 +1,6 @@
 // The controls at the right: buttons, all from the table of keys, and the sliders of the X-ray system.
 #include "render/panel_internal.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -101,9 +102,22 @@ void panel_action_button(Panel *panel, const PanelState *state, ActionId id, con
     } else if (action->kind == ACTION_HOLD && !is_speed && press.held) {
         panel->mouse_held[id] = true;
     }
-    snprintf(last, sizeof last, "Key: %s%s", key, is_speed ? "; a click keeps it on" : action->kind == ACTION_HOLD ? " (hold)" : "");
+    snprintf(last, sizeof last, tr("Key: %s%s"), key, is_speed ? tr("; a click keeps it on") : action->kind == ACTION_HOLD ? tr(" (hold)") : "");
     gui_tooltip(panel->gui, action->name, action->help, last);
 }
+
+// Of labels in small letters.
+static float widest_label(Panel *panel, int count, const ActionId *action)
+{
+    float widest = 0, width, height;
+    for (int i = 0; i < count; i++) {
+        gui_text_extent(panel->gui, GUI_SMALL, key_table[action[i]].name, &width, &height);
+        widest = fmaxf(widest, width);
+    }
+    return widest;
+}
+
+static float button_width(float all, float gap, int in_line) { return floorf((all - gap * (float)(in_line - 1)) / (float)in_line); }
 
 static void button_row(Panel *panel, const PanelState *state, const ButtonRow *buttons)
 {
@@ -120,12 +134,15 @@ static void button_row(Panel *panel, const PanelState *state, const ButtonRow *b
     }
     if (count == 0)
         return;
-    float gap = floorf(3 * gui_scale(panel->gui)), all = gui_width(panel->gui);
-    float width = floorf((all - gap * (float)(count - 1)) / (float)count);
+    const float gap = floorf(3 * gui_scale(panel->gui)), all = gui_width(panel->gui);
+    // fewer in a line where a label in another language is too long
+    int in_line = count;
+    while (in_line > 1 && widest_label(panel, count, action) > button_width(all, gap, in_line))
+        in_line = (in_line + 1) / 2;
     for (int i = 0; i < count; i++) {
-        if (i > 0)
+        if (i % in_line > 0)
             gui_beside(panel->gui, gap);
-        panel_action_button(panel, state, action[i], "tab", width);
+        panel_action_button(panel, state, action[i], "tab", button_width(all, gap, in_line));
     }
 }
 
@@ -154,7 +171,7 @@ static void angle_sliders(Panel *panel, const PanelState *state)
 
 static void collimator_sliders(Panel *panel, const PanelState *state)
 {
-    static const char *const name[4] = {"left %.2f", "right %.2f", "lower %.2f", "upper %.2f"};
+    static const char *const name[4] = {N_("left %.2f"), N_("right %.2f"), N_("lower %.2f"), N_("upper %.2f")};
     float gap = floorf(3 * gui_scale(panel->gui)), width = floorf((gui_width(panel->gui) - gap) / 2);
     for (int i = 0; i < 4; i++) {
         if (i % 2)
@@ -193,7 +210,7 @@ static void draw_tab(Panel *panel, const PanelState *state, int tab)
         gui_text_wrapped(panel->gui, GUI_NORMAL, gui_colors.dim, "This is an examination: the 3D view and angioscopy are hidden.");
     if (tab == TAB_XRAY) {
         pulse_buttons(panel, state);
-        xray_slider(panel, state, &panel->xray.field_mm, 40, 400, "field %.0f mm", "side of the square field at the isocentre", 0);
+        xray_slider(panel, state, &panel->xray.field_mm, 40, 400, tr("field %.0f mm"), "side of the square field at the isocentre", 0);
     }
     if (tab == TAB_C_ARM)
         collimator_sliders(panel, state);

@@ -2,6 +2,7 @@
 // accompanied by
 // signs: a tick, a triangle or a cross for a mark, a tick and a bar for a button that is on.
 #include "render/panel_internal.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -31,16 +32,16 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     if (!is_guided && panel_first_line(state->instructions, text, sizeof text)) {
         gui_text_wrapped(gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, gui_colors.text, text);
         if (panel_has_more_lines(state->instructions)) {
-            snprintf(text, sizeof text, "Full text: %s", key_table_text(ACTION_BRIEFING, value, sizeof value));
+            snprintf(text, sizeof text, tr("Full text: %s"), key_table_text(ACTION_BRIEFING, value, sizeof value));
             gui_text(gui, GUI_SMALL, gui_colors.dim, text);
         }
     }
     if (state->hold_needed_s > 0) {
         const char *target = panel_text(state->target)[0] ? state->target : "target";
         if (state->hold_s > 0)
-            snprintf(text, sizeof text, "%s: held %.1f of %.1f s", target, fmin(state->hold_s, state->hold_needed_s), state->hold_needed_s);
+            snprintf(text, sizeof text, tr("%s: held %.1f of %.1f s"), target, fmin(state->hold_s, state->hold_needed_s), state->hold_needed_s);
         else
-            snprintf(text, sizeof text, "target: %s", target);
+            snprintf(text, sizeof text, tr("target: %s"), target);
         gui_progress(gui, state->hold_s / state->hold_needed_s, text);
     }
     for (int i = 0; i < state->figure_count; i++) {
@@ -163,7 +164,7 @@ static void draw_top(Panel *panel, const PanelState *state)
     gui_beside(gui, gap);
     badge(panel, panel_mode_name[state->mode], gui_colors.frame_on, gui_colors.text);
     gui_beside(gui, gap);
-    snprintf(text, sizeof text, "%s%s", state->is_paused ? "PAUSED " : "", panel_minutes(time, sizeof time, state->time_s));
+    snprintf(text, sizeof text, "%s%s", state->is_paused ? tr("PAUSED ") : "", panel_minutes(time, sizeof time, state->time_s));
     badge(panel, text, state->is_paused ? gui_colors.warning : gui_colors.frame, state->is_paused ? gui_colors.window : gui_colors.text);
     gui_window_end(gui);
     gui_window_begin(gui, "session", session, GUI_KEPT);
@@ -206,7 +207,7 @@ static void draw_machine(Panel *panel, const PanelState *state, GuiRect at)
     snprintf(text, sizeof text, "%s / %s", panel_figure(one, sizeof one, state->step_median_us, 0, ""),
              panel_figure(other, sizeof other, state->step_p999_us, 0, "\u00b5s"));
     small_row(panel, "Step, median / p99.9", MARK_NONE, text);
-    snprintf(text, sizeof text, "\u00d7%s, %lld missed", panel_figure(one, sizeof one, state->real_time_factor, 2, ""), (long long)state->missed_deadlines);
+    snprintf(text, sizeof text, tr("\u00d7%s, %lld missed"), panel_figure(one, sizeof one, state->real_time_factor, 2, ""), (long long)state->missed_deadlines);
     small_row(panel, "Real time, deadlines", state->warnings & (WARN_SLOW | WARN_STALLED) ? MARK_WARNING : MARK_NONE, text);
     panel_figure(one, sizeof one, state->frame_ms, 1, "ms");
     snprintf(text, sizeof text, state->shown_side > state->drawn_side ? "%s, image %d of %d px" : "%s per frame", one, state->drawn_side, state->shown_side);
@@ -237,7 +238,7 @@ static void draw_bottom(Panel *panel, const PanelState *state)
             panel_hint_text(hint, text, sizeof text);
         if (state->is_finished) {
             char restart[16], quit[16];
-            snprintf(text, sizeof text, "The exercise is over. %s restarts it, %s ends the session; its report compares it with earlier ones.",
+            snprintf(text, sizeof text, tr("The exercise is over. %s restarts it, %s ends the session; its report compares it with earlier ones."),
                      key_table_text(ACTION_RESTART, restart, sizeof restart), key_table_text(ACTION_QUIT, quit, sizeof quit));
         }
         enum { TWO_LINES = 120 };    // letters of the large font

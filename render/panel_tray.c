@@ -3,6 +3,7 @@
 
 #include "render/panel_internal.h"
 #include "render/tick_step.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -108,9 +109,9 @@ static void draw_sliders(Panel *panel)
     static const struct {
         const char *id, *format, *tip;
         float least, most;
-    } slider[] = {{"tip length", "bend %.0f mm long", "from the tip back to the start of the bend", 1, 80},
-                  {"tip angle", "keeps %.0f\u00b0", "the remaining angle after springback of the core; keys: Left, Right", 5, 330},
-                  {"tip mandrel", "mandrel R %.1f mm", "radius of the mandrel for bending the tip: the thinner, the tighter the final bend", 0.3f, 10}};
+    } slider[] = {{"tip length", N_("bend %.0f mm long"), "from the tip back to the start of the bend", 1, 80},
+                  {"tip angle", N_("keeps %.0f\u00b0"), "the remaining angle after springback of the core; keys: Left, Right", 5, 330},
+                  {"tip mandrel", N_("mandrel R %.1f mm"), "radius of the mandrel for bending the tip: the thinner, the tighter the final bend", 0.3f, 10}};
     Gui *gui = panel->gui;
     float gap = floorf(4 * gui_scale(gui)), width = floorf((gui_width(gui) - 2 * gap) / 3);
     for (int i = 0; i < 3; i++) {

@@ -2,6 +2,7 @@
 #include "render/panel_internal.h"
 
 #include "render/vessel_scene.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -63,19 +64,19 @@ static float draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiR
     if (!is_main)
         return at.y;
     float right = at.x + at.width - pad, y = at.y + at.height - pad - normal;
-    snprintf(text, sizeof text, "contrast %.1f ml", isfinite(state->contrast_ml) ? state->contrast_ml : 0);
+    snprintf(text, sizeof text, tr("contrast %.1f ml"), isfinite(state->contrast_ml) ? state->contrast_ml : 0);
     label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
-    snprintf(text, sizeof text, "fluoroscopy %s", panel_minutes(time, sizeof time, state->fluoro_s));
+    snprintf(text, sizeof text, tr("fluoroscopy %s"), panel_minutes(time, sizeof time, state->fluoro_s));
     label_right(panel, right, y - normal, GUI_NORMAL, gui_colors.text, text);
-    snprintf(text, sizeof text, "%g pulses/s", (double)state->xray.pulses_s);
+    snprintf(text, sizeof text, tr("%g pulses/s"), (double)state->xray.pulses_s);
     label_right(panel, right, y - 2 * normal, GUI_NORMAL, gui_colors.text, text);
-    snprintf(text, sizeof text, "field %.0f mm", (double)state->xray.field_mm);
+    snprintf(text, sizeof text, tr("field %.0f mm"), (double)state->xray.field_mm);
     label_right(panel, right, y - 3 * normal, GUI_NORMAL, gui_colors.text, text);
     draw_dose(panel, state, right, y - 4 * normal, normal);
     label(panel, at.x + pad, at.y + pad / 2, GUI_LARGE, gui_colors.text, panel_mode_name[state->mode]);
     y = at.y + pad / 2 + gui_line_height(gui, GUI_LARGE) + floorf(6 * s);
     if (state->mode == PANEL_CINE) {
-        snprintf(text, sizeof text, "frame %d of %d", state->cine_frame + 1, state->cine_frames);
+        snprintf(text, sizeof text, tr("frame %d of %d"), state->cine_frame + 1, state->cine_frames);
         label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.text, text);
         y += normal;
     }

@@ -17,10 +17,13 @@
 
 // the window
 #include "render/case_window.h"
+#include "render/case_picture.h"
 #include "render/edit_window.h"
 #include "render/replay_window.h"
+#include "render/settings_in_force.h"
 #include "render/start_window.h"
 #include "render/trainer.h"
+#include "render/translation.h"
 #include "render/trainer_figures.h"
 
 #endif

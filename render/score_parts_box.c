@@ -1,4 +1,5 @@
 #include "render/score_parts_box.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -34,9 +35,9 @@ static void print_part(const Box *box, const ScoreFigures *f, const ScoreFigures
     snprintf(title, sizeof title, "%s [%s]", score_part_words[part].title, score_part_words[part].unit);
     print_points(judged, points);
     if (judged->most > 0)
-        snprintf(measured, sizeof measured, "%.3g (full up to %.3g)", judged->measured, judged->par);
+        snprintf(measured, sizeof measured, tr("%.3g (full up to %.3g)"), judged->measured, judged->par);
     else
-        snprintf(measured, sizeof measured, "%.3g (not scored)", judged->measured);
+        snprintf(measured, sizeof measured, tr("%.3g (not scored)"), judged->measured);
     if (beside) {
         char theirs[40];
         print_points(&beside->judged[part], theirs);
@@ -58,7 +59,7 @@ static void print_errors(const Box *box, const ScoreFigures *f, const ScoreFigur
             continue;
         snprintf(count, sizeof count, "%d", f->error[i].count);
         if (f->error[i].count > 0)
-            snprintf(last, sizeof last, "last at %.2f s%s", f->error[i].last_s, f->error[i].is_on ? ", now" : "");
+            snprintf(last, sizeof last, tr("last at %.2f s%s"), f->error[i].last_s, f->error[i].is_on ? tr(", now") : "");
         if (beside)
             snprintf(other, sizeof other, "%d", beside->error[i].count);
         print_row(box, f->error[i].count > 0 ? gui_colors.bad : gui_colors.text, (const char *const[COLUMNS]){score_error_words[i], count, last, other});
@@ -85,14 +86,14 @@ void score_parts_box(Gui *gui, const ScoreFigures *f, const ScoreFigures *beside
              : f->state == SCORE_TIME_OUT ? "out of time"
                                           : "target not yet held");
     if (beside)
-        snprintf(text, sizeof text, "%s; beside: %.0f after %.1f s", title, beside->points, beside->time_s);
+        snprintf(text, sizeof text, tr("%s; beside: %.0f after %.1f s"), title, beside->points, beside->time_s);
     gui_text(gui, GUI_NORMAL, gui_colors.text, beside ? text : title);
     print_row(&box, gui_colors.dim, (const char *const[COLUMNS]){"Part", "Points", "Measured", beside ? "Beside" : ""});
     for (int i = 0; i < PART_COUNT; i++)
         print_part(&box, f, beside, (ScorePart)i);
     print_errors(&box, f, beside);
     if (f->state != SCORE_REACHED) {
-        snprintf(text, sizeof text, "Only %.0f %% of these points count until the target is held.", 100 * score_share(f));
+        snprintf(text, sizeof text, tr("Only %.0f %% of these points count until the target is held."), 100 * score_share(f));
         gui_text(gui, GUI_SMALL, gui_colors.dim, text);
     }
     gui_window_end(gui);

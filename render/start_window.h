@@ -1,26 +1,8 @@
-// The window of `seldinger` without arguments: exercises and cases, earlier sessions, and files to open. It only asks; the caller does what was chosen.
+// The window of `seldinger` without arguments: exercises and cases, earlier sessions, files to open, devices, settings. It only asks; the caller does what was chosen.
 #ifndef SELDINGER_RENDER_START_WINDOW_H
 #define SELDINGER_RENDER_START_WINDOW_H
 
-#include "sim/sim.h"
-
-typedef enum { START_LEAVE, START_STEER, START_REPLAY, START_REPORT } StartChoice;
-
-typedef struct StartOptions {
-    const Shelf *shelf;
-    const char *message;         // what happened before, one or more lines; "": nothing
-    int width, height;
-    double duration_s;           // ends after this much real time; 0: never
-} StartOptions;
-
-// Kept between two calls: which page is open and where.
-typedef struct StartState {
-    int page, row;
-    char folder[4096];           // that the page of files shows
-    char trainee[64];
-    bool is_examination;         // steer without 3D view and angioscopy
-    char path[4096];             // result: the scene or case, the file to open, or the session file
-} StartState;
+#include "render/start_state.h"
 
 // Runs until the user has chosen or leaves. START_LEAVE with a fault if no window can be opened.
 StartChoice start_window_run(const StartOptions *options, StartState *state, Faults *faults);

@@ -3,6 +3,7 @@
 #include "render/message.h"
 #include "render/score_parts_box.h"
 #include "render/session_figures.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -184,7 +185,7 @@ static void draw_captions(Gui *gui, const TimelineState *state, float s)
     draw_caption(gui, "caption", half, file_name(state->note ? state->note : ""), s);
     half.x += half.width;
     if (side->is_in_step)
-        snprintf(text, sizeof text, "%.200s, in step at %.1f s", file_name(side->name), side->time_s);
+        snprintf(text, sizeof text, tr("%.200s, in step at %.1f s"), file_name(side->name), side->time_s);
     else
         snprintf(text, sizeof text, "%.200s, %.1f s %s", file_name(side->name), fabs(side->behind_s), side->behind_s >= 0 ? "behind" : "ahead");
     draw_caption(gui, "caption beside", half, text, s);
@@ -234,7 +235,7 @@ static GuiRect draw_bar(Gui *gui, PanelRect at, TimelineActions *actions, const 
         ask_for_time(actions, (double)time);
     if (side) {
         gui_beside(gui, 8 * s);
-        snprintf(label, sizeof label, "beside: %%.2f s of %.2f s", side->end_s);
+        snprintf(label, sizeof label, tr("beside: %%.2f s of %.2f s"), side->end_s);
         actions->seek_side = gui_slider(gui, "side", &other, 0, (float)side->end_s, label, 0);
         actions->seek_side_s = (double)other;
     }

@@ -11,6 +11,7 @@
 #include "render/trainer_panel.h"
 #include "render/trainer_tray.h"
 #include "sim/sim.h"
+#include "render/translation.h"
 
 #include <pthread.h>
 #include <stdarg.h>
@@ -69,7 +70,7 @@ __attribute__((format(printf, 3, 4))) static void show_message(Trainer *trainer,
     char text[4600];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(text, sizeof text, tr(format), arguments);
     va_end(arguments);
     panel_message(trainer->panel, since_begin(trainer), mark, text);
 }
@@ -143,8 +144,8 @@ static void offer_recovery(Trainer *trainer)
     if (faults) {
         const char *slash = strrchr(found.path[found.count - 1], '/');
         snprintf(text, sizeof text,
-                 found.count > 1 ? "%d sessions were interrupted, the last is %s. Their reports can still be made: the sessions are simulated again."
-                                 : "%d session was interrupted: %s. Its report can still be made: the session is simulated again.",
+                 found.count > 1 ? tr("%d sessions were interrupted, the last is %s. Their reports can still be made: the sessions are simulated again.")
+                                 : tr("%d session was interrupted: %s. Its report can still be made: the session is simulated again."),
                  found.count, slash ? slash + 1 : "");
         bool wanted = is_answered_yes(trainer, (PanelQuestion){"Recover interrupted sessions?", text, "Recover", "Not now"});
         trainer->progress = "Simulating the session again";
@@ -698,7 +699,7 @@ static void show_devices(Trainer *trainer)
         char moves[TOOLS_MOST * (TOOL_NAME_SIZE + 2)] = "";
         if (trainer->scene->tool_count > 1)
             name_moved(trainer, hands_port(trainer->hands, i), info.hand_count, moves, sizeof moves);
-        snprintf(shown->device_note[at], sizeof shown->device_note[at], "%s%s, %.0f reports/s; %s", moves, info.map, info.report_hz, info.force);
+        snprintf(shown->device_note[at], sizeof shown->device_note[at], tr("%s%s, %.0f reports/s; %s"), moves, info.map, info.report_hz, info.force);
         shown->device[at] = (PanelDevice){shown->device_name[at], info.state, shown->device_note[at]};
         if (info.state == HAND_LOST)
             state->warnings |= WARN_DEVICE_LOST;
@@ -887,6 +888,9 @@ static bool open_hands(Trainer *trainer, Faults *faults)
     hands.map = (const DeviceMap *const *)options->map;
     hands.map_count = options->map_count;
     hands.use_built_in = options->has_built_in_maps;
+    const OperatorSpeeds speeds = controls_speeds();
+    hands.push = speeds.push;
+    hands.twist = speeds.twist;
     trainer->hands = hands_open(&hands, faults);
     const ToolNames tools = scene_tool_names(trainer->scene);
     char text[HAND_MESSAGE_LENGTH];
@@ -896,6 +900,9 @@ static bool open_hands(Trainer *trainer, Faults *faults)
     if (options->has_built_in_maps) {
         trainer->built_in[0] = device_map_built_in(trainer->scene->tool_count > 1 ? BUILT_IN_GAMEPAD_PAIR : BUILT_IN_GAMEPAD);
         trainer->built_in[1] = device_map_built_in(BUILT_IN_JOYSTICK);
+        for (int i = 0; i < 2; i++)
+            if (trainer->built_in[i])
+                device_map_scale(trainer->built_in[i], speeds.push, speeds.twist);
     }
     return trainer->hands != NULL;
 }

@@ -2,6 +2,7 @@
 
 #include "base/base.h"
 #include "render/gl_canvas.h"
+#include "render/translation.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,10 +49,10 @@ bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *rem
         cine_lock(cine->cine, false);
         if (cine_is_recording(cine->cine)) {
             cine_stop(cine->cine);
-            snprintf(remark, capacity, "cine: %d images, %.1f s; F7 shows it, F8 saves it", cine_count(cine->cine), cine_duration_s(cine->cine));
+            snprintf(remark, capacity, tr("cine: %d images, %.1f s; F7 shows it, F8 saves it"), cine_count(cine->cine), cine_duration_s(cine->cine));
         } else {
             cine_record(cine->cine);
-            snprintf(remark, capacity, "cine is recorded while the X-ray is on; the last %d images are kept", cine_capacity(cine->cine));
+            snprintf(remark, capacity, tr("cine is recorded while the X-ray is on; the last %d images are kept"), cine_capacity(cine->cine));
         }
         return was_shown;
     }
@@ -132,8 +133,8 @@ bool trainer_cine_save(TrainerCine *cine, Views *views, const char *stem, char *
     }
     gl_canvas_destroy(&drawing.canvas);
     if (good)
-        snprintf(remark, capacity, film ? "cine %.200s.cine and .mp4%s" : "cine %.200s.cine; no video: %s", stem, film ? "" : message);
+        snprintf(remark, capacity, film ? tr("cine %.200s.cine and .mp4%s") : tr("cine %.200s.cine; no video: %s"), stem, film ? "" : message);
     else
-        snprintf(remark, capacity, "the cine could not be saved: %.200s", faults->count ? faults->text[0] : "out of memory");
+        snprintf(remark, capacity, tr("the cine could not be saved: %.200s"), faults->count ? faults->text[0] : "out of memory");
     return good;
 }

@@ -1,4 +1,5 @@
 #include "render/trainer_panel.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -17,7 +18,7 @@ static void name_device(TrainerPanel *panel, const Scene *scene, int k, int whic
     const char *title = scene_device(scene, k, which)->title;
     snprintf(panel->tool[k], sizeof panel->tool[k], "%s%s%s %.2f mm x %.0f mm%s", title, title[0] ? ": " : "",
              tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0, wire_length(&wire),
-             tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+             tip && tip->rest_curvature != 0 ? tr(", curved tip") : "");
     panel->fitted[k] = which;
 }
 
@@ -71,7 +72,7 @@ __attribute__((format(printf, 3, 4))) static void add_line(char *text, size_t ca
 // The result: a first line, then the points of each part with the reason for those that were lost, then what the sum is multiplied by and the errors.
 static void tell_result(char *text, size_t capacity, const Scene *scene, const ScoreFigures *score)
 {
-    snprintf(text, capacity, "%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.\n",
+    snprintf(text, capacity, tr("%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.\n"),
              score->state == SCORE_REACHED ? "Target reached and held" : "Time is up", score->points, score->time_s, score->error_total,
              score->error_total == 1 ? "" : "s");
     for (int i = 0; i < PART_COUNT; i++) {
@@ -81,23 +82,23 @@ static void tell_result(char *text, size_t capacity, const Scene *scene, const S
         if (!(part->most > 0))
             continue;
         score_part_reason(score, (ScorePart)i, why, sizeof why);
-        add_line(text, capacity, "- %s: %.1f of %.1f points", words->title, part->points, part->most);
+        add_line(text, capacity, tr("- %s: %.1f of %.1f points"), words->title, part->points, part->most);
         if (*why)
-            add_line(text, capacity, " (%.3g %s, full points up to %.3g): %s", part->measured, words->unit, part->par, why);
+            add_line(text, capacity, tr(" (%.3g %s, full points up to %.3g): %s"), part->measured, words->unit, part->par, why);
         add_line(text, capacity, ".\n");
     }
     if (score->state != SCORE_REACHED)
-        add_line(text, capacity, "- Only %.0f %% of these points count: the target was not held.\n", 100 * score_share(score));
+        add_line(text, capacity, tr("- Only %.0f %% of these points count: the target was not held.\n"), 100 * score_share(score));
     for (int i = 0; i < ERROR_COUNT; i++)
         if (score->error[i].count > 0)
-            add_line(text, capacity, "- %d \u00d7 %s: %.1f points lost.\n", score->error[i].count, score_error_words[i],
+            add_line(text, capacity, tr("- %d \u00d7 %s: %.1f points lost.\n"), score->error[i].count, score_error_words[i],
                      score_error_points(scene->exercise, (ScoreError)i) * score->error[i].count);
     const Guide *guide = &scene->exercise->guide;
     for (int i = 0; i < guide->count; i++)
         if (i < score->guide.done)
-            add_line(text, capacity, "- Step %d done at %.1f s: %s\n", i + 1, score->guide.done_s[i], guide->step[i].text);
+            add_line(text, capacity, tr("- Step %d done at %.1f s: %s\n"), i + 1, score->guide.done_s[i], guide->step[i].text);
         else
-            add_line(text, capacity, "- Step %d not done: %s\n", i + 1, guide->step[i].text);
+            add_line(text, capacity, tr("- Step %d not done: %s\n"), i + 1, guide->step[i].text);
 }
 
 // Names of the places of consequences, for the views.
@@ -108,7 +109,7 @@ static void name_spots(TrainerPanel *panel, const ScoreFigures *score)
     for (int i = 0; i < score->mark_count; i++) {
         const ScoreMark *mark = &score->mark[i];
         if (mark->kind == ERROR_SPASM)
-            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], "%s: radius %.0f %%", score_error_words[mark->kind], 100 * score->narrowest);
+            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], tr("%s: radius %.0f %%"), score_error_words[mark->kind], 100 * score->narrowest);
         else
             snprintf(panel->spot_text[i], sizeof panel->spot_text[i], "%s", score_error_words[mark->kind]);
     }
@@ -138,7 +139,8 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
         if (error->count == 0)
             continue;
         char *text = panel->error_text[state->error_count];
-        snprintf(text, sizeof panel->error_text[0], "%s%s: %d, last at %.1f s", error->is_on ? "NOW " : "", score_error_words[i], error->count, error->last_s);
+        snprintf(text, sizeof panel->error_text[0], tr("%s%s: %d, last at %.1f s"), error->is_on ? tr("NOW ") : "", score_error_words[i], error->count,
+                 error->last_s);
         panel->error[state->error_count++] = text;
     }
     state->hint = score->hint;
@@ -267,7 +269,7 @@ static void label_scene(TrainerPanel *panel, const OperatorControls *controls, c
             continue;
         char *text = panel->label_text[state->label_count];
         if (it->kind == LABEL_TARGET && isfinite(it->distance_mm))
-            snprintf(text, sizeof panel->label_text[0], "%.63s, %.0f mm in a straight line", it->name, it->distance_mm);
+            snprintf(text, sizeof panel->label_text[0], tr("%.63s, %.0f mm in a straight line"), it->name, it->distance_mm);
         else
             snprintf(text, sizeof panel->label_text[0], "%.63s", it->name);
         panel->label[state->label_count++] = (PanelLabel){it->x, it->y, it->radius, text};
@@ -332,11 +334,11 @@ void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, 
     double requested = (double)xray->contrast_ml_s;
     if (!(requested > 0) || tool < 0 || flow_ml_s >= well * requested || panel->state.warning)
         return;
-    const char *name = scene->tool[tool].name, *advice = tool + 1 < scene->tool_count ? "; more after the tool inside it is withdrawn" : "";
+    const char *name = scene->tool[tool].name, *advice = tool + 1 < scene->tool_count ? tr("; more after the tool inside it is withdrawn") : "";
     if (flow_ml_s < 0.01 * requested)
-        snprintf(panel->warning, sizeof panel->warning, "Almost no contrast agent flows through %s: its lumen is filled%s", name, advice);
+        snprintf(panel->warning, sizeof panel->warning, tr("Almost no contrast agent flows through %s: its lumen is filled%s"), name, advice);
     else
-        snprintf(panel->warning, sizeof panel->warning, "At the injector's pressure only %.2g of %.2g ml/s flow through the lumen of %s%s", flow_ml_s,
+        snprintf(panel->warning, sizeof panel->warning, tr("At the injector's pressure only %.2g of %.2g ml/s flow through the lumen of %s%s"), flow_ml_s,
                  requested, name, advice);
     panel->state.warning = panel->warning;
 }
@@ -353,7 +355,7 @@ void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip)
             last++;
         if (last == first || state->tool[k].note)
             continue;
-        snprintf(panel->tool_note[k], sizeof panel->tool_note[k], "locked %d%s%d", first + 1, last > first + 1 ? " to " : " and ", last + 1);
+        snprintf(panel->tool_note[k], sizeof panel->tool_note[k], tr("locked %d%s%d"), first + 1, last > first + 1 ? " to " : tr(" and "), last + 1);
         state->tool[k].note = panel->tool_note[k];
         state->tool[k].force_n = hand_grip_sum(grip, state->tool_count, k, force);
         state->tool[k].torque_n_mm = hand_grip_sum(grip, state->tool_count, k, torque);

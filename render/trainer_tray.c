@@ -1,4 +1,5 @@
 #include "render/trainer_tray.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -89,9 +90,9 @@ static void show_device(PanelTrayDevice *shown, const TrayDevice *device, char *
     print_range(outer, sizeof outer, wire, false);
     print_range(inner, sizeof inner, wire, true);
     if (is_wire)
-        snprintf(what, capacity, "wire, %s core, %s mm thick, %.0f mm long", tool_core_name[device->tool.core], outer, wire_length(wire));
+        snprintf(what, capacity, tr("wire, %s core, %s mm thick, %.0f mm long"), tool_core_name[device->tool.core], outer, wire_length(wire));
     else
-        snprintf(what, capacity, "%s, outside %s mm, lumen %s mm, %.0f mm long", kind[device->tool.kind], outer, inner, wire_length(wire));
+        snprintf(what, capacity, tr("%s, outside %s mm, lumen %s mm, %.0f mm long"), kind[device->tool.kind], outer, inner, wire_length(wire));
     *shown = (PanelTrayDevice){
         .name = device->title,
         .what = what,
@@ -117,12 +118,12 @@ static const char *why_still_in(char *text, const Scene *scene, const Pose *pose
 {
     double beyond = beyond_hub(pose, tool), to_withdraw = tool > 0 ? beyond - at_hub_mm : beyond;
     if (!scene->wire.has_sheath && tool == 0) {
-        snprintf(text, TRAY_WORDS, "'%s' is held by a test rig and cannot be removed", scene->tool[tool].name);
+        snprintf(text, TRAY_WORDS, tr("'%s' is held by a test rig and cannot be removed"), scene->tool[tool].name);
         return text;
     }
     if (to_withdraw <= 0)
         return NULL;
-    snprintf(text, TRAY_WORDS, "'%s' is still inserted: pull it back %.0f mm, to %s; then another can be inserted", scene->tool[tool].name,
+    snprintf(text, TRAY_WORDS, tr("'%s' is still inserted: pull it back %.0f mm, to %s; then another can be inserted"), scene->tool[tool].name,
              fmax(1, ceil(to_withdraw)), tool > 0 ? "the hub" : "the sheath's mouth");
     return text;
 }
@@ -134,16 +135,17 @@ static const char *why_too_long_or_short(char *text, const Scene *scene, const P
         // after the outermost tool has been withdrawn to the mouth, this length is outside
         double outside = length_of(pose, m) - (tool > 0 ? beyond_hub(pose, m) : pose->tool[m].inserted_mm);
         if (outside < length) {
-            snprintf(text, TRAY_WORDS,
-                     "'%s' inside is too short for it: %.0f mm of that are outside, and this device is %.0f mm long. An exchange needs a wire of that length",
-                     scene->tool[m].name, outside, length);
+            snprintf(
+                text, TRAY_WORDS,
+                tr("'%s' inside is too short for it: %.0f mm of that are outside, and this device is %.0f mm long. An exchange needs a wire of that length"),
+                scene->tool[m].name, outside, length);
             return text;
         }
     }
     for (int m = tool - 1; m > 0; m--) {
         double outside = length_of(pose, m) - beyond_hub(pose, m);
         if (length < outside) {
-            snprintf(text, TRAY_WORDS, "it is %.0f mm long, but '%s' around it has %.0f mm outside", length, scene->tool[m].name, outside);
+            snprintf(text, TRAY_WORDS, tr("it is %.0f mm long, but '%s' around it has %.0f mm outside"), length, scene->tool[m].name, outside);
             return text;
         }
     }
@@ -157,7 +159,7 @@ static const char *why_not(TrainerTray *tray, int index, const TrayDevice *devic
     if (!is_new && device->which == pose->tool[tool].fitted)
         return "this device is already inserted";
     if (is_new && scene_device_count(scene, tool) > EXCHANGES_MOST) {
-        snprintf(text, TRAY_WORDS, "a session has room for %d devices in addition to the first one of '%s'; the existing ones can be inserted again",
+        snprintf(text, TRAY_WORDS, tr("a session has room for %d devices in addition to the first one of '%s'; the existing ones can be inserted again"),
                  EXCHANGES_MOST, scene->tool[tool].name);
         return text;
     }
@@ -215,7 +217,7 @@ static void shape_chosen(TrainerTray *tray)
     const TipShaped *how = &tray->shaped.tool.tip_shaped;
     tray->shaped_shown.note = is_kept ? NULL : why;
     tray->shaped_shown.remark = is_kept ? tray->remark : NULL;
-    snprintf(tray->remark, sizeof tray->remark, "Bent by %.0f\u00b0 around the mandrel it springs back to %.0f\u00b0, with a radius of %.1f mm",
+    snprintf(tray->remark, sizeof tray->remark, tr("Bent by %.0f\u00b0 around the mandrel it springs back to %.0f\u00b0, with a radius of %.1f mm"),
              how->bent_angle / per_degree, tip.angle / per_degree, how->rest_radius);
 }
 

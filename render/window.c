@@ -20,6 +20,10 @@ enum { SIGNALS = 3 };
 static const int end_signal[SIGNALS] = {SIGINT, SIGTERM, SIGHUP};
 static volatile sig_atomic_t ended_by_signal;   // global, because a signal handler has no argument for it
 
+static double letter_scale = 1;
+
+void window_scale_letters(double factor) { letter_scale = factor; }
+
 struct Window {
     GLFWwindow *window;
     GLFWwindow *previous;
@@ -209,7 +213,7 @@ static const WindowInput *window_poll(Window *w)
     glfwGetFramebufferSize(w->window, &input->width, &input->height);
     float scale_x, scale_y;
     glfwGetWindowContentScale(w->window, &scale_x, &scale_y);
-    input->scale = fmax(1, fmax(scale_x, scale_y));
+    input->scale = letter_scale * fmax(1, fmax(scale_x, scale_y));
     int width, height;
     glfwGetWindowSize(w->window, &width, &height);
     double x, y;

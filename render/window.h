@@ -65,7 +65,7 @@ enum { WINDOW_EVENTS = 256, WINDOW_GAMEPADS = 16, WINDOW_AXES = 16, WINDOW_BUTTO
 // Input since the last poll. It can also be filled by code to drive the panel off screen: zeros with width, height and scale give a still frame.
 typedef struct WindowInput {
     int width, height;       // of the framebuffer [pixel]
-    double scale;            // content scale: 1, 2 on a high-density display
+    double scale;            // of letters: content scale (1, 2 on a high-density display) times the user's factor
     double mouse_x, mouse_y; // [pixel], y down; negative if there is no mouse
     unsigned mouse_buttons;  // pressed now; a click between two polls is visible for at least one poll
     bool has_focus, is_iconified;
@@ -85,6 +85,8 @@ typedef struct WindowGamepad {
 
 typedef struct Window Window;
 
+// The user's factor of all letters in the windows of this process, default 1.
+void window_scale_letters(double factor);
 // Creates a window with a current context and signal handlers, at most as large as the screen. `hz`: frames per second (0: 30). One window per process.
 // Returns NULL with a reason, such as "no display; seldinger run works without one, or start under Xvfb".
 Window *window_create(const char *title, int width, int height, double hz, char *message, size_t capacity);

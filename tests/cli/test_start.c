@@ -35,6 +35,41 @@ static const char hand[] = "window() { xdotool search --sync --onlyvisible --nam
                            "keys() { for k in \"$@\"; do xdotool key $k; sleep 0.4; done; }; "
                            "until_true() { for i in $(seq 300); do eval \"$1\" && return 0; sleep 0.1; done; echo \"never: $1\"; exit 1; }; ";
 
+// Every page by keys alone: the letter Y is given to Push and the letters grow; the trainer then pushes by Y.
+static void a_user_sets_keys(void **state)
+{
+    (void)state;
+    need_display();
+    char script[3000];
+    snprintf(script, sizeof script,
+             "%s export XDG_CONFIG_HOME=$PWD/config; $S > set 2>&1 & P=$!; window; "
+             "keys Tab Tab Tab u Tab Down Down Down Down Down Down Down Right Down Down Return y Escape; wait $P; [ $? = 0 ] && ! [ -s set ] || exit 1; "
+             "grep -q 'push: \"Y\"' config/seldinger/settings.yaml && grep -q 'interface_scale: 1.1' config/seldinger/settings.yaml || exit 2; "
+             "$S nav '%s/scenes/exercises/aneurysm.yaml' --sessions pushed --duration-s 60 > pushed.txt 2>&1 & N=$!; window; sleep 2; "
+             "xdotool keydown y; sleep 3; xdotool keyup y; sleep 0.3; kill -TERM $N; wait $N; "
+             "$S export pushed/*.h5 -o pushed.csv --quiet && awk -F, '$3 == 0 { if (!n++) from = $6; to = $6 } END { exit !(to - from > 5) }' pushed.csv",
+             hand, SOURCE_DIR);
+    int code = shell(script);
+    if (code != 0)
+        fail_msg("ended with %d: %s", code, text_of(in_folder("set")));
+}
+
+// The window asks nobody to wait for the pictures of its cases; they come into the cache by themselves.
+static void pictures_of_cases_come(void **state)
+{
+    (void)state;
+    need_display();
+    char script[3000];
+    snprintf(script, sizeof script,
+             "%s rm -rf cache/pictures; $S > drawn 2>&1 & P=$!; window; "
+             "for i in $(seq 240); do [ $(ls cache/pictures 2>/dev/null | grep -c png) -ge 1 ] && break; sleep 0.5; done; "
+             "[ $(ls cache/pictures | grep -c png) -ge 1 ] || exit 1; sleep 1; keys Escape; wait $P; [ $? = 0 ] && ! [ -s drawn ]",
+             hand);
+    int code = shell(script);
+    if (code != 0)
+        fail_msg("ended with %d: %s", code, text_of(in_folder("drawn")));
+}
+
 static void no_display_prints_the_usage(void **state)
 {
     (void)state;
@@ -58,9 +93,10 @@ static void a_user_trains(void **state)
     char script[3000];
     snprintf(script, sizeof script,
              "%s $S > trained 2>&1 & P=$!; window; keys n A d a Return; keys x Return; "
-             "until_true 'pgrep -P '$P' >/dev/null'; C=$(pgrep -P $P); window; sleep 1; kill -TERM $C; "
-             "until_true 'ls seldinger/sessions/*.json >/dev/null 2>&1'; until_true '! pgrep -P '$P' >/dev/null'; window; "
-             "keys Tab r; until_true 'ls seldinger/sessions/*.html >/dev/null 2>&1'; until_true '! pgrep -P '$P' >/dev/null'; window; keys Escape; wait $P; [ "
+             "until_true \"pgrep -f -P $P 'seldinger nav' >/dev/null\"; C=$(pgrep -f -P $P 'seldinger nav'); window; sleep 1; kill -TERM $C; "
+             "until_true 'ls seldinger/sessions/*.json >/dev/null 2>&1'; until_true \"! pgrep -f -P $P 'seldinger nav' >/dev/null\"; window; "
+             "keys Tab r; until_true 'ls seldinger/sessions/*.html >/dev/null 2>&1'; until_true \"! pgrep -f -P $P 'seldinger report' >/dev/null\"; window; "
+             "keys Escape; wait $P; [ "
              "$? = 0 ] || exit 1; "
              "grep -q '\"trainee\":.*\"[Aa]da\"' seldinger/sessions/*.json && grep -q '\"mode\":.*\"examination\"' seldinger/sessions/*.json",
              hand);
@@ -92,6 +128,8 @@ int main(void)
         cmocka_unit_test(no_display_prints_the_usage),
         cmocka_unit_test(a_user_leaves),
         cmocka_unit_test(a_user_trains),
+        cmocka_unit_test(a_user_sets_keys),
+        cmocka_unit_test(pictures_of_cases_come),
         cmocka_unit_test(a_user_opens_a_volume),
     };
     return cmocka_run_group_tests(tests, begin, end);

@@ -431,6 +431,25 @@ static void gamepads_are_plain_arrays(void **state)
     free(map);
 }
 
+// The user's speeds: factors of push and twist apart; a negative one inverts, and twice inverted is as before.
+static void built_in_maps_are_scaled(void **state)
+{
+    (void)state;
+    DeviceMap *map = device_map_built_in(BUILT_IN_GAMEPAD), *usual = device_map_built_in(BUILT_IN_GAMEPAD);
+    assert_true(map && usual && map->axis_count > 2);
+    device_map_scale(map, 0.5, -2);
+    for (int i = 0; i < map->axis_count; i++) {
+        const bool is_twist = map->axis[i].is_twist;
+        assert_true(map->axis[i].scale == usual->axis[i].scale * (is_twist ? 2 : 0.5));
+        assert_int_equal(map->axis[i].invert, usual->axis[i].invert != is_twist);
+    }
+    device_map_scale(map, 2, -0.5);
+    for (int i = 0; i < map->axis_count; i++)
+        assert_true(map->axis[i].scale == usual->axis[i].scale && map->axis[i].invert == usual->axis[i].invert);
+    free(map);
+    free(usual);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -447,6 +466,7 @@ int main(void)
         cmocka_unit_test(real_reports_become_rates),
         cmocka_unit_test(a_map_that_a_device_cannot_fill_is_refused),
         cmocka_unit_test(gamepads_are_plain_arrays),
+        cmocka_unit_test(built_in_maps_are_scaled),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

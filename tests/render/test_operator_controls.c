@@ -21,6 +21,8 @@ static OperatorControls controls_in_front(void)
                               .contrast_ml_s = 3,
                               .push_mm_s = 10,
                               .twist_deg_s = 120,
+                              .sideways_deg_s = 25,
+                              .tilt_deg_s = 25,
                               .look.camera = {.focus = {1, 2, 3},
                                               .turn = {1, 0, 0, 0},
                                               .width_mm = 100,
@@ -593,9 +595,30 @@ static void an_examination_refuses_the_keys_of_hidden_views(void **state)
     }
 }
 
+// The user's settings: factors of the speeds of all controls created afterwards; negative ones invert.
+static void speeds_and_inverted_axes_of_the_user_apply(void **unused)
+{
+    (void)unused;
+    const OperatorSpeeds usual = controls_speeds();
+    OperatorControls before = controls_in_front(), controls = before;
+    controls_take_speeds(&before);
+    controls_use_speeds(&(OperatorSpeeds){0.5, -2, -1, 3});
+    controls_take_speeds(&controls);
+    PanelActions actions = {.mouse.view = -1};
+    actions.held[ACTION_PUSH] = actions.held[ACTION_TWIST_RIGHT] = actions.held[ACTION_LAO] = actions.held[ACTION_CRA] = true;
+    Command command = controls_command(&controls, &actions), usual_command = controls_command(&before, &actions);
+    assert_true(command.push_mm_s == 0.5 * usual_command.push_mm_s && command.twist_deg_s == -2 * usual_command.twist_deg_s);
+    obey(&controls, &actions, 0.1);
+    obey(&before, &actions, 0.1);
+    assert_true(before.xray.lao_deg > 0 && controls.xray.lao_deg == -before.xray.lao_deg);
+    assert_true(fabs((double)controls.xray.cra_deg - 3 * (double)before.xray.cra_deg) < 1e-4);      // floats
+    controls_use_speeds(&usual);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_c_arm_stops_at_its_limits),
+                                       cmocka_unit_test(speeds_and_inverted_axes_of_the_user_apply),
                                        cmocka_unit_test(the_table_carries_the_patient_where_the_key_says),
                                        cmocka_unit_test(blades_and_field_keep_their_ranges),
                                        cmocka_unit_test(pulse_rates_go_round),

@@ -7,6 +7,7 @@
 #include "render/panel_tray.h"
 #include "render/png_file.h"
 #include "render/tick_step.h"
+#include "render/translation.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,6 +20,8 @@
 #include <epoxy/gl.h>
 #include <math.h>
 #include <time.h>
+
+#include "tests/render/pseudo.h"
 
 static GlContext *context;
 
@@ -357,6 +360,31 @@ static void every_action_has_a_button_that_works(void **unused)
     assert_true(dialogues >> DIALOGUE_TRAINEE & 1);
     assert_true(helps > 0 && hidden > 0);
     end_controls(&controls);
+}
+
+// A translation that is twice as long: on every tab no label and no figure is cut off. (Names of tabs are shortened by dots.)
+static void doubled_letters_are_not_cut(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    translation_replace(pseudo_translation);
+    OperatorControls controls = new_controls(1280, 720);
+    PanelRect right = controls.panel->layout.right;
+    float s = (float)controls.panel->layout.scale;
+    for (int tab = 0; tab < 5; tab++) {
+        bool ignored[ACTION_COUNT] = {false};
+        const char *first;
+        char name[32];
+        click(&controls, right.x + 10 * s + (float)(tab + 0.35) * 45 * s, right.y + 16 * s, ignored);
+        frame(&controls);
+        snprintf(name, sizeof name, "doubled%d", tab);
+        keep_picture(&controls.canvas, name);
+        if (gui_cut_texts(controls.panel->gui, &first) > 0)
+            fail_msg("tab %d: '%s' is cut off", tab, first);
+    }
+    end_controls(&controls);
+    translation_replace(NULL);
 }
 
 // ---- the tray
@@ -1013,6 +1041,7 @@ int main(void)
                                        cmocka_unit_test(ticks_are_round),
                                        cmocka_unit_test(pictures_at_all_sizes),
                                        cmocka_unit_test(every_action_has_a_button_that_works),
+                                       cmocka_unit_test(doubled_letters_are_not_cut),
                                        cmocka_unit_test(the_tray_fits_at_any_size),
                                        cmocka_unit_test(keys_choose_shape_and_take_from_the_tray),
                                        cmocka_unit_test(the_mouse_chooses_on_the_tray),

@@ -1,0 +1,25 @@
+// Keys as users read and write them: "Up", "Alt+I", "Keypad +", "F1 or ?". No window, no GL.
+#ifndef SELDINGER_RENDER_KEY_BINDING_H
+#define SELDINGER_RENDER_KEY_BINDING_H
+
+#include "render/window.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct KeyBinding {
+    int key;                 // WindowKey
+    unsigned modifiers;      // WINDOW_ALT or 0. Shift and Ctrl only change the speed of the tool and are not part of a key
+    char character;          // alternative typed character, independent of the layout; 0: none
+} KeyBinding;
+
+enum { KEY_BINDING_TEXT = 32 };
+
+// Writes a key as shown to the user; returns text.
+const char *key_binding_text(KeyBinding binding, char *text, size_t capacity);
+// Reads what key_binding_text writes, in capitals or small letters. Returns false if there is no such key; *binding is then unchanged.
+bool key_binding_parse(const char *text, KeyBinding *binding);
+// Whether one press could mean both.
+bool key_binding_clash(KeyBinding a, KeyBinding b);
+
+#endif
