@@ -234,12 +234,8 @@ void controls_obey(OperatorControls *controls, const VesselScene *scene, const P
     // first, because sliders contain all controls as shown; keys are applied on top
     if (actions->xray_set)
         obey_sliders(&controls->xray, actions);
-<<<<<<< HEAD
-    obey_arm(&controls->xray, &controls->patient, actions, seconds);
-    obey_stored(controls, actions);
-=======
     obey_arm(controls, actions, seconds);
->>>>>>> h-settings
+    obey_stored(controls, actions);
     obey_xray(controls, actions);
     obey_grip(controls, actions);
     obey_views(controls, scene, actions, seconds);

@@ -210,7 +210,8 @@ static void draw_machine(Panel *panel, const PanelState *state, GuiRect at)
     snprintf(text, sizeof text, tr("\u00d7%s, %lld missed"), panel_figure(one, sizeof one, state->real_time_factor, 2, ""), (long long)state->missed_deadlines);
     small_row(panel, "Real time, deadlines", state->warnings & (WARN_SLOW | WARN_STALLED) ? MARK_WARNING : MARK_NONE, text);
     panel_figure(one, sizeof one, state->frame_ms, 1, "ms");
-    snprintf(text, sizeof text, state->shown_side > state->drawn_side ? "%s, image %d of %d px" : "%s per frame", one, state->drawn_side, state->shown_side);
+    snprintf(text, sizeof text, state->shown_side > state->drawn_side ? tr("%s, image %d of %d px") : tr("%s per frame"), one, state->drawn_side,
+             state->shown_side);
     small_row(panel, "Drawing", MARK_NONE, text);
     gui_window_end(panel->gui);
 }

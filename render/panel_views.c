@@ -43,11 +43,11 @@ static void draw_dose(Panel *panel, const PanelState *state, float right, float 
     char text[64];
     if (!(state->tube_kv > 0))
         return;
-    snprintf(text, sizeof text, "DAP %.2f Gy cm\u00b2", state->kerma_area_gy_cm2);
+    snprintf(text, sizeof text, tr("DAP %.2f Gy cm\u00b2"), state->kerma_area_gy_cm2);
     label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
-    snprintf(text, sizeof text, "air kerma %.1f mGy", state->kerma_mgy);
+    snprintf(text, sizeof text, tr("air kerma %.1f mGy"), state->kerma_mgy);
     label_right(panel, right, y - line, GUI_NORMAL, gui_colors.text, text);
-    snprintf(text, sizeof text, "%.1f mGy/min", state->kerma_rate_mgy_min);
+    snprintf(text, sizeof text, tr("%.1f mGy/min"), state->kerma_rate_mgy_min);
     label_right(panel, right, y - 2 * line, GUI_NORMAL, gui_colors.text, text);
     snprintf(text, sizeof text, "%.0f kV  %.0f mA", state->tube_kv, state->tube_ma);
     label_right(panel, right, y - 3 * line, GUI_NORMAL, gui_colors.text, text);

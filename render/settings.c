@@ -81,6 +81,12 @@ static const char *const action_name[ACTION_COUNT + 1] = {
     [ACTION_HINTS] = "hints",
     [ACTION_BRIEFING] = "briefing",
     [ACTION_HELP] = "help",
+    [ACTION_BIPLANE] = "biplane",
+    [ACTION_CAMERA_C_ARM] = "camera_c_arm",
+    [ACTION_LATERAL] = "lateral",
+    [ACTION_RECALL] = "recall",
+    [ACTION_REFERENCE] = "reference",
+    [ACTION_STORE] = "store",
     [ACTION_QUIT] = "quit",
 };
 

@@ -1,13 +1,8 @@
 #include "render/start_window.h"
 
-<<<<<<< HEAD
-#include "render/gui.h"
 #include "render/redraw.h"
-#include "render/window.h"
-=======
 #include "render/settings_in_force.h"
 #include "render/start_pages.h"
->>>>>>> h-settings
 
 #include <stdio.h>
 
@@ -25,7 +20,9 @@ static void run_frames(StartWindow *w)
                 start_choose(w, START_STEER, window_dropped(w->window));
         }
         w->ends |= input->close != WINDOW_OPEN || (w->options->duration_s > 0 && clock_s(CLOCK_MONOTONIC) - begun > w->options->duration_s);
-        if (!visible || w->ends || !redraw_is_due(&redraw, input, NULL, 0, clock_s(CLOCK_MONOTONIC), 0.5))
+        // values of devices change without input, and a field gets the keys in the picture after the next
+        const double refresh_s = w->state->page == PAGE_DEVICES || w->takes_name > 0 ? 0 : 0.5;
+        if (!visible || w->ends || !redraw_is_due(&redraw, input, NULL, 0, clock_s(CLOCK_MONOTONIC), refresh_s))
             continue;
         start_draw(w, input, 0);
         if (settings_page_save(&w->settings))
