@@ -825,7 +825,7 @@ static const char *check_file(const char *path, hsize_t count[2])
 
 // --- every state of the file in a flush ---
 
-typedef struct Watched {
+typedef struct Observed {
     char path[256], copy[256];
     int states, failures, commits, most_writes, writes;
     int every, first;           // the states that are read, besides the first and those at the end of a flush
@@ -833,7 +833,7 @@ typedef struct Watched {
     off_t length, end;          // length of the file and end in the superblock, after the last commit
     const char *fault;
     atomic_llong committed;
-} Watched;
+} Observed;
 
 static off_t length_of(const char *path)
 {
@@ -876,7 +876,7 @@ static off_t used_end(const char *path)
 // Called in the recording's thread: checks the file as a kill at this moment would leave it.
 static void look(void *context, bool done)
 {
-    Watched *watched = context;
+    Observed *watched = context;
     hsize_t count[2] = {0, 0};
     if (access(watched->path, F_OK) != 0)
         return;      // the file has no name yet
@@ -921,8 +921,8 @@ static void look(void *context, bool done)
 
 static void look_at_states(const RecordingOptions *given, int every, int first)
 {
-    static Watched watched;
-    watched = (Watched){.every = every, .first = first};
+    static Observed watched;
+    watched = (Observed){.every = every, .first = first};
     snprintf(watched.path, sizeof watched.path, "%s/states.h5", folder);
     snprintf(watched.copy, sizeof watched.copy, "%s/state.h5", folder);
     unlink(watched.path);
