@@ -1,5 +1,7 @@
 #include "sim/xray_tube.h"
 
+#include "base/base.h"
+
 #include <math.h>
 
 static const double output_ugy_mas = 0.008373, output_power = 1.983, output_mm = 1016;
@@ -71,7 +73,7 @@ XrayExposure xray_expose(const XrayPatient *patient, const XrayControl *xray)
     double water = xray_patient_water_mm(patient, (double)xray->lao_deg, (double)xray->cra_deg);
     double field = clamped((double)xray->field_mm, 40, 400), rate = clamped((double)xray->pulses_s, 1, 1000);
     double kv = clamped(50 + 0.13 * water, 60, 125), width = is_dsa ? dsa_ms : fluoroscopy_ms;
-    double transmitted = couch_and_grid * exp(-attenuation_of_water(0.7 * kv) * water);
+    double transmitted = couch_and_grid * same_exp(-attenuation_of_water(0.7 * kv) * water);
     double wanted = detector_ugy * detector_side_mm / (field * XRAY_DETECTOR_MM / XRAY_SOURCE_MM) * (is_dsa ? XRAY_DSA_DOSE : 1);
     double farther = XRAY_DETECTOR_MM / XRAY_REFERENCE_MM, kerma_ugy = wanted / transmitted * farther * farther;
     if (!is_dsa)
