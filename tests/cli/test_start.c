@@ -43,10 +43,10 @@ static void a_user_sets_keys(void **state)
     char script[3000];
     snprintf(script, sizeof script,
              "%s export XDG_CONFIG_HOME=$PWD/config; $S > set 2>&1 & P=$!; window; "
-             "keys Tab Tab Tab u Tab Down Down Down Down Down Down Down Right Down Down Return y Escape; wait $P; [ $? = 0 ] && ! [ -s set ] || exit 1; "
-             "grep -q 'push: \"Y\"' config/seldinger/settings.yaml && grep -q 'interface_scale: 1.1' config/seldinger/settings.yaml || exit 2; "
+             "keys Tab Tab Tab u Tab Down Down Down Down Down Down Down Right Down Down Return Insert Escape; wait $P; [ $? = 0 ] && ! [ -s set ] || exit 1; "
+             "grep -q 'push: \"Insert\"' config/seldinger/settings.yaml && grep -q 'interface_scale: 1.1' config/seldinger/settings.yaml || exit 2; "
              "$S nav '%s/scenes/exercises/aneurysm.yaml' --sessions pushed --duration-s 60 > pushed.txt 2>&1 & N=$!; window; sleep 2; "
-             "xdotool keydown y; sleep 3; xdotool keyup y; sleep 0.3; kill -TERM $N; wait $N; "
+             "xdotool keydown Insert; sleep 3; xdotool keyup Insert; sleep 0.3; kill -TERM $N; wait $N; "
              "$S export pushed/*.h5 -o pushed.csv --quiet && awk -F, '$3 == 0 { if (!n++) from = $6; to = $6 } END { exit !(to - from > 5) }' pushed.csv",
              hand, SOURCE_DIR);
     int code = shell(script);

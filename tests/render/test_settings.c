@@ -91,7 +91,7 @@ static void what_is_written_is_read(void **state)
     settings.interface_scale = 1.5;
     settings.key[ACTION_PUSH] = (KeyBinding){'"', 0, 0};
     settings.key[ACTION_PULL] = (KeyBinding){'\\', WINDOW_ALT, 0};
-    settings.key[ACTION_HELP] = (KeyBinding){WINDOW_KEY_F1 + 11, 0, '#'};
+    settings.key[ACTION_HELP] = (KeyBinding){WINDOW_KEY_INSERT, 0, '#'};
     settings.key[ACTION_DSA] = key_table_default(ACTION_ROADMAP);          // they exchange their keys
     settings.key[ACTION_ROADMAP] = key_table_default(ACTION_DSA);
     char *text = settings_text(&settings);
