@@ -23,6 +23,9 @@ void process_be_expendable(unsigned processor_s, unsigned wall_s);
 // folder `bin`
 // beside the library's folder or beside its parent. False if the path of the running program is unknown or the result is too long.
 bool process_beside(const char *name, char *path, size_t capacity);
+// The folder `name` of scenes/ that belongs to the running program: in the source tree around its build folder, or where the package puts it. False if there is
+// none. `path` has PATH_MAX characters.
+bool process_scenes(const char *name, char *path);
 // The file that this code was loaded from: the program, or the library that contains it. False if unknown.
 bool process_code_file(char *path, size_t capacity);
 

@@ -1,7 +1,9 @@
 // The part of process.h that the library uses too. Nothing here changes the streams, signals or end of the calling process, except in its own child.
+#define _XOPEN_SOURCE 700   // realpath
 #include "base/process.h"
 
 #include <fcntl.h>
+#include <limits.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -69,4 +71,14 @@ bool process_beside(const char *name, char *path, size_t capacity)
         if (name_beside(library, below[i], name, other, sizeof other) && access(other, X_OK) == 0)
             return snprintf(path, capacity, "%s", other) < (int)capacity;
     return true;
+}
+
+bool process_scenes(const char *name, char *path)
+{
+    static const char *const above[] = {"../../scenes/", "../share/seldinger/scenes/"};
+    char beside[PATH_MAX], below[64];
+    for (int i = 0; i < 2; i++)
+        if (snprintf(below, sizeof below, "%s%s", above[i], name) < (int)sizeof below && process_beside(below, beside, sizeof beside) && realpath(beside, path))
+            return true;
+    return false;
 }

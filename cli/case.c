@@ -84,7 +84,7 @@ static int call(void *structure, Faults *faults)
 #ifdef SELDINGER_RENDER
     char library[PATH_MAX];
     command->made.input = command->input;
-    if (!command->made.library && case_library(library))
+    if (!command->made.library && process_scenes("tools", library))
         command->made.library = library;
     if (opens_window(command))
         return open_window(command, faults);

@@ -10,16 +10,6 @@
 
 bool case_can_open(const char *path) { return start_is_possible() && !case_is_there(path) && file_kind(path) == FILE_VOLUME; }
 
-bool case_library(char out[PATH_MAX])
-{
-    static const char *const places[] = {"../../scenes/tools", "../share/seldinger/scenes/tools"};
-    char path[PATH_MAX];
-    for (int i = 0; i < 2; i++)
-        if (process_beside(places[i], path, sizeof path) && realpath(path, out))
-            return true;
-    return false;
-}
-
 int case_open(const CaseWindowOptions *options, Faults *faults)
 {
     char steer[PATH_MAX];

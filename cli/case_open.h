@@ -4,13 +4,10 @@
 
 #include "render/render.h"
 
-#include <limits.h>
 #include <stdbool.h>
 
 // Whether `path` is a volume that a window can be opened for: there is a display.
 bool case_can_open(const char *path);
-// The folder of device files beside the program; false if there is none.
-bool case_library(char out[PATH_MAX]);
 // Runs the window; then, if the user chose to, `nav` in a process of its own. Returns an exit code.
 int case_open(const CaseWindowOptions *options, Faults *faults);
 

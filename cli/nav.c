@@ -1,6 +1,7 @@
 // seldinger nav: the trainer.
 #include "cli/cli.h"
 
+#include "base/base.h"
 #include "cli/case_open.h"
 #include "cli/output_plan.h"
 #include "cli/scene_input.h"
@@ -114,7 +115,9 @@ static int open_volume(const NavOptions *nav, Faults *faults)
 {
     char library[PATH_MAX];
     const char *tools = nav->trainer.library;
-    const CaseOptions made = {.input = nav->scene, .threads = nav->trainer.threads, .library = tools ? tools : case_library(library) ? library : NULL};
+    if (!tools && process_scenes("tools", library))
+        tools = library;
+    const CaseOptions made = {.input = nav->scene, .threads = nav->trainer.threads, .library = tools};
     return case_open(&(CaseWindowOptions){.made = &made, .width = nav->trainer.width, .height = nav->trainer.height, .duration_s = nav->trainer.duration_s},
                      faults);
 }

@@ -21,17 +21,6 @@ bool start_is_possible(void)
     return (x && *x) || (wayland && *wayland);
 }
 
-// The exercises, beside the program in its build folder or where the package puts them; false if there are none.
-static bool exercises_folder(char out[PATH_MAX])
-{
-    static const char *const places[] = {"../../scenes/exercises", "../share/seldinger/scenes/exercises"};
-    char path[PATH_MAX];
-    for (int i = 0; i < 2; i++)
-        if (process_beside(places[i], path, sizeof path) && realpath(path, out))
-            return true;
-    return false;
-}
-
 // The file that keeps the last folder from one start to the next; NULL if there is no cache.
 static char *last_folder_file(void)
 {
@@ -72,7 +61,7 @@ int start_run(void)
     static StartState state;
     char exercises[PATH_MAX], cache[PATH_MAX] = "", sessions[4096], message[CHILD_MESSAGE] = "";
     char *cases = folders_cache(cache, sizeof cache) ? text_file_in(cache, "cases") : NULL;
-    const char *folder[] = {exercises_folder(exercises) ? exercises : NULL, cases};
+    const char *folder[] = {process_scenes("exercises", exercises) ? exercises : NULL, cases};
     bool goes_on = session_folder(NULL, sessions, sizeof sessions, &faults);
     pid_t pictures = -1;
     recall_folder(&state);

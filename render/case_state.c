@@ -39,7 +39,7 @@ static void list_tools(CaseState *s)
     for (struct dirent *entry; folder && s->tool_count < CASE_TOOLS && (entry = readdir(folder));) {
         size_t length = strlen(entry->d_name);
         if (length < sizeof s->tool_name[0] && length > 5 && !strncmp(entry->d_name, "wire-", 5) && !strcmp(entry->d_name + length - 5, ".yaml"))
-            snprintf(s->tool_name[s->tool_count++], sizeof s->tool_name[0], "%s", entry->d_name);
+            memcpy(s->tool_name[s->tool_count++], entry->d_name, length + 1);
     }
     if (folder)
         closedir(folder);

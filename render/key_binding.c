@@ -53,7 +53,7 @@ static const char *key_name(int key, char *text, size_t capacity)
 
 const char *key_binding_text(KeyBinding binding, char *text, size_t capacity)
 {
-    char one[8];
+    char one[16];
     const char *key = key_name(binding.key, one, sizeof one), *alt = binding.modifiers & WINDOW_ALT ? "Alt+" : "";
     if (is_keypad_sign(binding))
         snprintf(text, capacity, "%s%c", alt, binding.character);
@@ -71,7 +71,7 @@ static int key_of(const char *name)
         if (!strcasecmp(named[i].name, name))
             return named[i].key;
     for (int i = 0; i < 12; i++) {
-        char text[8];
+        char text[16];
         snprintf(text, sizeof text, "F%d", i + 1);
         if (!strcasecmp(text, name))
             return WINDOW_KEY_F1 + i;

@@ -37,7 +37,7 @@ static double clamped(double value, double least, double most) { return isfinite
 double xray_patient_water_mm(const XrayPatient *patient, double lao_deg, double cra_deg)
 {
     double theta = clamped(lao_deg, -90, 90) * PI / 180, phi = clamped(cra_deg, -45, 45) * PI / 180, sum = 0;
-    const double along[3] = {cos(phi) * sin(theta), cos(phi) * cos(theta), sin(phi)};
+    const double along[3] = {same_cos(phi) * same_sin(theta), same_cos(phi) * same_cos(theta), same_sin(phi)};
     for (int k = 0; k < 3; k++)
         sum += along[k] * along[k] / (patient->half_mm[k] * patient->half_mm[k]);
     return 2 / sqrt(sum) * patient->water;
@@ -46,7 +46,7 @@ double xray_patient_water_mm(const XrayPatient *patient, double lao_deg, double 
 double xray_output_ugy_mas(double kv, double distance_mm)
 {
     double nearer = output_mm / distance_mm;
-    return output_ugy_mas * pow(kv, output_power) * nearer * nearer;
+    return output_ugy_mas * same_pow(kv, output_power) * nearer * nearer;
 }
 
 // [1/mm] of water at an energy in keV, interpolated between the logarithms.
@@ -57,8 +57,8 @@ static double attenuation_of_water(double kev)
     int i = 0;
     while (i < ROWS - 2 && kev > table[i + 1][0])
         i++;
-    double t = log(kev / table[i][0]) / log(table[i + 1][0] / table[i][0]);
-    return table[i][1] * pow(table[i + 1][1] / table[i][1], t);
+    double t = same_log(kev / table[i][0]) / same_log(table[i + 1][0] / table[i][0]);
+    return table[i][1] * same_pow(table[i + 1][1] / table[i][1], t);
 }
 
 static double open_part(const float blade[4])

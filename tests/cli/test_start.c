@@ -35,7 +35,7 @@ static const char hand[] = "window() { xdotool search --sync --onlyvisible --nam
                            "keys() { for k in \"$@\"; do xdotool key $k; sleep 0.4; done; }; "
                            "until_true() { for i in $(seq 300); do eval \"$1\" && return 0; sleep 0.1; done; echo \"never: $1\"; exit 1; }; ";
 
-// Every page by keys alone: the letter Y is given to Push and the letters grow; the trainer then pushes by Y.
+// Every page by keys alone: the key End is given to Push and the letters grow; the trainer then pushes by End.
 static void a_user_sets_keys(void **state)
 {
     (void)state;
@@ -43,10 +43,10 @@ static void a_user_sets_keys(void **state)
     char script[3000];
     snprintf(script, sizeof script,
              "%s export XDG_CONFIG_HOME=$PWD/config; $S > set 2>&1 & P=$!; window; "
-             "keys Tab Tab Tab u Tab Down Down Down Down Down Down Down Right Down Down Return Insert Escape; wait $P; [ $? = 0 ] && ! [ -s set ] || exit 1; "
-             "grep -q 'push: \"Insert\"' config/seldinger/settings.yaml && grep -q 'interface_scale: 1.1' config/seldinger/settings.yaml || exit 2; "
+             "keys Tab Tab Tab u Tab Down Down Down Down Down Down Down Right Down Down Return End Escape; wait $P; [ $? = 0 ] && ! [ -s set ] || exit 1; "
+             "grep -q 'push: \"End\"' config/seldinger/settings.yaml && grep -q 'interface_scale: 1.1' config/seldinger/settings.yaml || exit 2; "
              "$S nav '%s/scenes/exercises/aneurysm.yaml' --sessions pushed --duration-s 60 > pushed.txt 2>&1 & N=$!; window; sleep 2; "
-             "xdotool keydown Insert; sleep 3; xdotool keyup Insert; sleep 0.3; kill -TERM $N; wait $N; "
+             "xdotool keydown End; sleep 3; xdotool keyup End; sleep 0.3; kill -TERM $N; wait $N; "
              "$S export pushed/*.h5 -o pushed.csv --quiet && awk -F, '$3 == 0 { if (!n++) from = $6; to = $6 } END { exit !(to - from > 5) }' pushed.csv",
              hand, SOURCE_DIR);
     int code = shell(script);
@@ -113,8 +113,9 @@ static void a_user_opens_a_volume(void **state)
     char script[3000];
     snprintf(script, sizeof script,
              "%s mkdir files; $S synth capsule --quiet -o files/a.nrrd && rm -f files/*.h5; printf '%%s' \"$PWD/files\" > cache/last-folder; "
-             "$S 2> said & P=$!; window; keys Tab Tab Return; until_true 'pgrep -P '$P' >/dev/null'; "
-             "xdotool search --sync --onlyvisible --name 'Seldinger case' >/dev/null; sleep 1; keys Escape; until_true '! pgrep -P '$P' >/dev/null'; "
+             "$S 2> said & P=$!; window; keys Tab Tab Return; "
+             "xdotool search --sync --onlyvisible --name 'Seldinger case' >/dev/null; sleep 1; keys Escape; "
+             "until_true \"! xdotool search --name 'Seldinger case' >/dev/null\"; "
              "sleep 1; window; keys Escape; wait $P; [ $? = 0 ] && [ \"$(cat cache/last-folder)\" = \"$PWD/files\" ]",
              hand);
     int code = shell(script);

@@ -91,7 +91,7 @@ static void what_is_written_is_read(void **state)
     settings.interface_scale = 1.5;
     settings.key[ACTION_PUSH] = (KeyBinding){'"', 0, 0};
     settings.key[ACTION_PULL] = (KeyBinding){'\\', WINDOW_ALT, 0};
-    settings.key[ACTION_HELP] = (KeyBinding){WINDOW_KEY_INSERT, 0, '#'};
+    settings.key[ACTION_HELP] = (KeyBinding){WINDOW_KEY_END, 0, '%'};
     settings.key[ACTION_DSA] = key_table_default(ACTION_ROADMAP);          // they exchange their keys
     settings.key[ACTION_ROADMAP] = key_table_default(ACTION_DSA);
     char *text = settings_text(&settings);
@@ -102,7 +102,7 @@ static void what_is_written_is_read(void **state)
     assert_true(again.speed.rotation_inverted && again.speed.tilt_inverted && !again.speed.insertion_inverted && !again.speed.sideways_inverted);
     assert_int_equal(again.key[ACTION_PUSH].key, '"');
     assert_int_equal(again.key[ACTION_PULL].modifiers, WINDOW_ALT);
-    assert_int_equal(again.key[ACTION_HELP].character, '#');
+    assert_int_equal(again.key[ACTION_HELP].character, '%');
     assert_int_equal(again.key[ACTION_DSA].key, 'R');
     assert_int_equal(again.key[ACTION_ROADMAP].key, 'T');
     free(text);
