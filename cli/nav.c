@@ -114,9 +114,7 @@ static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, cons
 static int open_volume(const NavOptions *nav, Faults *faults)
 {
     char library[PATH_MAX];
-    const char *tools = nav->trainer.library;
-    if (!tools && process_scenes("tools", library))
-        tools = library;
+    const char *given = nav->trainer.library, *tools = given || !process_scenes("tools", library) ? given : library;
     const CaseOptions made = {.input = nav->scene, .threads = nav->trainer.threads, .library = tools};
     return case_open(&(CaseWindowOptions){.made = &made, .width = nav->trainer.width, .height = nav->trainer.height, .duration_s = nav->trainer.duration_s},
                      faults);
