@@ -23,19 +23,21 @@ bool folders_create(char *path)
     return false;
 }
 
-bool folders_cache(char *out, size_t capacity)
+// Where the XDG Base Directory Specification puts a program's folder.
+static bool xdg_folder(const char *variable, const char *below_home, char *out, size_t capacity)
 {
-    const char *own = getenv("SELDINGER_CACHE"), *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
-    int length = own && *own     ? snprintf(out, capacity, "%s", own)
-                 : xdg && *xdg   ? snprintf(out, capacity, "%s/seldinger", xdg)
-                 : home && *home ? snprintf(out, capacity, "%s/.cache/seldinger", home)
-                                 : -1;
+    const char *xdg = getenv(variable), *home = getenv("HOME");
+    int length = xdg && *xdg ? snprintf(out, capacity, "%s/seldinger", xdg) : home && *home ? snprintf(out, capacity, "%s/%s/seldinger", home, below_home) : -1;
     return length > 0 && (size_t)length < capacity;
 }
 
-bool folders_config(char *out, size_t capacity)
+bool folders_cache(char *out, size_t capacity)
 {
-    const char *xdg = getenv("XDG_CONFIG_HOME"), *home = getenv("HOME");
-    int length = xdg && *xdg ? snprintf(out, capacity, "%s/seldinger", xdg) : home && *home ? snprintf(out, capacity, "%s/.config/seldinger", home) : -1;
-    return length > 0 && (size_t)length < capacity;
+    const char *own = getenv("SELDINGER_CACHE");
+    if (!own || !*own)
+        return xdg_folder("XDG_CACHE_HOME", ".cache", out, capacity);
+    return snprintf(out, capacity, "%s", own) < (int)capacity;
 }
+
+bool folders_config(char *out, size_t capacity) { return xdg_folder("XDG_CONFIG_HOME", ".config", out, capacity); }
+bool folders_data(char *out, size_t capacity) { return xdg_folder("XDG_DATA_HOME", ".local/share", out, capacity); }

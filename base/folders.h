@@ -1,4 +1,4 @@
-// Folders: creation with all parents, the user's cache and settings.
+// Folders: creation with all parents, the user's cache, settings and data.
 #ifndef SELDINGER_BASE_FOLDERS_H
 #define SELDINGER_BASE_FOLDERS_H
 
@@ -11,5 +11,7 @@ bool folders_create(char *path);
 bool folders_cache(char *out, size_t capacity);
 // The folder of the user's settings: $XDG_CONFIG_HOME/seldinger, else ~/.config/seldinger. Returns false as above.
 bool folders_config(char *out, size_t capacity);
+// The folder of what the user made and wants to keep, sessions and cases: $XDG_DATA_HOME/seldinger, else ~/.local/share/seldinger. Returns false as above.
+bool folders_data(char *out, size_t capacity);
 
 #endif

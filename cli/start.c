@@ -59,8 +59,8 @@ int start_run(void)
 {
     static Faults faults;
     static StartState state;
-    char exercises[PATH_MAX], cache[PATH_MAX] = "", sessions[4096], message[CHILD_MESSAGE] = "";
-    char *cases = folders_cache(cache, sizeof cache) ? text_file_in(cache, "cases") : NULL;
+    char exercises[PATH_MAX], data[PATH_MAX] = "", sessions[4096], message[CHILD_MESSAGE] = "";
+    char *cases = folders_data(data, sizeof data) ? text_file_in(data, "cases") : NULL;
     const char *folder[] = {process_scenes("exercises", exercises) ? exercises : NULL, cases};
     bool goes_on = session_folder(NULL, sessions, sizeof sessions, &faults);
     pid_t pictures = -1;

@@ -348,10 +348,10 @@ const char *case_state_hint(const CaseState *s)
     }
 }
 
-// A folder in the cache that holds no case yet, named after the volume.
+// A folder of the user's cases that holds none yet, named after the volume.
 static bool new_folder(const char *volume, char *out, size_t capacity)
 {
-    char cache[PATH_MAX], name[80] = "";
+    char data[PATH_MAX], name[80] = "";
     size_t length = strlen(volume);
     while (length > 1 && volume[length - 1] == '/')
         length--;
@@ -360,10 +360,10 @@ static bool new_folder(const char *volume, char *out, size_t capacity)
         first--;
     for (size_t i = first; i < length && volume[i] != '.' && i - first + 1 < sizeof name; i++)
         name[i - first] = volume[i];
-    if (!folders_cache(cache, sizeof cache))
+    if (!folders_data(data, sizeof data))
         return false;
     for (int i = 1; i < 10000; i++) {
-        int wrote = i == 1 ? snprintf(out, capacity, "%s/cases/%s", cache, name[0] ? name : "case") : snprintf(out, capacity, "%s/cases/%s-%d", cache, name, i);
+        int wrote = i == 1 ? snprintf(out, capacity, "%s/cases/%s", data, name[0] ? name : "case") : snprintf(out, capacity, "%s/cases/%s-%d", data, name, i);
         if (wrote <= 0 || (size_t)wrote >= capacity)
             return false;
         if (!case_is_there(out))
@@ -377,7 +377,7 @@ bool case_state_save(CaseState *s, const char *folder, char *out, size_t capacit
     if (folder)
         snprintf(out, capacity, "%s", folder);
     else if (!new_folder(s->made.input, out, capacity))
-        faults_add(faults, s->made.input, 0, 0, "no case of it can be kept in a cache: neither $XDG_CACHE_HOME nor $HOME names a writable folder");
+        faults_add(faults, s->made.input, 0, 0, "its case cannot be kept: neither $XDG_DATA_HOME nor $HOME names a writable folder");
     bool good = faults->count == 0 && case_builder_save(s->builder, out, faults);
     if (!good)
         say_fault(s, faults->text[0]);

@@ -71,7 +71,7 @@ void case_state_zoom(CaseState *state, int view, double notches);
 void case_state_window(CaseState *state, double wider, double higher);
 // What the user may do now, in a sentence.
 const char *case_state_hint(const CaseState *state);
-// Writes the case. `folder` NULL: one of the cache, named after the volume. `out`: the folder.
+// Writes the case. `folder` NULL: one of the user's data, named after the volume. `out`: the folder.
 bool case_state_save(CaseState *state, const char *folder, char *out, size_t capacity, Faults *faults);
 
 #endif

@@ -6,6 +6,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,11 +15,10 @@
 
 bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
 {
-    const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
-    int length = wanted          ? snprintf(out, capacity, "%s", wanted)
-                 : data && *data ? snprintf(out, capacity, "%s/seldinger/sessions", data)
-                 : home && *home ? snprintf(out, capacity, "%s/.local/share/seldinger/sessions", home)
-                                 : snprintf(out, capacity, "sessions");
+    char data[PATH_MAX];
+    int length = wanted                            ? snprintf(out, capacity, "%s", wanted)
+                 : folders_data(data, sizeof data) ? snprintf(out, capacity, "%s/sessions", data)
+                                                   : snprintf(out, capacity, "sessions");
     bool fits = length > 0 && (size_t)length < capacity - 512;
     if (!fits)
         errno = ENAMETOOLONG;

@@ -59,14 +59,14 @@ static void a_click_on_a_vessel_ends_in_a_case(void **state)
                "$S case tube.nrrd --trace clicked/trace.yaml --quiet -o again 2>> said && diff -r clicked again >> said");
 }
 
-// By keys alone, from `nav`: the cross-hair begins in the vessel. The case goes to the cache.
+// By keys alone, from `nav`: the cross-hair begins in the vessel. The case is kept in the user's data.
 static void keys_alone_do_too(void **state)
 {
     (void)state;
     need_display();
     check_case("$S nav tube.nrrd --size 900x600 > said 2>&1 & P=$!; window case; sleep 1; keys Tab Prior Next Right w w space Return; "
-               "steers cache/cases/tube || exit 1; "
-               "$S case tube.nrrd --trace cache/cases/tube/trace.yaml --quiet -o keys 2>> said && diff -r cache/cases/tube keys >> said");
+               "steers seldinger/cases/tube || exit 1; "
+               "$S case tube.nrrd --trace seldinger/cases/tube/trace.yaml --quiet -o keys 2>> said && diff -r seldinger/cases/tube keys >> said");
 }
 
 static void a_user_leaves(void **state)

@@ -129,7 +129,9 @@ static int make_volume(void **state)
 {
     const int size[3] = {76, 56, 40};
     Vec3 axis[3] = {{0.4, 0, 0}, {0, 0.4, 0}, {0, 0, 0.4}};
-    Volume *v = make_folder(state) == 0 && setenv("SELDINGER_CACHE", in_folder("cache"), 1) == 0 ? volume_create(size, vec3(0, 0, 0), axis) : NULL;
+    Volume *v = make_folder(state) == 0 && setenv("SELDINGER_CACHE", in_folder("cache"), 1) == 0 && setenv("XDG_DATA_HOME", folder, 1) == 0
+                    ? volume_create(size, vec3(0, 0, 0), axis)
+                    : NULL;
     if (!v)
         return 1;
     snprintf(v->frame, sizeof v->frame, "LPS");
@@ -287,7 +289,7 @@ static void a_case_is_the_same_without_the_window(void **state)
     assert_false(case_state_save(s, in_folder("window"), out, sizeof out, &faults));
     faults_clear(&faults);
     assert_true(case_state_save(s, NULL, out, sizeof out, &faults));
-    assert_string_equal(out, in_folder("cache/cases/vessel"));
+    assert_string_equal(out, in_folder("seldinger/cases/vessel"));
     // from its trace, without the window
     size_t length;
     char *trace = whole_file_read(in_folder("window/trace.yaml"), &length, &faults);
@@ -302,7 +304,7 @@ static void a_case_is_the_same_without_the_window(void **state)
             fail_msg("%s", faults.text[0]);
         assert_int_equal(same_folders("window", name), 0);
     }
-    assert_int_equal(same_folders("window", "cache/cases/vessel"), 0);
+    assert_int_equal(same_folders("window", "seldinger/cases/vessel"), 0);
     free(trace);
     end(s);
 }
