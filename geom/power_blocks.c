@@ -4,8 +4,11 @@
 
 #include <stdlib.h>
 
-static Vec3 least(Vec3 a, Vec3 b) { return vec3(fmin(a.x, b.x), fmin(a.y, b.y), fmin(a.z, b.z)); }
-static Vec3 most(Vec3 a, Vec3 b) { return vec3(fmax(a.x, b.x), fmax(a.y, b.y), fmax(a.z, b.z)); }
+// Comparisons instead of fmin and fmax, which are calls; a box's numbers are finite.
+static double lower(double a, double b) { return a < b ? a : b; }
+static double higher(double a, double b) { return a > b ? a : b; }
+static Vec3 least(Vec3 a, Vec3 b) { return vec3(lower(a.x, b.x), lower(a.y, b.y), lower(a.z, b.z)); }
+static Vec3 most(Vec3 a, Vec3 b) { return vec3(higher(a.x, b.x), higher(a.y, b.y), higher(a.z, b.z)); }
 
 static PowerBox box_of(const PowerBlocks *blocks, int level, int i)
 {
@@ -82,10 +85,21 @@ static void look(const PowerBlocks *blocks, int level, int i, Vec3 x, Best *best
     }
 }
 
-int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x)
+int power_blocks_nearest_from(const PowerBlocks *blocks, Vec3 x, int near)
 {
     const VesselTree *tree = blocks->tree;
+    SEL_ASSERT(near >= 0 && near < tree->node_count, "the search begins at a node");
     Best best = {power_distance(x, tree->center[0], tree->radius[0]), 0};
+    if (blocks->levels > 0) {
+        look(blocks, 0, near / POWER_BLOCK, x, &best);
+        look(blocks, blocks->levels - 1, 0, x, &best);
+    }
+    SEL_ASSERT(best.node >= 0 && best.node < tree->node_count, "the nearest node is one of the tree");
+    return best.node;
+}
+
+int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x)
+{
     int at = 0;
     for (int level = blocks->levels - 2; level >= 0; level--) {   // first find a good candidate: descend through the most promising boxes
         double least_bound = HUGE_VAL;
@@ -93,13 +107,8 @@ int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x)
         for (int k = first; k < first + POWER_BLOCK && k < blocks->count[level]; k++) {
             double b = bound(&blocks->box[level][k], x);
             at = b < least_bound ? k : k == first ? first : at;
-            least_bound = fmin(b, least_bound);
+            least_bound = lower(b, least_bound);
         }
     }
-    if (blocks->levels > 0) {
-        look(blocks, 0, at, x, &best);
-        look(blocks, blocks->levels - 1, 0, x, &best);
-    }
-    SEL_ASSERT(best.node >= 0 && best.node < tree->node_count, "the nearest node is one of the tree");
-    return best.node;
+    return power_blocks_nearest_from(blocks, x, POWER_BLOCK * at);
 }

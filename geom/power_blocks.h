@@ -24,5 +24,7 @@ typedef struct PowerBlocks {
 bool power_blocks_create(PowerBlocks *blocks, const VesselTree *tree);
 void power_blocks_free(PowerBlocks *blocks);
 int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x);
+// The same node, sooner if `near` lies near x.
+int power_blocks_nearest_from(const PowerBlocks *blocks, Vec3 x, int near);
 
 #endif

@@ -38,6 +38,7 @@ typedef struct Draft {       // rows of a node while they are being collected
 typedef struct Job {
     const VesselTree *tree;
     PowerBlocks blocks;
+    double *reach;           // (N) [mm] of the points from their node's centre, at least
     Draft *draft;            // (N) rows from each node's points and tube
     int **cell;              // (N) the cells that contain those rows, data first
     FieldRows *rows;
@@ -117,14 +118,16 @@ static bool is_between(Vec3 x, Vec3 wall)
 }
 
 // Returns true if x is at least `clear` away from every tube and from all data near the node.
-static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
+static bool is_clear(const Job *job, int node, Vec3 x, double clear)
 {
+    const VesselTree *tree = job->tree;
     for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
         int at = k < tree->near_offset[node] ? node : tree->near[k];
         double r = tree->radius[at], share = tree->kind[at] == NODE_VESSEL ? 1.1 : SAC_BALL;
         if (share_of_tube(tree, at, x) * r < share * r + 0.5 * clear)
             return false;
-        if (vec3_distance(x, tree->center[at]) > r + tree->height[at] + 2 * clear + 1.5 * r)
+        double away = vec3_distance(x, tree->center[at]);
+        if (away > r + tree->height[at] + 2 * clear + 1.5 * r || (tree->kind[at] == NODE_VESSEL && away > job->reach[at] + clear))
             continue;
         Vec3 out = vec3_sub(x, tree->center[at]);
         for (int64_t i = tree->point_offset[at]; i < tree->point_offset[at + 1]; i++) {
@@ -141,10 +144,10 @@ static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
 // vessel may begin, a sibling or a part of the same vessel that bends back, which is not near in the tree but shares blobs with it.
 static bool is_outside(const Job *job, int node, Vec3 x, double clear)
 {
-    if (!is_clear(job->tree, node, x, clear))
+    if (!is_clear(job, node, x, clear))
         return false;
-    int cell = power_blocks_nearest(&job->blocks, x);
-    return cell == node || is_clear(job->tree, cell, x, clear);
+    int cell = power_blocks_nearest_from(&job->blocks, x, node);
+    return cell == node || is_clear(job, cell, x, clear);
 }
 
 static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)
@@ -239,6 +242,16 @@ static void extend_inlet(const VesselTree *tree, Draft *d)
         }
     for (int k = 1; k <= 4; k++)
         add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), MOST_INSIDE);
+}
+
+static void measure_reach(const VesselTree *tree, double *reach)
+{
+    const double rounding = 1 + 1e-12;
+    for (int node = 0; node < tree->node_count; node++)
+        for (int64_t i = tree->point_offset[node]; i < tree->point_offset[node + 1]; i++) {
+            double away = rounding * vec3_distance(tree->point[i], tree->center[node]);
+            reach[node] = away > reach[node] ? away : reach[node];
+        }
 }
 
 static void draft_node(void *context, long index)
@@ -403,10 +416,15 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
 {
     size_t n = (size_t)tree->node_count;
     *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
-    Job job = {
-        .tree = tree, .draft = calloc(n, sizeof *job.draft), .cell = calloc(n, sizeof *job.cell), .rows = rows, .dropped = calloc(n, sizeof *job.dropped)};
-    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.draft && job.cell && job.dropped;
+    Job job = {.tree = tree,
+               .reach = calloc(n, sizeof *job.reach),
+               .draft = calloc(n, sizeof *job.draft),
+               .cell = calloc(n, sizeof *job.cell),
+               .rows = rows,
+               .dropped = calloc(n, sizeof *job.dropped)};
+    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.reach && job.draft && job.cell && job.dropped;
     if (good) {
+        measure_reach(tree, job.reach);
         parallel_for(threads, tree->node_count, draft_node, &job, NULL);
         good = make_tiles(&job);
     }
@@ -417,6 +435,7 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
         free(job.draft[i].bound);
         free(job.cell[i]);
     }
+    free(job.reach);
     free(job.draft);
     free(job.cell);
     free(job.dropped);
