@@ -98,7 +98,7 @@ static void show_choices(Gui *gui, CaseState *s)
 
 static void show_marks(Gui *gui, CaseState *s, GuiRect at)
 {
-    static const char *const sign[] = {"sac", "narrow", "closed", "doubt"};
+    static const char *const sign[] = {"sac", "narrow", "closed", "missing", "doubt"};
     const CaseMark *mark;
     int count = case_builder_marks(s->builder, &mark);
     gui_window_begin(gui, "marks", at, 0);

@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+// Of what is as bright as the vessels, the tree should hold at least this.
+static const double LEAST_HELD = 0.5;
 #define ACTS "the acts"      // instead of a trace's path in messages
 
 static void say(CaseState *s, bool is_fault, const char *format, ...) __attribute__((format(printf, 3, 4)));
@@ -120,6 +122,10 @@ bool case_state_frame(CaseState *s)
         s->mode = CASE_START;
     if (is_new && now->stage == BUILD_LOOKING)
         say(s, false, "the wall is fitted: choose a target, or steer");
+    if (is_new && now->stage == BUILD_DONE && now->held < LEAST_HELD)
+        say(s, true,
+            "the tree holds %.0f %% of what is as bright as its vessels; the marks list the rest. To grow it from elsewhere: 1, and click a wider vessel",
+            100 * now->held);
     s->pictures += is_new;
     return is_new || now->seen != before.seen || fabs(now->part - before.part) > 0.004;
 }

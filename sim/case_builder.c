@@ -111,8 +111,14 @@ static void forget_work(CaseBuilder *b)
 static void look(CaseBuilder *b)
 {
     const double wire = 0.18;        // [mm] radius of the thinnest wire
-    int count = case_marks_find(&b->work, &b->wall, wire, b->mark);
+    Missed missed;
+    if (!missed_find(b->volume, b->work.file.tree, &missed))
+        missed = (Missed){.held = 1};
+    int count = case_marks_find(&b->work, &b->wall, &missed, wire, b->mark);
     b->mark_count = count > 0 ? count : 0;
+    pthread_mutex_lock(&b->lock);
+    b->progress.held = missed.held;
+    pthread_mutex_unlock(&b->lock);
     if (!is_stopped(b))
         b->mesh = triangle_mesh_of_model(&b->wall, 0);
 }

@@ -20,6 +20,7 @@ typedef struct BuildProgress {
     double part;             // 0 to 1, of loading and fitting
     int seen;                // grows with each new picture of the tree
     double load_s, track_s, fit_s, look_s;   // [s] wall time of what is finished, of the last request
+    double held;             // at BUILD_DONE: see Missed
     char message[600];       // of BUILD_FAILED
 } BuildProgress;
 

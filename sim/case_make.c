@@ -96,14 +96,17 @@ static bool is_at_border(const VesselTree *tree, int end, const Volume *volume)
     return false;
 }
 
+// An end at the border was cut off by the field of view; the field of a rotational angiography ends within its volume, as do vessels without contrast.
+static const double BORDER = 2;
+
 int case_tree_widest_end(const VesselTree *tree, const Volume *volume)
 {
     int best = -1;
     double widest = 0;
     for (int i = 0; i < tree->node_count; i++) {
-        double radius = case_tree_is_end(tree, i) && is_at_border(tree, i, volume) ? radius_at_end(tree, i) : 0;
-        if (radius > widest)
-            widest = radius, best = i;
+        double width = case_tree_is_end(tree, i) ? radius_at_end(tree, i) * (is_at_border(tree, i, volume) ? BORDER : 1) : 0;
+        if (width > widest)
+            widest = width, best = i;
     }
     return best;
 }

@@ -43,7 +43,7 @@ bool case_is_there(const char *folder);
 // Creates `folder`, unless it exists and is no case yet. Returns false with faults; files that were written before remain.
 bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figures, Faults *faults);
 
-// Reads the trace and tracks the volume (borrowed; NULL: the input is a tree, which is loaded). Without an entry the widest end of a vessel at the volume's border
+// Reads the trace and tracks the volume (borrowed; NULL: the input is a tree, which is loaded). Without an entry the widest end of a vessel
 // becomes the root, unless the trace gives the first branch's direction; without such an end the root stays.
 bool case_work_track(CaseWork *work, const CaseOptions *options, const Volume *volume, const RbtWatch *watch, Faults *faults);
 bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults);
@@ -58,7 +58,7 @@ void case_work_free(CaseWork *work);
 // The ends of vessels, where tools may enter: nodes with one neighbour. Returns the one nearest to x.
 bool case_tree_is_end(const VesselTree *tree, int node);
 int case_tree_end_near(const VesselTree *tree, Vec3 x);
-// The widest end at the border of the volume; -1: none is.
+// The widest end; one at the border of the volume counts twice as wide. -1: no vessel has an end.
 int case_tree_widest_end(const VesselTree *tree, const Volume *volume);
 
 #endif

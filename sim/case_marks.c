@@ -7,13 +7,13 @@
 
 typedef struct Marks {
     CaseMark *mark;
-    int count, of_kind[4];
+    int count, of_kind[MARK_KINDS];
 } Marks;
 
 static void add(Marks *marks, CaseMarkKind kind, const Vec3 *place, const char *format, ...) __attribute__((format(printf, 4, 5)));
 static void add(Marks *marks, CaseMarkKind kind, const Vec3 *place, const char *format, ...)
 {
-    enum { OF_EACH = CASE_MARKS / 4 };
+    enum { OF_EACH = CASE_MARKS / MARK_KINDS };
     va_list arguments;
     if (marks->of_kind[kind] == OF_EACH)
         return;
@@ -67,7 +67,7 @@ static bool add_stops(Marks *marks, const ModelField *wall, double tool_radius)
     return good;
 }
 
-int case_marks_find(const CaseWork *work, const ModelField *wall, double tool_radius, CaseMark *mark)
+int case_marks_find(const CaseWork *work, const ModelField *wall, const Missed *missed, double tool_radius, CaseMark *mark)
 {
     Marks marks = {.mark = mark};
     for (int i = 0; i < work->report.check.warning_count; i++)
@@ -77,5 +77,7 @@ int case_marks_find(const CaseWork *work, const ModelField *wall, double tool_ra
         if (j->support == RBT_DOUBTFUL && !j->is_inner)
             add(&marks, MARK_DOUBT, &j->place, "the image hardly shows how this branch is connected (%.0f %% of its brightness)", 100 * j->share);
     }
+    for (int i = 0; i < missed->count; i++)
+        add(&marks, MARK_MISSED, &missed->part[i].place, "as bright as the vessels, %.0f mm3: a vessel that is missing, or bone", missed->part[i].volume);
     return add_findings(&marks, wall) && add_stops(&marks, wall, tool_radius) ? marks.count : -1;
 }
