@@ -14,8 +14,9 @@ static const CaseWire wires[] = {
     {"a nitinol wire of 0.014 inch with an angled tip (scenes/tools/wire-014-nitinol.yaml)", 85,
      "diameter_mm: 0.3556, young_modulus_gpa: 59.88, poisson_ratio: 0.3, density_g_cm3: 6.45",
      "    - {length_mm: 50, diameter_mm: 0.3556, young_modulus_gpa: 19.11, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
-     "    - {length_mm: 25, diameter_mm: 0.3556, young_modulus_gpa: 2.548, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
-     "    - {length_mm: 10, diameter_mm: 0.3556, young_modulus_gpa: 2.548, poisson_ratio: 0.3, density_g_cm3: 6.45, rest_curvature_1_mm: 0.1}\n",
+     "    - {length_mm: 25, diameter_mm: 0.3556, young_modulus_gpa: 2.548, poisson_ratio: 0.3, density_g_cm3: 6.45, attenuation_1_mm: 3}\n"
+     "    - {length_mm: 10, diameter_mm: 0.3556, young_modulus_gpa: 2.548, poisson_ratio: 0.3, density_g_cm3: 6.45, attenuation_1_mm: 3, rest_curvature_1_mm: "
+     "0.1}\n",
      "{mass_1_s: 0.1, stiffness_s: 0.0002}"},
     {"a wire of 0.035 inch with an angled tip (scenes/exercises/left-carotid.yaml)", 100,
      "diameter_mm: 0.89, young_modulus_gpa: 9.5, poisson_ratio: 0.3, density_g_cm3: 4",
@@ -70,8 +71,9 @@ static void write_wire(FILE *out, const VesselTree *tree, double farthest)
 {
     const CaseWire *wire = &wires[mean_radius(tree) >= WIDE_MM];
     double length = fmax(10 * ceil((farthest + SPARE_MM) / 10), wire->tip + 20), elements = ceil(length / ELEMENT_MM);
-    fprintf(out, "wire:   # %s\n  elements: %.0f\n  sections:\n    - {length_mm: %.0f, %s}\n%s  damping: %s\n", wire->name,
-            fmin(fmax(elements, ELEMENTS_LEAST), ELEMENTS_MOST), length - wire->tip, wire->shaft, wire->tip_sections, wire->damping);
+    fprintf(out,
+            "wire:   # %s\n  elements: %.0f\n  sections:\n    - {length_mm: %.0f, %s}\n%s  tip_marker: {length_mm: 3, attenuation_1_mm: 6}\n  damping: %s\n",
+            wire->name, fmin(fmax(elements, ELEMENTS_LEAST), ELEMENTS_MOST), length - wire->tip, wire->shaft, wire->tip_sections, wire->damping);
 }
 
 // The axis of the model whose positive direction is `letter`, or whose negative one is `opposite`.
@@ -85,13 +87,34 @@ static bool direction_in(const char *frame, char letter, char opposite, int axis
     return false;
 }
 
-static void write_patient(FILE *out, const CaseScene *options)
+// How the patient lies if the file does not say it: vessels lead upwards from where the tools enter, and reach further to the sides than forwards.
+static void guess_patient(const VesselTree *tree, int front[3], int up[3])
+{
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, sum[3] = {0};
+    int along = 0;
+    for (int i = 0; i < tree->node_count; i++) {
+        Vec3 x = tree->center[i], from = vec3_sub(x, tree->center[0]);
+        const double at[3] = {x.x, x.y, x.z}, way[3] = {from.x, from.y, from.z};
+        for (int k = 0; k < 3; k++)
+            low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]), sum[k] += way[k];
+    }
+    for (int k = 1; k < 3; k++)
+        along = fabs(sum[k]) > fabs(sum[along]) ? k : along;
+    int a = (along + 1) % 3, b = (along + 2) % 3;
+    up[along] = sum[along] < 0 ? -1 : 1;
+    front[high[a] - low[a] < high[b] - low[b] ? a : b] = 1;
+}
+
+static void write_patient(FILE *out, const VesselTree *tree, const CaseScene *options)
 {
     int front[3] = {0}, up[3] = {0};
-    if (direction_in(options->frame, 'A', 'P', front) && direction_in(options->frame, 'S', 'I', up))
-        fprintf(out, "fluoroscopy:\n  anterior: [%d, %d, %d]\n  superior: [%d, %d, %d]\n", front[0], front[1], front[2], up[0], up[1], up[2]);
-    else if (options->behind)
-        fprintf(out, "fluoroscopy: {lao_deg: 0}\n");
+    bool is_known = direction_in(options->frame, 'A', 'P', front) && direction_in(options->frame, 'S', 'I', up);
+    if (!is_known) {
+        memset(front, 0, sizeof front), memset(up, 0, sizeof up);
+        guess_patient(tree, front, up);
+    }
+    fprintf(out, "fluoroscopy:%s\n  anterior: [%d, %d, %d]\n  superior: [%d, %d, %d]\n",
+            is_known ? "" : "   # guessed: the file does not say how the patient lies", front[0], front[1], front[2], up[0], up[1], up[2]);
 }
 
 static void write_exercise(FILE *out, const VesselTree *tree, const CaseScene *options, int node, double path)
@@ -136,7 +159,7 @@ static bool write_scene(OutputText *text, const VesselTree *tree, const CaseScen
     else
         write_wire(text->stream, tree, farthest);
     fprintf(text->stream, "sheath: {inlet: root, inserted_mm: 2}\n");
-    write_patient(text->stream, options);
+    write_patient(text->stream, tree, options);
     if (options->has_target)
         write_exercise(text->stream, tree, options, node, path[node]);
     free(path);

@@ -1,4 +1,5 @@
-// What a tree does not hold of an angiogram, against tubes and a ball of known volume, and the end that is proposed as the entry.
+// What a case proposes: parts of the angiogram that the tree does not hold, against tubes and a ball of known volume; the end where tools enter; how the patient
+// lies.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -8,10 +9,13 @@
 
 #include "base/base.h"
 #include "sim/case_missed.h"
+#include "sim/case_scene.h"
 #include "sim/sim.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double RADIUS = 1.6, THIN = 1.1, BALL = 2;      // [mm]
 static const double LENGTH = 40;                             // [mm] edge of the volume
@@ -136,12 +140,52 @@ static void the_widest_end_is_proposed(void **state)
     assert_int_equal(proposed(15, 25, 1, 2), 1);
 }
 
+// A vessel of 60 mm along an axis, up or down it, with branches that reach 20 mm along the next axis.
+static void patient_of(int along, double sign, char *text, size_t capacity)
+{
+    enum { NODES = 60 };
+    Faults faults = {0};
+    VesselTree *t = vessel_tree_create(NODES, 0, 0);
+    assert_non_null(t);
+    for (int i = 0; i < NODES; i++) {
+        double at[3] = {0, 0, 0}, way[3] = {0, 0, 0};
+        at[along] = sign * (i < 40 ? 1.5 * i : 30), at[(along + 1) % 3] = i < 40 ? 0 : i - 40;
+        way[i < 40 ? along : (along + 1) % 3] = i < 40 ? sign : 1;
+        t->center[i] = vec3(at[0], at[1], at[2]);
+        t->direction[i] = vec3(way[0], way[1], way[2]);
+        t->radius[i] = 1;
+        t->height[i] = 1;
+        t->parent[i] = i == 40 ? 20 : i - 1;
+    }
+    assert_true(vessel_tree_link(t));
+    char *scene = case_scene_text(t, &(CaseScene){.model = "model.h5", .frame = ""}, &faults), *line = scene ? strstr(scene, "anterior") : NULL;
+    assert_non_null(line);
+    snprintf(text, capacity, "%s", line);
+    free(scene);
+    vessel_tree_free(t);
+}
+
+static void vessels_lead_upwards(void **state)
+{
+    (void)state;
+    char text[200], expected[200];
+    for (int along = 0; along < 3; along++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            int up[3] = {0}, front[3] = {0};
+            up[along] = sign, front[(along + 2) % 3] = 1;
+            patient_of(along, sign, text, sizeof text);
+            snprintf(expected, sizeof expected, "anterior: [%d, %d, %d]\n  superior: [%d, %d, %d]\n", front[0], front[1], front[2], up[0], up[1], up[2]);
+            assert_string_equal(text, expected);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(volumes_are_those_of_the_shapes),
         cmocka_unit_test(a_whole_tree_misses_the_ball_alone),
         cmocka_unit_test(the_widest_end_is_proposed),
+        cmocka_unit_test(vessels_lead_upwards),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
