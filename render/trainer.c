@@ -785,10 +785,12 @@ static void measure_frame(Trainer *trainer)
     double cpu = drawing_cpu_s(trainer);
     if (trainer->figures->frames > 0)
         views_spend(trainer->views, 1000 * (cpu - trainer->frame_cpu_s));
-    if (trainer->figures->frames++ > 0)
+    if (trainer->figures->frames++ > 0) {
         histogram_add(&trainer->frame_cpu_ns, (int64_t)((cpu - trainer->frame_cpu_s) * 1e9));
-    else
+    } else {
         trainer->figures->first_picture_s = since_begin(trainer);
+        trainer->figures->first_picture_cpu_s = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+    }
     trainer->frame_cpu_s = cpu;
     if (trainer->figures->frames == 1 || (trainer->figures->frames % 30 == 0 && since_begin(trainer) < 60))
         trainer->figures->resident_mb[0] = resident_mb();

@@ -40,7 +40,7 @@ typedef struct ViewsFrame {
     bool is_still;                   // an independent picture: nothing is reused from the previous frame
 } ViewsFrame;
 
-// Draws each view of the layout (secondary views in turn) into `framebuffer`, with a dark background between them.
+// Draws each view of the layout (secondary views in turn, from the second picture on) into `framebuffer`, with a dark background between them.
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
 // The X-ray image as shown now becomes the reference image.
 void views_take_reference(Views *views, const Pose *pose);
