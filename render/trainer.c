@@ -740,8 +740,12 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
 {
     const TrackerView *tracked = moment->extra;
     const Pose *pose = moment->pose;
-    ViewsFrame frame = {
-        .pose = pose, .xray = xray, .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
+    ViewsFrame frame = {.pose = pose,
+                        .xray = xray,
+                        .pulse = (uint32_t)trainer->pulses.count,
+                        .look = &trainer->controls.look,
+                        .scope_tool = trainer->controls.grip.chosen + 1,
+                        .is_repeat = trainer->redraw.is_repeat};
     trainer_cine_frame(&trainer->cine, passed_s, tracked->concentration, &frame);
     const XrayControl plane = controls_second_plane(xray);
     frame.second = trainer->controls.second == SECOND_PLANE ? &plane : NULL;

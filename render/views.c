@@ -21,6 +21,7 @@ struct Views {
     VesselScene *scene;
     Angioscope *angioscope;
     GlCanvas kept[VIEW_COUNT];       // of views that are not drawn straight into the port; zeroed: not yet made
+    bool is_kept[VIEW_COUNT];        // it has been drawn
     GlEnlarger enlarger[VIEW_COUNT];
     ViewPort port[VIEW_COUNT];       // as shown last
     int drawn_side[VIEW_COUNT];      // shorter side as drawn last
@@ -134,11 +135,14 @@ static void draw_kept(Views *views, PanelView view, const ViewsFrame *frame, Vie
             return;
         }
     }
+    const bool is_turn = is_main || (views->frames + (int)view) % 2 == 0, is_due = is_turn && !(frame->is_repeat && views->is_kept[view]);
     // a secondary view takes up to 0.3 s when it is drawn first, so the first picture comes without it
-    if (!views->has_shown && !is_main && !frame->is_still)
+    if (!views->has_shown && !is_main && !frame->is_still) {
         gl_canvas_begin(kept, surroundings);
-    else if (!fits || is_main || frame->is_still || (views->frames + (int)view) % 2 == 0)
+    } else if (!fits || frame->is_still || is_due) {
         draw_view(views, view, frame, (ViewPort){kept->framebuffer, 0, 0, width, height});
+        views->is_kept[view] = true;
+    }
     views->drawn_side[view] = width < height ? width : height;
     bool is_same = width == port.width && height == port.height;
     if (!is_same && gl_enlarge(&views->enlarger[view], kept->framebuffer, width, height, port))

@@ -114,6 +114,33 @@ static void a_slow_drift_is_shown(void **state)
     redraw_free(&redraw);
 }
 
+// Views are drawn again when something changed and while they refine, not in the pictures that only refresh figures; what they show is compared with what they
+// showed when they were drawn, so that a drift too slow for one picture adds up.
+static void views_are_not_drawn_again_for_figures(void **state)
+{
+    (void)state;
+    Redraw redraw = {0};
+    WindowInput input = quiet();
+    Vec3 place[1] = {{0, 0, 0}};
+    Pose pose = {.node_count = 1, .position = place};
+    double shown = 0, now_s = 0;
+    int repeats = 0, drawn = 0;
+    for (int i = 0; i < 30 * 20; i++, now_s += 1 / 30.0) {
+        place[0].x = 0.03 * fmax(0, now_s - 10);     // 0.015 mm from one refreshed picture to the next
+        if (!redraw_is_due(&redraw, &input, &pose, 0, now_s, 0.5))
+            continue;
+        repeats += redraw.is_repeat;
+        drawn += !redraw.is_repeat;
+        shown = redraw.is_repeat ? shown : place[0].x;
+        assert_true(fabs(place[0].x - shown) <= 0.02);
+        if (now_s < 10)
+            assert_int_equal(drawn, i < 11 ? i + 1 : 11);     // the first one, and ten in which views refine
+    }
+    assert_true(repeats >= 18);
+    assert_true(drawn > 11);
+    redraw_free(&redraw);
+}
+
 // --- enlargement ---
 
 static void enlarging_interpolates(void **state)
@@ -157,6 +184,7 @@ int main(void)
         cmocka_unit_test(one_slow_picture_changes_nothing),
         cmocka_unit_test(a_window_at_rest_is_drawn_twice_a_second),
         cmocka_unit_test(a_slow_drift_is_shown),
+        cmocka_unit_test(views_are_not_drawn_again_for_figures),
         cmocka_unit_test(enlarging_interpolates),
         cmocka_unit_test(a_turned_picture_has_its_rows_and_channels_exchanged),
     };
