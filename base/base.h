@@ -22,6 +22,7 @@
 #include "base/simd_kernel.h"
 
 // numbers
+#include "base/content_digest.h"
 #include "base/same_math.h"
 #include "base/sha256.h"
 

@@ -28,5 +28,8 @@ bool process_beside(const char *name, char *path, size_t capacity);
 bool process_scenes(const char *name, char *path);
 // The file that this code was loaded from: the program, or the library that contains it. False if unknown.
 bool process_code_file(char *path, size_t capacity);
+// Identifies the content of that file, in hexadecimal digits: its GNU build ID, or its SHA-256 if it was linked without one. False if unknown; `id` is then "".
+enum { PROCESS_CODE_ID = 65 };
+bool process_code_id(char id[PROCESS_CODE_ID]);
 
 #endif

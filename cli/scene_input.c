@@ -32,7 +32,7 @@ static bool cached_case(const char *path, char *out, size_t capacity, Faults *fa
         return false;
     }
     sha256_add(&sha, digest, strlen(digest));
-    if (process_code_file(text, sizeof text) && sha256_of_file(text, digest))
+    if (process_code_id(digest))
         sha256_add(&sha, digest, strlen(digest));
     sha256_end(&sha, digest);
     size_t used = folders_cache(text, sizeof text) ? strlen(text) : 0;

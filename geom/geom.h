@@ -39,6 +39,7 @@
 #include "geom/model_mesh.h"
 #include "geom/mesh_closure.h"
 #include "geom/mesh_decimate.h"
+#include "geom/morton_order.h"
 #include "geom/surface_parts.h"
 
 // what a tool can reach, and likely defects of the model

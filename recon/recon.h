@@ -38,6 +38,7 @@
 #include "recon/surface/import_surface.h"
 #include "recon/surface/mesh_centreline.h"
 #include "recon/surface/mesh_check.h"
+#include "recon/surface/mesh_pack.h"
 #include "recon/surface/model_mask.h"
 #include "recon/surface/model_surface.h"
 #include "recon/surface/section_table.h"

@@ -9,6 +9,7 @@
 // nothing more.
 #include "render/angioscope.h"
 
+#include "geom/geom.h"
 #include "render/drawable_mesh.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
@@ -104,55 +105,6 @@ static const char *const FRAGMENT =
     "}\n";
 
 // --- the wall in patches ---
-
-typedef struct TriangleKey {
-    uint64_t key;
-    int triangle;
-} TriangleKey;
-
-static int by_key(const void *a, const void *b)
-{
-    const TriangleKey *x = a, *y = b;
-    if (x->key != y->key)
-        return x->key < y->key ? -1 : 1;
-    return (x->triangle > y->triangle) - (x->triangle < y->triangle);
-}
-
-// Inserts two zeros between the bits of a 20-bit number.
-static uint64_t spread_bits(uint64_t x)
-{
-    uint64_t result = 0;
-    for (int b = 0; b < 20; b++)
-        result |= (x >> b & 1) << 3 * b;
-    return result;
-}
-
-static Vec3 triangle_middle(const TriangleMesh *mesh, int t)
-{
-    const int *c = mesh->triangle[t];
-    return vec3_scale(vec3_add(vec3_add(mesh->vertex[c[0]], mesh->vertex[c[1]]), mesh->vertex[c[2]]), 1 / 3.0);
-}
-
-static TriangleKey *order_triangles(const TriangleMesh *mesh)
-{
-    TriangleKey *key = malloc((size_t)mesh->triangle_count * sizeof *key);
-    if (!key)
-        return NULL;
-    Vec3 low = mesh->vertex[mesh->triangle[0][0]], high = low;
-    for (int i = 0; i < mesh->vertex_count; i++) {
-        Vec3 p = mesh->vertex[i];
-        low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), fmin(low.z, p.z));
-        high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
-    }
-    Vec3 size = vec3_sub(high, low);
-    double scale = ((1 << 20) - 1) / fmax(fmax(fmax(size.x, size.y), size.z), 1e-300);
-    for (int t = 0; t < mesh->triangle_count; t++) {
-        Vec3 p = vec3_scale(vec3_sub(triangle_middle(mesh, t), low), scale);
-        key[t] = (TriangleKey){spread_bits((uint64_t)p.x) | spread_bits((uint64_t)p.y) << 1 | spread_bits((uint64_t)p.z) << 2, t};
-    }
-    qsort(key, (size_t)mesh->triangle_count, sizeof *key, by_key);
-    return key;
-}
 
 static void enclose(Angioscope *scope, Patch *patch)
 {
@@ -278,7 +230,7 @@ static bool read_tree(Angioscope *scope)
 }
 
 // Each patch has its own copy of its vertices.
-static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const TriangleKey *key, int *copy_of, uint32_t *index)
+static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const int *order, int *copy_of, uint32_t *index)
 {
     for (int i = 0; i < mesh->vertex_count; i++)
         copy_of[i] = -1;
@@ -287,7 +239,7 @@ static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const Tria
             scope->patch[scope->patch_count++] = (Patch){.first_index = 3 * t, .first_vertex = scope->vertex_count};
         Patch *patch = &scope->patch[scope->patch_count - 1];
         for (int k = 0; k < 3; k++) {
-            int v = mesh->triangle[key[t].triangle][k];
+            int v = mesh->triangle[order[t]][k];
             if (copy_of[v] < patch->first_vertex) {
                 Vec3 p = vec3_sub(mesh->vertex[v], scope->origin), n = vec3_negate(mesh->normal[v]);
                 copy_of[v] = scope->vertex_count;
@@ -330,7 +282,7 @@ static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message,
     scope->origin = mesh->vertex[mesh->triangle[0][0]];
     measure(scope, mesh);
     size_t triangles = (size_t)mesh->triangle_count, patches = triangles / PATCH_TRIANGLES + 1;
-    TriangleKey *key = order_triangles(mesh);
+    int *order = morton_order(mesh);
     int *copy_of = malloc((size_t)mesh->vertex_count * sizeof *copy_of);
     uint32_t *index = malloc(3 * triangles * sizeof *index);
     scope->patch = calloc(patches, sizeof *scope->patch);
@@ -339,9 +291,9 @@ static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message,
     scope->draw_offset = calloc(patches, sizeof *scope->draw_offset);
     scope->vertex = malloc(3 * triangles * sizeof *scope->vertex);
     scope->node = malloc(3 * triangles * sizeof *scope->node);
-    bool good = key && copy_of && index && scope->patch && scope->seen && scope->draw_count && scope->draw_offset && scope->vertex && scope->node;
+    bool good = order && copy_of && index && scope->patch && scope->seen && scope->draw_count && scope->draw_offset && scope->vertex && scope->node;
     if (good) {
-        fill_patches(scope, mesh, key, copy_of, index);
+        fill_patches(scope, mesh, order, copy_of, index);
         glBindVertexArray(scope->wall_array);
         glBindBuffer(GL_ARRAY_BUFFER, scope->wall_vertices);
         glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)scope->vertex_count * sizeof *scope->vertex), scope->vertex, GL_STATIC_DRAW);
@@ -355,7 +307,7 @@ static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message,
         glVertexAttribPointer(3, 2, GL_FLOAT, GL_FALSE, sizeof(WallVertex), at_byte(offsetof(WallVertex, look)));
         glBindVertexArray(0);
     }
-    free(key);
+    free(order);
     free(copy_of);
     free(index);
     return good || message_fail(message, capacity, "not enough memory for a surface of %d triangles", mesh->triangle_count);

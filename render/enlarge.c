@@ -1,17 +1,21 @@
-// A pixel is spread over a word of 64 bits, 16 for each channel, so that one multiplication weighs all four.
+// First each row of the picture is enlarged in width: a pixel is spread over a word of 64 bits, 16 for each channel, so that one multiplication weighs all four.
+// Then each row of the result is mixed from two of these, in loops over channels that a compiler makes vectors of.
 #include "render/enlarge.h"
+
+#include "base/base.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { ONE = 256 };
+enum { ONE = 256, CHANNELS = 4 };
 
 void enlarger_free(Enlarger *enlarger)
 {
     free(enlarger->picture);
-    free(enlarger->enlarged);
-    free(enlarger->row);
+    free(enlarger->spread);
+    free(enlarger->row[0]);
+    free(enlarger->row[1]);
     free(enlarger->column);
     free(enlarger->weight);
     *enlarger = (Enlarger){0};
@@ -33,11 +37,12 @@ bool enlarger_fit(Enlarger *e, int from_width, int from_height, int to_width, in
         return true;
     enlarger_free(e);
     e->picture = malloc((size_t)from_width * (size_t)from_height * sizeof *e->picture);
-    e->enlarged = malloc((size_t)to_width * (size_t)to_height * sizeof *e->enlarged);
-    e->row = calloc((size_t)from_width + 1, sizeof *e->row);
+    e->spread = calloc((size_t)from_width + 1, sizeof *e->spread);
+    for (int i = 0; i < 2; i++)
+        e->row[i] = malloc((size_t)to_width * sizeof *e->row[i]);
     e->column = malloc((size_t)to_width * sizeof *e->column);
     e->weight = malloc((size_t)to_width * sizeof *e->weight);
-    if (!e->picture || !e->enlarged || !e->row || !e->column || !e->weight) {
+    if (!e->picture || !e->spread || !e->row[0] || !e->row[1] || !e->column || !e->weight) {
         enlarger_free(e);
         return false;
     }
@@ -45,8 +50,11 @@ bool enlarger_fit(Enlarger *e, int from_width, int from_height, int to_width, in
     e->to[0] = to_width, e->to[1] = to_height;
     for (int x = 0; x < to_width; x++)
         e->column[x] = place(x, from_width, to_width, &e->weight[x]);
+    enlarger_begin(e);
     return true;
 }
+
+void enlarger_begin(Enlarger *e) { e->row_of[0] = e->row_of[1] = -1; }
 
 static uint64_t spread(uint32_t p)
 {
@@ -59,25 +67,35 @@ static uint64_t mixed(uint64_t a, uint64_t b, uint64_t weight)
     return (a * (ONE - weight) + b * weight + half) >> 8 & bytes;
 }
 
-static uint32_t joined(uint64_t p)
-{
-    p |= p >> 8;                         // two channels in the lower half of each 32 bits
-    return (uint32_t)((p & 0xffff) | (p >> 16 & 0xffff0000u));
-}
-
 static uint32_t exchanged(uint32_t p) { return (p & 0xff00ff00u) | (p & 0xff) << 16 | (p >> 16 & 0xff); }
 
-void enlarger_run(Enlarger *e, bool turned)
+static const uint64_t *widened(Enlarger *e, int y, bool turned)
 {
-    const int width = e->from[0], height = e->from[1];
-    for (int y = 0; y < e->to[1]; y++) {
+    const int i = y % 2, width = e->from[0];
+    if (e->row_of[i] == y)
+        return e->row[i];
+    const uint32_t *from = e->picture + (size_t)y * (size_t)width;
+    uint64_t *to = e->row[i];
+    for (int x = 0; x < width; x++)
+        e->spread[x] = spread(turned ? exchanged(from[x]) : from[x]);
+    e->spread[width] = e->spread[width - 1];
+    for (int x = 0; x < e->to[0]; x++)
+        to[x] = mixed(e->spread[e->column[x]], e->spread[e->column[x] + 1], (uint64_t)e->weight[x]);
+    e->row_of[i] = y;
+    return to;
+}
+
+#define KERNEL_TEXT "render/enlarge_kernel.inc"
+#include "base/each_simd.inc"
+static void (*const mix_rows_on[SIMD_COUNT])(const uint16_t *, const uint16_t *, int, int, uint8_t *) = SIMD_FORMS(mix_rows);
+
+void enlarger_rows(Enlarger *e, int first, int count, bool turned, uint32_t *out)
+{
+    const int width = e->to[0], height = e->from[1];
+    for (int y = first; y < first + count; y++) {
         int weight, above = place(y, height, e->to[1], &weight), next = above + 1 < height ? above + 1 : above;
-        const uint32_t *a = e->picture + (size_t)above * (size_t)width, *b = e->picture + (size_t)next * (size_t)width;
-        for (int x = 0; x < width; x++)
-            e->row[x] = mixed(spread(turned ? exchanged(a[x]) : a[x]), spread(turned ? exchanged(b[x]) : b[x]), (uint64_t)weight);
-        e->row[width] = e->row[width - 1];
-        uint32_t *out = e->enlarged + (size_t)(turned ? e->to[1] - 1 - y : y) * (size_t)e->to[0];
-        for (int x = 0; x < e->to[0]; x++)
-            out[x] = joined(mixed(e->row[e->column[x]], e->row[e->column[x] + 1], (uint64_t)e->weight[x]));
+        const uint64_t *a = widened(e, above, turned), *b = widened(e, next, turned);
+        uint32_t *to = out + (size_t)(turned ? first + count - 1 - y : y - first) * (size_t)width;
+        mix_rows_on[simd_level()]((const uint16_t *)(const void *)a, (const uint16_t *)(const void *)b, weight, CHANNELS * width, (uint8_t *)to);
     }
 }

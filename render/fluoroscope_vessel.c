@@ -118,9 +118,9 @@ static TriangleMesh *closed_copy(const FluoroscopeOptions *options, const MeshLi
 static bool send_both(Lumen *lumen, const FluoroscopeOptions *options, const MeshLids *lids)
 {
     TriangleMesh *closed = closed_copy(options, lids);
-    TriangleMesh *fine = closed && closed->triangle_count > FINE_TRIANGLES ? mesh_decimate(closed, FINE_TRIANGLES, HUGE_VAL) : NULL;
+    TriangleMesh *fine = closed && closed->triangle_count > FINE_TRIANGLES ? cached_decimation(closed, FINE_TRIANGLES) : NULL;
     const TriangleMesh *shown = fine ? fine : closed;
-    TriangleMesh *coarse = shown && shown->triangle_count > COARSE_TRIANGLES ? mesh_decimate(shown, COARSE_TRIANGLES, HUGE_VAL) : NULL;
+    TriangleMesh *coarse = shown && shown->triangle_count > COARSE_TRIANGLES ? cached_decimation(shown, COARSE_TRIANGLES) : NULL;
     bool good = shown != NULL;
     if (good) {
         Vec3 low = shown->vertex[0], high = low;

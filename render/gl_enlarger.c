@@ -1,13 +1,23 @@
+// In strips that stay in the processor's cache, from the enlarger's buffer into a texture of this height and from there into the port.
 // The texture has the order of channels and rows of the buffer to which it is copied: then the driver copies memory, else it runs a shader (see gui.cpp).
 #include "render/gl_enlarger.h"
 
 #include <epoxy/gl.h>
 #include <stddef.h>
+#include <stdlib.h>
+
+enum { STRIP_ROWS = 48 };
 
 static bool make_texture(GlEnlarger *enlarger, int width, int height, bool is_turned)
 {
     if (enlarger->texture && enlarger->width == width && enlarger->height == height && enlarger->is_turned == is_turned)
         return true;
+    free(enlarger->strip);
+    enlarger->strip = malloc((size_t)width * (size_t)height * sizeof *enlarger->strip);
+    if (!enlarger->strip) {
+        enlarger->width = 0;
+        return false;
+    }
     if (!enlarger->texture) {
         glGenTextures(1, &enlarger->texture);
         glGenFramebuffers(1, &enlarger->framebuffer);
@@ -26,20 +36,23 @@ static bool make_texture(GlEnlarger *enlarger, int width, int height, bool is_tu
 
 bool gl_enlarge(GlEnlarger *enlarger, unsigned framebuffer, int width, int height, ViewPort port)
 {
-    bool is_turned = port.framebuffer == 0;
-    if (!enlarger_fit(&enlarger->pixels, width, height, port.width, port.height) || !make_texture(enlarger, port.width, port.height, is_turned))
+    const bool is_turned = port.framebuffer == 0;
+    if (!enlarger_fit(&enlarger->pixels, width, height, port.width, port.height) || !make_texture(enlarger, port.width, STRIP_ROWS, is_turned))
         return false;
     glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
     glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, enlarger->pixels.picture);
-    enlarger_run(&enlarger->pixels, is_turned);
     glBindTexture(GL_TEXTURE_2D, enlarger->texture);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, port.width, port.height, is_turned ? GL_BGRA : GL_RGBA, GL_UNSIGNED_BYTE, enlarger->pixels.enlarged);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, enlarger->framebuffer);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);
-    int bottom = is_turned ? port.y + port.height : port.y, top = is_turned ? port.y : port.y + port.height;
-    glBlitFramebuffer(0, 0, port.width, port.height, port.x, bottom, port.x + port.width, top, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    enlarger_begin(&enlarger->pixels);
+    for (int y = 0; y < port.height; y += STRIP_ROWS) {
+        const int rows = port.height - y < STRIP_ROWS ? port.height - y : STRIP_ROWS, low = port.y + y, high = low + rows;
+        enlarger_rows(&enlarger->pixels, y, rows, is_turned, enlarger->strip);
+        glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, port.width, rows, is_turned ? GL_BGRA : GL_RGBA, GL_UNSIGNED_BYTE, enlarger->strip);
+        glBlitFramebuffer(0, 0, port.width, rows, port.x, is_turned ? high : low, port.x + port.width, is_turned ? low : high, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    }
     return true;
 }
 
@@ -50,5 +63,6 @@ void gl_enlarger_destroy(GlEnlarger *enlarger)
         glDeleteFramebuffers(1, &enlarger->framebuffer);
     }
     enlarger_free(&enlarger->pixels);
+    free(enlarger->strip);
     *enlarger = (GlEnlarger){0};
 }

@@ -7,6 +7,7 @@
 
 typedef struct GlEnlarger {    // initialise with zeros
     Enlarger pixels;
+    uint32_t *strip;           // (height, width) the rows under way
     unsigned texture, framebuffer;
     int width, height;         // of the texture
     bool is_turned;            // as the buffer of a window

@@ -50,6 +50,7 @@ bool redraw_is_due(Redraw *redraw, const WindowInput *input, const Pose *pose, u
     bool is_due = is_new || redraw->trail > 0 || now_s - redraw->drawn_s >= refresh_s;
     if (!is_due)
         return false;
+    redraw->is_repeat = !is_new && redraw->trail == 0;
     redraw->trail = is_new ? TRAIL : redraw->trail > 0 ? redraw->trail - 1 : 0;
     redraw->has_picture = true;
     redraw->drawn_s = now_s;
@@ -60,7 +61,8 @@ bool redraw_is_due(Redraw *redraw, const WindowInput *input, const Pose *pose, u
     redraw->height = input->height;
     redraw->has_focus = input->has_focus;
     redraw->settings = settings;
-    take_pose(redraw, pose);
+    if (!redraw->is_repeat)      // else a slow movement would never add up
+        take_pose(redraw, pose);
     return true;
 }
 

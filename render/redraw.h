@@ -9,13 +9,14 @@ typedef struct Redraw {
     bool has_picture;
     double drawn_s;
     int trail;                   // pictures to be drawn after the last change: views refine once they are at rest
+    bool is_repeat;              // the picture due only refreshes figures: its views show what they showed in the last one
     double mouse_x, mouse_y;     // of the last picture …
     unsigned mouse_buttons;
     int width, height;
     bool has_focus;
     uint64_t settings;
     int node_count, capacity;
-    Vec3 *node;                  // (node_count) … and the tools in it
+    Vec3 *node;                  // (node_count) … and the tools as its views show them
 } Redraw;
 
 void redraw_free(Redraw *redraw);

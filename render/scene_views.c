@@ -49,7 +49,7 @@ static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const
                      Faults *faults)
 {
     if (!open->mesh && open->tree && !open->sweep)
-        open->mesh = isosurface_of_tree(open->tree, live_cell(open->tree));
+        open->mesh = cached_isosurface_of_tree(open->tree, live_cell(open->tree));
     const TriangleMesh *mesh = open_vessel_mesh(scene, open);
     ViewsOptions options = {.scene = scene, .vessel = open->vessel, .tree = open->tree, .mesh = mesh, .pose = pose, .patient = patient_of(scene, mesh)};
     if (volume) {

@@ -740,8 +740,12 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
 {
     const TrackerView *tracked = moment->extra;
     const Pose *pose = moment->pose;
-    ViewsFrame frame = {
-        .pose = pose, .xray = xray, .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->controls.look, .scope_tool = trainer->controls.grip.chosen + 1};
+    ViewsFrame frame = {.pose = pose,
+                        .xray = xray,
+                        .pulse = (uint32_t)trainer->pulses.count,
+                        .look = &trainer->controls.look,
+                        .scope_tool = trainer->controls.grip.chosen + 1,
+                        .is_repeat = trainer->redraw.is_repeat};
     trainer_cine_frame(&trainer->cine, passed_s, tracked->concentration, &frame);
     const XrayControl plane = controls_second_plane(xray);
     frame.second = trainer->controls.second == SECOND_PLANE ? &plane : NULL;
@@ -785,10 +789,12 @@ static void measure_frame(Trainer *trainer)
     double cpu = drawing_cpu_s(trainer);
     if (trainer->figures->frames > 0)
         views_spend(trainer->views, 1000 * (cpu - trainer->frame_cpu_s));
-    if (trainer->figures->frames++ > 0)
+    if (trainer->figures->frames++ > 0) {
         histogram_add(&trainer->frame_cpu_ns, (int64_t)((cpu - trainer->frame_cpu_s) * 1e9));
-    else
+    } else {
         trainer->figures->first_picture_s = since_begin(trainer);
+        trainer->figures->first_picture_cpu_s = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+    }
     trainer->frame_cpu_s = cpu;
     if (trainer->figures->frames == 1 || (trainer->figures->frames % 30 == 0 && since_begin(trainer) < 60))
         trainer->figures->resident_mb[0] = resident_mb();

@@ -33,6 +33,7 @@ typedef struct TrainerOptions {
 // Performance of a session on this machine, for `nav --figures`.
 typedef struct TrainerFigures {
     double first_picture_s;          // from the call to the first frame on the screen
+    double first_picture_cpu_s;      // CPU time of the process until then, from its start
     int64_t frames, frames_skipped;
     double longest_gap_s;            // between two frames on the screen, also while a session is saved
     double frame_cpu_ms[3];          // CPU time of a frame, all threads of drawing: median, p99, worst

@@ -8,6 +8,7 @@ bool trainer_figures_write(const char *path, const TrainerFigures *figures, Faul
 {
     cJSON *out = cJSON_CreateObject();
     cJSON_AddNumberToObject(out, "first_picture_s", figures->first_picture_s);
+    cJSON_AddNumberToObject(out, "first_picture_cpu_s", figures->first_picture_cpu_s);
     cJSON_AddNumberToObject(out, "frames", (double)figures->frames);
     cJSON_AddNumberToObject(out, "frames_skipped", (double)figures->frames_skipped);
     cJSON_AddNumberToObject(out, "longest_gap_s", figures->longest_gap_s);

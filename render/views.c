@@ -21,12 +21,16 @@ struct Views {
     VesselScene *scene;
     Angioscope *angioscope;
     GlCanvas kept[VIEW_COUNT];       // of views that are not drawn straight into the port; zeroed: not yet made
+    bool is_kept[VIEW_COUNT];        // it has been drawn
     GlEnlarger enlarger[VIEW_COUNT];
     ViewPort port[VIEW_COUNT];       // as shown last
     int drawn_side[VIEW_COUNT];      // shorter side as drawn last
     TimeBudget budget;
     long frames;
+    bool has_shown;                  // a picture with a view
 };
+
+static const float surroundings[3] = {0.03F, 0.035F, 0.045F};
 
 static Fluoroscope *create_fluoroscope(const Views *views, const ViewsOptions *options, const TriangleMesh *mesh, char *message, size_t capacity)
 {
@@ -51,9 +55,9 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
 {
     Views *views = calloc(1, sizeof *views);
     bool is_large = options->mesh && options->mesh->triangle_count > FINE_TRIANGLES;
-    TriangleMesh *fine = is_large ? mesh_decimate(options->mesh, FINE_TRIANGLES, HUGE_VAL) : NULL;
+    TriangleMesh *fine = is_large ? cached_decimation(options->mesh, FINE_TRIANGLES) : NULL;
     const TriangleMesh *mesh = fine ? fine : options->mesh;
-    TriangleMesh *coarse = mesh ? mesh_decimate(mesh, COARSE_TRIANGLES, HUGE_VAL) : NULL;
+    TriangleMesh *coarse = mesh ? cached_decimation(mesh, COARSE_TRIANGLES) : NULL;
     const Scene *scene = options->scene;
     VesselSceneOptions shown = {.vessel = mesh,
                                 .coarse = coarse,
@@ -131,8 +135,14 @@ static void draw_kept(Views *views, PanelView view, const ViewsFrame *frame, Vie
             return;
         }
     }
-    if (!fits || is_main || frame->is_still || (views->frames + (int)view) % 2 == 0)
+    const bool is_turn = is_main || (views->frames + (int)view) % 2 == 0, is_due = is_turn && !(frame->is_repeat && views->is_kept[view]);
+    // a secondary view takes up to 0.3 s when it is drawn first, so the first picture comes without it
+    if (!views->has_shown && !is_main && !frame->is_still) {
+        gl_canvas_begin(kept, surroundings);
+    } else if (!fits || frame->is_still || is_due) {
         draw_view(views, view, frame, (ViewPort){kept->framebuffer, 0, 0, width, height});
+        views->is_kept[view] = true;
+    }
     views->drawn_side[view] = width < height ? width : height;
     bool is_same = width == port.width && height == port.height;
     if (!is_same && gl_enlarge(&views->enlarger[view], kept->framebuffer, width, height, port))
@@ -154,7 +164,7 @@ static void clear_around(const PanelLayout *layout, int width, int height)
     const int gap = 2 * (int)ceil(2 * layout->scale);
     bool has_view = false;
     glViewport(0, 0, width, height);
-    glClearColor(0.03F, 0.035F, 0.045F, 1);
+    glClearColor(surroundings[0], surroundings[1], surroundings[2], 1);
     glEnable(GL_SCISSOR_TEST);
     for (int i = 0; i < VIEW_COUNT; i++) {
         const ViewPort *at = &layout->view[i];
@@ -231,6 +241,7 @@ void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout
     if (second.width > 0)
         draw_second(views, frame, second);
     views->frames++;
+    views->has_shown |= main->width > 0;
 }
 
 XrayControl views_reference(const Views *views) { return views->second_xray; }

@@ -38,9 +38,10 @@ typedef struct ViewsFrame {
     bool leaves_surroundings;        // of the views: does not clear what lies outside them
     const XrayControl *second;       // controls of the second plane; NULL: the second image of the layout, if any, is the reference
     bool is_still;                   // an independent picture: nothing is reused from the previous frame
+    bool is_repeat;                  // the views show the same as in the previous frame, with the same layout: those kept are not drawn again
 } ViewsFrame;
 
-// Draws each view of the layout (secondary views in turn) into `framebuffer`, with a dark background between them.
+// Draws each view of the layout (secondary views in turn, from the second picture on) into `framebuffer`, with a dark background between them.
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
 // The X-ray image as shown now becomes the reference image.
 void views_take_reference(Views *views, const Pose *pose);

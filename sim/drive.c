@@ -46,6 +46,27 @@ static void priority_restore(const Priority *before)
         pthread_setschedparam(pthread_self(), before->policy, &before->parameter);
 }
 
+// The most steps that wait for one wake-up, and the part of a step's time that they may take together.
+enum { REST_STEPS = 8 };
+static const double rest_share = 0.5;
+
+static bool is_still(const ToolCommands *commands)
+{
+    bool still = commands->contrast_ml_s == 0;
+    for (int k = 0; k < TOOLS_MOST; k++)
+        still &= commands->tool[k].push_mm_s == 0 && commands->tool[k].twist_deg_s == 0;
+    return still;
+}
+
+// The number of steps to make at the next wake-up.
+static int64_t steps_at_once(const Simulator *simulator, const DriveOptions *options, const ToolCommands *commands, double at_rest_s, int64_t step_ns)
+{
+    if (!options->hand || !options->may_rest || at_rest_s < rest_hold_s || !is_still(commands) || !options->may_rest(options->hand_context))
+        return 1;
+    int64_t cost_ns = simulator_step_ns(simulator);
+    return (int64_t)fmax(1, fmin(REST_STEPS, rest_share * (double)step_ns / fmax(1, (double)cost_ns)));
+}
+
 // After a step of a paced run: counts a missed deadline.
 static void count_late(DriveReport *report, int64_t late)
 {
@@ -94,7 +115,7 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
     report.real_time_priority = priority.raised;
     if (options->live)
         options->live->real_time_priority = priority.raised;
-    int64_t begin = wall_ns(), base = begin, step_ns = (int64_t)(scene->dt * 1e6 + 0.5);
+    int64_t begin = wall_ns(), base = begin, step_ns = (int64_t)(scene->dt * 1e6 + 0.5), last_of_wake = -1;
     int cursor = 0;
     ToolCommands commands = {0};
 
@@ -105,10 +126,12 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         }
         if (i >= driven && at_rest_s >= rest_hold_s && simulator_time_s(simulator) >= ramp_s)
             break;
-        if (options->paced)
-            sleep_until(base + i * step_ns);
-        if (options->paced && options->late_ns)
-            histogram_add(options->late_ns, wall_ns() - (base + i * step_ns));
+        if (options->paced && i > last_of_wake) {
+            last_of_wake = i + steps_at_once(simulator, options, &commands, at_rest_s, step_ns) - 1;
+            sleep_until(base + last_of_wake * step_ns);
+            if (options->late_ns)
+                histogram_add(options->late_ns, wall_ns() - (base + last_of_wake * step_ns));
+        }
         bool scripted = options->script && i < driven;
         if (scripted)
             commands = script_tools_at(options->script, (double)i * scene->dt / 1000, &cursor);
@@ -119,7 +142,7 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         simulator_step(simulator, &commands);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
         bool keeps_running = !options->after_step || options->after_step(options->context, simulator, &commands);
-        if (options->paced)
+        if (options->paced && i == last_of_wake)
             keep_pace(&report, options->live, &base, base + (i + 1) * step_ns);
         if (!keeps_running) {
             report.end = DRIVE_STOPPED;

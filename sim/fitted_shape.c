@@ -25,8 +25,8 @@ static bool cache_key(const Scene *scene, char hex[65])
 {
     int kind = contact_is_local(scene->contact) ? 1 : contact_is_swept(scene->contact) ? 2 + (int)contact_section(scene->contact) : 0;
     Sha256 sha;
-    char program[65], path[CACHE_PATH];
-    if (!process_code_file(path, sizeof path) || !sha256_of_file(path, program))
+    char program[PROCESS_CODE_ID];
+    if (!process_code_id(program))
         return false;
     sha256_begin(&sha);
     sha256_add(&sha, program, strlen(program));

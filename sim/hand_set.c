@@ -105,6 +105,14 @@ unsigned hand_set_buttons(const HandSet *set)
     return buttons;
 }
 
+bool hand_set_has_device(const HandSet *set)
+{
+    bool has_device = false;
+    for (int i = 0; i < set->count; i++)
+        has_device |= atomic_load_explicit(&set->port[i]->state, memory_order_relaxed) != HAND_ABSENT;
+    return has_device;
+}
+
 void hand_set_answer(HandSet *set, const StepReport *report, int64_t step)
 {
     double force[TOOLS_MOST], torque[TOOLS_MOST];

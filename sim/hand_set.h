@@ -28,6 +28,7 @@ void hand_set_grip(HandSet *set, const HandGrip *grip);
 // The commands of the next step of dt [ms]; HAND_STOP on any hand stops all tools.
 ToolCommands hand_set_command(HandSet *set, double dt);
 unsigned hand_set_buttons(const HandSet *set);
+bool hand_set_has_device(const HandSet *set);      // whether a device is connected, not only keys: it may give forces
 // To be called after a step: returns force, torque and the step's number to the hands.
 void hand_set_answer(HandSet *set, const StepReport *report, int64_t step);
 

@@ -6,6 +6,7 @@
 #include "recon/recon.h"
 #include "sim/contact_surface.h"
 #include "sim/fitted_shape.h"
+#include "sim/surface_cache.h"
 #include "sim/tube_tree.h"
 
 #include <stdlib.h>
@@ -204,7 +205,7 @@ const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)
     if (open->tree && open->sweep)
         open->mesh = triangle_mesh_of_sweep(open->sweep, NULL);
     else if (open->tree)
-        open->mesh = isosurface_of_tree(open->tree, isosurface_cell_for(open->tree));
+        open->mesh = cached_isosurface_of_tree(open->tree, isosurface_cell_for(open->tree));
     else if (scene->source == SOURCE_TUBE)
         open->mesh = triangle_mesh_of_tube(&scene->tube);
     else if (scene->source == SOURCE_PLANE)

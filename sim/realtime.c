@@ -46,6 +46,8 @@ static ToolCommands read_hands(void *context)
     return hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt);
 }
 
+static bool may_rest(const void *context) { return !hand_set_has_device(&((const Realtime *)context)->hands); }
+
 static void renew_figures(Realtime *realtime)
 {
     RealtimeFigures *figures = &realtime->figures;
@@ -108,6 +110,7 @@ static void *run_session(void *argument)
     DriveOptions drive = drive_default_options();
     drive.hand = read_hands;
     drive.hand_context = realtime;
+    drive.may_rest = may_rest;
     drive.duration_s = SCRIPT_LONGEST_S;
     drive.paced = true;
     drive.after_step = after_step;

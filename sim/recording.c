@@ -733,6 +733,7 @@ static void *write_rings(void *argument)
         // frames first: the rows they refer to were pushed before them
         long long frames = atomic_load_explicit(&recording->frames.head, memory_order_acquire);
         long long steps = atomic_load_explicit(&recording->steps.head, memory_order_acquire);
+        const bool is_quiet = steps - atomic_load_explicit(&recording->steps.tail, memory_order_relaxed) < STEP_RING / 64;
         errno = 0;
         bool good = drain(recording, steps, frames);
         if (good && (last || (double)(now_ns() - flushed) >= recording->options.flush_s * 0.5e9)) {
@@ -746,7 +747,7 @@ static void *write_rings(void *argument)
             break;
         }
         if (!last)
-            nap(10);
+            nap(is_quiet ? 30 : 10);     // in real time 30 steps come in 30 ms
     }
     return NULL;
 }
