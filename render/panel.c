@@ -80,8 +80,7 @@ static void confirm(Panel *panel, PanelActions *actions)
     panel->dialogue = DIALOGUE_NONE;
 }
 
-// Number of presses of a key in this frame.
-static int presses(const WindowInput *input, int key)
+int panel_presses(const WindowInput *input, int key)
 {
     int count = 0;
     for (int i = 0; i < input->event_count; i++)
@@ -89,16 +88,16 @@ static int presses(const WindowInput *input, int key)
     return count;
 }
 
-static bool has_key(const WindowInput *input, int key) { return presses(input, key) > 0; }
+static bool has_key(const WindowInput *input, int key) { return panel_presses(input, key) > 0; }
 
 // X closes the box that X opened.
 static void take_tray(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table_binding(ACTION_EXCHANGE).key);
     bool is_taken = panel->answer > 0 || has_key(input, WINDOW_KEY_ENTER);
-    panel_move_in_tray(panel, presses(input, WINDOW_KEY_DOWN) - presses(input, WINDOW_KEY_UP));
-    panel->tray.is_shaped ^= presses(input, 'S') % 2;
-    panel->tray_value[1] = fminf(330, fmaxf(5, panel->tray_value[1] + 5 * (float)(presses(input, WINDOW_KEY_RIGHT) - presses(input, WINDOW_KEY_LEFT))));
+    panel_move_in_tray(panel, panel_presses(input, WINDOW_KEY_DOWN) - panel_presses(input, WINDOW_KEY_UP));
+    panel->tray.is_shaped ^= panel_presses(input, 'S') % 2;
+    panel_shape_by_keys(panel, input);
     panel->answer = 0;
     if (is_closed && !is_taken)
         panel_close_tray(panel);

@@ -117,7 +117,7 @@ static void open_row(StartWindow *w, int row)
     if (w->state->page == PAGE_FILES)
         open_file(w, &w->file[row]);
     else if (w->state->page == PAGE_SESSIONS)
-        start_choose(w, START_REPLAY, shelf->session[row].path);
+        start_choose(w, START_REPLAY, shelf->session[row].recording);
     else if (w->state->page == PAGE_SETTINGS)
         settings_page_enter(&w->settings, row);
     else if (shelf->cases[row].missing[0])
@@ -314,11 +314,11 @@ static void draw_row_buttons(StartWindow *w)
     Gui *gui = w->gui;
     const int row = w->state->row;
     if (w->state->page == PAGE_SESSIONS && row < row_count(w)) {
-        const char *path = w->options->shelf->session[row].path;
+        const ShelfSession *session = &w->options->shelf->session[row];
         if (gui_button(gui, "replay", "Replay", "Enter", 0, false).pressed)
-            start_choose(w, START_REPLAY, path);
+            start_choose(w, START_REPLAY, session->recording);
         if (gui_button(gui, "report", "Report", "R", 0, false).pressed)
-            start_choose(w, START_REPORT, path);
+            start_choose(w, START_REPORT, session->path);
     } else if (w->state->page == PAGE_DEVICES && w->devices) {
         const bool can = devices_page_can_learn(w->devices, row);
         if (can && gui_button(gui, "learn push", "Learn the push", "P", 0, false).pressed)

@@ -68,6 +68,9 @@ static void take_session(Shelf *shelf, const char *path, const Session *session)
     ShelfSession *out = &shelf->session[shelf->session_count++];
     *out = (ShelfSession){.points = session->figures.points};
     snprintf(out->path, sizeof out->path, "%s", path);
+    char *recording = *session->recording_path ? text_file_beside(path, session->recording_path) : NULL;
+    snprintf(out->recording, sizeof out->recording, "%s", recording ? recording : "");
+    free(recording);
     snprintf(out->trainee, sizeof out->trainee, "%s", session->trainee);
     snprintf(out->title, sizeof out->title, "%s", session->title);
     snprintf(out->date, sizeof out->date, "%s", session->date);

@@ -17,6 +17,7 @@ typedef struct ShelfCase {
 
 typedef struct ShelfSession {
     char path[4096];             // of the session file
+    char recording[4096];        // the recording that it is about; "": none is named
     char trainee[SESSION_NAME], title[EXERCISE_TITLE], date[SESSION_DATE];
     double points;
 } ShelfSession;

@@ -85,7 +85,7 @@ static void a_user_leaves(void **state)
     assert_int_equal(shell(script), 0);
 }
 
-// Cases, then a session of the first one, its report, and back.
+// Cases, then a session of the first one, its report, its replay, and back.
 static void a_user_trains(void **state)
 {
     (void)state;
@@ -96,6 +96,8 @@ static void a_user_trains(void **state)
              "until_true \"pgrep -f -P $P 'seldinger nav' >/dev/null\"; C=$(pgrep -f -P $P 'seldinger nav'); window; sleep 1; kill -TERM $C; "
              "until_true 'ls seldinger/sessions/*.json >/dev/null 2>&1'; until_true \"! pgrep -f -P $P 'seldinger nav' >/dev/null\"; window; "
              "keys Tab r; until_true 'ls seldinger/sessions/*.html >/dev/null 2>&1'; until_true \"! pgrep -f -P $P 'seldinger report' >/dev/null\"; window; "
+             "keys Return; until_true \"xdotool search --onlyvisible --name 'Seldinger replay' >/dev/null\"; sleep 1; keys Escape Return; "
+             "until_true \"! pgrep -f -P $P 'seldinger replay' >/dev/null\"; window; "
              "keys Escape; wait $P; [ "
              "$? = 0 ] || exit 1; "
              "grep -q '\"trainee\":.*\"[Aa]da\"' seldinger/sessions/*.json && grep -q '\"mode\":.*\"examination\"' seldinger/sessions/*.json",

@@ -468,6 +468,16 @@ static void keys_choose_shape_and_take_from_the_tray(void **unused)
     assert_int_equal(controls.actions.tray.device, 0);
     assert_false(controls.actions.tray.is_shaped);
     double angle = controls.actions.tray.angle_deg;
+    const double length = controls.actions.tray.length_mm, mandrel = controls.actions.tray.mandrel_mm;
+    tap(&controls, WINDOW_KEY_PAGE_UP);
+    tap(&controls, WINDOW_KEY_PAGE_UP);
+    tap(&controls, WINDOW_KEY_PAGE_DOWN);
+    for (int i = 0; i < 20; i++)
+        tap(&controls, WINDOW_KEY_HOME);
+    assert_true(controls.actions.tray.length_mm == length + 1 && fabs(controls.actions.tray.mandrel_mm - 0.3) < 1e-6);
+    for (int i = 0; i < 7; i++)
+        tap(&controls, WINDOW_KEY_END);
+    assert_true(fabs(controls.actions.tray.mandrel_mm - mandrel) < 1e-6);
     tap(&controls, 'S');
     tap(&controls, WINDOW_KEY_RIGHT);
     assert_true(controls.actions.tray.is_shaped && controls.actions.tray.angle_deg == angle + 5 && controls.actions.held[ACTION_TWIST_RIGHT] == 0);

@@ -50,7 +50,8 @@ static ShelfCase cases[] = {
     {.path = "/nosuch/b.yaml", .title = "Exchange for a stiff wire", .text = "", .level = 5},
     {.path = "/nosuch/c", .title = "acase", .missing = "/nosuch/model.h5"},
 };
-static ShelfSession sessions[] = {{.path = "/nosuch/1.json", .trainee = "Ada", .title = "Reach the aneurysm", .date = "2026-11-28T09:00:00Z", .points = 87}};
+static ShelfSession sessions[] = {
+    {.path = "/nosuch/1.json", .recording = "/nosuch/1.h5", .trainee = "Ada", .title = "Reach the aneurysm", .date = "2026-11-28T09:00:00Z", .points = 87}};
 static Shelf shelf = {.case_count = 3, .cases = cases, .session_count = 1, .session = sessions, .broken = 2};
 
 // X, Y: 8 bits each, 0 to 255; 4 buttons
@@ -145,6 +146,21 @@ static void keys_reach_every_page(void **state)
     assert_int_equal(s->state.row, settings_page_rows() - 1);
     key(s, WINDOW_KEY_ESCAPE, 0);
     assert_true(s->window.ends);
+    close_stage(s);
+}
+
+// `replay` takes a recording, `report` a session file.
+static void a_session_is_replayed_and_reported(void **state)
+{
+    (void)state;
+    StartStage *s = open_stage(1280, 720, 1);
+    start_turn_page(&s->window, PAGE_SESSIONS);
+    key(s, WINDOW_KEY_ENTER, 0);
+    assert_int_equal(s->window.choice, START_REPLAY);
+    assert_string_equal(s->state.path, "/nosuch/1.h5");
+    key(s, 'R', 0);
+    assert_int_equal(s->window.choice, START_REPORT);
+    assert_string_equal(s->state.path, "/nosuch/1.json");
     close_stage(s);
 }
 
@@ -368,10 +384,15 @@ static void the_theme_has_contrast(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keys_reach_every_page), cmocka_unit_test(a_key_is_given_refused_and_exchanged),
-        cmocka_unit_test(a_moved_axis_pushes),   cmocka_unit_test(no_permission_is_explained),
-        cmocka_unit_test(a_case_has_a_picture),  cmocka_unit_test(doubled_letters_are_not_cut),
-        cmocka_unit_test(a_cut_text_is_noticed), cmocka_unit_test(the_theme_has_contrast),
+        cmocka_unit_test(keys_reach_every_page),
+        cmocka_unit_test(a_key_is_given_refused_and_exchanged),
+        cmocka_unit_test(a_session_is_replayed_and_reported),
+        cmocka_unit_test(a_moved_axis_pushes),
+        cmocka_unit_test(no_permission_is_explained),
+        cmocka_unit_test(a_case_has_a_picture),
+        cmocka_unit_test(doubled_letters_are_not_cut),
+        cmocka_unit_test(a_cut_text_is_noticed),
+        cmocka_unit_test(the_theme_has_contrast),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }

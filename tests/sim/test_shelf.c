@@ -69,6 +69,8 @@ static void the_best_of_two_sessions(void **state)
     assert_int_equal(shelf.session_count, 2);
     assert_true(shelf.session[0].points == 40 && shelf.session[1].points == 61);
     assert_string_equal(shelf.session[0].trainee, "Ada");
+    assert_string_equal(shelf.session[0].path, in_folder("sessions/2.json"));
+    assert_string_equal(shelf.session[0].recording, in_folder("sessions/r.h5"));
     assert_int_equal(shelf.broken, 1);
     shelf_free(&shelf);
     // no folder at all
