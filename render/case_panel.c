@@ -1,5 +1,6 @@
 // See case_panel.h.
 #include "render/case_panel.h"
+#include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -35,13 +36,13 @@ static void show_progress(Gui *gui, const CaseState *s)
     switch (p->stage) {
     case BUILD_LOADING: gui_progress(gui, p->part, "loading"); break;
     case BUILD_TRACKING:
-        snprintf(text, sizeof text, "the tree grows: %d places", s->seen_count);
+        snprintf(text, sizeof text, tr("the tree grows: %d places"), s->seen_count);
         gui_progress(gui, 0, text);
         break;
     case BUILD_FITTING: gui_progress(gui, p->part, "fitting the wall"); break;
     case BUILD_LOOKING: gui_progress(gui, 1, "looking for marks"); break;
     case BUILD_DONE:
-        snprintf(text, sizeof text, "read %.1f s, tracked %.1f s, fitted %.1f s", p->load_s, p->track_s, p->fit_s);
+        snprintf(text, sizeof text, tr("read %.1f s, tracked %.1f s, fitted %.1f s"), p->load_s, p->track_s, p->fit_s);
         gui_progress(gui, 1, text);
         break;
     default: gui_progress(gui, 0, ""); break;
@@ -55,8 +56,8 @@ static void show_volume(Gui *gui, const CaseState *s)
     gui_text(gui, GUI_LARGE, gui_colors.text, name && name[1] ? name + 1 : s->made.input);
     if (s->has_volume) {
         const Volume *v = s->volume;
-        snprintf(text, sizeof text, "%d x %d x %d voxels of %.2f x %.2f x %.2f mm%s%s", v->size[0], v->size[1], v->size[2], vec3_norm(v->axis[0]),
-                 vec3_norm(v->axis[1]), vec3_norm(v->axis[2]), s->axes.is_known ? ", " : "; no orientation given", s->axes.is_known ? v->frame : "");
+        snprintf(text, sizeof text, tr("%d x %d x %d voxels of %.2f x %.2f x %.2f mm%s%s"), v->size[0], v->size[1], v->size[2], vec3_norm(v->axis[0]),
+                 vec3_norm(v->axis[1]), vec3_norm(v->axis[2]), s->axes.is_known ? ", " : tr("; no orientation given"), s->axes.is_known ? v->frame : "");
         gui_text_wrapped(gui, GUI_SMALL, gui_colors.dim, text);
     }
     show_progress(gui, s);
@@ -88,7 +89,7 @@ static void show_choices(Gui *gui, CaseState *s)
     const CaseAct *behind = case_acts_last(&s->acts, CASE_BEHIND);
     char label[120];
     heading(gui, "TOOL AND BACKGROUND");
-    const char *tool = s->tool > 0 ? s->tool_name[s->tool] : "wire that suits the vessels";
+    const char *tool = s->tool > 0 ? s->tool_name[s->tool] : tr("wire that suits the vessels");
     snprintf(label, sizeof label, "%.*s", (int)strcspn(tool, "."), tool);
     if (gui_button(gui, "tool", label, "T", 0, false).pressed)
         case_state_next_tool(s, 1);

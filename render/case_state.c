@@ -1,6 +1,7 @@
 #include "render/case_state.h"
 
 #include "base/base.h"
+#include "render/translation.h"
 
 #include <dirent.h>
 #include <limits.h>
@@ -14,12 +15,13 @@
 static const double LEAST_HELD = 0.5;
 #define ACTS "the acts"      // instead of a trace's path in messages
 
+// Shows a message: its format is translated here.
 static void say(CaseState *s, bool is_fault, const char *format, ...) __attribute__((format(printf, 3, 4)));
 static void say(CaseState *s, bool is_fault, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(s->message, sizeof s->message, format, arguments);
+    vsnprintf(s->message, sizeof s->message, tr(format), arguments);
     va_end(arguments);
     s->message_is_fault = is_fault;
 }
@@ -155,7 +157,7 @@ static void add(CaseState *s, const CaseAct *act)
 {
     char text[160];
     if (!s->has_volume || (act->kind != CASE_START && !case_acts_last(&s->acts, CASE_START))) {
-        say(s, true, s->has_volume ? "click a vessel first: the tree grows from there" : "the volume is still being loaded");
+        say(s, true, s->has_volume ? N_("click a vessel first: the tree grows from there") : N_("the volume is still being loaded"));
         return;
     }
     if (!case_acts_add(&s->acts, act)) {
@@ -199,12 +201,12 @@ static void undo_or_redo(CaseState *s, bool is_undo)
 {
     char text[160];
     if (!(is_undo ? case_acts_undo(&s->acts) : case_acts_redo(&s->acts))) {
-        say(s, false, "nothing to %s", is_undo ? "undo" : "do again");
+        say(s, false, is_undo ? N_("nothing to undo") : N_("nothing to do again"));
         return;
     }
     const CaseAct *act = &s->acts.act[s->acts.count - !is_undo];
     case_act_describe(act, text, sizeof text);
-    say(s, false, "%s: %s", is_undo ? "undone" : "done again", text);
+    say(s, false, is_undo ? N_("undone: %s") : N_("done again: %s"), text);
     if (act->kind == CASE_DEVICE) {
         const CaseAct *last = case_acts_last(&s->acts, CASE_DEVICE);
         s->tool = 0;

@@ -1,6 +1,7 @@
 // Hints: about what is happening (sim/hints.h), the present step of a guided exercise, and, for new users, about the keys: each of those is shown until its
 // action has been used.
 #include "render/panel_internal.h"
+#include "render/translation.h"
 
 #include <stdio.h>
 
@@ -122,7 +123,7 @@ static void fill(const char *from, const ActionId *key, const char *value, char 
     text[length] = 0;
 }
 
-void panel_hint_text(int index, char *text, size_t capacity) { fill(hint[index].text, hint[index].key, "", text, capacity); }
+void panel_hint_text(int index, char *text, size_t capacity) { fill(tr(hint[index].text), hint[index].key, "", text, capacity); }
 
 bool panel_happening_text(const PanelState *state, char *text, size_t capacity)
 {
@@ -132,9 +133,9 @@ bool panel_happening_text(const PanelState *state, char *text, size_t capacity)
     if (is_happening) {
         const struct Happening *h = &happening[state->hint];
         panel_figure(value, sizeof value, h->scale * state->hint_value, h->decimals, h->unit);
-        fill(h->text, h->key, value, text, capacity);
+        fill(tr(h->text), h->key, value, text, capacity);
     } else if (guide && state->steps_done < guide->count) {
-        snprintf(text, capacity, "Step %d of %d: %s", state->steps_done + 1, guide->count, guide->step[state->steps_done].text);
+        snprintf(text, capacity, tr("Step %d of %d: %s"), state->steps_done + 1, guide->count, guide->step[state->steps_done].text);
     }
     return is_happening || (guide && state->steps_done < guide->count);
 }
@@ -147,7 +148,7 @@ void panel_draw_steps(Panel *panel, const PanelState *state)
     char text[GUIDE_TEXT + 16];
     if (!guide || guide->count == 0)
         return;
-    snprintf(text, sizeof text, "%d of %d steps done", state->steps_done, guide->count);
+    snprintf(text, sizeof text, tr("%d of %d steps done"), state->steps_done, guide->count);
     gui_text(panel->gui, GUI_SMALL, gui_colors.dim, text);
     for (int i = state->steps_done > 0 ? state->steps_done - 1 : 0; i < guide->count && i <= state->steps_done + AHEAD; i++) {
         const bool is_done = i < state->steps_done, is_now = i == state->steps_done;

@@ -842,6 +842,30 @@ static void what_happens_is_told(void **unused)
     assert_false(panel_happening_text(&state, text, sizeof text));
 }
 
+static const char *marked(const char *text)
+{
+    static char translated[300];
+    snprintf(translated, sizeof translated, "<%s>", text);
+    return translated;
+}
+
+// Both kinds of hint are looked up before keys and values are filled in.
+static void hints_are_translated(void **unused)
+{
+    (void)unused;
+    PanelState state = some_state();
+    char text[256];
+    translation_replace(marked);
+    state.hint = HINT_COILS;
+    const bool happens = panel_happening_text(&state, text, sizeof text);
+    const char first = text[0];
+    panel_hint_text(0, text, sizeof text);
+    translation_replace(NULL);
+    assert_true(happens);
+    assert_int_equal(first, '<');
+    assert_int_equal(text[0], '<');
+}
+
 // Marks of consequences change the picture at their places, the leaked agent darkens the X-ray image around; the list of steps needs its place.
 static void consequences_and_steps_are_drawn(void **unused)
 {
@@ -1065,6 +1089,7 @@ int main(void)
                                        cmocka_unit_test(instructions_are_shown_until_followed),
                                        cmocka_unit_test(the_result_is_shown_once),
                                        cmocka_unit_test(hints_lead_on_with_use),
+                                       cmocka_unit_test(hints_are_translated),
                                        cmocka_unit_test(what_happens_is_told),
                                        cmocka_unit_test(consequences_and_steps_are_drawn),
                                        cmocka_unit_test(strange_states_draw),
