@@ -80,7 +80,8 @@ static void confirm(Panel *panel, PanelActions *actions)
     panel->dialogue = DIALOGUE_NONE;
 }
 
-int panel_presses(const WindowInput *input, int key)
+// Number of presses of a key in this frame.
+static int presses(const WindowInput *input, int key)
 {
     int count = 0;
     for (int i = 0; i < input->event_count; i++)
@@ -88,16 +89,18 @@ int panel_presses(const WindowInput *input, int key)
     return count;
 }
 
-static bool has_key(const WindowInput *input, int key) { return panel_presses(input, key) > 0; }
+static bool has_key(const WindowInput *input, int key) { return presses(input, key) > 0; }
 
-// X closes the box that X opened.
+// X closes the box that X opened. The keys of a tip's length, angle and mandrel: less, more.
 static void take_tray(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
+    static const int tip_keys[3][2] = {{WINDOW_KEY_PAGE_DOWN, WINDOW_KEY_PAGE_UP}, {WINDOW_KEY_LEFT, WINDOW_KEY_RIGHT}, {WINDOW_KEY_HOME, WINDOW_KEY_END}};
     bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table_binding(ACTION_EXCHANGE).key);
     bool is_taken = panel->answer > 0 || has_key(input, WINDOW_KEY_ENTER);
-    panel_move_in_tray(panel, panel_presses(input, WINDOW_KEY_DOWN) - panel_presses(input, WINDOW_KEY_UP));
-    panel->tray.is_shaped ^= panel_presses(input, 'S') % 2;
-    panel_shape_by_keys(panel, input);
+    panel_move_in_tray(panel, presses(input, WINDOW_KEY_DOWN) - presses(input, WINDOW_KEY_UP));
+    panel->tray.is_shaped ^= presses(input, 'S') % 2;
+    for (int i = 0; i < 3; i++)
+        panel_shape_in_tray(panel, i, presses(input, tip_keys[i][1]) - presses(input, tip_keys[i][0]));
     panel->answer = 0;
     if (is_closed && !is_taken)
         panel_close_tray(panel);

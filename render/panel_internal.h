@@ -91,8 +91,6 @@ void panel_draw_briefing(Panel *panel, const PanelState *state);
 void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *state);
 void panel_draw_dialogue(Panel *panel, const WindowInput *input);
 void panel_draw_tray(Panel *panel, const WindowInput *input, const PanelState *state);
-void panel_shape_by_keys(Panel *panel, const WindowInput *input);  // the sliders of the tray
-int panel_presses(const WindowInput *input, int key);              // number of presses of a key in this frame
 void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *state);
 int panel_current_hint(const Panel *panel, int tool_count);        // -1: none left
 void panel_hint_text(int hint, char *text, size_t capacity);

@@ -107,21 +107,10 @@ static void draw_list(Panel *panel, const PanelTray *tray)
 static const struct {
     const char *id, *format, *tip;
     float least, most, step;
-    int less, more;              // keys
-} slider[] = {
-    {"tip length", N_("bend %.0f mm long"), "from the tip back to the start of the bend; keys: Page down, Page up", 1, 80, 1, WINDOW_KEY_PAGE_DOWN,
-     WINDOW_KEY_PAGE_UP},
-    {"tip angle", N_("keeps %.0f\u00b0"), "the remaining angle after springback of the core; keys: Left, Right", 5, 330, 5, WINDOW_KEY_LEFT, WINDOW_KEY_RIGHT},
-    {"tip mandrel", N_("mandrel R %.1f mm"), "radius of the mandrel for bending the tip: the thinner, the tighter the final bend; keys: Home, End", 0.3f, 10,
-     0.1f, WINDOW_KEY_HOME, WINDOW_KEY_END}};
-
-void panel_shape_by_keys(Panel *panel, const WindowInput *input)
-{
-    for (int i = 0; i < 3; i++) {
-        const float by = slider[i].step * (float)(panel_presses(input, slider[i].more) - panel_presses(input, slider[i].less));
-        panel->tray_value[i] = fminf(slider[i].most, fmaxf(slider[i].least, panel->tray_value[i] + by));
-    }
-}
+} slider[] = {{"tip length", N_("bend %.0f mm long"), "from the tip back to the start of the bend; keys: Page down, Page up", 1, 80, 1},
+              {"tip angle", N_("keeps %.0f\u00b0"), "the remaining angle after springback of the core; keys: Left, Right", 5, 330, 5},
+              {"tip mandrel", N_("mandrel R %.1f mm"), "radius of the mandrel for bending the tip: the thinner, the tighter the final bend; keys: Home, End",
+               0.3f, 10, 0.1f}};
 
 static void draw_sliders(Panel *panel)
 {
@@ -189,6 +178,11 @@ void panel_draw_tray(Panel *panel, const WindowInput *input, const PanelState *s
     gui_window_begin(gui, "tray device", right, GUI_ON_TOP);
     draw_device(panel, tray, right);
     panel->tray_over = gui_window_end(gui);
+}
+
+void panel_shape_in_tray(Panel *panel, int i, int steps)
+{
+    panel->tray_value[i] = fminf(slider[i].most, fmaxf(slider[i].least, panel->tray_value[i] + slider[i].step * (float)steps));
 }
 
 void panel_move_in_tray(Panel *panel, int devices)
