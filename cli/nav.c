@@ -67,7 +67,7 @@ static const OptionTable table = {
     .does = "opens the trainer: steer the tools in a window; sessions are recorded and scored",
     .usage = "SCENE [options]",
     .intro = "Opens the trainer's window in a scene, a case (`seldinger case`), a tree or a model (of a volume, the window of `seldinger case` first): steer "
-             "the tools by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its "
+             "the tools by keyboard, gamepad, HID or USB device. The window's help lists the keys. Each session is recorded, and its "
              "score written beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.",
     .exits = "0 done; 2 wrong usage, bad input or no display; 3 the simulation diverged or the recording is incomplete",
     CLI_OPTIONS(rows, NavOptions),
