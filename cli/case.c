@@ -71,7 +71,7 @@ static int open_window(const CaseCommand *command, Faults *faults)
     output_plan_picture(&plan, "--picture", command->picture);
     output_plan_read_volume(&plan, "the volume", command->input);
     const CaseWindowOptions window = {&command->made, command->output, command->picture, command->width, command->height, command->duration_s};
-    return faults->count == 0 ? case_open(&window, faults) : EXIT_BAD_INPUT;
+    return faults->count == 0 ? case_open(&window, command->trainee, command->is_examination, faults) : EXIT_BAD_INPUT;
 }
 #endif
 

@@ -51,6 +51,8 @@ static const Option rows[] = {
     {"output", "CASE", OPTION_FOLDER, AT(output),
      "the folder (required without the window); it must not hold a case yet; default in the window: a folder of the cache", .letter = 'o'},
 #ifdef SELDINGER_RENDER
+    {"trainee", "NAME", OPTION_TEXT, AT(trainee), "name of who steers from the window, for the report"},
+    {"examination", NULL, OPTION_FLAG, AT(is_examination), "what is steered from the window is an examination (`seldinger nav`)"},
     {"picture", "F.png", OPTION_FILE, AT(picture), "the window as it looks at its end"},
     CLI_SIZE(CaseCommand, width, "size of the window"),
     {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "ends the window after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
@@ -59,7 +61,7 @@ static const Option rows[] = {
     CLI_QUIET(CaseCommand, quiet, "no summary, no progress"),
 };
 
-static void set_defaults(void *structure) { *(CaseCommand *)structure = (CaseCommand){.width = 1280, .height = 720}; }
+static void set_defaults(void *structure) { *(CaseCommand *)structure = (CaseCommand){.trainee = "", .width = 1280, .height = 720}; }
 
 static const char *check(void *structure)
 {

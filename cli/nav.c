@@ -117,7 +117,7 @@ static int open_volume(const NavOptions *nav, Faults *faults)
     const char *given = nav->trainer.library, *tools = given || !process_scenes("tools", library) ? given : library;
     const CaseOptions made = {.input = nav->scene, .threads = nav->trainer.threads, .library = tools};
     return case_open(&(CaseWindowOptions){.made = &made, .width = nav->trainer.width, .height = nav->trainer.height, .duration_s = nav->trainer.duration_s},
-                     faults);
+                     nav->trainer.trainee, nav->trainer.is_examination, faults);
 }
 
 static int call(void *structure, Faults *faults)
