@@ -19,12 +19,19 @@ static char *trace_of_options(const CaseCommand *command)
 {
     CaseActs acts = {0};
     const CaseOptions *o = &command->made;
-    CaseAct device = {.kind = CASE_DEVICE};
-    snprintf(device.device, sizeof device.device, "%s", o->device ? o->device : "");
+    const struct {
+        CaseActKind kind;
+        const char *name;
+    } named[] = {{CASE_DEVICE, o->device}, {CASE_CATHETER, o->catheter}, {CASE_ANATOMY, o->anatomy}};
     bool good = case_acts_add(&acts, &(CaseAct){.kind = CASE_START, .place = command->start_mm}) &&
                 (!o->has_entry || case_acts_add(&acts, &(CaseAct){.kind = CASE_ENTRY, .place = o->entry})) &&
                 (!o->has_target || case_acts_add(&acts, &(CaseAct){.kind = CASE_TARGET, .place = o->target})) &&
-                (!o->device || case_acts_add(&acts, &device)) && (!o->is_behind || case_acts_add(&acts, &(CaseAct){.kind = CASE_BEHIND, .is_on = true}));
+                (!o->is_behind || case_acts_add(&acts, &(CaseAct){.kind = CASE_BEHIND, .is_on = true}));
+    for (size_t i = 0; i < sizeof named / sizeof *named; i++) {
+        CaseAct act = {.kind = named[i].kind};
+        snprintf(act.name, sizeof act.name, "%s", named[i].name ? named[i].name : "");
+        good = good && (!named[i].name || case_acts_add(&acts, &act));
+    }
     char *text = good ? case_acts_trace(&acts) : NULL;
     case_acts_free(&acts);
     return text;
@@ -66,12 +73,13 @@ static bool opens_window(const CaseCommand *command) { return !command->start &&
 static int open_window(const CaseCommand *command, Faults *faults)
 {
     OutputPlan plan = {.faults = faults};
-    if (command->made.has_target || command->made.has_entry || command->made.device || command->made.is_behind)
-        faults_add(faults, "seldinger case", 0, 0, "target, entry, device and background are chosen in the window; or add --start X,Y,Z");
+    if (command->made.has_target || command->made.has_entry || command->made.device || command->made.catheter || command->made.anatomy ||
+        command->made.is_behind)
+        faults_add(faults, "seldinger case", 0, 0, "target, entry, device, catheter, anatomy and background are chosen in the window; or add --start X,Y,Z");
     output_plan_picture(&plan, "--picture", command->picture);
     output_plan_read_volume(&plan, "the volume", command->input);
     const CaseWindowOptions window = {&command->made, command->output, command->picture, command->width, command->height, command->duration_s};
-    return faults->count == 0 ? case_open(&window, faults) : EXIT_BAD_INPUT;
+    return faults->count == 0 ? case_open(&window, command->trainee, command->is_examination, faults) : EXIT_BAD_INPUT;
 }
 #endif
 

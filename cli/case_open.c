@@ -10,7 +10,7 @@
 
 bool case_can_open(const char *path) { return start_is_possible() && !case_is_there(path) && file_kind(path) == FILE_VOLUME; }
 
-int case_open(const CaseWindowOptions *options, Faults *faults)
+int case_open(const CaseWindowOptions *options, const char *trainee, bool is_examination, Faults *faults)
 {
     char steer[PATH_MAX];
     cli_use_settings();
@@ -22,6 +22,8 @@ int case_open(const CaseWindowOptions *options, Faults *faults)
     static StartState state;
     char message[CHILD_MESSAGE];
     snprintf(state.path, sizeof state.path, "%s", steer);
+    snprintf(state.trainee, sizeof state.trainee, "%s", trainee);
+    state.is_examination = is_examination;
     child_verb_run("nav", &state, message);
     return EXIT_DONE;
 }

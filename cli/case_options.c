@@ -1,6 +1,9 @@
 #include "cli/case_options.h"
 
 #include "recon/recon.h"
+#include "sim/sim.h"
+
+#include <string.h>
 
 static const char *take_place(const char *text, const char *refused, Vec3 *place)
 {
@@ -36,6 +39,17 @@ static const char *take_entry(void *structure, const Option *option, const char 
     return take_place(text, "--entry takes a point: three numbers X,Y,Z in mm", &command->made.entry);
 }
 
+static const char *take_anatomy(void *structure, const Option *option, const char *text)
+{
+    CaseCommand *command = structure;
+    (void)option;
+    for (const char *const *name = patient_segment_name; *name; name++)
+        if (!strcmp(*name, text))
+            command->made.anatomy = text;
+    return command->made.anatomy ? NULL
+                                 : "--anatomy takes the name of a segment: left_internal_carotid, basilar, aortic_arch, … (docs/scene-format.md lists them)";
+}
+
 #define AT(member) OPTION_AT(CaseCommand, member)
 static const Option rows[] = {
     {"start", "X,Y,Z", OPTION_POINT, AT(start), "of a volume: a point in a vessel, from which the whole tree is tracked", .unit = "mm", .take = take_start},
@@ -45,12 +59,18 @@ static const Option rows[] = {
     {"target", "X,Y,Z", OPTION_POINT, AT(made.target), "where the tip of the wire has to go, in a vessel or a sac; default: no exercise", .unit = "mm",
      .take = take_target},
     {"device", "F.yaml", OPTION_TEXT, AT(made.device), "the tool: a wire of the device library, which is copied; default: a wire that suits the vessels"},
+    {"catheter", "F.yaml", OPTION_TEXT, AT(made.catheter),
+     "a catheter or microcatheter of the device library around the wire, which then is one that fits into it unless --device names another; default: none"},
+    {"anatomy", "NAME", OPTION_TEXT, AT(made.anatomy),
+     "which vessel of the body it is (`anatomy:` in docs/scene-format.md): the patient is drawn around it; default: not said", .take = take_anatomy},
     {"tools", "FOLDER", OPTION_FOLDER, AT(made.library), "the device library", .otherwise = "scenes/tools"},
     {"model", "KIND", OPTION_CHOICE, AT(made.kind), "the wall's model (`seldinger fit --help`): lim, sweep, raster, rbf, pas", .choices = model_names},
     {"behind", NULL, OPTION_FLAG, AT(made.is_behind), "of a CT volume: shows its bone and soft tissue behind the vessels, instead of a plain head"},
     {"output", "CASE", OPTION_FOLDER, AT(output),
      "the folder (required without the window); it must not hold a case yet; default in the window: a folder of the cache", .letter = 'o'},
 #ifdef SELDINGER_RENDER
+    {"trainee", "NAME", OPTION_TEXT, AT(trainee), "name of who steers from the window, for the report"},
+    {"examination", NULL, OPTION_FLAG, AT(is_examination), "what is steered from the window is an examination (`seldinger nav`)"},
     {"picture", "F.png", OPTION_FILE, AT(picture), "the window as it looks at its end"},
     CLI_SIZE(CaseCommand, width, "size of the window"),
     {"duration-s", "S", OPTION_NUMBER, AT(duration_s), "ends the window after S seconds of real time", .most = SCRIPT_LONGEST_S, .otherwise = ""},
@@ -59,7 +79,7 @@ static const Option rows[] = {
     CLI_QUIET(CaseCommand, quiet, "no summary, no progress"),
 };
 
-static void set_defaults(void *structure) { *(CaseCommand *)structure = (CaseCommand){.width = 1280, .height = 720}; }
+static void set_defaults(void *structure) { *(CaseCommand *)structure = (CaseCommand){.trainee = "", .width = 1280, .height = 720}; }
 
 static const char *check(void *structure)
 {

@@ -8,7 +8,8 @@ typedef struct CaseCommand {
     const char *input, *trace, *start, *output, *picture;
     Vec3 start_mm;
     CaseOptions made;
-    bool quiet;
+    const char *trainee;         // of the session in which the window ends
+    bool is_examination, quiet;
     int width, height;
     double duration_s;
 } CaseCommand;

@@ -44,7 +44,7 @@ bool child_verb_run(const char *verb, const StartState *state, char message[CHIL
 {
     char *arguments[7] = {(char *)(size_t) "seldinger", (char *)(size_t)verb, (char *)(size_t)state->path};
     int pipes[2], status = 0, count = 3;
-    const bool steers = !strcmp(verb, "nav");
+    const bool steers = !strcmp(verb, "nav") || !strcmp(verb, "case");
     message[0] = 0;
     if (steers && state->trainee[0])
         arguments[count++] = (char *)(size_t) "--trainee", arguments[count++] = (char *)(size_t)state->trainee;

@@ -67,7 +67,7 @@ static const OptionTable table = {
     .does = "opens the trainer: steer the tools in a window; sessions are recorded and scored",
     .usage = "SCENE [options]",
     .intro = "Opens the trainer's window in a scene, a case (`seldinger case`), a tree or a model (of a volume, the window of `seldinger case` first): steer "
-             "the tools by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its "
+             "the tools by keyboard, gamepad, HID or USB device. The window's help lists the keys. Each session is recorded, and its "
              "score written beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.",
     .exits = "0 done; 2 wrong usage, bad input or no display; 3 the simulation diverged or the recording is incomplete",
     CLI_OPTIONS(rows, NavOptions),
@@ -117,7 +117,7 @@ static int open_volume(const NavOptions *nav, Faults *faults)
     const char *given = nav->trainer.library, *tools = given || !process_scenes("tools", library) ? given : library;
     const CaseOptions made = {.input = nav->scene, .threads = nav->trainer.threads, .library = tools};
     return case_open(&(CaseWindowOptions){.made = &made, .width = nav->trainer.width, .height = nav->trainer.height, .duration_s = nav->trainer.duration_s},
-                     faults);
+                     nav->trainer.trainee, nav->trainer.is_examination, faults);
 }
 
 static int call(void *structure, Faults *faults)

@@ -45,11 +45,11 @@ const OptionTable replay_options = {
     .program = "seldinger replay",
     .does = "shows a recording, simulates it again and compares, or makes a scene from it",
     .usage = "REC.h5 [options]",
-    .intro =
-        "Shows a recording of `nav` or `run --record` in a window: play, pause, seek (Left, Right, the strip below), jump to what happened (Up, Down: "
-        "errors, bookmarks, injections, the target), see the parts of the score at each moment (Y), and continue from any moment (F5) as a new session. With "
-        "--beside a second recording runs in step with it, counted from the first action in each (9: by its own time; Ctrl with Left and Right moves it "
-        "alone). With one of the first four options no window is opened.",
+    .intro = "Shows a recording of `nav` or `run --record` in a window: play, pause, seek (the strip below), jump to what happened (errors, "
+             "bookmarks, injections, the target), see the parts of the score at each moment, and continue from any moment as a new session. With "
+             "--beside a second recording runs in step with it, counted from the first action in each, or by its own time. The window's help lists the keys. "
+             "With one "
+             "of the first four options no window is opened.",
     .exits = "0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged",
     CLI_OPTIONS(options, ReplayOptions),
     .set_defaults = set_defaults,

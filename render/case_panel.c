@@ -18,7 +18,9 @@ static const char *const key_help[][2] = {{"click", "does what is chosen on the 
                                           {"1 to 8, L", "what a click does; L: it only looks"},
                                           {"N, P", "next and previous mark"},
                                           {"W", "the wall instead of the projection"},
-                                          {"T, B", "next tool; what lies behind the vessels"},
+                                          {"T, C (Shift: back)", "next wire; next catheter around it, or none"},
+                                          {"A (Shift: back)", "which vessel of the body it is"},
+                                          {"B", "what lies behind the vessels"},
                                           {"Ctrl+Z, Ctrl+Y", "undoes, does again"},
                                           {"S", "saves the case and steers in it"},
                                           {"Esc", "stops what is being made; leaves"}};
@@ -88,11 +90,17 @@ static void show_choices(Gui *gui, CaseState *s)
 {
     const CaseAct *behind = case_acts_last(&s->acts, CASE_BEHIND);
     char label[120];
-    heading(gui, "TOOL AND BACKGROUND");
-    const char *tool = s->tool > 0 ? s->tool_name[s->tool] : tr("wire that suits the vessels");
-    snprintf(label, sizeof label, "%.*s", (int)strcspn(tool, "."), tool);
-    if (gui_button(gui, "tool", label, "T", 0, false).pressed)
-        case_state_next_tool(s, 1);
+    heading(gui, "TOOLS AND PATIENT");
+    static const struct {
+        const char *none, *key;
+    } list[CASE_LISTS] = {{N_("wire that suits the vessels"), "T"}, {N_("no catheter"), "C"}, {N_("which vessel it is: not said"), "A"}};
+    for (int i = 0; i < CASE_LISTS; i++) {
+        const int chosen = s->list[i].chosen;
+        const char *name = chosen > 0 ? s->list[i].name[chosen] : tr(list[i].none);
+        snprintf(label, sizeof label, "%.*s", (int)strcspn(name, "."), name);
+        if (gui_button(gui, list[i].key, label, list[i].key, 0, chosen > 0).pressed)
+            case_state_next(s, (CaseListId)i, 1);
+    }
     if (gui_button(gui, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", "B", 0, behind && behind->is_on).pressed)
         case_state_turn_background(s);
 }

@@ -35,26 +35,41 @@ static void say_fault(CaseState *s, const char *text)
 
 static int by_name(const void *a, const void *b) { return strcmp(a, b); }
 
-// The wires of the device library: a first tool for one person's hand. A catheter needs a wire within it.
-static void list_tools(CaseState *s)
+static void add_name(CaseState *s, CaseListId list, const char *name)
+{
+    if (s->list[list].count < CASE_NAMES && strlen(name) < sizeof s->list[list].name[0])
+        strcpy(s->list[list].name[s->list[list].count++], name);
+}
+
+// Wires and catheters of the device library, and the segments of the body.
+static void list_choices(CaseState *s)
 {
     DIR *folder = s->made.library ? opendir(s->made.library) : NULL;
-    s->tool_count = 1;
-    for (struct dirent *entry; folder && s->tool_count < CASE_TOOLS && (entry = readdir(folder));) {
-        size_t length = strlen(entry->d_name);
-        if (length < sizeof s->tool_name[0] && length > 5 && !strncmp(entry->d_name, "wire-", 5) && !strcmp(entry->d_name + length - 5, ".yaml"))
-            memcpy(s->tool_name[s->tool_count++], entry->d_name, length + 1);
+    for (int i = 0; i < CASE_LISTS; i++)
+        s->list[i].count = 1;
+    for (struct dirent *entry; folder && (entry = readdir(folder));) {
+        const char *name = entry->d_name;
+        size_t length = strlen(name);
+        if (length <= 5 || strcmp(name + length - 5, ".yaml"))
+            continue;
+        if (!strncmp(name, "wire-", 5))
+            add_name(s, CASE_WIRES, name);
+        else if (!strncmp(name, "catheter-", 9) || !strncmp(name, "microcatheter-", 14))
+            add_name(s, CASE_CATHETERS, name);
     }
     if (folder)
         closedir(folder);
-    qsort(s->tool_name[1], (size_t)(s->tool_count - 1), sizeof s->tool_name[0], by_name);
+    for (int i = 0; i < CASE_SEGMENTS; i++)
+        qsort(s->list[i].name[1], (size_t)(s->list[i].count - 1), sizeof s->list[i].name[0], by_name);
+    for (const char *const *name = patient_segment_name; *name; name++)
+        add_name(s, CASE_SEGMENTS, *name);
 }
 
 bool case_state_begin(CaseState *s, const CaseOptions *made)
 {
     *s = (CaseState){.made = *made, .mode = CASE_START, .forbid_radius = 3, .chosen_mark = -1, .view = CASE_PROJECTION, .turns = true};
     s->made.trace_path = ACTS;
-    list_tools(s);
+    list_choices(s);
     s->builder = case_builder_create(&s->made);
     return s->builder != NULL;
 }
@@ -197,6 +212,8 @@ void case_state_click(CaseState *s, Vec3 place)
 
 void case_state_mode(CaseState *s, int mode) { s->mode = mode; }
 
+static const CaseActKind list_act[CASE_LISTS] = {CASE_DEVICE, CASE_CATHETER, CASE_ANATOMY};
+
 static void undo_or_redo(CaseState *s, bool is_undo)
 {
     char text[160];
@@ -207,12 +224,12 @@ static void undo_or_redo(CaseState *s, bool is_undo)
     const CaseAct *act = &s->acts.act[s->acts.count - !is_undo];
     case_act_describe(act, text, sizeof text);
     say(s, false, is_undo ? N_("undone: %s") : N_("done again: %s"), text);
-    if (act->kind == CASE_DEVICE) {
-        const CaseAct *last = case_acts_last(&s->acts, CASE_DEVICE);
-        s->tool = 0;
-        for (int i = 1; last && i < s->tool_count; i++)
-            if (!strcmp(s->tool_name[i], last->device))
-                s->tool = i;
+    for (int list = 0; list < CASE_LISTS; list++) {
+        const CaseAct *last = case_acts_last(&s->acts, list_act[list]);
+        s->list[list].chosen = 0;
+        for (int i = 1; last && i < s->list[list].count; i++)
+            if (!strcmp(s->list[list].name[i], last->name))
+                s->list[list].chosen = i;
     }
     follow(s, case_act_changes_tree(act->kind));
     s->mode = case_acts_last(&s->acts, CASE_START) ? s->mode : CASE_START;
@@ -231,13 +248,13 @@ void case_state_cancel(CaseState *s)
     say(s, false, "stopped; Ctrl+Y begins it again");
 }
 
-void case_state_next_tool(CaseState *s, int by)
+void case_state_next(CaseState *s, CaseListId list, int by)
 {
-    CaseAct act = {.kind = CASE_DEVICE};
-    int next = (s->tool + by + s->tool_count) % s->tool_count, before = s->acts.count;
-    snprintf(act.device, sizeof act.device, "%s", s->tool_name[next]);
+    CaseAct act = {.kind = list_act[list]};
+    const int count = s->list[list].count, next = (s->list[list].chosen + by + count) % count, before = s->acts.count;
+    snprintf(act.name, sizeof act.name, "%s", s->list[list].name[next]);
     add(s, &act);
-    s->tool = s->acts.count > before ? next : s->tool;
+    s->list[list].chosen = s->acts.count > before ? next : s->list[list].chosen;
 }
 
 void case_state_turn_background(CaseState *s)
@@ -345,9 +362,7 @@ const char *case_state_hint(const CaseState *s)
                                                       "Click into the sac",
                                                       "Click the end where the tools enter",
                                                       "Click where the tip has to go",
-                                                      "",
-                                                      "",
-                                                      "Click to look there; 1 to 8 choose what a click does; S steers"};
+                                                      [CASE_LOOK] = "Click to look there; 1 to 8 choose what a click does; S steers"};
     switch (s->progress.stage) {
     case BUILD_LOADING: return "The volume is being loaded; Esc leaves";
     case BUILD_TRACKING: return "The tree grows; Esc stops it";

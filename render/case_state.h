@@ -8,7 +8,9 @@
 #include "sim/sim.h"
 
 // The views: the three slices (SliceView), and a projection that turns.
-enum { CASE_PROJECTION = 3, CASE_VIEWS, CASE_TOOLS = 48 };
+enum { CASE_PROJECTION = 3, CASE_VIEWS, CASE_NAMES = 48 };
+// Lists of which the user chooses one name: an act each.
+typedef enum { CASE_WIRES, CASE_CATHETERS, CASE_SEGMENTS, CASE_LISTS } CaseListId;
 // What a click does: a CaseActKind at that point, or only to look there.
 enum { CASE_LOOK = CASE_ACTS };
 
@@ -34,8 +36,10 @@ typedef struct CaseState {
     RbtSeen *seen;               // the tree as it grows
     int seen_count, seen_number;
     int chosen_mark;             // -1: none
-    int tool_count, tool;        // device files that can be chosen; 0: a wire that suits the vessels
-    char tool_name[CASE_TOOLS][80];
+    struct {
+        int count, chosen;           // 0: "", none, or a wire that suits the vessels
+        char name[CASE_NAMES][80];
+    } list[CASE_LISTS];
     int pictures;                // grows with each change of what all views show …
     int turned;                  // … and of how the projection is seen
     char message[600];
@@ -57,7 +61,7 @@ void case_state_undo(CaseState *state);
 void case_state_redo(CaseState *state);
 // Stops what is being made, and undoes the act that it follows from.
 void case_state_cancel(CaseState *state);
-void case_state_next_tool(CaseState *state, int by);
+void case_state_next(CaseState *state, CaseListId list, int by);
 void case_state_turn_background(CaseState *state);
 void case_state_choose_mark(CaseState *state, int mark);
 

@@ -358,7 +358,7 @@ static void draw_marks(const Over *o)
 
 static void draw_acts(const Over *o)
 {
-    static const char *const name[CASE_BEHIND + 1] = {"start", "branch", "forbidden", "cut", "end", "sac", "entry", "target", NULL, NULL};
+    static const char *const name[CASE_ACTS] = {"start", "branch", "forbidden", "cut", "end", "sac", "entry", "target"};
     const CaseActs *acts = &o->s->acts;
     int first = 0;
     for (int i = 0; i < acts->count; i++)

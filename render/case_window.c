@@ -109,7 +109,9 @@ static void press_letter(CaseWindow *w, int key)
         s->shows_wall = !s->shows_wall;
         s->pictures++;
         break;
-    case 'T': case_state_next_tool(s, w->shift ? -1 : 1); break;
+    case 'T': case_state_next(s, CASE_WIRES, w->shift ? -1 : 1); break;
+    case 'C': case_state_next(s, CASE_CATHETERS, w->shift ? -1 : 1); break;
+    case 'A': case_state_next(s, CASE_SEGMENTS, w->shift ? -1 : 1); break;
     case 'B': case_state_turn_background(s); break;
     case 'H': w->shows_help = !w->shows_help; break;
     case 'S': steer(w); break;

@@ -120,6 +120,9 @@ KeyBinding key_table_binding(ActionId id);
 void key_table_bind(const KeyBinding *binding);
 // Writes the keys in force as shown to the user, "Alt+Up", "F1 or ?"; returns text.
 const char *key_table_text(ActionId id, char *text, size_t capacity);
+// Copies a text in which {NAME}, with the name of an action, stands for its key: "Hold {X-ray pedal}." becomes "Hold F." Every text that a user sees names keys
+// so, also those of exercises and translations (which keep the names in English). Braces around anything else stay. Returns text.
+char *key_table_fill(const char *from, char *text, size_t capacity);
 // Writes a line of the list of keys, starting at this action: "Alt+Up Down" and its description. Returns the number of actions covered, 1 or more.
 int key_table_line(ActionId first, char *keys, size_t capacity, const char **help);
 

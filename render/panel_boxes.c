@@ -1,5 +1,6 @@
 // Boxes over everything: the instructions of the exercise, the list of keys, dialogues.
 #include "render/panel_internal.h"
+#include "render/replay_keys.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -59,19 +60,32 @@ static void veil(Panel *panel, const WindowInput *input)
     gui_window_end(panel->gui);
 }
 
+static void help_line(Gui *gui, const char *keys, const char *help, GuiFont font, float key_width)
+{
+    GuiRect at = gui_place(gui, 0, gui_line_height(gui, font));
+    gui_draw_text(gui, at.x, at.y, font, gui_colors.accent, keys);
+    gui_draw_text(gui, at.x + key_width, at.y, font, gui_colors.text, help);
+}
+
 static void help_group(Panel *panel, ActionGroup group, GuiFont font, float key_width)
 {
-    Gui *gui = panel->gui;
     panel_heading(panel, action_group_name[group]);
     for (int i = 0, covered = 1; i < ACTION_COUNT; i += covered) {
         char keys[64];
         const char *help;
         covered = key_table_line((ActionId)i, keys, sizeof keys, &help);
-        if (key_table[i].group != group)
-            continue;
-        GuiRect at = gui_place(gui, 0, gui_line_height(gui, font));
-        gui_draw_text(gui, at.x, at.y, font, gui_colors.accent, keys);
-        gui_draw_text(gui, at.x + key_width, at.y, font, gui_colors.text, help);
+        if (key_table[i].group == group && (!panel->is_replay || replay_has_action((ActionId)i)))
+            help_line(panel->gui, keys, help, font, key_width);
+    }
+}
+
+// In a replay the tool and the X-ray system obey the recording: instead of their keys, those of the timeline.
+static void help_timeline(Panel *panel, GuiFont font, float key_width)
+{
+    panel_heading(panel, "Timeline");
+    for (int i = 0; i < REPLAY_KEYS; i++) {
+        char key[KEY_BINDING_TEXT];
+        help_line(panel->gui, replay_key_text((ReplayKey)i, key, sizeof key), replay_key_help((ReplayKey)i), font, key_width);
     }
 }
 
@@ -106,7 +120,9 @@ void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *s
     for (int i = 0; i < 2; i++) {
         GuiRect part = {at.x + (i ? half : 0), at.y + head, i ? at.width - half : half, at.height - head};
         gui_window_begin(gui, i ? "help right" : "help left", part, GUI_ON_TOP);
-        for (int group = 0; group < ACTION_GROUPS; group++)
+        if (panel->is_replay && i == 0)
+            help_timeline(panel, font, key_width);
+        for (int group = panel->is_replay ? GROUP_VIEW : 0; group < ACTION_GROUPS; group++)
             if ((group >= GROUP_VIEW) == (i == 1))
                 help_group(panel, (ActionGroup)group, font, key_width);
         gui_window_end(gui);

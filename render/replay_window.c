@@ -3,6 +3,7 @@
 #include "base/base.h"
 #include "render/playback.h"
 #include "render/redraw.h"
+#include "render/replay_keys.h"
 #include "render/replay_side.h"
 #include "render/scene_views.h"
 #include "render/timeline.h"
@@ -227,6 +228,9 @@ static void run_window(ReplayWindow *replay)
         double now = clock_s(CLOCK_MONOTONIC), passed = fmin(now - last, 0.1);
         last = now;
         panel_take_input(replay->panel, input, &actions);
+        for (int i = 0; i < ACTION_COUNT; i++)
+            if (replay_keys_claim(input, (ActionId)i))
+                actions.held[i] = 0, actions.pressed[i] = 0;
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
         controls_obey(&replay->controls, views_scene(replay->views), &actions, &layout, passed);
         obey(replay, &actions, passed);

@@ -1,5 +1,6 @@
 #include "render/session_page.h"
 
+#include "render/key_table.h"
 #include "render/page.h"
 
 #include <stdlib.h>
@@ -204,12 +205,13 @@ static void print_steps(const SessionPage *page)
     const GuideProgress *progress = &page->session->figures.guide;
     const Guide *guide = page->scene && page->scene->exercise ? &page->scene->exercise->guide : NULL;
     const int count = guide ? guide->count : progress->done;
+    char text[2 * GUIDE_TEXT];
     if (count == 0)
         return;
     fprintf(out, "<section id=\"steps\"><h2>Steps</h2>\n<ol>\n");
     for (int i = 0; i < count; i++) {
         fprintf(out, "<li>");
-        page_text(out, guide ? guide->step[i].text : "");
+        page_text(out, guide ? key_table_fill(guide->step[i].text, text, sizeof text) : "");
         if (i < progress->done)
             fprintf(out, " (done at %.1f s)</li>\n", progress->done_s[i]);
         else

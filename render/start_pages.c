@@ -391,7 +391,8 @@ void start_draw(StartWindow *w, const WindowInput *input, unsigned framebuffer)
     draw_list(w, (GuiRect){side, 0, width - side, height - foot});
     gui_window_begin(w->gui, "foot", (GuiRect){side, height - foot, width - side, foot}, 0);
     gui_text_wrapped(w->gui, GUI_SMALL, gui_colors.dim, page_hint[w->state->page]);
-    gui_text_wrapped(w->gui, GUI_NORMAL, gui_colors.text, w->message[0] ? w->message : about_row(w));
+    char about[1200];
+    gui_text_wrapped(w->gui, GUI_NORMAL, gui_colors.text, w->message[0] ? w->message : key_table_fill(tr(about_row(w)), about, sizeof about));
     gui_window_end(w->gui);
     gui_end(w->gui, framebuffer);
 }

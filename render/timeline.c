@@ -1,6 +1,7 @@
 #include "render/timeline.h"
 
 #include "render/message.h"
+#include "render/replay_keys.h"
 #include "render/score_parts_box.h"
 #include "render/session_figures.h"
 #include "render/translation.h"
@@ -58,13 +59,13 @@ TimelineActions timeline_take_keys(const WindowInput *input, const TimelineState
     TimelineActions actions = {.speed = state->speed};
     for (int i = 0; i < input->event_count; i++) {
         const WindowEvent *event = &input->event[i];
-        bool is_key = event->kind == WINDOW_KEY_DOWN_EVENT && !(event->modifiers & (WINDOW_ALT | WINDOW_SUPER));
-        if (is_key && (event->key == WINDOW_KEY_UP || event->key == WINDOW_KEY_DOWN))
-            ask_for_mark(&actions, state, event->key == WINDOW_KEY_DOWN);
-        if (is_key && !event->is_repeat)
-            actions.toggle_parts ^= event->key == 'Y', actions.toggle_step ^= event->key == '9' && state->side;
-        if (event->kind == WINDOW_TEXT_EVENT && (event->character == '<' || event->character == '>'))
-            actions.speed = fminf(8, fmaxf(0.1F, actions.speed * (event->character == '>' ? 1.25F : 0.8F)));
+        const bool is_before = replay_key_is_pressed(REPLAY_MARK_BEFORE, event), is_slower = replay_key_is_pressed(REPLAY_SLOWER, event);
+        if (is_before || replay_key_is_pressed(REPLAY_MARK_AFTER, event))
+            ask_for_mark(&actions, state, !is_before);
+        if (is_slower || replay_key_is_pressed(REPLAY_FASTER, event))
+            actions.speed = fminf(8, fmaxf(0.1F, actions.speed * (is_slower ? 0.8F : 1.25F)));
+        actions.toggle_parts ^= !event->is_repeat && replay_key_is_pressed(REPLAY_PARTS, event);
+        actions.toggle_step ^= !event->is_repeat && replay_key_is_pressed(REPLAY_STEP, event) && state->side;
     }
     return actions;
 }
@@ -193,31 +194,37 @@ static void draw_captions(Gui *gui, const TimelineState *state, float s)
 
 // --- the strip ---
 
+static bool key_button(Gui *gui, const char *id, const char *label, ReplayKey key, float width, bool is_on)
+{
+    char text[KEY_BINDING_TEXT];
+    return gui_button(gui, id, label, replay_key_text(key, text, sizeof text), width, is_on).pressed;
+}
+
 static void draw_buttons(Gui *gui, const TimelineState *state, TimelineActions *actions, float s)
 {
     const float gap = 5 * s;
-    actions->toggle_play = gui_button(gui, "play", state->is_playing ? "Stop" : "Play", "P", 74 * s, state->is_playing).pressed;
+    actions->toggle_play = key_button(gui, "play", state->is_playing ? "Stop" : "Play", REPLAY_PLAY, 74 * s, state->is_playing);
     gui_beside(gui, gap);
-    if (gui_button(gui, "back", "-5 s", "Left", 74 * s, false).pressed)
+    if (key_button(gui, "back", "-5 s", REPLAY_BACK, 74 * s, false))
         ask_for_time(actions, state->time_s - 5);
     gui_beside(gui, gap);
-    if (gui_button(gui, "on", "+5 s", "Right", 80 * s, false).pressed)
+    if (key_button(gui, "on", "+5 s", REPLAY_ON, 80 * s, false))
         ask_for_time(actions, state->time_s + 5);
     gui_beside(gui, gap);
-    if (gui_button(gui, "before", "Mark before", "Up", 116 * s, false).pressed)
+    if (key_button(gui, "before", "Mark before", REPLAY_MARK_BEFORE, 116 * s, false))
         ask_for_mark(actions, state, false);
     gui_beside(gui, gap);
-    if (gui_button(gui, "after", "Mark after", "Down", 124 * s, false).pressed)
+    if (key_button(gui, "after", "Mark after", REPLAY_MARK_AFTER, 124 * s, false))
         ask_for_mark(actions, state, true);
     gui_beside(gui, gap);
     gui_slider(gui, "speed", &actions->speed, 0.1F, 8, "speed %.1f", 100 * s);
     gui_beside(gui, gap);
-    actions->toggle_parts = gui_button(gui, "parts", "Score", "Y", 84 * s, state->has_parts).pressed;
+    actions->toggle_parts = key_button(gui, "parts", "Score", REPLAY_PARTS, 84 * s, state->has_parts);
     gui_beside(gui, gap);
-    actions->resume = gui_button(gui, "resume", "Continue from here", "F5", 176 * s, false).pressed;
+    actions->resume = key_button(gui, "resume", "Continue from here", REPLAY_RESUME, 176 * s, false);
     if (state->side) {
         gui_beside(gui, gap);
-        actions->toggle_step = gui_button(gui, "step", "In step", "9", 90 * s, state->side->is_in_step).pressed;
+        actions->toggle_step = key_button(gui, "step", "In step", REPLAY_STEP, 90 * s, state->side->is_in_step);
     }
     gui_beside(gui, 2 * gap);
     gui_text(gui, GUI_NORMAL, gui_colors.dim, state->note ? state->note : "");

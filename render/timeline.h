@@ -41,8 +41,7 @@ typedef struct Timeline Timeline;
 
 Timeline *timeline_create(char *message, size_t capacity);   // needs a current GL context; NULL with a reason
 void timeline_destroy(Timeline *timeline);
-// The keys of the timeline's own actions: Up and Down to the mark before and after, Y parts of the score, 9 in step, < and > speed. The others (P, F5, Left,
-// Right) are in the key table.
+// The timeline's own actions by keys (render/replay_keys.h); play, back, on and resume come as actions of the key table.
 TimelineActions timeline_take_keys(const WindowInput *input, const TimelineState *state);
 // Draws a frame; `at` is the bottom strip of the layout.
 TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, const TimelineState *state, double scale, PanelRect at, unsigned framebuffer);

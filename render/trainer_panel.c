@@ -38,7 +38,8 @@ void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *tr
     }
     state->trainee = trainee;
     state->title = scene->exercise ? scene->exercise->title : "Free practice";
-    state->instructions = scene->exercise ? scene->exercise->instructions : "This scene has no exercise: navigate freely.";
+    state->instructions =
+        key_table_fill(scene->exercise ? scene->exercise->instructions : tr("This scene has no exercise: navigate freely."), panel->task, sizeof panel->task);
     if (scene->exercise) {
         state->guide = &scene->exercise->guide;
         snprintf(panel->target, sizeof panel->target, "%s", scene->target[scene->exercise->target].name);
@@ -72,7 +73,7 @@ __attribute__((format(printf, 3, 4))) static void add_line(char *text, size_t ca
 // The result: a first line, then the points of each part with the reason for those that were lost, then what the sum is multiplied by and the errors.
 static void tell_result(char *text, size_t capacity, const Scene *scene, const ScoreFigures *score)
 {
-    snprintf(text, capacity, tr("%s: %.0f points in %.0f s with %d handling error%s. F4 restarts; Esc ends.\n"),
+    snprintf(text, capacity, tr("%s: %.0f points in %.0f s with %d handling error%s. {Restart} restarts; {Quit} ends.\n"),
              score->state == SCORE_REACHED ? "Target reached and held" : "Time is up", score->points, score->time_s, score->error_total,
              score->error_total == 1 ? "" : "s");
     for (int i = 0; i < PART_COUNT; i++) {
@@ -150,9 +151,11 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->hold_s = score->held_s;
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
-        tell_result(panel->instructions, sizeof panel->instructions, scene, score);
-        state->instructions = panel->instructions;
+        char result[sizeof panel->result];
+        tell_result(result, sizeof result, scene, score);
+        key_table_fill(result, panel->result, sizeof panel->result);
     }
+    state->instructions = state->is_finished ? panel->result : panel->task;
     state->fluoro_s = score->fluoroscopy_s;
     state->contrast_ml = score->contrast_ml;
     state->tube_kv = score->pulse.kv;
@@ -193,12 +196,12 @@ static void warn(TrainerPanel *panel, const Pose *pose, const ScoreFigures *scor
         if (!figures->real_time_priority && pose->step > 0)
             state->warnings |= WARN_NO_FIFO;
         if (figures->state == REALTIME_DIVERGED)
-            line = "The simulation diverged: the session has ended with the last good state. F4 restarts";
+            line = "The simulation diverged: the session has ended with the last good state. {Restart} restarts";
         else if (figures->state == REALTIME_UNRECORDED)
-            line = "The recording could not be written (disk full?): the session has ended. F4 restarts";
+            line = "The recording could not be written (disk full?): the session has ended. {Restart} restarts";
     }
     if (line) {
-        snprintf(panel->warning, sizeof panel->warning, "%s", line);
+        key_table_fill(tr(line), panel->warning, sizeof panel->warning);
         state->warning = panel->warning;
     }
 }
@@ -322,7 +325,7 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
                        : xray->mode == XRAY_DSA && fluoroscope.mask_has_moved ? "C-arm, table or field have moved since the mask was taken: M takes a new one"
                                                                               : NULL;
     if (line && !state->warning) {
-        snprintf(panel->warning, sizeof panel->warning, "%s", line);
+        key_table_fill(tr(line), panel->warning, sizeof panel->warning);
         state->warning = panel->warning;
     }
     state->is_roadmap_ready = xray->mode == XRAY_DSA ? fluoroscope.has_mask : fluoroscope.has_roadmap;

@@ -19,7 +19,7 @@ typedef struct TrainerPanel {
     char label_text[PANEL_LABELS][96];
     int fitted[PANEL_TOOLS];         // fitted device that the texts in `tool` describe
     char tool[PANEL_TOOLS][200], tool_note[PANEL_TOOLS][64], target[96], warning[200];
-    char instructions[4200];
+    char task[4200], result[4200];   // with the names of keys
     int mark_count;
     ScoreMark mark[SCORE_MARKS_MOST];
     char spot_text[SCORE_MARKS_MOST][64];

@@ -62,10 +62,13 @@ bool case_act_changes_tree(CaseActKind kind) { return kind <= CASE_ENTRY; }
 
 void case_act_describe(const CaseAct *act, char *out, size_t capacity)
 {
-    static const char *const name[CASE_ACTS] = {"start", "branch", "forbid", "cut", "end here", "sac", "entry", "target", "tool", "background"};
+    static const char *const name[CASE_ACTS] = {"start", "branch", "forbid", "cut",      "end here", "sac",
+                                                "entry", "target", "tool",   "catheter", "anatomy",  "background"};
     Vec3 x = act->place;
     if (act->kind == CASE_DEVICE)
-        snprintf(out, capacity, "tool: %s", act->device[0] ? act->device : "a wire that suits the vessels");
+        snprintf(out, capacity, "tool: %s", act->name[0] ? act->name : "a wire that suits the vessels");
+    else if (act->kind == CASE_CATHETER || act->kind == CASE_ANATOMY)
+        snprintf(out, capacity, "%s: %s", name[act->kind], act->name[0] ? act->name : "none");
     else if (act->kind == CASE_BEHIND)
         snprintf(out, capacity, "background: %s", act->is_on ? "the volume" : "a plain patient");
     else if (act->kind == CASE_FORBID)
@@ -130,30 +133,25 @@ static int write_list(FILE *out, const CaseActs *acts, const char *list, CaseAct
 
 static void write_choices(FILE *out, const CaseActs *acts)
 {
-    const CaseAct *entry = case_acts_last(acts, CASE_ENTRY), *target = case_acts_last(acts, CASE_TARGET), *device = case_acts_last(acts, CASE_DEVICE),
-                  *behind = case_acts_last(acts, CASE_BEHIND);
-    const char *comma = "";
-    device = device && device->device[0] ? device : NULL;
-    behind = behind && behind->is_on ? behind : NULL;
-    if (!entry && !target && !device && !behind)
-        return;
-    fputs("case: {", out);
-    if (entry) {
-        write_place(out, "entry_mm", entry->place);
-        comma = ", ";
+    static const struct {
+        CaseActKind kind;
+        const char *key;
+    } row[] = {{CASE_ENTRY, "entry_mm"},    {CASE_TARGET, "target_mm"}, {CASE_DEVICE, "device"},
+               {CASE_CATHETER, "catheter"}, {CASE_ANATOMY, "anatomy"},  {CASE_BEHIND, "behind"}};
+    int count = 0;
+    for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
+        const CaseAct *act = case_acts_last(acts, row[i].kind);
+        bool is_place = row[i].kind <= CASE_TARGET, is_switch = row[i].kind == CASE_BEHIND;
+        if (!act || (is_switch ? !act->is_on : !is_place && !act->name[0]))
+            continue;
+        fputs(count++ == 0 ? "case: {" : ", ", out);
+        if (is_place)
+            write_place(out, row[i].key, act->place);
+        else
+            fprintf(out, "%s: %s", row[i].key, is_switch ? "true" : act->name);
     }
-    if (target) {
-        fputs(comma, out);
-        write_place(out, "target_mm", target->place);
-        comma = ", ";
-    }
-    if (device) {
-        fprintf(out, "%sdevice: %s", comma, device->device);
-        comma = ", ";
-    }
-    if (behind)
-        fprintf(out, "%sbehind: true", comma);
-    fputs("}\n", out);
+    if (count > 0)
+        fputs("}\n", out);
 }
 
 char *case_acts_trace(const CaseActs *acts)

@@ -15,7 +15,9 @@ typedef enum {
     CASE_SAC,                // an aneurysm, from a point within
     CASE_ENTRY,              // tools enter at the end of a vessel near this point
     CASE_TARGET,             // where the tip has to go
-    CASE_DEVICE,             // the tool
+    CASE_DEVICE,             // the wire
+    CASE_CATHETER,           // a catheter around it
+    CASE_ANATOMY,            // which vessel of the body it is
     CASE_BEHIND,             // the volume lies behind the vessels in fluoroscopy, or no longer
     CASE_ACTS
 } CaseActKind;
@@ -25,7 +27,9 @@ typedef struct CaseAct {
     Vec3 place;              // [mm]
     double radius;           // [mm] of CASE_FORBID
     bool is_on;              // of CASE_BEHIND
-    char device[80];         // of CASE_DEVICE: a file of the device library; "": a wire that suits the vessels
+    // of CASE_DEVICE and CASE_CATHETER: a file of the device library; "": a wire that suits the vessels, no catheter. Of CASE_ANATOMY: a segment
+    // (sim/patient_landmarks.h); "": not said
+    char name[80];
 } CaseAct;
 
 typedef struct CaseActs {

@@ -204,7 +204,7 @@ static bool write_model(const CaseWork *work, const char *folder, Faults *faults
 }
 
 // The device stands in the folder, so that the case can be copied.
-static bool write_device(const char *folder, const char *library, const char *device, Faults *faults)
+static bool write_device(const char *folder, const char *library, const char *device, bool *is_micro, Faults *faults)
 {
     char *from = library && trace_is_device_name(device) ? text_file_in(library, device) : NULL;
     size_t length;
@@ -218,28 +218,48 @@ static bool write_device(const char *folder, const char *library, const char *de
     }
     char *text = whole_file_read_most(from, 1 << 20, &length, faults);
     bool good = text && write_text(folder, device, text, faults);
+    *is_micro = text && strstr(text, "\nkind: microcatheter");
     free(text);
     free(from);
     return good;
 }
 
+// Whether the scene can be opened: the wire fits into its catheter, and the segment exists.
+static bool is_valid(const char *folder, const char *text, Faults *faults)
+{
+    char *path = text_file_in(folder, SCENE);
+    Scene *scene = path ? scene_parse(text, strlen(text), path, faults) : NULL;
+    if (!path)
+        faults_add(faults, folder, 0, 0, "out of memory");
+    scene_free(scene);
+    free(path);
+    return scene != NULL;
+}
+
+static const char *choice(const char *option, const char *said) { return option && option[0] ? option : said && said[0] ? said : NULL; }
+
 static bool write_scene(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
 {
     char behind[PATH_MAX];
     const TraceCase *said = work->trace ? &work->trace->made : NULL;
-    const char *device = options->device ? options->device : said && said->device[0] ? said->device : NULL;
+    const char *device = choice(options->device, said ? said->device : NULL), *catheter = choice(options->catheter, said ? said->catheter : NULL);
+    bool is_micro = false, is_wire = false;
     bool is_behind = options->is_behind || (said && said->is_behind);
     CaseScene scene = {.model = MODEL,
                        .contact = options->kind > 0 ? (ContactKind)(CONTACT_SWEEP + options->kind - 1) : CONTACT_LIM,
                        .frame = work->frame,
                        .behind = is_behind && path_resolve(options->input, behind) ? behind : NULL,
                        .device = device,
+                       .catheter = catheter,
+                       .anatomy = choice(options->anatomy, said ? said->anatomy : NULL),
                        .has_target = options->has_target || (said && said->has_target),
                        .target = options->has_target || !said ? options->target : said->target};
-    if (device && !write_device(folder, options->library, device, faults))
+    if ((device && !write_device(folder, options->library, device, &is_wire, faults)) ||
+        (catheter && !write_device(folder, options->library, catheter, &is_micro, faults)))
         return false;
+    scene.is_micro = is_micro;
     char *text = case_scene_text(work->file.tree, &scene, faults);
-    bool good = text && write_text(folder, SCENE, text, faults);
+    bool good = text && is_valid(folder, text, faults) && write_text(folder, SCENE, text, faults);
     free(text);
     return good;
 }

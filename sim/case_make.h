@@ -17,6 +17,8 @@ typedef struct CaseOptions {
     bool has_target, has_entry;
     Vec3 target, entry;          // [mm]
     const char *device;          // a file of the device library, without its folder; NULL: as the trace says
+    const char *catheter;        // the same of a catheter around the wire
+    const char *anatomy;         // a segment of the body (sim/patient_landmarks.h); NULL: as the trace says
     const char *library;         // folder of device files; NULL: none
     int threads;                 // 0: all cores; the result does not depend on them
     const Progress *progress;    // may be NULL

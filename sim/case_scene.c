@@ -27,6 +27,8 @@ static const CaseWire wires[] = {
 static const double WIDE_MM = 2.5;      // mean radius of the vessels from which on the thicker wire is taken
 static const double SPARE_MM = 60;      // of wire, beyond the farthest place
 static const double DEVICE_SPARE_MM = 300;      // the same of a device, whose soft end alone may be 250 mm long
+static const double MICRO_SPARE_MM = 60;        // further for a microcatheter, whose soft end is 350 mm long
+static const double AHEAD_MM = 60;      // of the wire beyond its catheter, when both are in as far as they go
 static const double ELEMENT_MM = 1.5;
 enum { ELEMENTS_LEAST = 60, ELEMENTS_MOST = 400 };
 
@@ -59,21 +61,39 @@ static double mean_radius(const VesselTree *tree)
     return length > 0 ? sum / length : tree->radius[0];
 }
 
+static double elements_of(double length) { return fmin(fmax(ceil(length / ELEMENT_MM), ELEMENTS_LEAST), ELEMENTS_MOST); }
+
 // A device keeps its own sections, damping and shape; only its shaft is cut to length.
-static void write_device(FILE *out, const char *device, double farthest)
+static void write_device(FILE *out, const char *name, const char *device, double length)
 {
-    double length = 10 * ceil((farthest + DEVICE_SPARE_MM) / 10);
-    fprintf(out, "tools:\n  - {name: wire, device: %s, length_mm: %.0f, elements: %.0f}\n", device, length,
-            fmin(fmax(ceil(length / ELEMENT_MM), ELEMENTS_LEAST), ELEMENTS_MOST));
+    fprintf(out, "  - {name: %s, device: %s, length_mm: %.0f, elements: %.0f}\n", name, device, length, elements_of(length));
 }
 
-static void write_wire(FILE *out, const VesselTree *tree, double farthest)
+// A key or an item of `tools`.
+static void write_wire(FILE *out, const char *begin, const char *indent, const CaseWire *wire, double length)
 {
-    const CaseWire *wire = &wires[mean_radius(tree) >= WIDE_MM];
-    double length = fmax(10 * ceil((farthest + SPARE_MM) / 10), wire->tip + 20), elements = ceil(length / ELEMENT_MM);
-    fprintf(out,
-            "wire:   # %s\n  elements: %.0f\n  sections:\n    - {length_mm: %.0f, %s}\n%s  tip_marker: {length_mm: 3, attenuation_1_mm: 6}\n  damping: %s\n",
-            wire->name, fmin(fmax(elements, ELEMENTS_LEAST), ELEMENTS_MOST), length - wire->tip, wire->shaft, wire->tip_sections, wire->damping);
+    fprintf(out, "%s   # %s\n%selements: %.0f\n%ssections:\n    - {length_mm: %.0f, %s}\n%s%stip_marker: {length_mm: 3, attenuation_1_mm: 6}\n%sdamping: %s\n",
+            begin, wire->name, indent, elements_of(length), indent, length - wire->tip, wire->shaft, wire->tip_sections, indent, indent, wire->damping);
+}
+
+// The catheter outside, and its wire, which is longer by what is beyond its tip.
+static void write_tools(FILE *out, const VesselTree *tree, const CaseScene *options, double farthest)
+{
+    const bool is_thin = options->catheter ? options->is_micro : mean_radius(tree) < WIDE_MM;
+    const CaseWire *wire = &wires[!is_thin];
+    const double device = 10 * ceil((farthest + DEVICE_SPARE_MM) / 10), catheter = options->is_micro ? device + MICRO_SPARE_MM : device;
+    const double plain = fmax(10 * ceil((farthest + SPARE_MM) / 10), wire->tip + 20);
+    const double length = options->catheter ? catheter + AHEAD_MM : options->device ? device : plain;
+    if (options->catheter || options->device)
+        fputs("tools:\n", out);
+    if (options->catheter)
+        write_device(out, "catheter", options->catheter, catheter);
+    if (options->device)
+        write_device(out, "wire", options->device, length);
+    else if (options->catheter)
+        write_wire(out, "  - kind: wire\n    name: wire", "    ", wire, length);
+    else
+        write_wire(out, "wire:", "  ", wire, length);
 }
 
 // The axis of the model whose positive direction is `letter`, or whose negative one is `opposite`.
@@ -154,12 +174,11 @@ static bool write_scene(OutputText *text, const VesselTree *tree, const CaseScen
             "# A case: `seldinger nav` opens its folder. Change what you like (docs/scene-format.md).\n"
             "seldinger: 1\nvessel:\n  model: %s\n  contact: %s\n  friction: 0.04\n",
             options->model, contact_name[options->contact]);
-    if (options->device)
-        write_device(text->stream, options->device, farthest);
-    else
-        write_wire(text->stream, tree, farthest);
+    write_tools(text->stream, tree, options, farthest);
     fprintf(text->stream, "sheath: {inlet: root, inserted_mm: 2}\n");
     write_patient(text->stream, tree, options);
+    if (options->anatomy)
+        fprintf(text->stream, "anatomy: %s\n", options->anatomy);
     if (options->has_target)
         write_exercise(text->stream, tree, options, node, path[node]);
     free(path);

@@ -11,6 +11,9 @@ typedef struct CaseScene {
     const char *frame;           // of the patient: "LPS", "RAS", …; "": not known
     const char *behind;          // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
     const char *device;          // of the wire, relative to the scene's folder; NULL: one that suits the vessels
+    const char *catheter;        // of a catheter around it; NULL: none
+    bool is_micro;               // the catheter is a microcatheter, which takes a wire of 0.014 inch
+    const char *anatomy;         // segment of the body (sim/patient_landmarks.h); NULL: not said
     bool has_target;
     Vec3 target;                 // [mm]
 } CaseScene;

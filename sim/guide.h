@@ -8,6 +8,7 @@
 //       - {text: Push it on., inserted_mm: 30}              # inserted_mm: beyond the sheath's mouth
 //       - {text: Enter the branch., tip_in: branch}         # tip_in: a target of the scene that holds the tool's tip
 //       - {text: Hold still., held_s: 2}                    # held_s: the exercise's target held for so long
+// A text names the user's keys by the names of their buttons in braces, "Hold {X-ray pedal}." (render/key_table.h: key_table_fill).
 // `tool: NAME` beside turned_deg, inserted_mm or tip_in: of this tool; default: of the tool that has to reach the target.
 #ifndef SELDINGER_SIM_GUIDE_H
 #define SELDINGER_SIM_GUIDE_H

@@ -72,7 +72,7 @@ bool replay_is_of(const RecordedRun *run, const Scene *scene, const char *record
         return true;
     faults_add(faults, recording, 0, 0,
                "is a recording of another scene than %s, of an older state of it, or with devices added from the tray; `seldinger replay` can continue any "
-               "recording (F5)",
+               "recording",
                scene->path);
     return false;
 }

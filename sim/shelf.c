@@ -32,6 +32,7 @@ static bool take_case(const char *path, const char *name, ShelfCase *out)
         snprintf(out->title, sizeof out->title, "%.90s", scene->exercise ? scene->exercise->title : name);
         snprintf(out->text, sizeof out->text, "%.990s", scene->exercise ? scene->exercise->instructions : "");
         out->level = scene->exercise ? scene->exercise->level : 0;
+        out->is_guided = scene->exercise && scene->exercise->guide.count > 0;
         snprintf(out->missing, sizeof out->missing, "%s", needed && access(needed, R_OK) != 0 ? needed : "");
     }
     scene_free(scene);
@@ -109,12 +110,23 @@ static bool read_sessions(Shelf *shelf, const char *folder)
     return good;
 }
 
+// By level, those without one last; of one level a guided exercise first, then by path.
+static int easiest_first(const void *a, const void *b)
+{
+    const ShelfCase *p = a, *q = b;
+    if (p->level != q->level)
+        return !p->level ? 1 : !q->level ? -1 : p->level - q->level;
+    return p->is_guided != q->is_guided ? (int)q->is_guided - (int)p->is_guided : strcmp(p->path, q->path);
+}
+
 bool shelf_read(Shelf *shelf, const char *const *folder, int folder_count, const char *sessions)
 {
     bool good = true;
     *shelf = (Shelf){0};
     for (int i = 0; good && i < folder_count; i++)
         good = !folder[i] || read_cases(shelf, folder[i]);
+    if (shelf->case_count > 1)
+        qsort(shelf->cases, (size_t)shelf->case_count, sizeof *shelf->cases, easiest_first);
     return good && read_sessions(shelf, sessions);
 }
 

@@ -10,6 +10,7 @@ typedef struct ShelfCase {
     char title[EXERCISE_TITLE];  // of the exercise, else the name of the file or folder
     char text[1000];             // the start of the exercise's instructions; "": none
     int level;                   // of the exercise, 1 to 5; 0: none
+    bool is_guided;              // its exercise has steps
     char missing[4096];          // the model or mesh that its scene needs and that cannot be read; "": none
     int sessions;                // recorded in it
     double best;                 // points; 0 without sessions

@@ -312,11 +312,22 @@ bool trace_is_device_name(const char *text)
     return text[0] && text[0] != '.' && text[strspn(text, signs)] == 0;
 }
 
+static void read_case_name(const Walk *w, const yaml_node_t *value, const char *key, char out[80])
+{
+    const char *text = scalar_of(value);
+    if (!text || !trace_is_device_name(text) || strlen(text) >= 80)
+        FAULT(w, value, "%s is not valid; expected a name of letters, digits and . - _, of a device file without its folder", key);
+    else
+        snprintf(out, 80, "%s", text);
+}
+
 // The key `case`.
 static void read_case(const Walk *w, const yaml_node_t *map, TraceCase *out)
 {
     if (map->type != YAML_MAPPING_NODE) {
-        FAULT(w, map, "the case is not valid; expected {entry_mm: [x, y, z], target_mm: [x, y, z], device: FILE.yaml, behind: true}");
+        FAULT(
+            w, map,
+            "the case is not valid; expected {entry_mm: [x, y, z], target_mm: [x, y, z], device: FILE.yaml, catheter: FILE.yaml, anatomy: NAME, behind: true}");
         return;
     }
     for (int i = 0; i < pair_count(map); i++) {
@@ -336,12 +347,13 @@ static void read_case(const Walk *w, const yaml_node_t *map, TraceCase *out)
             if (!text || (!out->is_behind && strcmp(text, "false")))
                 FAULT(w, value, "behind is not valid; expected true or false");
         } else if (!strcmp(key, "device")) {
-            if (!text || !trace_is_device_name(text) || strlen(text) >= sizeof out->device)
-                FAULT(w, value, "device is not valid; expected the name of a device file, of letters, digits and . - _, without its folder");
-            else
-                snprintf(out->device, sizeof out->device, "%s", text);
+            read_case_name(w, value, key, out->device);
+        } else if (!strcmp(key, "catheter")) {
+            read_case_name(w, value, key, out->catheter);
+        } else if (!strcmp(key, "anatomy")) {
+            read_case_name(w, value, key, out->anatomy);
         } else {
-            FAULT(w, value, "unknown key '%.40s' in a case; expected entry_mm, target_mm, device, behind", key);
+            FAULT(w, value, "unknown key '%.40s' in a case; expected entry_mm, target_mm, device, catheter, anatomy, behind", key);
         }
     }
 }

@@ -11,6 +11,8 @@ typedef struct TraceCase {   // the key `case`: what `seldinger case` makes of t
     Vec3 entry;              // [mm] the end of a vessel where the tools enter
     Vec3 target;             // [mm] where the tip of the tool has to go
     char device[80];         // a file of the device library, without its folder; "": a wire that suits the vessels
+    char catheter[80];       // the same of a catheter around it; "": none
+    char anatomy[80];        // the segment of the body that the vessel is (`anatomy:` of a scene); "": not said
 } TraceCase;
 
 typedef struct Trace {
@@ -24,7 +26,7 @@ typedef struct Trace {
     TraceCase made;
 } Trace;
 
-// Whether a text can be the name of a device file: letters, digits and . - _ only, so that it can be written into a scene and into a path.
+// Whether a text can be the name of a device file, or of a segment: letters, digits and . - _ only, so that it can be written into a scene and into a path.
 bool trace_is_device_name(const char *text);
 // Parses a trace file. `text` need not be NUL-terminated; `path` is used in messages. Returns NULL with faults.
 Trace *trace_parse(const char *text, size_t length, const char *path, Faults *faults);

@@ -54,6 +54,34 @@ static void a_volume_becomes_a_case(void **state)
     assert_non_null(strstr(output, "target target: reached"));
 }
 
+// A catheter around its wire, and the vessel's name: in the scene, in the trace, and the same from that trace.
+static void a_case_has_a_catheter_and_an_anatomy(void **state)
+{
+    (void)state;
+    char *library = SOURCE_DIR "/scenes/tools", line[1000], name[40];
+    static const char *const set[] = {"--catheter microcatheter-angled.yaml", "--catheter microcatheter-angled.yaml --device wire-014-steel.yaml",
+                                      "--catheter catheter-5f-straight.yaml"};
+    for (int i = 0; i < 3; i++) {
+        snprintf(line, sizeof line, "case 'a tube.nrrd' --start 2,0,0 --tools %s %s --anatomy basilar -o set%d", library, set[i], i);
+        assert_int_equal(run_in("", line), 0);
+        snprintf(line, sizeof line, "case 'a tube.nrrd' --trace set%d/trace.yaml --tools %s --quiet -o from%d", i, library, i);
+        assert_int_equal(run_in("", line), 0);
+        snprintf(line, sizeof line, "diff -r set%d from%d &&", i, i);
+        assert_int_equal(run_in(line, "--version"), 0);
+        snprintf(line, sizeof line, "run set%d --duration-s 0.05", i);
+        assert_int_equal(run_in("", line), 0);
+        snprintf(name, sizeof name, "set%d/scene.yaml", i);
+        char *text = text_of(in_folder(name));
+        assert_true(strstr(text, "anatomy: basilar") && strstr(text, "name: catheter") && strstr(text, "name: wire"));
+        free(text);
+    }
+    // what does not fit is refused, and no case is left
+    snprintf(line, sizeof line, "case 'a tube.nrrd' --start 2,0,0 --tools %s --catheter microcatheter-angled.yaml --device wire-035-j.yaml -o thick", library);
+    refused(line, "wire");
+    assert_int_equal(run_in("", "run thick --duration-s 0.05"), 2);
+    refused("case 'a tube.nrrd' --start 2,0,0 --anatomy knee -o none", "--anatomy takes the name of a segment");
+}
+
 static void a_tree_becomes_a_case(void **state)
 {
     (void)state;
@@ -114,9 +142,8 @@ static void nav_names_the_command(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_volume_becomes_a_case),
-        cmocka_unit_test(a_tree_becomes_a_case),
-        cmocka_unit_test(bad_cases_are_refused),
+        cmocka_unit_test(a_volume_becomes_a_case), cmocka_unit_test(a_case_has_a_catheter_and_an_anatomy),
+        cmocka_unit_test(a_tree_becomes_a_case),   cmocka_unit_test(bad_cases_are_refused),
         cmocka_unit_test(nav_names_the_command),
     };
     return cmocka_run_group_tests(tests, make_volume, remove_folder);

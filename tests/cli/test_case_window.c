@@ -64,9 +64,11 @@ static void keys_alone_do_too(void **state)
 {
     (void)state;
     need_display();
-    check_case("$S nav tube.nrrd --size 900x600 > said 2>&1 & P=$!; window case; sleep 1; keys Tab Prior Next Right w w space Return; "
-               "steers seldinger/cases/tube || exit 1; "
-               "$S case tube.nrrd --trace seldinger/cases/tube/trace.yaml --quiet -o keys 2>> said && diff -r seldinger/cases/tube keys >> said");
+    check_case(
+        "$S nav tube.nrrd --trainee Ada --examination --size 900x600 > said 2>&1 & P=$!; window case; sleep 1; keys Tab Prior Next Right w w space Return; "
+        "steers seldinger/cases/tube || exit 1; "
+        "grep -q '\"trainee\":.*\"Ada\"' seldinger/sessions/*.json && grep -q '\"mode\":.*\"examination\"' seldinger/sessions/*.json || exit 3; "
+        "$S case tube.nrrd --trace seldinger/cases/tube/trace.yaml --quiet -o keys 2>> said && diff -r seldinger/cases/tube keys >> said");
 }
 
 static void a_user_leaves(void **state)

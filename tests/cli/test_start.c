@@ -115,8 +115,9 @@ static void a_user_opens_a_volume(void **state)
     char script[3000];
     snprintf(script, sizeof script,
              "%s mkdir files; $S synth capsule --quiet -o files/a.nrrd && rm -f files/*.h5; printf '%%s' \"$PWD/files\" > cache/last-folder; "
-             "$S 2> said & P=$!; window; keys Tab Tab Return; "
-             "xdotool search --sync --onlyvisible --name 'Seldinger case' >/dev/null; sleep 1; keys Escape; "
+             "$S 2> said & P=$!; window; keys n A d a Return; keys x Tab Tab Return; "
+             "xdotool search --sync --onlyvisible --name 'Seldinger case' >/dev/null; sleep 1; "
+             "ps -o args= --ppid $P | grep -i -q -e '--trainee ada --examination' || exit 3; keys Escape; "
              "until_true \"! xdotool search --name 'Seldinger case' >/dev/null\"; "
              "sleep 1; window; keys Escape; wait $P; [ $? = 0 ] && [ \"$(cat cache/last-folder)\" = \"$PWD/files\" ]",
              hand);

@@ -160,7 +160,7 @@ static void wait_and_look(CaseState *s)
 static CaseState *begin(void)
 {
     CaseState *s = calloc(1, sizeof *s);
-    CaseOptions made = {.input = strdup(input())};
+    CaseOptions made = {.input = strdup(input()), .library = SOURCE_DIR "/scenes/tools"};
     assert_true(s && case_state_begin(s, &made));
     wait_and_look(s);
     assert_true(s->has_volume);
@@ -279,6 +279,12 @@ static void a_case_is_the_same_without_the_window(void **state)
     const CaseWork *work = case_builder_work(s->builder);
     case_state_act(s, CASE_TARGET, vec3(17, 11.5, 8));
     case_state_turn_background(s);
+    case_state_next(s, CASE_CATHETERS, 1);
+    case_state_next(s, CASE_SEGMENTS, 1);
+    case_state_next(s, CASE_SEGMENTS, 1);
+    case_state_undo(s);
+    assert_int_equal(s->list[CASE_SEGMENTS].chosen, 1);
+    assert_string_equal(case_acts_last(&s->acts, CASE_ANATOMY)->name, patient_segment_name[0]);
     case_state_frame(s);
     assert_ptr_equal(case_builder_work(s->builder), work);
     if (!case_state_save(s, in_folder("window"), out, sizeof out, &faults))
@@ -295,8 +301,9 @@ static void a_case_is_the_same_without_the_window(void **state)
     char *trace = whole_file_read(in_folder("window/trace.yaml"), &length, &faults);
     assert_non_null(trace);
     assert_non_null(strstr(trace, "start_mm: [6, 7, 8]"));
+    assert_true(strstr(trace, "catheter: catheter-5f-headhunter.yaml") && strstr(trace, "anatomy: right_internal_carotid"));
     for (int threads = 1; threads <= 2; threads++) {
-        CaseOptions options = {.input = s->made.input, .trace = trace, .trace_path = "trace.yaml", .threads = threads};
+        CaseOptions options = {.input = s->made.input, .library = s->made.library, .trace = trace, .trace_path = "trace.yaml", .threads = threads};
         CaseFigures figures;
         char name[20];
         snprintf(name, sizeof name, "plain%d", threads);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include <cmocka.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 static void every_action_has_one_row_a_key_and_help(void **unused)
@@ -57,6 +58,30 @@ static void the_list_of_keys_has_every_action(void **unused)
         lines[key_table[i].group >= GROUP_VIEW]++;
     }
     assert_true(lines[0] + 3 <= 34 && lines[1] + 2 <= 34);
+}
+
+// A text follows the user's keys; braces that name no action stay, and a text is cut at the capacity.
+static void texts_name_the_keys_in_force(void **unused)
+{
+    (void)unused;
+    KeyBinding bound[ACTION_COUNT];
+    char text[64], brief[12];
+    for (int i = 0; i < ACTION_COUNT; i++)
+        bound[i] = key_table_default((ActionId)i);
+    assert_string_equal(key_table_fill("Hold {X-ray pedal}, then {Push}.", text, sizeof text), "Hold F, then Up.");
+    bound[ACTION_PEDAL] = (KeyBinding){'Q', WINDOW_ALT, 0};
+    key_table_bind(bound);
+    key_table_fill("Hold {X-ray pedal}, then {Push}.", text, sizeof text);
+    key_table_fill("Hold {X-ray pedal}, then {Push}.", brief, sizeof brief);
+    key_table_bind(NULL);
+    assert_string_equal(text, "Hold Alt+Q, then Up.");
+    assert_string_equal(brief, "Hold Alt+Q,");
+    assert_string_equal(key_table_fill("{no action} {Push", text, sizeof text), "{no action} {Push");
+    for (int i = 0; i < ACTION_COUNT; i++) {
+        char name[32], key[32];
+        snprintf(name, sizeof name, "{%s}", key_table[i].name);
+        assert_string_equal(key_table_fill(name, text, sizeof text), key_table_text((ActionId)i, key, sizeof key));
+    }
 }
 
 // Typed signs must not also be printable keys of the table: one press would do two things.
@@ -247,6 +272,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_action_has_one_row_a_key_and_help),
                                        cmocka_unit_test(the_list_of_keys_has_every_action),
+                                       cmocka_unit_test(texts_name_the_keys_in_force),
                                        cmocka_unit_test(a_typed_sign_is_no_key_of_another_action),
                                        cmocka_unit_test(each_key_does_its_own_action_only),
                                        cmocka_unit_test(two_keys_are_held_together),

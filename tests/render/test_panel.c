@@ -842,6 +842,47 @@ static void what_happens_is_told(void **unused)
     assert_false(panel_happening_text(&state, text, sizeof text));
 }
 
+// With every action on a key of its own, no hint and no step keeps the usual one.
+static void texts_follow_the_users_keys(void **unused)
+{
+    (void)unused;
+    static Faults faults;
+    KeyBinding bound[ACTION_COUNT];
+    PanelState state = some_state();
+    char usual[256], text[256];
+    Scene *scene = scene_load(SOURCE_DIR "/scenes/exercises/first-case.yaml", &faults);
+    assert_non_null(scene);
+    for (int i = 0; i < ACTION_COUNT; i++)
+        bound[i] = (KeyBinding){WINDOW_KEY_F1, WINDOW_ALT, 0};
+    for (int i = 0; i < 11; i++) {
+        panel_hint_text(i, usual, sizeof usual);
+        key_table_bind(bound);
+        panel_hint_text(i, text, sizeof text);
+        key_table_bind(NULL);
+        assert_non_null(strstr(text, "Alt+F1"));
+        assert_null(strpbrk(text, "{}"));
+        assert_null(strpbrk(usual, "{}"));
+        assert_string_not_equal(text, usual);
+    }
+    state.hint = HINT_COILS;
+    key_table_bind(bound);
+    panel_happening_text(&state, text, sizeof text);
+    key_table_bind(NULL);
+    assert_non_null(strstr(text, "Alt+F1"));
+    state.hint = HINT_NONE;
+    state.guide = &scene->exercise->guide;
+    panel_happening_text(&state, usual, sizeof usual);
+    key_table_bind(bound);
+    panel_happening_text(&state, text, sizeof text);
+    key_table_bind(NULL);
+    assert_non_null(strstr(usual, "Hold F, the X-ray pedal"));
+    assert_non_null(strstr(text, "Hold Alt+F1, the X-ray pedal"));
+    // each brace is an action's name
+    for (int i = 0; i < scene->exercise->guide.count; i++)
+        assert_null(strpbrk(key_table_fill(scene->exercise->guide.step[i].text, text, sizeof text), "{}"));
+    scene_free(scene);
+}
+
 static const char *marked(const char *text)
 {
     static char translated[300];
@@ -1090,6 +1131,7 @@ int main(void)
                                        cmocka_unit_test(the_result_is_shown_once),
                                        cmocka_unit_test(hints_lead_on_with_use),
                                        cmocka_unit_test(hints_are_translated),
+                                       cmocka_unit_test(texts_follow_the_users_keys),
                                        cmocka_unit_test(what_happens_is_told),
                                        cmocka_unit_test(consequences_and_steps_are_drawn),
                                        cmocka_unit_test(strange_states_draw),

@@ -2,11 +2,13 @@
 // at their times in the colours of their kinds; buttons and keys lead from one to the next.
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
+#include "render/replay_keys.h"
 #include "render/timeline.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -167,6 +169,34 @@ static void keys_lead_from_mark_to_mark(void **state)
     assert_true(at.speed == 8);
 }
 
+// The keys of a replay follow the user's; the list of keys has those that act and no other, and none of them twice.
+static void keys_are_those_of_a_replay(void **state)
+{
+    (void)state;
+    KeyBinding bound[ACTION_COUNT];
+    TimelineState at = {.end_s = 120, .speed = 1, .time_s = 20, .marks = &marks};
+    for (int i = 0; i < ACTION_COUNT; i++)
+        bound[i] = key_table_default((ActionId)i);
+    bound[ACTION_PULL] = (KeyBinding){'B', 0, 0};
+    key_table_bind(bound);
+    char text[32];
+    const bool is_named = !strcmp(replay_key_text(REPLAY_MARK_AFTER, text, sizeof text), "B");
+    const bool seeks = press('B', 'b', &at).seek, seeks_usual = press(WINDOW_KEY_DOWN, 0, &at).seek;
+    key_table_bind(NULL);
+    assert_true(is_named && seeks && !seeks_usual);
+    for (int i = 0; i < REPLAY_KEYS; i++) {
+        assert_in_range(strlen(replay_key_help((ReplayKey)i)), 8, 75);
+        for (int k = 0; k < ACTION_COUNT; k++)
+            assert_false(replay_has_action((ActionId)k) && key_binding_clash(replay_key_binding((ReplayKey)i), key_table_binding((ActionId)k)));
+    }
+    assert_true(replay_has_action(ACTION_VIEW_3D) && replay_has_action(ACTION_HELP));
+    assert_false(replay_has_action(ACTION_CONTRAST) || replay_has_action(ACTION_LAO) || replay_has_action(ACTION_RESTART));
+    // Y lists the parts of the score, and the 3D view stays as it is
+    WindowInput input = {.event_count = 1, .event = {{.kind = WINDOW_KEY_DOWN_EVENT, .key = 'Y'}}};
+    assert_true(replay_keys_claim(&input, ACTION_CAMERA_C_ARM));
+    assert_false(replay_keys_claim(&input, ACTION_MODEL) || replay_keys_claim(&input, ACTION_LATERAL));
+}
+
 // Columns of the strip in which some pixel has a colour, to 40 of 255.
 static int columns_of(const uint8_t *rgb, Color color, double from_x, double to_x)
 {
@@ -214,7 +244,7 @@ static void marks_are_drawn_at_their_times(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_clicked_is_done), cmocka_unit_test(keys_lead_from_mark_to_mark),
-                                       cmocka_unit_test(marks_are_drawn_at_their_times)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_clicked_is_done), cmocka_unit_test(keys_are_those_of_a_replay),
+                                       cmocka_unit_test(keys_lead_from_mark_to_mark), cmocka_unit_test(marks_are_drawn_at_their_times)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -57,15 +57,15 @@ static void the_best_of_two_sessions(void **state)
     const char *list[] = {NULL, scenes, in_folder("nosuch")};
     assert_true(shelf_read(&shelf, list, 3, sessions));
     assert_int_equal(shelf.case_count, 2);
-    assert_string_equal(shelf.cases[0].title, "acase");
-    assert_non_null(strstr(shelf.cases[0].missing, "nosuch.h5"));
-    assert_string_equal(shelf.cases[1].title, "Reach the end");
-    assert_string_equal(shelf.cases[1].text, "Push.");
-    assert_int_equal(shelf.cases[0].level, 0);
-    assert_int_equal(shelf.cases[1].level, 3);
-    assert_string_equal(shelf.cases[1].missing, "");
-    assert_int_equal(shelf.cases[1].sessions, 2);
-    assert_true(shelf.cases[1].best == 61 && shelf.cases[0].sessions == 0);
+    assert_string_equal(shelf.cases[1].title, "acase");
+    assert_non_null(strstr(shelf.cases[1].missing, "nosuch.h5"));
+    assert_string_equal(shelf.cases[0].title, "Reach the end");
+    assert_string_equal(shelf.cases[0].text, "Push.");
+    assert_int_equal(shelf.cases[1].level, 0);
+    assert_int_equal(shelf.cases[0].level, 3);
+    assert_string_equal(shelf.cases[0].missing, "");
+    assert_int_equal(shelf.cases[0].sessions, 2);
+    assert_true(shelf.cases[0].best == 61 && shelf.cases[1].sessions == 0);
     assert_int_equal(shelf.session_count, 2);
     assert_true(shelf.session[0].points == 40 && shelf.session[1].points == 61);
     assert_string_equal(shelf.session[0].trainee, "Ada");
@@ -79,8 +79,22 @@ static void the_best_of_two_sessions(void **state)
     shelf_free(&shelf);
 }
 
+// The shipped exercises: the guided first case, then by level.
+static void the_first_case_comes_first(void **state)
+{
+    (void)state;
+    Shelf shelf;
+    const char *list[] = {SOURCE_DIR "/scenes/exercises"};
+    assert_true(shelf_read(&shelf, list, 1, in_folder("nosuch")));
+    assert_true(shelf.case_count > 1);
+    assert_string_equal(strrchr(shelf.cases[0].path, '/'), "/first-case.yaml");
+    for (int i = 0; i < shelf.case_count; i++)
+        assert_true(shelf.cases[i].level >= (i > 0 ? shelf.cases[i - 1].level : 1));
+    shelf_free(&shelf);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_best_of_two_sessions)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_best_of_two_sessions), cmocka_unit_test(the_first_case_comes_first)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
