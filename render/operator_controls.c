@@ -274,7 +274,7 @@ void controls_note_sight(const OperatorControls *controls, const PanelLayout *la
 {
     const int guides = SEEN_3D | SEEN_ANGIOSCOPY;
     const CArm arm = c_arm_place(xray, &controls->patient);
-    int seen = SEEN_KNOWN | (controls->is_examination ? SEEN_EXAMINATION : 0);
+    int seen = SEEN_KNOWN | (controls->is_examination ? SEEN_EXAMINATION : 0) | (controls->second == SECOND_PLANE ? SEEN_BIPLANE : 0);
     seen |= is_live && is_shown(layout, VIEW_FLUOROSCOPY) ? SEEN_XRAY : 0;
     seen |= is_shown(layout, VIEW_3D) ? SEEN_3D : 0;
     seen |= is_shown(layout, VIEW_ANGIOSCOPY) ? SEEN_ANGIOSCOPY : 0;
@@ -303,14 +303,6 @@ Command controls_partner_command(const OperatorControls *controls, const PanelAc
 {
     return controls->tool_count < 2 ? (Command){0, 0}
                                     : command_by(controls, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
-}
-
-XrayControl controls_second_plane(const XrayControl *xray)
-{
-    XrayControl second = *xray;
-    second.lao_deg += second.lao_deg > 0 ? -90.0F : 90.0F;
-    second.cra_deg = 0;
-    return second;
 }
 
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons)

@@ -52,8 +52,6 @@ void controls_obey(OperatorControls *controls, const VesselScene *scene, const P
 // The speeds that held keys request for the selected tool and its partner (0 if there is none): fast is three times and slow a fifth of the normal speed.
 Command controls_command(const OperatorControls *controls, const PanelActions *actions);
 Command controls_partner_command(const OperatorControls *controls, const PanelActions *actions);
-// Those of the second plane: 90 degrees from the first in LAO or RAO, level.
-XrayControl controls_second_plane(const XrayControl *xray);
 // The X-ray controls including input devices (HAND_ bits) and held keys: pedal, contrast through the selected tool.
 XrayControl controls_xray(const OperatorControls *controls, const PanelActions *actions, unsigned hand_buttons);
 // Records in `xray` what a window shows (XrayControl.seen) and counts looks at the 3D view and angioscopy; `before`: the controls of the last frame. `pose` NULL:

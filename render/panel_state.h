@@ -114,8 +114,10 @@ typedef struct PanelState {
     PanelMode mode;
     bool is_pedal_latched, is_roadmap_ready, is_recording_cine;
     double fluoro_s, contrast_ml;
-    double tube_kv, tube_ma, kerma_rate_mgy_min;   // of the last pulse (kv 0: none yet); the rate is 0 while the pedal is up
+    double tube_kv, tube_ma, kerma_rate_mgy_min;   // of the last pulse (kv 0: none yet); the rate, of both planes, is 0 while the pedal is up
     double kerma_mgy, kerma_area_gy_cm2;
+    double second_kv, second_ma;   // of the second plane's tube; 0: it is off
+    double second_kerma_mgy, second_kerma_area_gy_cm2;     // its part of the dose
     int cine_frame, cine_frames;
     // views
     PanelView view;

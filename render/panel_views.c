@@ -37,19 +37,32 @@ static void label_right(Panel *panel, float right, float y, GuiFont font, Color 
     label(panel, right - width, y, font, color, text);
 }
 
-// Above `y`, from below: what a dose display shows (IEC 60601-2-43).
+// Above `y`, from below: what a dose display shows (IEC 60601-2-43); of two planes the sum, and below it each plane's part.
 static void draw_dose(Panel *panel, const PanelState *state, float right, float y, float line)
 {
     char text[64];
     if (!(state->tube_kv > 0))
         return;
+    if (state->second_kerma_mgy > 0) {
+        const double kerma = state->second_kerma_mgy, area = state->second_kerma_area_gy_cm2;
+        snprintf(text, sizeof text, tr("A %.2f  B %.2f Gy cm\u00b2"), state->kerma_area_gy_cm2 - area, area);
+        label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
+        snprintf(text, sizeof text, tr("A %.1f  B %.1f mGy"), state->kerma_mgy - kerma, kerma);
+        label_right(panel, right, y - line, GUI_NORMAL, gui_colors.text, text);
+        y -= 2 * line;
+    }
     snprintf(text, sizeof text, tr("DAP %.2f Gy cm\u00b2"), state->kerma_area_gy_cm2);
     label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
     snprintf(text, sizeof text, tr("air kerma %.1f mGy"), state->kerma_mgy);
     label_right(panel, right, y - line, GUI_NORMAL, gui_colors.text, text);
     snprintf(text, sizeof text, tr("%.1f mGy/min"), state->kerma_rate_mgy_min);
     label_right(panel, right, y - 2 * line, GUI_NORMAL, gui_colors.text, text);
-    snprintf(text, sizeof text, "%.0f kV  %.0f mA", state->tube_kv, state->tube_ma);
+    if (state->second_kv > 0) {
+        snprintf(text, sizeof text, "B %.0f kV  %.0f mA", state->second_kv, state->second_ma);
+        label_right(panel, right, y - 3 * line, GUI_NORMAL, gui_colors.text, text);
+        y -= line;
+    }
+    snprintf(text, sizeof text, "%s%.0f kV  %.0f mA", state->second_kv > 0 ? "A " : "", state->tube_kv, state->tube_ma);
     label_right(panel, right, y - 3 * line, GUI_NORMAL, gui_colors.text, text);
 }
 

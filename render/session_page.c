@@ -99,6 +99,10 @@ static void print_figures(const SessionPage *page)
 {
     FILE *out = page->out;
     const ScoreFigures *f = &page->session->figures;
+    char planes[120] = "";
+    if (f->second_kerma_mgy > 0)
+        snprintf(planes, sizeof planes, " (first plane %.2f mGy, %.3f Gy cm²; second plane %.2f mGy, %.3f Gy cm²)", f->air_kerma_mgy - f->second_kerma_mgy,
+                 f->kerma_area_gy_cm2 - f->second_kerma_area_gy_cm2, f->second_kerma_mgy, f->second_kerma_area_gy_cm2);
     fprintf(out,
             "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Path of the tip</dt><dd>%.0f mm; straight distance to the target %.0f mm; efficiency %.0f "
             "%%</dd>\n"
@@ -110,11 +114,11 @@ static void print_figures(const SessionPage *page)
         fprintf(
             out,
             "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n"
-            "<dt>Dose</dt><dd>air kerma at the patient entrance reference point %.2f mGy, dose-area product %.3f Gy cm²; tube at %.0f kV and %.0f mA in the "
+            "<dt>Dose</dt><dd>air kerma at the patient entrance reference point %.2f mGy, dose-area product %.3f Gy cm²%s; tube at %.0f kV and %.0f mA in the "
             "mean of the pulses (a model, not a measurement)</dd>\n"
             "<dt>Sight</dt><dd>tools were moved by %.1f mm without a fresh X-ray image (pulling counts half), and for %.1f s with the 3D view or "
             "angioscopy in sight</dd>\n",
-            f->fluoroscopy_s, (long long)f->pulses, f->dose_area_cm2, f->contrast_ml, f->air_kerma_mgy, f->kerma_area_gy_cm2, f->mean_kv, f->mean_ma,
+            f->fluoroscopy_s, (long long)f->pulses, f->dose_area_cm2, f->contrast_ml, f->air_kerma_mgy, f->kerma_area_gy_cm2, planes, f->mean_kv, f->mean_ma,
             f->blind_total_mm, f->guided_s);
     else
         fprintf(out, "<dt>X-rays</dt><dd>none: a headless run</dd>\n");

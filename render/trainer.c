@@ -747,7 +747,7 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
                         .scope_tool = trainer->controls.grip.chosen + 1,
                         .is_repeat = trainer->redraw.is_repeat};
     trainer_cine_frame(&trainer->cine, passed_s, tracked->concentration, &frame);
-    const XrayControl plane = controls_second_plane(xray);
+    const XrayControl plane = xray_second_plane(xray);
     frame.second = trainer->controls.second == SECOND_PLANE ? &plane : NULL;
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &tracked->score, &moment->figures, xray);

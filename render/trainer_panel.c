@@ -162,6 +162,10 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->tube_ma = score->pulse.ma;
     state->kerma_mgy = score->air_kerma_mgy;
     state->kerma_area_gy_cm2 = score->kerma_area_gy_cm2;
+    state->second_kv = score->second_pulse.kv;
+    state->second_ma = score->second_pulse.ma;
+    state->second_kerma_mgy = score->second_kerma_mgy;
+    state->second_kerma_area_gy_cm2 = score->second_kerma_area_gy_cm2;
 }
 
 // A consequence is announced for some seconds.
@@ -238,7 +242,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         state->missed_deadlines = figures->deadline_misses;
     }
     show_score(panel, scene, score);
-    state->kerma_rate_mgy_min = xray->pedal > 0 ? score->pulse.rate_mgy_min : 0;
+    state->kerma_rate_mgy_min = xray->pedal > 0 ? score->pulse.rate_mgy_min + score->second_pulse.rate_mgy_min : 0;
     warn(panel, pose, score, figures);
 }
 
@@ -311,7 +315,7 @@ void trainer_panel_views(TrainerPanel *panel, const OperatorControls *controls, 
     place_spots(panel, views, views_fluoroscope(views));
     views_xray_sides(views, &state->drawn_side, &state->shown_side);
     state->second = controls->second;
-    state->second_xray = controls->second == SECOND_PLANE ? controls_second_plane(xray) : views_reference(views);
+    state->second_xray = controls->second == SECOND_PLANE ? xray_second_plane(xray) : views_reference(views);
     state->chosen_tool = controls->grip.chosen;
     state->view = controls->view;
     state->is_examination = controls->is_examination;

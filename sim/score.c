@@ -230,9 +230,12 @@ static int64_t count_pulses(Score *score, const XrayControl *xray, double second
     f->dose_area_cm2 = score->dose.area_cm2;
     f->air_kerma_mgy = score->dose.kerma_mgy;
     f->kerma_area_gy_cm2 = score->dose.kerma_area_gy_cm2;
+    f->second_kerma_mgy = score->dose.second_kerma_mgy;
+    f->second_kerma_area_gy_cm2 = score->dose.second_kerma_area_gy_cm2;
     f->mean_kv = f->pulses > 0 ? score->dose.kv_sum / (double)f->pulses : 0;
     f->mean_ma = f->pulses > 0 ? score->dose.ma_sum / (double)f->pulses : 0;
     f->pulse = score->dose.last;
+    f->second_pulse = score->dose.second;
     return pulses;
 }
 

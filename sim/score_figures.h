@@ -79,10 +79,11 @@ typedef struct ScoreFigures {
     double fluoroscopy_s;        // pedal down
     int64_t pulses;              // of X-rays
     double dose_area_cm2;        // pulses times the field's open area at the isocentre: proportional to the dose-area product
-    double air_kerma_mgy;        // reference air kerma, see sim/xray_tube.h
+    double air_kerma_mgy;        // reference air kerma, see sim/xray_tube.h; of both planes
     double kerma_area_gy_cm2;    // dose-area product
-    double mean_kv, mean_ma;     // of the tube, over pulses; 0 without
-    XrayExposure pulse;          // the last one; not in files
+    double second_kerma_mgy, second_kerma_area_gy_cm2;   // the second plane's part of them
+    double mean_kv, mean_ma;     // of the first plane's tube, over pulses; 0 without
+    XrayExposure pulse, second_pulse;    // the last one; not in files
     double contrast_ml;
     double path_mm;              // of the tip that has to reach the target, in chords of 0.2 mm, so that tremor does not count
     double way_mm;               // length of the path from the tip's place at the start to the target, along the tree's centrelines; straight without a tree

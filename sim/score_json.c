@@ -41,6 +41,8 @@ static const struct Figure {
     {"guided_s", offsetof(ScoreFigures, guided_s), 1e7, true},
     {"air_kerma_mgy", offsetof(ScoreFigures, air_kerma_mgy), 1e12, true},
     {"kerma_area_gy_cm2", offsetof(ScoreFigures, kerma_area_gy_cm2), 1e12, true},
+    {"second_kerma_mgy", offsetof(ScoreFigures, second_kerma_mgy), 1e12, true},
+    {"second_kerma_area_gy_cm2", offsetof(ScoreFigures, second_kerma_area_gy_cm2), 1e12, true},
     {"mean_kv", offsetof(ScoreFigures, mean_kv), 1e6, true},
     {"mean_ma", offsetof(ScoreFigures, mean_ma), 1e6, true},
 #undef FIGURE

@@ -30,7 +30,8 @@ enum {
     SEEN_ANGIOSCOPY = 8,
     SEEN_EXAMINATION = 16,   // the session is an examination: 3D view and angioscopy are not to be had
     SEEN_TIP = 32,           // shifted by k: the tip of tool k lies in the open field, between the collimator's blades
-    SEEN_MOST = 511          // all of them, with four tools
+    SEEN_BIPLANE = 512,      // the second plane is on: its tube gives a pulse with each of the first
+    SEEN_MOST = 1023         // all of them, with four tools
 };
 typedef enum { XRAY_LIVE, XRAY_DSA, XRAY_ROADMAP } XrayMode;
 

@@ -86,10 +86,19 @@ XrayExposure xray_expose(const XrayPatient *patient, const XrayControl *xray)
     return e;
 }
 
+XrayControl xray_second_plane(const XrayControl *xray)
+{
+    XrayControl second = *xray;
+    second.lao_deg += second.lao_deg > 0 ? -90.0F : 90.0F;
+    second.cra_deg = 0;
+    return second;
+}
+
 int64_t dose_meter_step(DoseMeter *meter, const XrayPatient *patient, const XrayControl *xray, double seconds)
 {
     bool pedal = xray->pedal > 0.5F;
     int64_t pulses = 0;
+    const bool is_biplane = (int)xray->seen & SEEN_BIPLANE;
     if (pedal) {
         double rate = fmin(fmax((double)xray->pulses_s, 0), 1000), field = (double)xray->field_mm;
         meter->fluoroscopy_s += seconds;
@@ -97,12 +106,16 @@ int64_t dose_meter_step(DoseMeter *meter, const XrayPatient *patient, const Xray
         pulses = (int64_t)(meter->phase + 1e-9);
         meter->phase -= (double)pulses;
         meter->pulses += pulses;
-        meter->area_cm2 += (double)pulses * field * field * open_part(xray->collimator) / 100;
+        meter->area_cm2 += (is_biplane ? 2.0 : 1.0) * (double)pulses * field * field * open_part(xray->collimator) / 100;
     }
     if (pulses > 0) {
+        const XrayControl plane = xray_second_plane(xray);
         meter->last = xray_expose(patient, xray);
-        meter->kerma_mgy += (double)pulses * meter->last.kerma_mgy;
-        meter->kerma_area_gy_cm2 += (double)pulses * meter->last.kerma_area_gy_cm2;
+        meter->second = is_biplane ? xray_expose(patient, &plane) : (XrayExposure){0};
+        meter->second_kerma_mgy += (double)pulses * meter->second.kerma_mgy;
+        meter->second_kerma_area_gy_cm2 += (double)pulses * meter->second.kerma_area_gy_cm2;
+        meter->kerma_mgy += (double)pulses * (meter->last.kerma_mgy + meter->second.kerma_mgy);
+        meter->kerma_area_gy_cm2 += (double)pulses * (meter->last.kerma_area_gy_cm2 + meter->second.kerma_area_gy_cm2);
         meter->kv_sum += (double)pulses * meter->last.kv;
         meter->ma_sum += (double)pulses * meter->last.ma;
     }

@@ -45,19 +45,22 @@ typedef struct XrayExposure {            // of one pulse
     double rate_mgy_min;                 // reference air kerma rate at the pulse rate set
 } XrayExposure;
 
+// The settings of the second plane: 90 degrees from the first in LAO or RAO, level, the same field and blades.
+XrayControl xray_second_plane(const XrayControl *xray);
 double xray_output_ugy_mas(double kv, double distance_mm);     // of the tube, free in air
 XrayExposure xray_expose(const XrayPatient *patient, const XrayControl *xray);
 
-// Pulses and dose of a session.
+// Pulses and dose of a session. Biplane has two tubes, each with its own exposure and its own reference point; the patient gets the sum.
 typedef struct DoseMeter {
     double phase;                        // of the next pulse; 1: due now
     bool had_pedal;
     int64_t pulses;
     double fluoroscopy_s;                // pedal down
-    double area_cm2;                     // pulses times the open area at the isocentre
-    double kerma_mgy, kerma_area_gy_cm2; // of all pulses
+    double area_cm2;                     // pulses times the open area at the isocentre, of both planes
+    double kerma_mgy, kerma_area_gy_cm2; // of all pulses of both planes …
+    double second_kerma_mgy, second_kerma_area_gy_cm2;   // … and the second plane's part
     double kv_sum, ma_sum;               // over pulses
-    XrayExposure last;                   // of the last pulse; zeros before
+    XrayExposure last, second;           // of the last pulse, in the second plane too if it is on; zeros before
 } DoseMeter;
 
 // A step of `seconds`; returns its number of pulses. The first pulse comes with the pedal.

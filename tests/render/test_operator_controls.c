@@ -485,7 +485,7 @@ static void a_second_image_has_its_place(void **state)
     assert_int_equal(controls.second, SECOND_NONE);
     for (int lao = -90; lao <= 90; lao += 15) {      // perpendicular to the first plane, within the C-arm's range
         controls.xray.lao_deg = (float)lao;
-        XrayControl second = controls_second_plane(&controls.xray);
+        XrayControl second = xray_second_plane(&controls.xray);
         CArm a = c_arm_place(&controls.xray, &controls.patient), b = c_arm_place(&second, &controls.patient);
         assert_near(vec3_dot(a.towards, b.towards), 0, 1e-6);
         assert_true(second.lao_deg >= -90 && second.lao_deg <= 90);
@@ -553,6 +553,13 @@ static void what_a_window_shows_is_noted(void **state)
     controls_note_sight(&controls, &alone, pose, true, &before, &xray);
     assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 0);
     assert_near(xray.looks, 0, 0);
+    controls.second = SECOND_PLANE;
+    controls_note_sight(&controls, &alone, pose, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY | SEEN_TIP | SEEN_BIPLANE, 0);
+    controls.second = SECOND_REFERENCE;          // a held image costs no dose
+    controls_note_sight(&controls, &alone, pose, true, &before, &xray);
+    assert_near(xray.seen, SEEN_KNOWN | SEEN_XRAY | SEEN_TIP, 0);
+    controls.second = SECOND_NONE;
     controls_note_sight(&controls, &alone, pose, false, &before, &xray);        // a cine loop
     assert_near(xray.seen, SEEN_KNOWN | SEEN_TIP, 0);
     controls_note_sight(&controls, &alone, NULL, true, &before, &xray);

@@ -121,6 +121,31 @@ static void a_meter_adds_up_pulses(void **state)
     assert_near(meter.kerma_mgy, 60 * e.kerma_mgy, 1e-12);
 }
 
+// With the second plane on, the same pulses come from two tubes: from the side a trunk is thicker, and the sum is that of both.
+static void two_planes_give_the_sum(void **state)
+{
+    (void)state;
+    XrayPatient trunk = xray_patient_trunk();
+    XrayControl xray = pedal_down();
+    DoseMeter one = {0}, two = {0};
+    xray.lao_deg = xray.cra_deg = 0;
+    for (int i = 0; i < 2000; i++)
+        dose_meter_step(&one, &trunk, &xray, 0.001);
+    assert_near(one.second_kerma_mgy + one.second_kerma_area_gy_cm2 + one.second.kv, 0, 0);
+    xray.seen = SEEN_KNOWN | SEEN_BIPLANE;
+    for (int i = 0; i < 2000; i++)
+        dose_meter_step(&two, &trunk, &xray, 0.001);
+    xray.lao_deg = 90;
+    XrayExposure side = xray_expose(&trunk, &xray);
+    assert_int_equal(two.pulses, one.pulses);
+    assert_near(two.second_kerma_mgy, (double)two.pulses * side.kerma_mgy, 1e-9);
+    assert_near(two.kerma_mgy, one.kerma_mgy + two.second_kerma_mgy, 1e-9);
+    assert_near(two.kerma_area_gy_cm2, one.kerma_area_gy_cm2 + (double)two.pulses * side.kerma_area_gy_cm2, 1e-9);
+    assert_near(two.area_cm2, 2 * one.area_cm2, 1e-9);
+    assert_true(two.second_kerma_mgy > one.kerma_mgy && side.kv > one.last.kv);
+    assert_near(two.kv_sum, one.kv_sum, 0);
+}
+
 static void the_tree_tells_which_part_it_is(void **state)
 {
     (void)state;
@@ -144,6 +169,7 @@ int main(void)
         cmocka_unit_test(thicker_parts_need_more),
         cmocka_unit_test(dsa_has_its_own_dose),
         cmocka_unit_test(a_meter_adds_up_pulses),
+        cmocka_unit_test(two_planes_give_the_sum),
         cmocka_unit_test(the_tree_tells_which_part_it_is),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
