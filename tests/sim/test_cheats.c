@@ -135,7 +135,7 @@ static void drive(const Scene *scene, const OpenVessel *open, Faults *faults, Sc
     simulator_destroy(simulator);
 }
 
-// The par values of an exercise with a level follow from the hand that solves it and watches the X-ray image: so many times its figure, rounded up to a whole
+// The par values of these exercises follow from the hand that solves it and watches the X-ray image: so many times its figure, rounded up to a whole
 // number of steps.
 static void pars_follow(const char *name, const Exercise *exercise, const ScoreFigures *solved)
 {
@@ -169,7 +169,11 @@ static void looking_pays(const char *name, const char *model)
     scene->exercise->consequences.mode = CONSEQUENCES_ON;
     double hint_s[HINT_COUNT] = {0};
     drive(scene, &open, &faults, figures, hint_s);
-    if (scene->exercise->level)
+    static const char *const followed[] = {"gentle-bend", "fork", "sac-untouched", "tortuous", "cross-over", "wire-exchange"};
+    bool follows = false;
+    for (size_t i = 0; i < sizeof followed / sizeof *followed; i++)
+        follows |= !strcmp(followed[i], name);
+    if (follows)
         pars_follow(name, scene->exercise, &figures[0]);
     open_vessel_close(&open);
     scene_free(scene);
