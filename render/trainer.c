@@ -23,6 +23,8 @@
 #include <unistd.h>
 
 enum { PADS = 4 };
+// A window that draws slowly still answers sooner; after this time nobody sees what his hand does.
+static const double PATIENCE_S = 1;
 
 typedef struct Trainer {
     const TrainerOptions *options;
@@ -193,6 +195,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
                                   .resume = resume,
                                   .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S,
                                   .paused = trainer->is_paused,
+                                  .patience_s = PATIENCE_S,
                                   .progress = trainer->figures->frames > 0 ? show_progress : NULL,
                                   .progress_context = trainer};
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))

@@ -59,12 +59,14 @@ void hand_set_grip(HandSet *set, const HandGrip *grip)
             forget_displacement(set, i);
 }
 
+void hand_set_let_go(HandSet *set, bool is_let_go) { set->is_let_go = is_let_go; }
+
 ToolCommands hand_set_command(HandSet *set, double dt)
 {
     double seconds = dt / 1000, most_mm = set->fastest_mm_s * seconds, most_deg = set->fastest_deg_s * seconds;
     double moved_mm[TOOLS_MOST] = {0}, turned_deg[TOOLS_MOST] = {0};     // of the outermost of the tools locked together
     const HandGrip *grip = &set->grip;
-    bool is_stopped = hand_set_buttons(set) & HAND_STOP;
+    bool is_stopped = set->is_let_go || (hand_set_buttons(set) & HAND_STOP);
     for (int i = 0; i < set->count; i++) {
         const HandPort *port = set->port[i];
         double mm_s = atomic_load_explicit(&port->push_mm_s, memory_order_relaxed), deg_s = atomic_load_explicit(&port->twist_deg_s, memory_order_relaxed);

@@ -19,12 +19,15 @@ typedef struct HandSet {
     int count;
     HandPort *port[HANDS_SAMPLED];   // (count) borrowed; each written by one hand, see input/hand_port.h
     double taken_mm[HANDS_SAMPLED], taken_deg[HANDS_SAMPLED];   // displacement of each port already fed; owned by the simulation thread
+    bool is_let_go;                  // see hand_set_let_go
     double fastest_mm_s, fastest_deg_s;                   // fastest rate of a tool, default 200 and 1440
 } HandSet;
 
 void hand_set_init(HandSet *set, int tool_count);  // the first tool selected, none locked or released
 bool hand_set_add(HandSet *set, HandPort *port);   // false if there is no space. Its displacement so far is ignored
 void hand_set_grip(HandSet *set, const HandGrip *grip);
+// Until it is set to false, all tools are stopped as by HAND_STOP.
+void hand_set_let_go(HandSet *set, bool is_let_go);
 // The commands of the next step of dt [ms]; HAND_STOP on any hand stops all tools.
 ToolCommands hand_set_command(HandSet *set, double dt);
 unsigned hand_set_buttons(const HandSet *set);

@@ -72,6 +72,7 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
             memcpy(realtime.grip.fitted, session->resumed_fitted, sizeof session->resumed_fitted);
         realtime.xray = options->xray;
         realtime.paused = options->paused;
+        realtime.patience_s = options->patience_s;
         realtime.after_step = session_tracker_step;
         realtime.publish = session_tracker_publish;
         realtime.context = session->tracker;

@@ -31,6 +31,7 @@ typedef struct LiveSessionOptions {
     void (*progress)(void *context, double part);    // progress of that simulation; may be NULL
     void *progress_context;
     bool paused;
+    double patience_s;               // see RealtimeOptions
 } LiveSessionOptions;
 
 // Returns false with faults and leaves nothing open. A resumed recording that does not reproduce its own states is refused.

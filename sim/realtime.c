@@ -26,6 +26,7 @@ struct Realtime {
     // used by the thread only
     pthread_t thread;
     XrayControl now;         // controls of this step
+    double heard_s;          // real time of the window's last controls or grip
     int64_t pose_every, since_pose, moments;
     DriveReport live;
     TimeHistogram late_ns;
@@ -36,13 +37,28 @@ struct Realtime {
 
 RealtimeOptions realtime_default_options(void) { return (RealtimeOptions){.pose_ms = 10, .xray = xray_default_control()}; }
 
+// Lets everything go while the window is silent.
+static void listen(Realtime *realtime, bool is_heard)
+{
+    double now_s = clock_s(CLOCK_MONOTONIC);
+    if (is_heard)
+        realtime->heard_s = now_s;
+    bool is_silent = now_s - realtime->heard_s > realtime->options.patience_s;
+    hand_set_let_go(&realtime->hands, is_silent);
+    if (is_silent)
+        realtime->now.pedal = realtime->now.contrast_ml_s = 0;
+}
+
 static ToolCommands read_hands(void *context)
 {
     Realtime *realtime = context;
-    if (triple_buffer_fetch(&realtime->xray_buffer))
+    bool has_xray = triple_buffer_fetch(&realtime->xray_buffer), has_grip = triple_buffer_fetch(&realtime->grip_buffer);
+    if (has_xray)
         realtime->now = realtime->xray[realtime->xray_buffer.reading];
-    if (triple_buffer_fetch(&realtime->grip_buffer))
+    if (has_grip)
         hand_set_grip(&realtime->hands, &realtime->grip[realtime->grip_buffer.reading]);
+    if (realtime->options.patience_s > 0)
+        listen(realtime, has_xray || has_grip);
     return hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt);
 }
 

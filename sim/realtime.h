@@ -22,6 +22,9 @@ typedef struct RealtimeOptions {
     XrayControl xray;                // initial X-ray controls
     double pose_ms;                  // simulated time between published poses, default 10
     bool paused;                     // at the start
+    // [s] If the window has set neither controls nor grip for so long, all is let go until it does: the tools stand still, X-rays and contrast agent are off.
+    // A key that is held while no picture comes would otherwise push blindly. 0: never.
+    double patience_s;
     // On the thread, after each step; must not wait. May be NULL.
     void (*after_step)(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
     // On the thread, with each published pose: fills the additional data (`extra_bytes`). May be NULL.

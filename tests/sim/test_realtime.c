@@ -242,9 +242,48 @@ static void a_factor_is_not_known_before_a_second(void **state)
     rig_close(&rig);
 }
 
+// The command of the newest pose.
+static double pushed_mm_s(Realtime *session)
+{
+    const Moment *moment = realtime_moment(session);
+    return moment->pose->command.push_mm_s;
+}
+
+static void a_silent_window_lets_go(void **state)
+{
+    (void)state;
+    Rig rig = rig_open();
+    RealtimeOptions options = realtime_default_options();
+    HandPort key = {0}, *const one[] = {&key};
+    options.hand_count = 1;
+    options.hand = one;
+    options.simulator = rig.simulator;
+    options.patience_s = 0.15;
+    Realtime *session = realtime_start(&options, &faults);
+    assert_non_null(session);
+    XrayControl xray = xray_default_control();
+    xray.pedal = 1;
+    key.push_mm_s = 5;
+    for (int i = 0; i < 10; i++) {       // a window that answers
+        realtime_set_xray(session, &xray);
+        nap_ms(30);
+    }
+    assert_true(pushed_mm_s(session) == 5);
+    assert_true(realtime_moment(session)->pose->xray.pedal == 1);
+    nap_ms(400);
+    assert_true(pushed_mm_s(session) == 0);
+    assert_true(realtime_moment(session)->pose->xray.pedal == 0);
+    realtime_set_xray(session, &xray);
+    nap_ms(60);
+    assert_true(pushed_mm_s(session) == 5);
+    assert_true(realtime_moment(session)->pose->xray.pedal == 1);
+    realtime_stop(session);
+    rig_close(&rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_fetched_is_whole_and_never_older), cmocka_unit_test(a_session_replays_bit_for_bit),
-                                       cmocka_unit_test(a_factor_is_not_known_before_a_second)};
+                                       cmocka_unit_test(a_factor_is_not_known_before_a_second), cmocka_unit_test(a_silent_window_lets_go)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
