@@ -31,7 +31,8 @@ static int shell(const char *script)
 }
 
 // Waits for the window, presses keys with a pause, as pictures take long under a sanitizer, and waits for what they start.
-static const char hand[] = "window() { xdotool search --sync --onlyvisible --name Seldinger >/dev/null; sleep 0.5; }; "
+static const char hand[] = "trap 'kill $P 2>/dev/null' EXIT; replays() { pgrep -f -P $P 'seldinger replay' >/dev/null; }; "
+                           "window() { xdotool search --sync --onlyvisible --name Seldinger >/dev/null; sleep 0.5; }; "
                            "keys() { for k in \"$@\"; do xdotool key $k; sleep 0.4; done; }; "
                            "until_true() { for i in $(seq 300); do eval \"$1\" && return 0; sleep 0.1; done; echo \"never: $1\"; exit 1; }; ";
 
@@ -45,8 +46,8 @@ static void a_user_sets_keys(void **state)
              "%s export XDG_CONFIG_HOME=$PWD/config; $S > set 2>&1 & P=$!; window; "
              "keys Tab Tab Tab u Tab Down Down Down Down Down Down Down Right Down Down Return End Escape; wait $P; [ $? = 0 ] && ! [ -s set ] || exit 1; "
              "grep -q 'push: \"End\"' config/seldinger/settings.yaml && grep -q 'interface_scale: 1.1' config/seldinger/settings.yaml || exit 2; "
-             "$S nav '%s/scenes/exercises/aneurysm.yaml' --sessions pushed --duration-s 60 > pushed.txt 2>&1 & N=$!; window; sleep 2; "
-             "xdotool keydown End; sleep 3; xdotool keyup End; sleep 0.3; kill -TERM $N; wait $N; "
+             "$S nav '%s/scenes/exercises/aneurysm.yaml' --sessions pushed --duration-s 60 > pushed.txt 2>&1 & N=$!; window; sleep 4; "
+             "xdotool keydown End; sleep 6; xdotool keyup End; sleep 0.3; kill -TERM $N; wait $N; "
              "$S export pushed/*.h5 -o pushed.csv --quiet && awk -F, '$3 == 0 { if (!n++) from = $6; to = $6 } END { exit !(to - from > 5) }' pushed.csv",
              hand, SOURCE_DIR);
     int code = shell(script);
@@ -96,8 +97,9 @@ static void a_user_trains(void **state)
              "until_true \"pgrep -f -P $P 'seldinger nav' >/dev/null\"; C=$(pgrep -f -P $P 'seldinger nav'); window; sleep 1; kill -TERM $C; "
              "until_true 'ls seldinger/sessions/*.json >/dev/null 2>&1'; until_true \"! pgrep -f -P $P 'seldinger nav' >/dev/null\"; window; "
              "keys Tab r; until_true 'ls seldinger/sessions/*.html >/dev/null 2>&1'; until_true \"! pgrep -f -P $P 'seldinger report' >/dev/null\"; window; "
-             "keys Return; until_true \"xdotool search --onlyvisible --name 'Seldinger replay' >/dev/null\"; sleep 1; keys Escape Return; "
-             "until_true \"! pgrep -f -P $P 'seldinger replay' >/dev/null\"; window; "
+             "keys Return; until_true \"xdotool search --onlyvisible --name 'Seldinger replay' >/dev/null\"; "
+             "for i in $(seq 30); do replays || break; xdotool key Escape; sleep 1; replays || break; xdotool key Return; sleep 1; done; "
+             "! replays || exit 4; window; "
              "keys Escape; wait $P; [ "
              "$? = 0 ] || exit 1; "
              "grep -q '\"trainee\":.*\"[Aa]da\"' seldinger/sessions/*.json && grep -q '\"mode\":.*\"examination\"' seldinger/sessions/*.json",
