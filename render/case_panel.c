@@ -107,7 +107,8 @@ static void show_choices(Gui *gui, CaseState *s)
 
 static void show_marks(Gui *gui, CaseState *s, GuiRect at)
 {
-    static const char *const sign[] = {"sac", "narrow", "closed", "missing", "doubt"};
+    static const char *const sign[MARK_KINDS] = {
+        [MARK_SAC] = "sac", [MARK_NARROW_PLACE] = "narrow", [MARK_NO_ENTRY] = "closed", [MARK_MISSED] = "missing", [MARK_DOUBT] = "doubt"};
     const CaseMark *mark;
     int count = case_builder_marks(s->builder, &mark);
     gui_window_begin(gui, "marks", at, 0);

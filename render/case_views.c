@@ -339,7 +339,7 @@ static void draw_cut(const Over *o, Cut *cut, const TriangleMesh *mesh, const Ve
 
 static void draw_marks(const Over *o)
 {
-    static const char sign[] = "SNXD";
+    static const char sign[MARK_KINDS] = {[MARK_SAC] = 'S', [MARK_NARROW_PLACE] = 'N', [MARK_NO_ENTRY] = 'X', [MARK_MISSED] = 'M', [MARK_DOUBT] = 'D'};
     const CaseMark *mark;
     int count = case_builder_marks(o->s->builder, &mark);
     const double near = 1.5;         // [mm] from a slice
