@@ -67,7 +67,8 @@ static const Option rows[] = {
     {"model", "KIND", OPTION_CHOICE, AT(made.kind), "the wall's model (`seldinger fit --help`): lim, sweep, raster, rbf, pas", .choices = model_names},
     {"behind", NULL, OPTION_FLAG, AT(made.is_behind), "of a CT volume: shows its bone and soft tissue behind the vessels, instead of a plain head"},
     {"output", "CASE", OPTION_FOLDER, AT(output),
-     "the folder (required without the window); it must not hold a case yet; default in the window: a folder of the cache", .letter = 'o'},
+     "the folder (required without the window); it must not hold a case yet; default in the window: a folder of the user's data, which the start window lists",
+     .letter = 'o'},
 #ifdef SELDINGER_RENDER
     {"trainee", "NAME", OPTION_TEXT, AT(trainee), "name of who steers from the window, for the report"},
     {"examination", NULL, OPTION_FLAG, AT(is_examination), "what is steered from the window is an examination (`seldinger nav`)"},

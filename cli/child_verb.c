@@ -64,7 +64,7 @@ bool child_verb_run(const char *verb, const StartState *state, char message[CHIL
     }
     close(pipes[0]);
     if (child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 127)) {
-        snprintf(message, CHILD_MESSAGE, "%s could not be started: the program's file was removed or replaced, or memory is short", verb);
+        snprintf(message, CHILD_MESSAGE, "%s could not be started: the program's file was removed or replaced, or there is not enough memory", verb);
         fprintf(stderr, "seldinger: %s\n", message);
     } else if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_DONE && !message[0] && !strcmp(verb, "report")) {
         snprintf(message, CHILD_MESSAGE, "The report is the .html file beside %.400s", state->path);

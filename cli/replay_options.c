@@ -48,8 +48,7 @@ const OptionTable replay_options = {
     .intro = "Shows a recording of `nav` or `run --record` in a window: play, pause, seek (the strip below), jump to what happened (errors, "
              "bookmarks, injections, the target), see the parts of the score at each moment, and continue from any moment as a new session. With "
              "--beside a second recording runs in step with it, counted from the first action in each, or by its own time. The window's help lists the keys. "
-             "With one "
-             "of the first four options no window is opened.",
+             "With one of the first four options no window is opened.",
     .exits = "0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged",
     CLI_OPTIONS(options, ReplayOptions),
     .set_defaults = set_defaults,

@@ -141,7 +141,7 @@ bool case_state_frame(CaseState *s)
         say(s, false, "the wall is fitted: choose a target, or steer");
     if (is_new && now->stage == BUILD_DONE && now->held < LEAST_HELD)
         say(s, true,
-            "the tree holds %.0f %% of what is as bright as its vessels; the marks list the rest. To grow it from elsewhere: 1, and click a wider vessel",
+            "the tree holds %.0f %% of what is as bright as its vessels; the marks list the rest. To begin elsewhere, press 1 and click a wider vessel",
             100 * now->held);
     s->pictures += is_new;
     return is_new || now->seen != before.seen || fabs(now->part - before.part) > 0.004;

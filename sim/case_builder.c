@@ -1,6 +1,7 @@
 #include "sim/case_builder.h"
 
 #include "base/base.h"
+#include "sim/clock.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -36,13 +37,6 @@ struct CaseBuilder {
     Faults faults;
 };
 
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 static bool is_stopped(void *context) { return atomic_load(&((CaseBuilder *)context)->stops); }
 
 static void take_part(void *context, long done, long total)
@@ -69,7 +63,7 @@ static void take_seen(void *context, const RbtSeen *node, int count)
 
 static void note_time(CaseBuilder *b, double *time, double *begun)
 {
-    double now = seconds();
+    double now = clock_s(CLOCK_MONOTONIC);
     pthread_mutex_lock(&b->lock);
     *time = now - *begun;
     pthread_mutex_unlock(&b->lock);
@@ -136,7 +130,7 @@ static void show_tree(CaseBuilder *b)
 static void build(CaseBuilder *b)
 {
     CaseOptions options = b->options;
-    double begun = seconds();
+    double begun = clock_s(CLOCK_MONOTONIC);
     BuildProgress *p = &b->progress;
     options.trace = b->trace;
     options.progress = &b->watching;
@@ -180,7 +174,7 @@ static void free_all(CaseBuilder *b)
 static void load(CaseBuilder *b)
 {
     enum { REDUCED = 160 };          // voxels along an axis: a projection of them takes 20 ms of one core
-    double begun = seconds();
+    double begun = clock_s(CLOCK_MONOTONIC);
     Volume *volume = volume_load_with(b->options.input, &b->watching, &b->faults);
     if (volume && !(b->reduced = volume_reduced(volume, REDUCED))) {
         volume_free(volume);
@@ -190,7 +184,7 @@ static void load(CaseBuilder *b)
         volume_brightness(volume, &b->low, &b->high);
     pthread_mutex_lock(&b->lock);
     b->volume = volume;
-    b->progress.load_s = seconds() - begun;
+    b->progress.load_s = clock_s(CLOCK_MONOTONIC) - begun;
     b->progress.part = 0;
     b->progress.stage = volume ? BUILD_IDLE : BUILD_FAILED;
     if (!volume)

@@ -1,23 +1,17 @@
 #include "sim/case_make.h"
 
+#include "sim/clock.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 
 #define MODEL "model.h5"
 #define SCENE "scene.yaml"
 #define TRACE "trace.yaml"
-
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 bool case_is_there(const char *folder)
 {
@@ -297,13 +291,13 @@ bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figu
     // before the work that would be lost
     if (!create_folder(folder, faults))
         return false;
-    double start = seconds();
+    double start = clock_s(CLOCK_MONOTONIC);
     Volume *volume = options->trace ? volume_load(options->input, faults) : NULL;
     bool good = (volume || !options->trace) && case_work_track(&work, options, volume, NULL, faults);
     volume_free(volume);
-    figures->track_s = seconds() - start;
+    figures->track_s = clock_s(CLOCK_MONOTONIC) - start;
     good = good && case_work_fit(&work, options, faults);
-    figures->fit_s = seconds() - start - figures->track_s;
+    figures->fit_s = clock_s(CLOCK_MONOTONIC) - start - figures->track_s;
     good = good && case_work_write(&work, folder, options, faults);
     if (work.file.tree)
         case_work_measure(&work, figures);

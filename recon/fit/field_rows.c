@@ -38,7 +38,7 @@ typedef struct Draft {       // rows of a node while they are being collected
 typedef struct Job {
     const VesselTree *tree;
     PowerBlocks blocks;
-    double *reach;           // (N) [mm] of the points from their node's centre, at least
+    double *reach;           // (N) [mm] no point of a node lies further from its centre
     Draft *draft;            // (N) rows from each node's points and tube
     int **cell;              // (N) the cells that contain those rows, data first
     FieldRows *rows;
