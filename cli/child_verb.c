@@ -67,7 +67,9 @@ bool child_verb_run(const char *verb, const StartState *state, char message[CHIL
         snprintf(message, CHILD_MESSAGE, "%s could not be started: the program's file was removed or replaced, or there is not enough memory", verb);
         fprintf(stderr, "seldinger: %s\n", message);
     } else if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_DONE && !message[0] && !strcmp(verb, "report")) {
-        snprintf(message, CHILD_MESSAGE, "The report is the .html file beside %.400s", state->path);
+        const char *dot = strrchr(state->path, '.');
+        const int stem = dot ? (int)(dot - state->path) : (int)strlen(state->path);
+        snprintf(message, CHILD_MESSAGE, "The report: %.*s.html", stem < 400 ? stem : 400, state->path);
     }
     return child < 0 || WIFEXITED(status);
 }

@@ -15,7 +15,7 @@
 #include <stdlib.h>
 
 // Real time per frame for simulating the recordings again, and simulated seconds per second for a held arrow key.
-static const double rescore_budget_s = 0.01, scrub_s_s = 4;
+static const double rescore_budget_s = 0.01, rescore_behind_s = 0.025, scrub_s_s = 4;
 
 typedef struct ReplayWindow {
     const ReplayWindowOptions *options;
@@ -168,18 +168,23 @@ static void obey_timeline(ReplayWindow *replay, const TimelineActions *actions)
         replay_side_toggle_step(replay->side, playback_time_s(replay->playback));
 }
 
-// Both scores are computed to their ends, whatever is shown, so that a jump finds them.
-static const ScoreFigures *score_now(ReplayWindow *replay)
+// Both scores are computed to their ends, whatever is shown, so that a jump finds them; in haste while a shown moment has none yet. Returns the moment up to
+// which the score beside that moment is known [s].
+static double compute_scores(ReplayWindow *replay)
 {
-    const bool is_done = !replay->side || replay_side_compute(replay->side, rescore_budget_s / 2);
-    rescore_advance(replay->rescore, replay->run->step_count, is_done ? rescore_budget_s : rescore_budget_s / 2);
+    const double step_s = replay->run->step_ms / 1000;
+    const bool is_behind = (double)rescore_steps(replay->rescore) * step_s < playback_time_s(replay->playback);
+    const double budget = is_behind ? rescore_behind_s : rescore_budget_s;
+    const bool is_done = !replay->side || replay_side_compute(replay->side, budget / 2);
+    rescore_advance(replay->rescore, replay->run->step_count, is_done ? budget : budget / 2);
     int64_t different = rescore_first_different(replay->rescore);
     if (different >= 0 && !replay->has_reported_difference) {
         replay->has_reported_difference = true;
         panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING,
                       "the repeated simulation differs from the recording: the score is not updated after that step");
     }
-    return rescore_at(replay->rescore, playback_time_s(replay->playback));
+    int64_t steps = rescore_steps(replay->rescore);
+    return steps < replay->run->step_count ? (double)steps * step_s : INFINITY;
 }
 
 static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayout *layout)
@@ -199,7 +204,7 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
     views_draw(replay->views, &frame, &left, input->width, input->height, 0);
     if (replay->side)
         replay_side_draw(replay->side, layout->main, right, frame.look, input->width, input->height, 0);
-    const ScoreFigures *figures = score_now(replay);
+    const ScoreFigures *figures = rescore_at(replay->rescore, playback_time_s(replay->playback));
     refresh_marks(replay);
     trainer_panel_show(&replay->shown, replay->scene, pose, figures, NULL, &pose->xray);
     PanelState *state = &replay->shown.state;
@@ -240,12 +245,16 @@ static void run_window(ReplayWindow *replay)
         }
         is_running = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
                      !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);
-        if (!is_running || !visible)
+        if (!is_running)
+            continue;
+        const double scored_s = replay->line.scored_s = compute_scores(replay);
+        if (!visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, replay->controls.view, true);
         // the jump of a click changes the moment; the score may still be computed
-        const double time_s = playback_time_s(replay->playback);
-        const uint64_t settings = redraw_hash(redraw_hash(0, &time_s, sizeof time_s), &replay->controls, sizeof replay->controls);
+        const double time_s = playback_time_s(replay->playback), whole_s = floor(fmin(scored_s, time_s));
+        uint64_t settings = redraw_hash(redraw_hash(0, &time_s, sizeof time_s), &replay->controls, sizeof replay->controls);
+        settings = redraw_hash(settings, &whole_s, sizeof whole_s);
         if (!redraw_is_due(&redraw, input, playback_pose(replay->playback), settings, now, 0.25))
             continue;
         draw(replay, input, &layout);

@@ -233,11 +233,14 @@ static void draw_buttons(Gui *gui, const TimelineState *state, TimelineActions *
 // A slider that fills the width of the strip; returns where it is.
 static GuiRect draw_bar(Gui *gui, PanelRect at, TimelineActions *actions, const TimelineState *state, float s)
 {
-    char label[64];
+    char label[128];
     const TimelineSide *side = state->side;
     float time = (float)state->time_s, other = side ? (float)side->time_s : 0;
     const float height = gui_line_height(gui, GUI_NORMAL), width = side ? 0.62F * (at.width - 16 * s) : at.width - 16 * s;
-    snprintf(label, sizeof label, "%%.2f s of %.2f s", state->end_s);
+    if (state->scored_s < state->time_s)
+        snprintf(label, sizeof label, tr("%%.2f s of %.2f s; score computed up to %.0f s"), state->end_s, state->scored_s);
+    else
+        snprintf(label, sizeof label, "%%.2f s of %.2f s", state->end_s);
     if (gui_slider(gui, "time", &time, 0, (float)state->end_s, label, width))
         ask_for_time(actions, (double)time);
     if (side) {

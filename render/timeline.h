@@ -21,6 +21,7 @@ typedef struct TimelineState {
     const char *note;                // one line: the name of the recording
     const RunMarks *marks;           // NULL: none
     double known_s;                  // errors are known up to here; later ones are still being computed
+    double scored_s;                 // so are the points
     bool has_parts;                  // the parts of the score are shown …
     const ScoreFigures *figures;     // … of these figures at the time shown
     const TimelineSide *side;        // NULL: none
