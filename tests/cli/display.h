@@ -41,7 +41,7 @@ static inline int display_start(void)
         snprintf(descriptor, sizeof descriptor, "%d", message[1]);
         if (!freopen("/dev/null", "w", stderr))
             _exit(1);
-        execlp("Xvfb", "Xvfb", display, descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", (char *)NULL);
+        execlp("Xvfb", "Xvfb", display, descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset", (char *)NULL);
         _exit(1);
     }
     close(message[1]);

@@ -796,7 +796,7 @@ static void begin_window(void)
         snprintf(descriptor, sizeof descriptor, "%d", said[1]);
         if (!freopen("/dev/null", "w", stderr))
             _exit(1);
-        execlp("Xvfb", "Xvfb", "-displayfd", descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", (char *)NULL);
+        execlp("Xvfb", "Xvfb", "-displayfd", descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset", (char *)NULL);
         _exit(1);
     }
     close(said[1]);
