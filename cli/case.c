@@ -17,8 +17,8 @@
 // The trace of the options, as the window writes it for the same acts.
 static char *trace_of_options(const CaseCommand *command)
 {
-    CaseActs acts = {0};
     const CaseOptions *o = &command->made;
+    CaseActs acts = {.model = o->has_kind ? model_names[o->kind] : NULL};
     const struct {
         CaseActKind kind;
         const char *name;

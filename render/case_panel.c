@@ -21,6 +21,8 @@ static const char *const key_help[][2] = {{"click", "does what is chosen on the 
                                           {"T, C (Shift: back)", "next wire; next catheter around it, or none"},
                                           {"A (Shift: back)", "which vessel of the body it is"},
                                           {"B", "what lies behind the vessels"},
+                                          {"M (Shift: back)", "the kind of the wall's model; a new kind is fitted"},
+                                          {"E", "edits sections and branches of a swept model (sweep); Esc leads back"},
                                           {"Ctrl+Z, Ctrl+Y", "undoes, does again"},
                                           {"S", "saves the case and steers in it"},
                                           {"Esc", "stops what is being made; leaves"}};
@@ -86,23 +88,33 @@ static void show_modes(Gui *gui, CaseState *s)
     }
 }
 
-static void show_choices(Gui *gui, CaseState *s)
+// True if the user wants to edit sections.
+static bool show_choices(Gui *gui, CaseState *s)
 {
+    float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
+    const CaseWork *work = case_builder_work(s->builder);
+    const bool is_swept = work && work->how.model == FIT_MODEL_SWEEP;
     const CaseAct *behind = case_acts_last(&s->acts, CASE_BEHIND);
     char label[120];
-    heading(gui, "TOOLS AND PATIENT");
+    heading(gui, "TOOLS, PATIENT AND WALL");
     static const struct {
         const char *none, *key;
-    } list[CASE_LISTS] = {{N_("wire that suits the vessels"), "T"}, {N_("no catheter"), "C"}, {N_("which vessel it is: not said"), "A"}};
+    } list[CASE_LISTS] = {
+        {N_("wire that suits the vessels"), "T"}, {N_("no catheter"), "C"}, {N_("which vessel it is: not said"), "A"}, {N_("wall of local models"), "M"}};
     for (int i = 0; i < CASE_LISTS; i++) {
         const int chosen = s->list[i].chosen;
         const char *name = chosen > 0 ? s->list[i].name[chosen] : tr(list[i].none);
-        snprintf(label, sizeof label, "%.*s", (int)strcspn(name, "."), name);
-        if (gui_button(gui, list[i].key, label, list[i].key, 0, chosen > 0).pressed)
+        snprintf(label, sizeof label, i == CASE_MODELS && chosen > 0 ? tr("wall: %.*s") : "%.*s", (int)strcspn(name, "."), name);
+        const bool has_neighbour = i == CASE_MODELS && is_swept;
+        if (gui_button(gui, list[i].key, label, list[i].key, has_neighbour ? half : 0, chosen > 0).pressed)
             case_state_next(s, (CaseListId)i, 1);
+        if (has_neighbour)
+            gui_beside(gui, gap);
     }
+    bool edits = is_swept && gui_button(gui, "edit", "Edit sections", "E", half, false).pressed;
     if (gui_button(gui, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", "B", 0, behind && behind->is_on).pressed)
         case_state_turn_background(s);
+    return edits;
 }
 
 static void show_marks(Gui *gui, CaseState *s, GuiRect at)
@@ -146,13 +158,13 @@ static void show_acts(Gui *gui, CaseState *s)
 CasePanelActions case_panel_draw(Gui *gui, CaseState *s, GuiRect at, bool shows_help)
 {
     CasePanelActions actions = {0};
-    float k = gui_scale(gui), gap = floorf(6 * k), low = floorf(fmaxf(0.2f * at.height, at.height - 560 * k));
+    float k = gui_scale(gui), gap = floorf(6 * k), low = floorf(fmaxf(0.2f * at.height, at.height - 590 * k));
     bool can_steer = case_builder_work(s->builder) != NULL;
     gui_window_begin(gui, "panel", (GuiRect){at.x, at.y, at.width, at.height - low}, 0);
     show_volume(gui, s);
     gui_text_wrapped(gui, GUI_NORMAL, gui_colors.accent, case_state_hint(s));
     show_modes(gui, s);
-    show_choices(gui, s);
+    actions.edit = show_choices(gui, s);
     show_acts(gui, s);
     gui_space(gui, floorf(4 * k));
     float half = floorf((gui_width(gui) - gap) / 2);

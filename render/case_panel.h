@@ -6,7 +6,7 @@
 #include "render/gui.h"
 
 typedef struct CasePanelActions {
-    bool steer, help, leave;
+    bool steer, help, edit, leave;
 } CasePanelActions;
 
 CasePanelActions case_panel_draw(Gui *gui, CaseState *state, GuiRect at, bool shows_help);

@@ -63,19 +63,40 @@ static void list_choices(CaseState *s)
         qsort(s->list[i].name[1], (size_t)(s->list[i].count - 1), sizeof s->list[i].name[0], by_name);
     for (const char *const *name = patient_segment_name; *name; name++)
         add_name(s, CASE_SEGMENTS, *name);
+    for (int i = 1; i < MODELS; i++)
+        add_name(s, CASE_MODELS, model_names[i]);
+}
+
+static const CaseActKind list_act[CASE_LISTS] = {CASE_DEVICE, CASE_CATHETER, CASE_ANATOMY, CASE_MODEL};
+
+// The lists show what the acts say.
+static void follow_choices(CaseState *s)
+{
+    for (int list = 0; list < CASE_LISTS; list++) {
+        const CaseAct *last = case_acts_last(&s->acts, list_act[list]);
+        const char *name = list == CASE_MODELS ? case_acts_model(&s->acts) : last ? last->name : "";
+        s->list[list].chosen = 0;
+        for (int i = 1; i < s->list[list].count; i++)
+            if (!strcmp(s->list[list].name[i], name))
+                s->list[list].chosen = i;
+    }
 }
 
 bool case_state_begin(CaseState *s, const CaseOptions *made)
 {
     *s = (CaseState){.made = *made, .mode = CASE_START, .forbid_radius = 3, .chosen_mark = -1, .view = CASE_PROJECTION, .turns = true};
     s->made.trace_path = ACTS;
+    s->made.has_kind = false;        // the trace says it
+    s->acts.model = made->has_kind ? model_names[made->kind] : NULL;
     list_choices(s);
+    follow_choices(s);
     s->builder = case_builder_create(&s->made);
     return s->builder != NULL;
 }
 
 void case_state_end(CaseState *s)
 {
+    case_state_edit_end(s);
     case_builder_free(s->builder);
     case_acts_free(&s->acts);
     free(s->seen);
@@ -149,13 +170,18 @@ bool case_state_frame(CaseState *s)
 
 // --- acts ---
 
-static void follow(CaseState *s, bool changes_tree)
+static void follow(CaseState *s, CaseActKind kind)
 {
     char *trace = case_acts_trace(&s->acts);
-    bool has_failed = s->progress.stage == BUILD_FAILED || s->progress.stage == BUILD_IDLE;
+    bool changes_tree = case_act_changes_tree(kind), has_failed = s->progress.stage == BUILD_FAILED || s->progress.stage == BUILD_IDLE;
     s->chosen_mark = changes_tree ? -1 : s->chosen_mark;
+    follow_choices(s);
+    if (changes_tree)        // the editor's model is about to go
+        case_state_edit_end(s);
     if (changes_tree || has_failed || !trace)
         case_builder_request(s->builder, trace);
+    else if (kind == CASE_EDIT)
+        case_builder_edit(s->builder, trace);
     else
         case_builder_retitle(s->builder, trace);
     free(trace);
@@ -175,13 +201,17 @@ static void add(CaseState *s, const CaseAct *act)
         say(s, true, s->has_volume ? N_("click a vessel first: the tree grows from there") : N_("the volume is still being loaded"));
         return;
     }
+    const int edits = case_act_changes_tree(act->kind) ? case_acts_edits(&s->acts) : 0;
     if (!case_acts_add(&s->acts, act)) {
         say(s, true, "out of memory");
         return;
     }
     case_act_describe(act, text, sizeof text);
-    say(s, false, "%s", text);
-    follow(s, case_act_changes_tree(act->kind));
+    if (edits > 0)
+        say(s, true, "%s; the %d edits of the wall before it no longer count: Ctrl+Z brings them back", text, edits);
+    else
+        say(s, false, "%s", text);
+    follow(s, act->kind);
     s->pictures++;
 }
 
@@ -212,8 +242,6 @@ void case_state_click(CaseState *s, Vec3 place)
 
 void case_state_mode(CaseState *s, int mode) { s->mode = mode; }
 
-static const CaseActKind list_act[CASE_LISTS] = {CASE_DEVICE, CASE_CATHETER, CASE_ANATOMY};
-
 static void undo_or_redo(CaseState *s, bool is_undo)
 {
     char text[160];
@@ -224,14 +252,11 @@ static void undo_or_redo(CaseState *s, bool is_undo)
     const CaseAct *act = &s->acts.act[s->acts.count - !is_undo];
     case_act_describe(act, text, sizeof text);
     say(s, false, is_undo ? N_("undone: %s") : N_("done again: %s"), text);
-    for (int list = 0; list < CASE_LISTS; list++) {
-        const CaseAct *last = case_acts_last(&s->acts, list_act[list]);
-        s->list[list].chosen = 0;
-        for (int i = 1; last && i < s->list[list].count; i++)
-            if (!strcmp(s->list[list].name[i], last->name))
-                s->list[list].chosen = i;
-    }
-    follow(s, case_act_changes_tree(act->kind));
+    if (s->editor && act->kind == CASE_EDIT && is_undo)
+        edit_state_undo(&s->edit);
+    else if (s->editor && act->kind == CASE_EDIT)
+        edit_state_do(&s->edit, &act->edit);
+    follow(s, act->kind);
     s->mode = case_acts_last(&s->acts, CASE_START) ? s->mode : CASE_START;
     s->pictures++;
 }
@@ -251,10 +276,57 @@ void case_state_cancel(CaseState *s)
 void case_state_next(CaseState *s, CaseListId list, int by)
 {
     CaseAct act = {.kind = list_act[list]};
-    const int count = s->list[list].count, next = (s->list[list].chosen + by + count) % count, before = s->acts.count;
+    const int count = s->list[list].count, next = (s->list[list].chosen + by + count) % count;
     snprintf(act.name, sizeof act.name, "%s", s->list[list].name[next]);
     add(s, &act);
-    s->list[list].chosen = s->acts.count > before ? next : s->list[list].chosen;
+}
+
+// --- editing the wall ---
+
+bool case_state_edit_begin(CaseState *s)
+{
+    const CaseWork *work = case_builder_work(s->builder);
+    if (s->editor)
+        return true;
+    if (!work) {
+        say(s, true, "there is no wall to edit yet");
+        return false;
+    }
+    if (work->how.model != FIT_MODEL_SWEEP) {
+        say(s, true, "the sections of a swept model can be edited: M chooses the model of the wall");
+        return false;
+    }
+    bool good = (s->editor = sweep_editor_create(case_work_sweep(work))) != NULL;
+    static Faults faults;
+    faults_clear(&faults);
+    for (int i = case_acts_first_edit(&s->acts); good && i < s->acts.count; i++)
+        if (s->acts.act[i].kind == CASE_EDIT)
+            good = sweep_editor_do(s->editor, &s->acts.act[i].edit, ACTS, NULL, &faults);
+    if (!good || !edit_state_begin(&s->edit, s->editor)) {
+        case_state_edit_end(s);
+        say_fault(s, faults.count > 0 ? faults.text[0] : "out of memory");
+        return false;
+    }
+    s->edit.saved_count = case_acts_edits(&s->acts);
+    return true;
+}
+
+void case_state_edit_end(CaseState *s)
+{
+    if (!s->editor)
+        return;
+    edit_state_end(&s->edit);
+    sweep_editor_free(s->editor);
+    s->editor = NULL;
+    s->pictures++;
+}
+
+void case_state_edit_take(CaseState *s)
+{
+    const EditList *list = s->editor ? sweep_editor_list(s->editor) : NULL;
+    for (int i = case_acts_edits(&s->acts); list && i < list->count; i++)
+        add(s, &(CaseAct){.kind = CASE_EDIT, .edit = list->edit[i]});
+    s->edit.saved_count = case_acts_edits(&s->acts);
 }
 
 void case_state_turn_background(CaseState *s)

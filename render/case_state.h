@@ -3,6 +3,7 @@
 #ifndef SELDINGER_RENDER_CASE_STATE_H
 #define SELDINGER_RENDER_CASE_STATE_H
 
+#include "render/edit_state.h"
 #include "render/vessel_scene_camera.h"
 #include "render/volume_view.h"
 #include "sim/sim.h"
@@ -10,7 +11,7 @@
 // The views: the three slices (SliceView), and a projection that turns.
 enum { CASE_PROJECTION = 3, CASE_VIEWS, CASE_NAMES = 48 };
 // Lists of which the user chooses one name: an act each.
-typedef enum { CASE_WIRES, CASE_CATHETERS, CASE_SEGMENTS, CASE_LISTS } CaseListId;
+typedef enum { CASE_WIRES, CASE_CATHETERS, CASE_SEGMENTS, CASE_MODELS, CASE_LISTS } CaseListId;
 // What a click does: a CaseActKind at that point, or only to look there.
 enum { CASE_LOOK = CASE_ACTS };
 
@@ -37,9 +38,11 @@ typedef struct CaseState {
     int seen_count, seen_number;
     int chosen_mark;             // -1: none
     struct {
-        int count, chosen;           // 0: "", none, or a wire that suits the vessels
+        int count, chosen;           // 0: "", none, a wire that suits the vessels, or local models
         char name[CASE_NAMES][80];
     } list[CASE_LISTS];
+    SweepEditor *editor;         // of the model, while its sections are edited; else NULL
+    EditState edit;              // with an editor
     int pictures;                // grows with each change of what all views show …
     int turned;                  // … and of how the projection is seen
     char message[600];
@@ -64,6 +67,12 @@ void case_state_cancel(CaseState *state);
 void case_state_next(CaseState *state, CaseListId list, int by);
 void case_state_turn_background(CaseState *state);
 void case_state_choose_mark(CaseState *state, int mark);
+
+// Begins to edit the sections of a swept model. False with a message if there is none. The edits are acts …
+bool case_state_edit_begin(CaseState *state);
+void case_state_edit_end(CaseState *state);
+// … once this has taken them, after anything that may have changed `edit`.
+void case_state_edit_take(CaseState *state);
 
 // A view of this size; the projection at CASE_PROJECTION.
 Camera case_state_camera(const CaseState *state, int view, int width, int height);

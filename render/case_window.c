@@ -4,6 +4,7 @@
 #include "render/case_panel.h"
 #include "render/case_state.h"
 #include "render/case_views.h"
+#include "render/edit_desk.h"
 #include "render/gl_canvas.h"
 #include "render/gui.h"
 #include "render/png_file.h"
@@ -23,6 +24,7 @@ typedef struct CaseWindow {
     Window *window;
     Gui *gui;
     CaseViews *views;
+    EditDesk *desk;              // while sections are edited; else NULL
     CaseState state;
     GuiRect at[CASE_VIEWS], panel_at;
     int held;                    // the view where the mouse was pressed
@@ -80,6 +82,34 @@ static void leave(CaseWindow *w)
         w->ends = true;
 }
 
+// --- the desk on which sections are edited ---
+
+static void close_desk(CaseWindow *w)
+{
+    edit_desk_destroy(w->desk);
+    w->desk = NULL;
+    w->unchanged = 0;
+    case_state_edit_end(&w->state);
+}
+
+static void open_desk(CaseWindow *w)
+{
+    if (!w->desk && case_state_edit_begin(&w->state) && !(w->desk = edit_desk_create(&w->state.edit, w->state.volume, true, w->message, sizeof w->message)))
+        close_desk(w);
+}
+
+static void do_what_the_desk_wants(CaseWindow *w)
+{
+    EditDeskWants wants = edit_desk_wants(w->desk);
+    case_state_edit_take(&w->state);
+    if (wants.undo)
+        case_state_undo(&w->state);
+    if (wants.redo)
+        case_state_redo(&w->state);
+    if (wants.leave || wants.save || !w->state.editor)
+        close_desk(w);
+}
+
 // --- keys ---
 
 static void arrow(CaseWindow *w, double right, double up)
@@ -113,6 +143,8 @@ static void press_letter(CaseWindow *w, int key)
     case 'C': case_state_next(s, CASE_CATHETERS, w->shift ? -1 : 1); break;
     case 'A': case_state_next(s, CASE_SEGMENTS, w->shift ? -1 : 1); break;
     case 'B': case_state_turn_background(s); break;
+    case 'M': case_state_next(s, CASE_MODELS, w->shift ? -1 : 1); break;
+    case 'E': open_desk(w); break;
     case 'H': w->shows_help = !w->shows_help; break;
     case 'S': steer(w); break;
     case '[': case_state_window(s, 1, -0.02); break;
@@ -281,6 +313,8 @@ static bool draw(CaseWindow *w, const WindowInput *input)
         case_panel_help(w->gui, input);
     gui_end(w->gui, 0);
     w->shows_help ^= actions.help;
+    if (actions.edit)
+        open_desk(w);
     if (actions.leave)
         leave(w);
     if (actions.steer)
@@ -312,7 +346,12 @@ static bool run_frames(CaseWindow *w, Faults *faults)
                                                                input->mouse_y != w->y || input->width != w->width || input->height != w->height;
         w->still++;
         w->width = input->width, w->height = input->height;
-        take_input(w, input);
+        if (w->desk)
+            edit_desk_take_input(w->desk, input);
+        else
+            take_input(w, input);
+        if (w->desk)
+            do_what_the_desk_wants(w);
         if (w->state.turns && w->state.has_volume) {
             free_camera_orbit(&w->state.camera, turn, 0);
             w->state.turned++;
@@ -322,7 +361,7 @@ static bool run_frames(CaseWindow *w, Faults *faults)
         w->unchanged = is_new || has_input || w->still < SETTLES ? 0 : w->unchanged + 1;
         if (!visible || (w->unchanged > SETTLES && !w->ends))
             continue;
-        if (!draw(w, input)) {
+        if (!(w->desk ? edit_desk_draw(w->desk, w->gui, input, w->message, sizeof w->message) : draw(w, input))) {
             faults_add(faults, w->options->made->input, 0, 0, "the window cannot be drawn: %s", w->message);
             return false;
         }
@@ -351,6 +390,7 @@ bool case_window_run(const CaseWindowOptions *options, char *steer, size_t capac
     if (!good)
         faults_add(faults, options->made->input, 0, 0, "no window: %s", w->message);
     good = good && run_frames(w, faults);
+    edit_desk_destroy(w->desk);
     case_views_destroy(w->views);
     if (w->gui)
         gui_destroy(w->gui);

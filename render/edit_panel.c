@@ -133,7 +133,7 @@ static void show_edits(Gui *gui, const EditState *s, GuiRect at)
     gui_window_end(gui);
 }
 
-EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_help)
+EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_help, bool is_of_case)
 {
     EditPanelActions actions = {0};
     float k = gui_scale(gui), gap = floorf(6 * k), list_height = floorf(fmaxf(at.height * 0.2f, at.height - 480 * k));
@@ -146,18 +146,16 @@ EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_
     show_branches(gui, s);
     heading(gui, "EDITS");
     float third = floorf((gui_width(gui) - 2 * gap) / 3);
-    if (gui_button(gui, "undo", "Undo", "^Z", third, false).pressed)
-        edit_state_undo(s);
+    actions.undo = gui_button(gui, "undo", "Undo", "^Z", third, false).pressed;
     gui_beside(gui, gap);
-    if (gui_button(gui, "redo", "Redo", "^Y", third, false).pressed)
-        edit_state_redo(s);
+    actions.redo = gui_button(gui, "redo", "Redo", "^Y", third, false).pressed;
     gui_beside(gui, gap);
-    actions.save = gui_button(gui, "save", "Save", "^S", third, false).pressed;
+    actions.save = gui_button(gui, "save", is_of_case ? "Done" : "Save", "^S", third, false).pressed;
     actions.help = gui_button(gui, "help", "All keys", "H", 0, shows_help).pressed;
     gui_space(gui, floorf(2 * k));
     gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, s->message);
     gui_window_end(gui);
-    snprintf(title, sizeof title, "%d edits, %s", edits, edits == s->saved_count ? "saved" : "not saved");
+    snprintf(title, sizeof title, is_of_case ? "%d edits" : "%d edits, %s", edits, edits == s->saved_count ? "saved" : "not saved");
     show_edits(gui, s, (GuiRect){at.x, at.y + at.height - list_height, at.width, list_height});
     return actions;
 }

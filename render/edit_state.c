@@ -1,6 +1,7 @@
 // See edit_state.h. Numbers of an edit are rounded to 0.0001 mm before it is applied, so that its line of YAML is short and replays to the same bits.
 #include "render/edit_state.h"
 
+#include "render/translation.h"
 #include "sim/sim.h"
 
 #include <stdarg.h>
@@ -17,7 +18,7 @@ void edit_state_say(EditState *s, bool is_fault, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(s->message, sizeof s->message, format, arguments);
+    vsnprintf(s->message, sizeof s->message, tr(format), arguments);
     va_end(arguments);
     s->message_is_fault = is_fault;
 }
@@ -180,6 +181,8 @@ static void apply(EditState *s, const SweepEdit *edit, bool is_kept)
     if (is_kept)
         edit_state_go(s, s->branch, s->t);
 }
+
+void edit_state_do(EditState *s, const SweepEdit *edit) { apply(s, edit, true); }
 
 static double short_t(const EditState *s)
 {

@@ -53,6 +53,8 @@ void edit_state_branch(EditState *state, int by);
 Vec3 edit_state_in_space(const EditState *state, Vec3 nb);
 bool edit_state_at_station(const EditState *state);
 
+// Makes this edit.
+void edit_state_do(EditState *state, const SweepEdit *edit);
 // Moves a handle and its neighbours to go through (n, b); the surface follows. edit_state_keep makes the contour an edit.
 void edit_state_drag(EditState *state, Vec3 nb);
 void edit_state_scale(EditState *state, double factor);

@@ -4,9 +4,12 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 void case_acts_free(CaseActs *acts)
 {
+    for (int i = 0; i < acts->count + acts->undone; i++)
+        edit_clear(&acts->act[i].edit);
     free(acts->act);
     *acts = (CaseActs){0};
 }
@@ -21,8 +24,12 @@ bool case_acts_add(CaseActs *acts, const CaseAct *act)
         acts->act = grown;
         acts->capacity = capacity;
     }
-    acts->act[acts->count++] = *act;
-    acts->undone = 0;
+    CaseAct copy = *act;
+    if (!edit_copy(&act->edit, &copy.edit))
+        return false;
+    for (; acts->undone > 0; acts->undone--)
+        edit_clear(&acts->act[acts->count + acts->undone - 1].edit);
+    acts->act[acts->count++] = copy;
     return true;
 }
 
@@ -58,17 +65,56 @@ const CaseAct *case_acts_last(const CaseActs *acts, CaseActKind kind)
     return NULL;
 }
 
-bool case_act_changes_tree(CaseActKind kind) { return kind <= CASE_ENTRY; }
+bool case_act_changes_tree(CaseActKind kind) { return kind <= CASE_ENTRY || kind == CASE_MODEL; }
+
+int case_acts_first_edit(const CaseActs *acts)
+{
+    int first = acts->count;
+    while (first > 0 && !case_act_changes_tree(acts->act[first - 1].kind))
+        first--;
+    return first;
+}
+
+int case_acts_edits(const CaseActs *acts)
+{
+    int count = 0;
+    for (int i = case_acts_first_edit(acts); i < acts->count; i++)
+        count += acts->act[i].kind == CASE_EDIT;
+    return count;
+}
+
+const char *case_acts_model(const CaseActs *acts)
+{
+    const CaseAct *act = case_acts_last(acts, CASE_MODEL);
+    const char *name = act ? act->name : acts->model ? acts->model : "";
+    return strcmp(name, model_names[0]) ? name : "";
+}
+
+static void describe_edit(const SweepEdit *edit, char *out, size_t capacity)
+{
+    static const char *const name[EDIT_KINDS] = {"section", "section deleted", "smoothed", "blend", "new branch", "cut", "flow"};
+    const bool is_placed = edit->kind != EDIT_BLEND && edit->kind != EDIT_TAG && (edit->kind != EDIT_SMOOTH || edit->extent == SMOOTH_SECTION);
+    if (edit->kind == EDIT_SMOOTH && edit->extent == SMOOTH_TREE)
+        snprintf(out, capacity, "edit: %s", name[edit->kind]);
+    else if (is_placed)
+        snprintf(out, capacity, "edit: %s, branch %d at %.2f mm", name[edit->kind], edit->branch, edit->t);
+    else
+        snprintf(out, capacity, "edit: %s, branch %d", name[edit->kind], edit->branch);
+}
 
 void case_act_describe(const CaseAct *act, char *out, size_t capacity)
 {
-    static const char *const name[CASE_ACTS] = {"start", "branch", "forbid", "cut",      "end here", "sac",
-                                                "entry", "target", "tool",   "catheter", "anatomy",  "background"};
+    static const char *const name[CASE_ACTS] = {"start",  "branch", "forbid",   "cut",     "end here",   "sac",   "entry",
+                                                "target", "tool",   "catheter", "anatomy", "background", "model", "edit"};
     Vec3 x = act->place;
     if (act->kind == CASE_DEVICE)
         snprintf(out, capacity, "tool: %s", act->name[0] ? act->name : "a wire that suits the vessels");
     else if (act->kind == CASE_CATHETER || act->kind == CASE_ANATOMY)
         snprintf(out, capacity, "%s: %s", name[act->kind], act->name[0] ? act->name : "none");
+    else if (act->kind == CASE_MODEL)
+        snprintf(out, capacity, "model: %s", act->name[0] ? act->name : model_names[0]);
+    else if (act->kind == CASE_EDIT)
+        describe_edit(&act->edit, out, capacity);
     else if (act->kind == CASE_BEHIND)
         snprintf(out, capacity, "background: %s", act->is_on ? "the volume" : "a plain patient");
     else if (act->kind == CASE_FORBID)
@@ -138,6 +184,7 @@ static void write_choices(FILE *out, const CaseActs *acts)
         const char *key;
     } row[] = {{CASE_ENTRY, "entry_mm"},    {CASE_TARGET, "target_mm"}, {CASE_DEVICE, "device"},
                {CASE_CATHETER, "catheter"}, {CASE_ANATOMY, "anatomy"},  {CASE_BEHIND, "behind"}};
+    const char *model = case_acts_model(acts);
     int count = 0;
     for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
         const CaseAct *act = case_acts_last(acts, row[i].kind);
@@ -150,8 +197,27 @@ static void write_choices(FILE *out, const CaseActs *acts)
         else
             fprintf(out, "%s: %s", row[i].key, is_switch ? "true" : act->name);
     }
+    if (model[0])
+        fprintf(out, "%s%s", count++ == 0 ? "case: {model: " : ", model: ", model);
     if (count > 0)
         fputs("}\n", out);
+}
+
+// After a model of another kind or tree no edit counts.
+static bool write_edits(FILE *out, const CaseActs *acts)
+{
+    char *text = NULL;
+    int count = 0;
+    for (int i = case_acts_first_edit(acts); i < acts->count; i++)
+        if (acts->act[i].kind == CASE_EDIT) {
+            count++;
+            text = count == 1 || text ? edit_text_add(text, &acts->act[i].edit) : NULL;
+        }
+    if (text)
+        fputs(text, out);
+    bool good = count == 0 || text;
+    free(text);
+    return good;
 }
 
 char *case_acts_trace(const CaseActs *acts)
@@ -168,6 +234,10 @@ char *case_acts_trace(const CaseActs *acts)
     if (branches > 1)        // a trace of several branches is tracked by hand otherwise
         fputs("automatic: 1\n", out);
     write_choices(out, acts);
+    if (!write_edits(out, acts)) {
+        output_text_forget(&text);
+        return NULL;
+    }
     if (!ferror(out) && fclose(out) == 0)
         return text.bytes;
     free(text.bytes);

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_CASE_ACTS_H
 #define SELDINGER_SIM_CASE_ACTS_H
 
-#include "geom/geom.h"
+#include "recon/recon.h"
 
 #include <stdbool.h>
 
@@ -19,6 +19,8 @@ typedef enum {
     CASE_CATHETER,           // a catheter around it
     CASE_ANATOMY,            // which vessel of the body it is
     CASE_BEHIND,             // the volume lies behind the vessels in fluoroscopy, or no longer
+    CASE_MODEL,              // the kind of the wall's model
+    CASE_EDIT,               // an edit of a swept model: those after the last act that changes the tree count
     CASE_ACTS
 } CaseActKind;
 
@@ -28,14 +30,16 @@ typedef struct CaseAct {
     double radius;           // [mm] of CASE_FORBID
     bool is_on;              // of CASE_BEHIND
     // of CASE_DEVICE and CASE_CATHETER: a file of the device library; "": a wire that suits the vessels, no catheter. Of CASE_ANATOMY: a segment
-    // (sim/patient_landmarks.h); "": not said
+    // (sim/patient_landmarks.h); "": not said. Of CASE_MODEL: one of model_names; "": the first
     char name[80];
+    SweepEdit edit;          // of CASE_EDIT; the acts own their copy
 } CaseAct;
 
 typedef struct CaseActs {
     int count, capacity;
     int undone;              // acts after `count` that can be done again
     CaseAct *act;
+    const char *model;       // the kind of the wall's model without a CASE_MODEL, one of model_names; NULL: the first
 } CaseActs;
 
 void case_acts_free(CaseActs *acts);
@@ -45,7 +49,11 @@ bool case_acts_undo(CaseActs *acts);     // false: nothing to undo
 bool case_acts_redo(CaseActs *acts);
 // The last act of the kind that counts; NULL if there is none.
 const CaseAct *case_acts_last(const CaseActs *acts, CaseActKind kind);
-// Whether an act changes the tree or its wall, so that it has to be made again.
+// The edits that count are the acts of this kind from here on.
+int case_acts_first_edit(const CaseActs *acts);
+int case_acts_edits(const CaseActs *acts);   // their number
+const char *case_acts_model(const CaseActs *acts);       // one of model_names; "": the first
+// Whether an act changes the tree or its model, so that they have to be made again.
 bool case_act_changes_tree(CaseActKind kind);
 // One line for people.
 void case_act_describe(const CaseAct *act, char *out, size_t capacity);

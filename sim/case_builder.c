@@ -20,6 +20,8 @@ struct CaseBuilder {
     pthread_mutex_t lock;        // of all below
     pthread_cond_t change;       // something is wanted, or the thread is idle
     bool quits, is_left, has_ended, is_wanted;
+    bool keeps_model;            // of what is wanted: only edits change
+    bool has_model;              // `work` holds the fitted model
     char *wanted;                // the trace that is wanted next; NULL with is_wanted: none
     char *trace;                 // of what runs; the thread's own
     char *title;                 // the trace of the case that is there, with the latest choices of its scene
@@ -91,15 +93,20 @@ static void fail(CaseBuilder *b)
     pthread_mutex_unlock(&b->lock);
 }
 
-static void forget_work(CaseBuilder *b)
+static void forget_wall(CaseBuilder *b)
 {
     triangle_mesh_free(b->mesh);
     b->mesh = NULL;
     b->mark_count = 0;
     model_field_free(&b->wall);
     b->wall = (ModelField){0};
-    case_work_free(&b->work);
     faults_clear(&b->faults);
+}
+
+static void forget_work(CaseBuilder *b)
+{
+    forget_wall(b);
+    case_work_free(&b->work);
 }
 
 static void look(CaseBuilder *b)
@@ -127,13 +134,35 @@ static void show_tree(CaseBuilder *b)
     free(node);
 }
 
-static void build(CaseBuilder *b)
+// From the fitted model on.
+static void build_wall(CaseBuilder *b, const CaseOptions *options, double begun)
+{
+    if (!case_work_edit(&b->work, options, &b->faults) || !case_work_wall(&b->work, &b->wall)) {
+        fail(b);
+        return;
+    }
+    if (!enter(b, BUILD_LOOKING))
+        return;
+    look(b);
+    note_time(b, &b->progress.look_s, &begun);
+    enter(b, BUILD_DONE);
+}
+
+static void build(CaseBuilder *b, bool keeps_model)
 {
     CaseOptions options = b->options;
     double begun = clock_s(CLOCK_MONOTONIC);
     BuildProgress *p = &b->progress;
     options.trace = b->trace;
     options.progress = &b->watching;
+    if (keeps_model) {
+        forget_wall(b);
+        if (case_work_choose(&b->work, &options, &b->faults))
+            build_wall(b, &options, begun);
+        else
+            fail(b);
+        return;
+    }
     forget_work(b);
     if (!enter(b, BUILD_TRACKING))
         return;
@@ -145,16 +174,15 @@ static void build(CaseBuilder *b)
     note_time(b, &p->track_s, &begun);
     if (!enter(b, BUILD_FITTING))
         return;
-    if (!case_work_fit(&b->work, &options, &b->faults) || !case_work_wall(&b->work, &b->wall)) {
+    if (!case_work_fit(&b->work, &options, &b->faults)) {
         fail(b);
         return;
     }
     note_time(b, &p->fit_s, &begun);
-    if (!enter(b, BUILD_LOOKING))
-        return;
-    look(b);
-    note_time(b, &p->look_s, &begun);
-    enter(b, BUILD_DONE);
+    pthread_mutex_lock(&b->lock);
+    b->has_model = true;
+    pthread_mutex_unlock(&b->lock);
+    build_wall(b, &options, begun);
 }
 
 static void free_all(CaseBuilder *b)
@@ -207,10 +235,12 @@ static void *run(void *context)
         b->trace = b->wanted;
         b->wanted = NULL;
         b->is_wanted = false;
+        bool keeps_model = b->keeps_model && b->has_model;
+        b->has_model = keeps_model;
         atomic_store(&b->stops, false);
         pthread_mutex_unlock(&b->lock);
         if (b->trace && b->volume)
-            build(b);
+            build(b, keeps_model);
         else
             forget_work(b);
         pthread_mutex_lock(&b->lock);
@@ -309,24 +339,29 @@ const Volume *case_builder_reduced(const CaseBuilder *b, float *low, float *high
     return volume ? b->reduced : NULL;
 }
 
-void case_builder_request(CaseBuilder *b, const char *trace)
+static void want(CaseBuilder *b, const char *trace, bool keeps_model)
 {
     pthread_mutex_lock(&b->lock);
     if (b->progress.stage != BUILD_LOADING && b->volume) {
+        b->keeps_model = keeps_model && b->has_model && (!b->is_wanted || b->keeps_model);
+        if (!b->keeps_model)
+            b->seen_count = 0;
         free(b->wanted);
         free(b->title);
         b->wanted = trace ? HEAP_TEXT(trace) : NULL;
         b->title = trace ? HEAP_TEXT(trace) : NULL;
         b->is_wanted = true;
-        b->seen_count = 0;
         b->progress.seen++;
-        b->progress.stage = trace ? BUILD_TRACKING : BUILD_IDLE;
+        b->progress.stage = !trace ? BUILD_IDLE : b->keeps_model ? BUILD_FITTING : BUILD_TRACKING;
         b->progress.part = 0;
         atomic_store(&b->stops, true);
         pthread_cond_broadcast(&b->change);
     }
     pthread_mutex_unlock(&b->lock);
 }
+
+void case_builder_request(CaseBuilder *b, const char *trace) { want(b, trace, false); }
+void case_builder_edit(CaseBuilder *b, const char *trace) { want(b, trace, true); }
 
 void case_builder_retitle(CaseBuilder *b, const char *trace)
 {
@@ -363,16 +398,6 @@ int case_builder_marks(const CaseBuilder *b, const CaseMark **mark)
     return is_there(b, BUILD_DONE) ? b->mark_count : 0;
 }
 
-// The choices of the scene may have changed since the tree was tracked.
-static bool read_choices(CaseBuilder *b, Faults *faults)
-{
-    Trace *now = trace_parse(b->title, strlen(b->title), b->options.trace_path, faults);
-    if (now)
-        b->work.trace->made = now->made;
-    trace_free(now);
-    return now != NULL;
-}
-
 bool case_builder_save(CaseBuilder *b, const char *folder, Faults *faults)
 {
     CaseOptions options = b->options;
@@ -381,7 +406,8 @@ bool case_builder_save(CaseBuilder *b, const char *folder, Faults *faults)
         faults_add(faults, folder, 0, 0, "there is no model to save yet");
         return false;
     }
-    return read_choices(b, faults) && case_work_write(&b->work, folder, &options, faults);
+    // the choices of the scene may have changed since the tree was tracked
+    return case_work_choose(&b->work, &options, faults) && case_work_write(&b->work, folder, &options, faults);
 }
 
 void case_builder_wait(CaseBuilder *b, double longest_s)

@@ -161,7 +161,7 @@ bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults)
 {
     ModelFile *file = &work->file;
     work->how = tree_fit_default_options();
-    work->how.model = (FitModel)options->kind;
+    work->how.model = (FitModel)(options->has_kind || !work->trace ? options->kind : work->trace->made.model);
     work->how.local.threads = options->threads;
     tree_fit_complete_options(&work->how, file->tree, &file->info);
     work->has_it = fit_model_is_swept(work->how.model) ? file->swept.of[fit_model_section(work->how.model)] != NULL : vessel_tree_is_model(file->tree);
@@ -170,11 +170,48 @@ bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults)
 
 const VesselTree *case_work_tree(const CaseWork *work) { return work->made.model ? work->made.model : work->file.tree; }
 
+const SweepModel *case_work_sweep(const CaseWork *work)
+{
+    if (work->made.sweep || !fit_model_is_swept(work->how.model))
+        return work->made.sweep;
+    return work->file.swept.of[fit_model_section(work->how.model)];
+}
+
+bool case_work_choose(CaseWork *work, const CaseOptions *options, Faults *faults)
+{
+    Trace *now = trace_parse(options->trace, strlen(options->trace), options->trace_path, faults);
+    if (!now)
+        return false;
+    EditList *before = work->trace->edits;
+    work->trace->made = now->made;
+    work->trace->edits = now->edits;
+    now->edits = before;
+    trace_free(now);
+    return true;
+}
+
+bool case_work_edit(CaseWork *work, const CaseOptions *options, Faults *faults)
+{
+    const EditList *edits = work->trace ? work->trace->edits : NULL;
+    sweep_editor_free(work->editor);
+    work->editor = NULL, work->edited = NULL;
+    if (!edits || edits->count == 0)
+        return true;
+    if (work->how.model != FIT_MODEL_SWEEP) {
+        faults_add(faults, options->trace_path, edits->edit[0].line, edits->edit[0].column,
+                   "the model of the case is '%s', which has no sections to edit; expected `case: {model: sweep}`, or a trace without edits",
+                   model_names[work->how.model]);
+        return false;
+    }
+    work->editor = sweep_editor_create(case_work_sweep(work));
+    if (!work->editor || (sweep_editor_replay(work->editor, edits, options->trace_path, faults) && !(work->edited = sweep_editor_result(work->editor))))
+        faults_add(faults, options->trace_path, 0, 0, "the edits need more memory than is available");
+    return work->edited != NULL;
+}
+
 bool case_work_wall(const CaseWork *work, ModelField *wall)
 {
-    const SweepModel *sweep = work->made.sweep;
-    if (!sweep && fit_model_is_swept(work->how.model))
-        sweep = work->file.swept.of[fit_model_section(work->how.model)];
+    const SweepModel *sweep = work->edited ? work->edited : case_work_sweep(work);
     *wall = model_field_of_blobs(case_work_tree(work));
     return !sweep || model_field_of_sweep(work->file.tree, sweep, wall);
 }
@@ -184,6 +221,8 @@ static bool write_model(const CaseWork *work, const char *folder, Faults *faults
     SweepModels swept = work->file.swept;
     if (work->made.sweep)
         swept.of[fit_model_section(work->how.model)] = work->made.sweep;
+    if (work->edited)
+        swept.of[SECTION_POLAR] = (SweepModel *)(uintptr_t)work->edited;
     char created_by[] = "seldinger " SELDINGER_VERSION " case", *path = text_file_in(folder, MODEL);
     TreeFileInfo info = {.source = work->file.info.source,
                          .parameters = work->has_it ? work->file.info.parameters : tree_fit_parameters(&work->how, &work->file.info),
@@ -240,7 +279,7 @@ static bool write_scene(const CaseWork *work, const char *folder, const CaseOpti
     bool is_micro = false, is_wire = false;
     bool is_behind = options->is_behind || (said && said->is_behind);
     CaseScene scene = {.model = MODEL,
-                       .contact = options->kind > 0 ? (ContactKind)(CONTACT_SWEEP + options->kind - 1) : CONTACT_LIM,
+                       .contact = fit_model_is_swept(work->how.model) ? (ContactKind)(CONTACT_SWEEP + fit_model_section(work->how.model)) : CONTACT_LIM,
                        .frame = work->frame,
                        .behind = is_behind && path_resolve(options->input, behind) ? behind : NULL,
                        .device = device,
@@ -276,6 +315,7 @@ void case_work_measure(const CaseWork *work, CaseFigures *figures)
 
 void case_work_free(CaseWork *work)
 {
+    sweep_editor_free(work->editor);
     sweep_model_free(work->made.sweep);
     vessel_tree_free(work->made.model);
     rbt_report_free(&work->report);
@@ -296,7 +336,7 @@ bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figu
     bool good = (volume || !options->trace) && case_work_track(&work, options, volume, NULL, faults);
     volume_free(volume);
     figures->track_s = clock_s(CLOCK_MONOTONIC) - start;
-    good = good && case_work_fit(&work, options, faults);
+    good = good && case_work_fit(&work, options, faults) && case_work_edit(&work, options, faults);
     figures->fit_s = clock_s(CLOCK_MONOTONIC) - start - figures->track_s;
     good = good && case_work_write(&work, folder, options, faults);
     if (work.file.tree)

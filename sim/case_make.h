@@ -1,7 +1,7 @@
 // Makes a case: a folder with everything that a session needs, which can be copied. model.h5 is the tree with its model, scene.yaml the scene (sim/case_scene.h),
 // trace.yaml, for a case from a volume, what was clicked (sim/case_acts.h): the same volume and trace give the same bytes.
 //
-// case_make() does it all at once. In steps: case_work_track(), case_work_fit(), case_work_write(), from any one thread at a time.
+// case_make() does it all at once. In steps: case_work_track(), case_work_fit(), case_work_edit(), case_work_write(), from any one thread at a time.
 #ifndef SELDINGER_SIM_CASE_MAKE_H
 #define SELDINGER_SIM_CASE_MAKE_H
 
@@ -12,6 +12,7 @@ typedef struct CaseOptions {
     const char *input;           // a volume with `trace`, or a file of a tree, with or without a model
     const char *trace;           // YAML text of the trace (recon/track/trace.h); NULL: the input is a tree
     const char *trace_path;      // for messages
+    bool has_kind;               // `kind` is given; else it is as the trace says
     int kind;                    // of the model, index in model_names (recon/model_file.h); fitted unless the tree's file has it
     bool is_behind;              // the volume lies behind the vessel in fluoroscopy
     bool has_target, has_entry;
@@ -38,6 +39,8 @@ typedef struct CaseWork {
     TreeFitOptions how;
     TreeFit made;                // the model, unless the file had it
     bool has_it;                 // it had
+    SweepEditor *editor;         // NULL: the trace has no edits
+    const SweepModel *edited;    // its result
 } CaseWork;
 
 // Whether `folder` is a case. Its scene is written last.
@@ -49,7 +52,13 @@ bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figu
 // becomes the root, unless the trace gives the first branch's direction; without such an end the root stays.
 bool case_work_track(CaseWork *work, const CaseOptions *options, const Volume *volume, const RbtWatch *watch, Faults *faults);
 bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults);
-// The wall of the fitted model; to be freed by model_field_free(). Returns false if out of memory.
+// Reads the choices and the edits of `options->trace` again; tree and model stay.
+bool case_work_choose(CaseWork *work, const CaseOptions *options, Faults *faults);
+// Applies the edits of the trace to the fitted model, which stays.
+bool case_work_edit(CaseWork *work, const CaseOptions *options, Faults *faults);
+// The swept model as it was fitted; NULL if the model is of another kind.
+const SweepModel *case_work_sweep(const CaseWork *work);
+// The wall of the model with its edits; to be freed by model_field_free(). Returns false if out of memory.
 bool case_work_wall(const CaseWork *work, ModelField *wall);
 // The tree after the fit, or before it.
 const VesselTree *case_work_tree(const CaseWork *work);

@@ -154,9 +154,9 @@ static void read_edit(YamlValue value, SweepEdit *edit)
     read[k](value, edit);
 }
 
-EditList *edit_list_parse(const char *text, size_t length, const char *name, Faults *faults)
+// `keys`: those of the map; NULL: any, and `edits` may be missing.
+static EditList *parse(const char *text, size_t length, const char *const *keys, const char *name, Faults *faults)
 {
-    static const char *const keys[] = {"edits", NULL};
     int before = faults->count;
     if (length > MOST_BYTES) {
         faults_add(faults, name, 0, 0, "has %zu bytes; expected at most %d", length, (int)MOST_BYTES);
@@ -168,7 +168,7 @@ EditList *edit_list_parse(const char *text, size_t length, const char *name, Fau
         faults_add(faults, name, 0, 0, "needs more memory than is available");
     if (list) {
         YamlMap root = yaml_map(yaml_root(reader), keys);
-        YamlValue items = root.value.node ? yaml_get(&root, "edits", true) : (YamlValue){0};
+        YamlValue items = root.value.node ? yaml_get(&root, "edits", keys != NULL) : (YamlValue){0};
         int count = items.node ? yaml_count(items, 0, EDIT_MOST_EDITS) : -1;
         list->edit = calloc((size_t)(count > 0 ? count : 1), sizeof *list->edit);
         if (!list->edit)
@@ -184,6 +184,14 @@ EditList *edit_list_parse(const char *text, size_t length, const char *name, Fau
     edit_list_free(list);
     return NULL;
 }
+
+EditList *edit_list_parse(const char *text, size_t length, const char *name, Faults *faults)
+{
+    static const char *const keys[] = {"edits", NULL};
+    return parse(text, length, keys, name, faults);
+}
+
+EditList *edit_list_parse_within(const char *text, size_t length, const char *name, Faults *faults) { return parse(text, length, NULL, name, faults); }
 
 EditList *edit_list_load(const char *path, Faults *faults)
 {

@@ -46,6 +46,8 @@ typedef struct EditList {
 EditList *edit_list_load(const char *path, Faults *faults);
 // The same from memory; `name` is used in messages.
 EditList *edit_list_parse(const char *text, size_t length, const char *name, Faults *faults);
+// The same of a text that has other keys too, which its own reader checks; without the key `edits` an empty list.
+EditList *edit_list_parse_within(const char *text, size_t length, const char *name, Faults *faults);
 void edit_list_free(EditList *list);
 
 // The edit as its line of YAML, without the dash: numbers have as few digits as read back to the same bits. NULL if out of memory; the caller frees it.

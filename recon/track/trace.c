@@ -2,6 +2,7 @@
 // unknown keys, several documents).
 #include "recon/track/trace.h"
 #include "base/base.h"
+#include "recon/model_file.h"
 #include "recon/track/cast_rays.h"
 
 #include <stdio.h>
@@ -300,7 +301,8 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         return;
     }
     FAULT(w, value,
-          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, case, parameters (default or paper), or a parameter that "
+          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, case, edits, parameters (default or paper), or a parameter "
+          "that "
           "`segment "
           "--help` lists",
           key);
@@ -327,7 +329,8 @@ static void read_case(const Walk *w, const yaml_node_t *map, TraceCase *out)
     if (map->type != YAML_MAPPING_NODE) {
         FAULT(
             w, map,
-            "the case is not valid; expected {entry_mm: [x, y, z], target_mm: [x, y, z], device: FILE.yaml, catheter: FILE.yaml, anatomy: NAME, behind: true}");
+            "the case is not valid; expected {entry_mm: [x, y, z], target_mm: [x, y, z], device: FILE.yaml, catheter: FILE.yaml, anatomy: NAME, behind: true, "
+            "model: sweep}");
         return;
     }
     for (int i = 0; i < pair_count(map); i++) {
@@ -352,13 +355,19 @@ static void read_case(const Walk *w, const yaml_node_t *map, TraceCase *out)
             read_case_name(w, value, key, out->catheter);
         } else if (!strcmp(key, "anatomy")) {
             read_case_name(w, value, key, out->anatomy);
+        } else if (!strcmp(key, "model")) {
+            for (out->model = 0; model_names[out->model] && (!text || strcmp(model_names[out->model], text));)
+                out->model++;
+            if (!model_names[out->model])
+                FAULT(w, value, "model is not valid; expected lim, sweep, raster, rbf or pas");
         } else {
-            FAULT(w, value, "unknown key '%.40s' in a case; expected entry_mm, target_mm, device, catheter, anatomy, behind", key);
+            FAULT(w, value, "unknown key '%.40s' in a case; expected entry_mm, target_mm, device, catheter, anatomy, behind, model", key);
         }
     }
 }
 
-static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
+// The list of `edits` has a reader of its own.
+static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace, bool *has_edits)
 {
     if (root->type != YAML_MAPPING_NODE) {
         FAULT(w, root, "the trace is not a map; expected `branches: [...]`");
@@ -381,6 +390,9 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
         const char *key = key_of(w, root, i, &value);
         double version;
         if (!key || !strcmp(key, "parameters"))
+            continue;
+        *has_edits |= !strcmp(key, "edits");
+        if (!strcmp(key, "edits"))
             continue;
         if (!strcmp(key, "seldinger"))
             read_number(w, value, key, 1, 1, true, &version);
@@ -417,6 +429,7 @@ void trace_free(Trace *trace)
     free(trace->cut);
     free(trace->until);
     free(trace->rival);
+    edit_list_free(trace->edits);
     free(trace);
 }
 
@@ -456,6 +469,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
     yaml_parser_t parser;
     yaml_document_t document;
     int before = faults->count;
+    bool has_edits = false;
     Trace *trace = calloc(1, sizeof *trace);
     if (!trace || !yaml_parser_initialize(&parser)) {
         free(trace);
@@ -470,7 +484,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
         Walk walk = {&document, path, faults};
         yaml_node_t *root = yaml_document_get_root_node(&document);
         if (root)
-            read_root(&walk, root, trace);
+            read_root(&walk, root, trace, &has_edits);
         else
             faults_add(faults, path, 1, 1, "the file is empty; expected a map such as `branches: [...]`");
         bool has_root = root != NULL;
@@ -486,6 +500,8 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
     }
     yaml_parser_delete(&parser);
     point_to_places(trace);
+    if (has_edits)
+        trace->edits = edit_list_parse_within(text, length, path, faults);
     if (faults->count == before)
         return trace;
     trace_free(trace);

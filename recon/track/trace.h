@@ -4,6 +4,7 @@
 #ifndef SELDINGER_RECON_TRACK_TRACE_H
 #define SELDINGER_RECON_TRACK_TRACE_H
 
+#include "recon/edit/edit_list.h"
 #include "recon/track/rbt_track.h"
 
 typedef struct TraceCase {   // the key `case`: what `seldinger case` makes of the tree; `segment` ignores it
@@ -12,6 +13,7 @@ typedef struct TraceCase {   // the key `case`: what `seldinger case` makes of t
     Vec3 target;             // [mm] where the tip of the tool has to go
     char device[80];         // a file of the device library, without its folder; "": a wire that suits the vessels
     char catheter[80];       // the same of a catheter around it; "": none
+    int model;               // of the wall, index in model_names (recon/model_file.h)
     char anatomy[80];        // the segment of the body that the vessel is (`anatomy:` of a scene); "": not said
 } TraceCase;
 
@@ -24,6 +26,7 @@ typedef struct Trace {
     int forbid_count, cut_count, until_count, rival_count;   // `parameters` points into these arrays
     RbtRegion *forbid, *cut, *until, *rival;                 // `rival`: the key `not`
     TraceCase made;
+    EditList *edits;         // the key `edits`, of a case whose model is swept (recon/edit/edit_list.h); `segment` ignores it. NULL: none
 } Trace;
 
 // Whether a text can be the name of a device file, or of a segment: letters, digits and . - _ only, so that it can be written into a scene and into a path.

@@ -71,6 +71,18 @@ static void keys_alone_do_too(void **state)
         "$S case tube.nrrd --trace seldinger/cases/tube/trace.yaml --quiet -o keys 2>> said && diff -r seldinger/cases/tube keys >> said");
 }
 
+// Sections of a swept model, by keys alone: the editor is opened until the wall is there, and every time a section is enlarged.
+static void sections_are_edited_by_keys(void **state)
+{
+    (void)state;
+    need_display();
+    check_case("$S case tube.nrrd -o edited --size 900x600 > said 2>&1 & P=$!; window case; sleep 1; keys Tab Prior Next Return m; "
+               "for i in 1 2 3 4 5 6; do sleep 2; keys e Prior equal ctrl+s; done; steers edited || exit 1; "
+               "grep -q 'model: sweep' edited/trace.yaml && grep -q '{edit: section, branch: 0' edited/trace.yaml || exit 2; "
+               "$S case tube.nrrd --trace edited/trace.yaml --quiet -o unedited 2>> said && diff -r edited unedited >> said && "
+               "$S edit edited/model.h5 --save-edits - | grep -q 'edit: section'");
+}
+
 static void a_user_leaves(void **state)
 {
     (void)state;
@@ -84,6 +96,7 @@ int main(void)
         cmocka_unit_test(a_user_leaves),
         cmocka_unit_test(a_click_on_a_vessel_ends_in_a_case),
         cmocka_unit_test(keys_alone_do_too),
+        cmocka_unit_test(sections_are_edited_by_keys),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }

@@ -316,6 +316,113 @@ static void a_case_is_the_same_without_the_window(void **state)
     end(s);
 }
 
+static void has_edits(const char *name, int wanted)
+{
+    size_t length;
+    char *trace = whole_file_read(in_folder(name), &length, &faults);
+    assert_non_null(trace);
+    int count = 0;
+    for (const char *at = trace; (at = strstr(at, "{edit: ")) != NULL; at++)
+        count++;
+    assert_int_equal(count, wanted);
+    assert_non_null(strstr(trace, "model: sweep"));
+    free(trace);
+}
+
+// How far a place lies within the wall, as the node nearest to it sees it [mm].
+static double depth_in(const CaseState *s, Vec3 x)
+{
+    const ModelField *wall = case_builder_wall(s->builder);
+    int near = 0;
+    assert_non_null(wall);
+    for (int i = 1; i < wall->tree->node_count; i++)
+        if (vec3_distance(x, wall->tree->center[i]) < vec3_distance(x, wall->tree->center[near]))
+            near = i;
+    return model_field_distance(wall, near, x);
+}
+
+// Sections are edited in the window; the edits are acts like the others, and the case comes out the same without it.
+static void sections_are_edited_in_the_window(void **state)
+{
+    (void)state;
+    CaseState *s = begin();
+    char out[4096];
+    assert_false(case_state_edit_begin(s));
+    case_state_click(s, vec3(6, 7, 8));
+    wait_and_look(s);
+    assert_false(case_state_edit_begin(s));      // local models have no sections
+    assert_true(s->message_is_fault && strstr(s->message, "M chooses the model"));
+    case_state_next(s, CASE_MODELS, 1);
+    wait_and_look(s);
+    if (s->progress.stage != BUILD_DONE)
+        fail_msg("%s", s->message);
+    assert_string_equal(s->list[CASE_MODELS].name[s->list[CASE_MODELS].chosen], "sweep");
+    const CaseWork *work = case_builder_work(s->builder);
+    const SweepModel *fitted = case_work_sweep(work);
+    const Vec3 middle = vec3(20, 7, 8 + 1.6 * 1.1);      // outside the wall, inside that of a section a fifth larger
+    assert_true(depth_in(s, middle) < 0);
+    assert_true(case_state_edit_begin(s));
+    int branch;
+    double t;
+    assert_true(sweep_edit_place(sweep_editor_field(s->editor), vec3(20, 7, 8 + 1.6), &branch, &t));
+    edit_state_go(&s->edit, branch, t);
+    edit_state_scale(&s->edit, 1.3);
+    case_state_edit_take(s);
+    assert_int_equal(case_acts_edits(&s->acts), 1);
+    edit_state_scale(&s->edit, 1.5);
+    case_state_edit_take(s);
+    // one history, in the editor and outside of it
+    case_state_undo(s);
+    assert_int_equal(sweep_editor_list(s->editor)->count, 1);
+    case_state_redo(s);
+    assert_int_equal(sweep_editor_list(s->editor)->count, 2);
+    case_state_undo(s);
+    case_state_edit_end(s);
+    wait_and_look(s);
+    assert_int_equal(s->progress.stage, BUILD_DONE);
+    // tree and model stay; the wall is that of the edits
+    assert_ptr_equal(case_work_sweep(case_builder_work(s->builder)), fitted);
+    assert_true(depth_in(s, middle) > 0);
+    case_state_redo(s);          // without the editor
+    case_state_undo(s);
+    case_state_act(s, CASE_TARGET, vec3(17, 11.5, 8));
+    wait_and_look(s);
+    if (!case_state_save(s, in_folder("edited"), out, sizeof out, &faults))
+        fail_msg("%s", s->message);
+    has_edits("edited/trace.yaml", 1);
+    size_t length;
+    char *trace = whole_file_read(in_folder("edited/trace.yaml"), &length, &faults);
+    for (int threads = 1; threads <= 2; threads++) {
+        CaseOptions options = {.input = s->made.input, .library = s->made.library, .trace = trace, .trace_path = "trace.yaml", .threads = threads};
+        CaseFigures figures;
+        char name[20];
+        snprintf(name, sizeof name, "headless%d", threads);
+        if (!case_make(in_folder(name), &options, &figures, &faults))
+            fail_msg("%s", faults.text[0]);
+        assert_int_equal(same_folders("edited", name), 0);
+    }
+    // another tree has other branches: the edits count no longer, until that is undone
+    case_state_act(s, CASE_CUT, vec3(18, 12.5, 8));
+    assert_true(s->message_is_fault && strstr(s->message, "1 edits"));
+    assert_int_equal(case_acts_edits(&s->acts), 0);
+    wait_and_look(s);
+    assert_int_equal(s->progress.stage, BUILD_DONE);
+    assert_true(depth_in(s, middle) < 0);
+    case_state_undo(s);
+    wait_and_look(s);
+    assert_int_equal(case_acts_edits(&s->acts), 1);
+    assert_true(depth_in(s, middle) > 0);
+    // and edits of what has no sections are refused
+    CaseOptions options = {.input = s->made.input, .trace = trace, .trace_path = "trace.yaml", .has_kind = true};
+    CaseFigures figures;
+    faults_clear(&faults);
+    assert_false(case_make(in_folder("local"), &options, &figures, &faults));
+    assert_non_null(strstr(faults.text[0], "has no sections to edit"));
+    faults_clear(&faults);
+    free(trace);
+    end(s);
+}
+
 static void views_move_as_the_patient_lies(void **state)
 {
     (void)state;
@@ -337,9 +444,10 @@ static void views_move_as_the_patient_lies(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(letters_are_the_patients),       cmocka_unit_test(a_click_in_a_projection_meets_the_vessel),
-        cmocka_unit_test(views_move_as_the_patient_lies), cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
-        cmocka_unit_test(what_runs_is_stopped_at_once),   cmocka_unit_test(a_case_is_the_same_without_the_window),
+        cmocka_unit_test(letters_are_the_patients),          cmocka_unit_test(a_click_in_a_projection_meets_the_vessel),
+        cmocka_unit_test(views_move_as_the_patient_lies),    cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
+        cmocka_unit_test(what_runs_is_stopped_at_once),      cmocka_unit_test(a_case_is_the_same_without_the_window),
+        cmocka_unit_test(sections_are_edited_in_the_window),
     };
     return cmocka_run_group_tests(tests, make_volume, remove_folder);
 }
