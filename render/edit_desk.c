@@ -48,8 +48,8 @@ void edit_desk_leave(EditDesk *w)
     EditState *s = w->state;
     if (w->shows_help)
         w->shows_help = false;
-    else if (s->draws_branch)
-        edit_state_draw_end(s, false);
+    else if (edit_state_draws(s))
+        edit_state_pen_end(s, false);
     else if (s->looks)
         edit_state_go(s, s->branch, s->t);
     else
@@ -61,6 +61,20 @@ void edit_desk_leave(EditDesk *w)
 
 static void press_control(EditDesk *w, int key)
 {
+    const double turn = 12;  // [pixel] of the mouse's way for a key
+    FreeCamera *camera = edit_scene_camera(w->scene);
+    switch (key) {
+    case WINDOW_KEY_LEFT: free_camera_orbit(camera, -turn, 0); break;
+    case WINDOW_KEY_RIGHT: free_camera_orbit(camera, turn, 0); break;
+    case WINDOW_KEY_UP: free_camera_orbit(camera, 0, -turn); break;
+    case WINDOW_KEY_DOWN: free_camera_orbit(camera, 0, turn); break;
+    case '=':
+    case WINDOW_KEY_KEYPAD_ADD: free_camera_zoom(camera, 1, 50, 50, 100, 100); break;
+    case '-':
+    case WINDOW_KEY_KEYPAD_SUBTRACT: free_camera_zoom(camera, -1, 50, 50, 100, 100); break;
+    default: break;
+    }
+    edit_scene_redraw(w->scene);
     w->wants.undo |= key == 'Z';
     w->wants.redo |= key == 'Y';
     w->wants.save |= key == 'S';
@@ -86,10 +100,39 @@ static void change_blend(EditState *s, float by)
     edit_state_blend(s, true);
 }
 
+// While a branch or a contour is drawn. A branch goes parallel to the screen, and towards and away from the viewer. False: not a key of the pen.
+static bool press_pen(EditDesk *w, int key)
+{
+    EditState *s = w->state;
+    Camera camera = edit_scene_projection(w->scene, w->scene_at);
+    const Vec3 right = s->draws_branch ? camera.right : vec3(1, 0, 0), up = s->draws_branch ? camera.up : vec3(0, 1, 0);
+    const Vec3 near = s->draws_branch ? camera.back : vec3(0, 0, 0);
+    const double step = (s->draws_branch ? 0.1 : 0.05) * (w->shift ? 10 : 1);    // [mm]
+    const float wider = 0.05f;
+    switch (key) {
+    case WINDOW_KEY_LEFT: edit_state_pen_move(s, vec3_scale(right, -step)); break;
+    case WINDOW_KEY_RIGHT: edit_state_pen_move(s, vec3_scale(right, step)); break;
+    case WINDOW_KEY_UP: edit_state_pen_move(s, vec3_scale(up, step)); break;
+    case WINDOW_KEY_DOWN: edit_state_pen_move(s, vec3_scale(up, -step)); break;
+    case WINDOW_KEY_PAGE_UP: edit_state_pen_move(s, vec3_scale(near, step)); break;
+    case WINDOW_KEY_PAGE_DOWN: edit_state_pen_move(s, vec3_scale(near, -step)); break;
+    case WINDOW_KEY_SPACE: edit_state_pen_add(s); break;
+    case WINDOW_KEY_BACKSPACE: edit_state_pen_back(s); break;
+    case WINDOW_KEY_ENTER: edit_state_pen_end(s, true); break;
+    case '=':
+    case WINDOW_KEY_KEYPAD_ADD: s->drawn_radius += wider; break;
+    case '-':
+    case WINDOW_KEY_KEYPAD_SUBTRACT: s->drawn_radius = fmaxf(0.1f, s->drawn_radius - wider); break;
+    default: return false;
+    }
+    edit_scene_redraw(w->scene);
+    return true;
+}
+
 static void press_section_key(EditState *s, int key)
 {
     switch (key) {
-    case WINDOW_KEY_TAB: s->handle = (s->handle + 1) % EDIT_HANDLES; break;
+    case WINDOW_KEY_TAB: edit_state_handle(s, (s->handle + 1) % EDIT_HANDLES); break;
     case WINDOW_KEY_UP: nudge(s, 0.02); break;
     case WINDOW_KEY_DOWN: nudge(s, -0.02); break;
     case '=':
@@ -109,23 +152,22 @@ static void press_section_key(EditState *s, int key)
 static void press(EditDesk *w, int key)
 {
     EditState *s = w->state;
+    w->has_left &= key == WINDOW_KEY_ESCAPE;
+    if (edit_state_draws(s) && press_pen(w, key))
+        return;
     switch (key) {
-    case WINDOW_KEY_ESCAPE: edit_desk_leave(w); return;
+    case WINDOW_KEY_ESCAPE: edit_desk_leave(w); break;
     case WINDOW_KEY_PAGE_UP: edit_state_step(s, 1); break;
     case WINDOW_KEY_PAGE_DOWN: edit_state_step(s, -1); break;
     case WINDOW_KEY_RIGHT: edit_state_move(s, 0.1); break;
     case WINDOW_KEY_LEFT: edit_state_move(s, -0.1); break;
     case ']': edit_state_branch(s, 1); break;
     case '[': edit_state_branch(s, -1); break;
-    case WINDOW_KEY_ENTER:
-        if (s->draws_branch)
-            edit_state_draw_end(s, true);
-        else
-            edit_state_keep(s);
-        break;
+    case WINDOW_KEY_ENTER: edit_state_keep(s); break;
     case 'J': change_blend(s, -0.05f); break;
     case 'K': change_blend(s, 0.05f); break;
     case 'B': edit_state_draw_begin(s); break;
+    case 'D': edit_state_contour_begin(s); break;
     case 'X': edit_state_cut(s); break;
     case 'T': edit_state_flip(s); break;
     case 'H': w->shows_help = !w->shows_help; break;
@@ -136,7 +178,6 @@ static void press(EditDesk *w, int key)
         break;
     default: press_section_key(s, key); break;
     }
-    w->has_left = false;
 }
 
 // --- mouse ---

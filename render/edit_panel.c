@@ -17,12 +17,19 @@ static const char *const key_help[][2] = {{"click on the wall", "goes there"},
                                           {"drag a handle", "moves the contour"},
                                           {"Tab, then Up, Down", "chooses a handle, moves it by 0.02 mm; Enter keeps it"},
                                           {"Shift and drag", "draws a new contour around the vessel"},
+                                          {"D", "draws a new contour by keys, from the handle"},
                                           {"+ and -", N_("makes the section 2 % larger, smaller")},
                                           {"Delete", "deletes the section"},
                                           {"E, O", "extent and shape of the smoothing"},
                                           {N_(", and ."), "weaker, stronger; A applies it"},
                                           {"J, K", "narrower, wider blend at the fork"},
-                                          {"B", "draws a new branch from the point clicked"},
+                                          {"B", "draws a new branch from the point clicked, or the handle"},
+                                          {"while drawing: arrows", "move the pen (Shift: ten times)"},
+                                          {"Page Up, Page Down", "move the pen of a branch to and from the viewer"},
+                                          {"Space, Backspace", "adds a point, takes it back"},
+                                          {"Enter, Esc", "ends, drops what is drawn"},
+                                          {N_("+ and -"), "wider, narrower branch"},
+                                          {N_("Ctrl and arrows, + and -"), "turns, zooms the surface"},
                                           {"X", "cuts the branch here"},
                                           {"T", "turns the flow of the nearer end"},
                                           {"Ctrl+Z, Ctrl+Y", "undoes, does again"},
@@ -144,7 +151,8 @@ EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_
     show_smoothing(gui, s);
     show_fork(gui, s);
     show_branches(gui, s);
-    heading(gui, "EDITS");
+    snprintf(title, sizeof title, is_of_case ? tr("EDITS: %d") : edits == s->saved_count ? tr("EDITS: %d, saved") : tr("EDITS: %d, not saved"), edits);
+    heading(gui, title);
     float third = floorf((gui_width(gui) - 2 * gap) / 3);
     actions.undo = gui_button(gui, "undo", "Undo", "^Z", third, false).pressed;
     gui_beside(gui, gap);
@@ -155,7 +163,6 @@ EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_
     gui_space(gui, floorf(2 * k));
     gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, s->message);
     gui_window_end(gui);
-    snprintf(title, sizeof title, is_of_case ? "%d edits" : "%d edits, %s", edits, edits == s->saved_count ? "saved" : "not saved");
     show_edits(gui, s, (GuiRect){at.x, at.y + at.height - list_height, at.width, list_height});
     return actions;
 }

@@ -63,7 +63,7 @@ void edit_scene_focus(EditScene *scene, Vec3 x)
     scene->is_stale = true;
 }
 
-static Camera projection(const EditScene *scene, GuiRect at) { return free_camera_projection(&scene->camera, (int)at.width, (int)at.height, scene->depth); }
+Camera edit_scene_projection(const EditScene *scene, GuiRect at) { return free_camera_projection(&scene->camera, (int)at.width, (int)at.height, scene->depth); }
 
 static void add_ends(EditScene *scene, const EditState *s)
 {
@@ -98,12 +98,16 @@ static void add_section(EditScene *scene, const EditState *s, double pixel)
         radius[i] = 2 * pixel, color[i] = section_color;
     }
     primitives_tube(&scene->primitives, s->outline.count > 0 ? POINTS : 0, point, radius, color);
-    for (int i = 0; s->draws_branch && i < s->drawn_count; i++) {
-        primitives_sphere(&scene->primitives, s->drawn[i], fmax(4 * pixel, 0.5 * (double)s->drawn_radius), drawn_color);
+    // the points, and the pen after them
+    for (int i = 0; s->draws_branch && i <= s->drawn_count; i++) {
+        bool is_pen = i == s->drawn_count;
+        Vec3 line[2] = {s->drawn[i > 0 ? i - 1 : 0], is_pen ? s->pen : s->drawn[i]};
+        primitives_sphere(&scene->primitives, line[1], is_pen ? 3 * pixel : fmax(4 * pixel, 0.5 * (double)s->drawn_radius),
+                          is_pen ? section_color : drawn_color);
         double thin[2] = {2 * pixel, 2 * pixel};
         Color both[2] = {drawn_color, drawn_color};
         if (i > 0)
-            primitives_tube(&scene->primitives, 2, &s->drawn[i - 1], thin, both);
+            primitives_tube(&scene->primitives, 2, line, thin, both);
     }
 }
 
@@ -128,7 +132,7 @@ bool edit_scene_draw(EditScene *scene, EditState *s, GuiRect at, int height, cha
         scene->is_stale = true;
     }
     if (scene->is_stale) {
-        Camera camera = projection(scene, at);
+        Camera camera = edit_scene_projection(scene, at);
         ShellStyle style = shell_style_glass();
         style.front_opacity = style.back_opacity = style.rim = 1;
         memcpy(style.haze, background, sizeof style.haze);
@@ -167,7 +171,7 @@ static bool weights(const Vec3 p[3], double x, double y, double w[3])
 bool edit_scene_pick(const EditScene *scene, const EditState *s, GuiRect at, double x, double y, Vec3 *wall, int *branch, double *t)
 {
     const TriangleMesh *mesh = s->mesh->surface;
-    Camera camera = projection(scene, at);
+    Camera camera = edit_scene_projection(scene, at);
     double nearest = -HUGE_VAL;
     for (int i = 0; i < mesh->triangle_count; i++) {
         Vec3 p[3];
@@ -193,7 +197,7 @@ bool edit_scene_pick(const EditScene *scene, const EditState *s, GuiRect at, dou
 
 Vec3 edit_scene_point(const EditScene *scene, GuiRect at, double x, double y, Vec3 through)
 {
-    Camera camera = projection(scene, at);
+    Camera camera = edit_scene_projection(scene, at);
     Vec3 p = camera_project(&camera, through);
     return vec3_add_scaled(vec3_add_scaled(through, (x - (double)at.x - p.x) * camera.mm_per_pixel, camera.right),
                            -(y - (double)at.y - p.y) * camera.mm_per_pixel, camera.up);

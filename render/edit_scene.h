@@ -19,6 +19,8 @@ bool edit_scene_draw(EditScene *scene, EditState *state, GuiRect at, int height,
 bool edit_scene_pick(const EditScene *scene, const EditState *state, GuiRect at, double x, double y, Vec3 *wall, int *branch, double *t);
 // The point under a pixel in the plane, parallel to the screen, through `through`.
 Vec3 edit_scene_point(const EditScene *scene, GuiRect at, double x, double y, Vec3 through);
+// How the view at `at` sees space.
+Camera edit_scene_projection(const EditScene *scene, GuiRect at);
 // Turns the camera's focus to a point.
 void edit_scene_focus(EditScene *scene, Vec3 x);
 

@@ -102,7 +102,7 @@ static void take_contour(EditState *s)
 {
     take_outline(s);
     take_points(s);
-    s->is_moved = false;
+    s->is_moved = s->draws_contour = false;
     s->stroke_count = 0;
     s->blend = (float)sweep_model_blend(model(s), s->branch);
 }
@@ -235,8 +235,8 @@ void edit_state_keep(EditState *s)
         show_contour(s, true);
 }
 
-// Points of a stroke closer than a 200th of its extent are left out.
-void edit_state_stroke_end(EditState *s)
+// Points of a stroke closer than a 50th of its extent are left out.
+static void end_stroke(EditState *s, int least, const char *too_short)
 {
     static Vec3 point[EDIT_STROKE];
     Vec3 *kept = s->stroke;
@@ -250,12 +250,71 @@ void edit_state_stroke_end(EditState *s)
     while (count > 3 && vec3_distance(kept[count - 1], kept[0]) < extent / 50)
         count--;
     s->stroke_count = 0;
-    if (count < 6) {
-        edit_state_say(s, true, "the stroke is too short; draw once around the vessel with Shift and the left button held");
+    if (count < least) {
+        edit_state_say(s, true, "%s", tr(too_short));
         return;
     }
     SweepEdit edit = section_of(s, point, count, kept);
     apply(s, &edit, true);
+}
+
+void edit_state_stroke_end(EditState *s)
+{
+    const int least = 6;     // of a hand that goes around
+    end_stroke(s, least, N_("the stroke is too short; draw once around the vessel with Shift and the left button held"));
+}
+
+// --- drawing by keys ---
+
+void edit_state_handle(EditState *s, int handle)
+{
+    s->handle = handle;
+    s->wall = edit_state_in_space(s, s->contour[handle * (EDIT_CONTOUR / EDIT_HANDLES)]);
+}
+
+void edit_state_contour_begin(EditState *s)
+{
+    edit_state_go(s, s->branch, s->t);
+    s->draws_contour = true;
+    s->draws_branch = false;
+    s->pen = s->contour[s->handle * (EDIT_CONTOUR / EDIT_HANDLES)];
+    edit_state_say(s, false, "arrows move the pen, Space adds a point, Backspace takes it back; Enter closes the contour, Esc drops it");
+}
+
+bool edit_state_draws(const EditState *s) { return s->draws_contour || s->draws_branch; }
+
+void edit_state_pen_move(EditState *s, Vec3 by) { s->pen = vec3_add(s->pen, by); }
+
+void edit_state_pen_add(EditState *s)
+{
+    if (s->draws_branch)
+        edit_state_draw_add(s, s->pen);
+    else if (s->draws_contour && s->stroke_count < EDIT_STROKE)
+        s->stroke[s->stroke_count++] = s->pen;
+}
+
+// The first point of a branch is where it begins.
+void edit_state_pen_back(EditState *s)
+{
+    if (s->draws_branch && s->drawn_count > 1)
+        s->drawn_count--;
+    else if (s->draws_contour && s->stroke_count > 0)
+        s->stroke_count--;
+}
+
+void edit_state_pen_end(EditState *s, bool is_kept)
+{
+    if (s->draws_branch) {
+        edit_state_draw_end(s, is_kept);
+        return;
+    }
+    s->draws_contour = false;
+    if (is_kept) {
+        end_stroke(s, 3, N_("a contour needs three points or more"));
+    } else {
+        s->stroke_count = 0;
+        edit_state_say(s, false, "the contour was dropped");
+    }
 }
 
 void edit_state_delete(EditState *s)
@@ -304,15 +363,18 @@ void edit_state_cut(EditState *s)
 void edit_state_draw_begin(EditState *s)
 {
     s->draws_branch = true;
-    s->drawn_count = 0;
+    s->draws_contour = false;
+    s->stroke_count = s->drawn_count = 0;
     edit_state_draw_add(s, s->wall);
-    edit_state_say(s, false, "click points of the new branch; Enter ends it, Esc drops it");
+    edit_state_say(s, false,
+                   "click points of the new branch, or arrows and Page Up and Page Down move the pen and Space adds a point; Enter ends it, Esc drops it");
 }
 
 void edit_state_draw_add(EditState *s, Vec3 x)
 {
     if (s->drawn_count < EDIT_DRAWN)
         s->drawn[s->drawn_count++] = short_point(x);
+    s->pen = x;
 }
 
 void edit_state_draw_end(EditState *s, bool is_kept)

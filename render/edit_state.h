@@ -27,7 +27,9 @@ typedef struct EditState {
     SmoothShape shape;
     SmoothExtent extent;     // section, branch or tree
     float blend;             // of the branch's fork, as the slider shows it
-    bool draws_branch;       // the next clicks add points of a new branch
+    bool draws_contour;      // the pen adds points of the stroke
+    bool draws_branch;       // clicks, or the pen, add points of a new branch
+    Vec3 pen;                // where keys draw: in space for a branch, (n, b, 0) for a contour
     int drawn_count;
     Vec3 drawn[EDIT_DRAWN];
     float drawn_radius;      // [mm]
@@ -60,6 +62,15 @@ void edit_state_drag(EditState *state, Vec3 nb);
 void edit_state_scale(EditState *state, double factor);
 void edit_state_keep(EditState *state);
 void edit_state_stroke_end(EditState *state);        // the stroke becomes the section
+// Chooses a handle; a new branch begins at the wall there.
+void edit_state_handle(EditState *state, int handle);
+// The same by keys: the stroke goes from point to point of a pen, which begins at the handle.
+void edit_state_contour_begin(EditState *state);
+bool edit_state_draws(const EditState *state);       // a contour, or a branch
+void edit_state_pen_move(EditState *state, Vec3 by);
+void edit_state_pen_add(EditState *state);           // a point at the pen
+void edit_state_pen_back(EditState *state);          // takes the last point back
+void edit_state_pen_end(EditState *state, bool is_kept);
 void edit_state_delete(EditState *state);
 void edit_state_smooth(EditState *state, bool is_kept);      // not kept: shows what it would be
 void edit_state_blend(EditState *state, bool is_kept);

@@ -188,7 +188,15 @@ void section_view_draw_contour(const SectionView *v, Gui *gui, const EditState *
     draw_closed(v, gui, at, s->outline.count > 0 ? FINE : 0, fine, gui_colors.accent, 2 * k, false);
     if (s->stroke_count > 1)
         draw_closed(v, gui, at, s->stroke_count, s->stroke, gui_colors.warning, 2 * k, true);
-    for (int i = 0; i < EDIT_HANDLES; i++) {
+    for (int i = 0; s->draws_contour && i <= s->stroke_count; i++) {
+        bool is_pen = i == s->stroke_count;
+        Vec3 at_point = is_pen ? s->pen : s->stroke[i];
+        float x, y, size = 4 * k;
+        to_pixel(v, at, at_point, &x, &y);
+        gui_draw_line(gui, x - size, y - size, x + size, y + size, is_pen ? gui_colors.text : gui_colors.warning, 2 * k);
+        gui_draw_line(gui, x - size, y + size, x + size, y - size, is_pen ? gui_colors.text : gui_colors.warning, 2 * k);
+    }
+    for (int i = 0; i < EDIT_HANDLES && !s->draws_contour; i++) {
         float x, y, size = (i == s->handle ? 9 : 6) * k;
         to_pixel(v, at, s->contour[i * (EDIT_CONTOUR / EDIT_HANDLES)], &x, &y);
         gui_draw_fill(gui, (GuiRect){x - size / 2 - k, y - size / 2 - k, size + 2 * k, size + 2 * k}, gui_colors.window);

@@ -102,6 +102,40 @@ static void a_saved_session_is_what_its_edits_replay_to(void **state)
     assert_int_equal(access(in_folder("window.png"), R_OK), 0);
 }
 
+// A contour and a branch drawn by keys alone; the pointer lies in a corner. A round contour of four points around the trunk, whose radius is 2 mm.
+static const char keys[] =
+    "P=${TEST_PAUSE:-0.25}; W=$(xdotool search --sync --onlyvisible --name Seldinger | head -1); xdotool windowmove $W 0 0; "
+    "xdotool windowfocus --sync $W 2>/dev/null; xdotool mousemove 899 1; sleep 1; k() { for a in \"$@\"; do xdotool key $a; sleep $P; done; }; "
+    "k Prior d space BackSpace space; k shift+Up shift+Up shift+Up shift+Up shift+Left shift+Left shift+Left shift+Left space; "
+    "k shift+Left shift+Left shift+Left shift+Left shift+Down shift+Down shift+Down shift+Down space; "
+    "k shift+Right shift+Right shift+Right shift+Right shift+Down shift+Down shift+Down shift+Down space; k Return; "
+    "k ctrl+Right ctrl+Up ctrl+equal; k Tab Tab Tab Tab b shift+Up shift+Up shift+Up space shift+Up shift+Next Right space equal Return; k d space Escape; k "
+    "ctrl+s; "
+    "while xdotool search --name Seldinger >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; done";
+
+static void contours_and_branches_are_drawn_by_keys(void **state)
+{
+    (void)state;
+    need_display();
+    int code = run("(%s) & %s edit model.h5 -o keys.h5 --duration-s 150 --size 900x600 >out.txt 2>&1; C=$?; wait; exit $C", keys, SELDINGER_PROGRAM);
+    assert_int_equal(code, 0);
+    assert_int_equal(run("%s edit keys.h5 --save-edits drawn.yaml && %s edit model.h5 --do drawn.yaml -o drawn.h5 --quiet && cmp keys.h5 drawn.h5",
+                         SELDINGER_PROGRAM, SELDINGER_PROGRAM),
+                     0);
+    EditList *list = edit_list_load(in_folder("drawn.yaml"), &faults);
+    assert_non_null(list);
+    assert_int_equal(list->count, 2);
+    const SweepEdit *section = &list->edit[0], *branch = &list->edit[1];
+    assert_true(section->kind == EDIT_SECTION && section->branch == 0 && section->count == 4);
+    for (int i = 0; i < 4; i++)      // from the handle, in quarter turns
+        assert_true(vec3_distance(section->point[i], vec3(2 - 2 * (i % 2) - 4 * (i == 2), 2 * (i == 1) - 2 * (i == 3), 0)) < 0.01);
+    assert_true(branch->kind == EDIT_BRANCH && branch->branch == 0 && branch->count == 3);
+    assert_true(fabs(branch->radius[2] - 0.55) < 1e-6);
+    assert_true(fabs(vec3_distance(branch->point[0], branch->point[1]) - 3) < 1e-3);
+    assert_true(fabs(vec3_distance(branch->point[1], branch->point[2]) - sqrt(2.01)) < 1e-3);
+    edit_list_free(list);
+}
+
 static void faults_and_usage_are_reported(void **state)
 {
     (void)state;
@@ -124,6 +158,7 @@ static void faults_and_usage_are_reported(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(faults_and_usage_are_reported), cmocka_unit_test(a_saved_session_is_what_its_edits_replay_to)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(faults_and_usage_are_reported), cmocka_unit_test(a_saved_session_is_what_its_edits_replay_to),
+                                       cmocka_unit_test(contours_and_branches_are_drawn_by_keys)};
     return cmocka_run_group_tests(tests, make_model, end);
 }
