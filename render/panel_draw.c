@@ -237,7 +237,9 @@ static void draw_bottom(Panel *panel, const PanelState *state)
         gui_beside(gui, 0);
         if (!is_happening)
             panel_hint_text(hint, text, sizeof text);
-        if (state->is_finished) {
+        if (state->is_finished && panel->is_replay) {
+            snprintf(text, sizeof text, "%s", tr("The exercise is over; its report compares it with earlier ones."));
+        } else if (state->is_finished) {
             char restart[16], quit[16];
             snprintf(text, sizeof text, tr("The exercise is over. %s restarts it, %s ends the session; its report compares it with earlier ones."),
                      key_table_text(ACTION_RESTART, restart, sizeof restart), key_table_text(ACTION_QUIT, quit, sizeof quit));

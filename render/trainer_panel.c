@@ -71,11 +71,13 @@ __attribute__((format(printf, 3, 4))) static void add_line(char *text, size_t ca
 }
 
 // The result: a first line, then the points of each part with the reason for those that were lost, then what the sum is multiplied by and the errors.
-static void tell_result(char *text, size_t capacity, const Scene *scene, const ScoreFigures *score)
+// A recording has no keys that restart or end it.
+static void tell_result(char *text, size_t capacity, const Scene *scene, const ScoreFigures *score, bool is_live)
 {
-    snprintf(text, capacity, tr("%s: %.0f points in %.0f s with %d handling error%s. {Restart} restarts; {Quit} ends.\n"),
-             score->state == SCORE_REACHED ? "Target reached and held" : "Time is up", score->points, score->time_s, score->error_total,
+    snprintf(text, capacity, tr("%s: %.0f points in %.0f s with %d handling error%s."),
+             score->state == SCORE_REACHED ? tr("Target reached and held") : tr("Time is up"), score->points, score->time_s, score->error_total,
              score->error_total == 1 ? "" : "s");
+    add_line(text, capacity, "%s\n", is_live ? tr(" {Restart} restarts; {Quit} ends.") : "");
     for (int i = 0; i < PART_COUNT; i++) {
         const ScorePartFigures *part = &score->judged[i];
         const ScorePartWords *words = &score_part_words[i];
@@ -116,7 +118,7 @@ static void name_spots(TrainerPanel *panel, const ScoreFigures *score)
     }
 }
 
-static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score)
+static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score, bool is_live)
 {
     PanelState *state = &panel->state;
     state->figure_count = state->error_count = 0;
@@ -152,7 +154,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
     state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
     if (state->is_finished) {
         char result[sizeof panel->result];
-        tell_result(result, sizeof result, scene, score);
+        tell_result(result, sizeof result, scene, score, is_live);
         key_table_fill(result, panel->result, sizeof panel->result);
     }
     state->instructions = state->is_finished ? panel->result : panel->task;
@@ -241,7 +243,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         state->real_time_factor = figures->real_time_factor;
         state->missed_deadlines = figures->deadline_misses;
     }
-    show_score(panel, scene, score);
+    show_score(panel, scene, score, figures != NULL);
     state->kerma_rate_mgy_min = xray->pedal > 0 ? score->pulse.rate_mgy_min + score->second_pulse.rate_mgy_min : 0;
     warn(panel, pose, score, figures);
 }

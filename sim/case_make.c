@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define MODEL "model.h5"
 #define SCENE "scene.yaml"
@@ -22,12 +23,14 @@ bool case_is_there(const char *folder)
     return is_there;
 }
 
-static bool create_folder(const char *folder, Faults *faults)
+// `is_new`: it was created here, and nothing is in it.
+static bool create_folder(const char *folder, bool *is_new, Faults *faults)
 {
     struct stat status;
+    *is_new = false;
     if (case_is_there(folder))
         faults_add(faults, folder, 0, 0, "is a case already; name another folder, or remove this one");
-    else if (mkdir(folder, 0777) != 0 && !(errno == EEXIST && stat(folder, &status) == 0 && S_ISDIR(status.st_mode)))
+    else if (!(*is_new = mkdir(folder, 0777) == 0) && !(errno == EEXIST && stat(folder, &status) == 0 && S_ISDIR(status.st_mode)))
         faults_add(faults, folder, 0, 0, "cannot be created as a folder: %s", strerror(errno));
     return faults->count == 0;
 }
@@ -236,34 +239,42 @@ static bool write_model(const CaseWork *work, const char *folder, Faults *faults
     return good;
 }
 
-// The device stands in the folder, so that the case can be copied.
-static bool write_device(const char *folder, const char *library, const char *device, bool *is_micro, Faults *faults)
+// A device of the library, which the folder gets as a copy, so that the case can be copied.
+typedef struct CaseDevice {
+    const char *name;        // NULL: none
+    char *text;
+    ToolKind kind;
+} CaseDevice;
+
+static bool read_device(CaseDevice *device, const char *library, Faults *faults)
 {
-    char *from = library && trace_is_device_name(device) ? text_file_in(library, device) : NULL;
     size_t length;
-    if (library && !from) {
-        faults_add(faults, device, 0, 0, "is not the name of a device file, without its folder, of letters, digits and . - _");
+    if (!device->name)
+        return true;
+    if (library && !trace_is_device_name(device->name)) {
+        faults_add(faults, device->name, 0, 0, "is not the name of a device file, without its folder, of letters, digits and . - _");
         return false;
     }
-    if (!from) {
-        faults_add(faults, device, 0, 0, "there is no folder of devices; name one: --tools FOLDER");
+    if (!library) {
+        faults_add(faults, device->name, 0, 0, "there is no folder of devices; name one: --tools FOLDER");
         return false;
     }
-    char *text = whole_file_read_most(from, 1 << 20, &length, faults);
-    bool good = text && write_text(folder, device, text, faults);
-    *is_micro = text && strstr(text, "\nkind: microcatheter");
-    free(text);
-    free(from);
+    char *path = text_file_in(library, device->name);
+    device->text = path ? whole_file_read_most(path, 1 << 20, &length, faults) : NULL;
+    if (!path)
+        faults_add(faults, device->name, 0, 0, "out of memory");
+    bool good = device->text && scene_device_kind(device->text, length, path, &device->kind, faults);
+    free(path);
     return good;
 }
 
-// Whether the scene can be opened: the wire fits into its catheter, and the segment exists.
-static bool is_valid(const char *folder, const char *text, Faults *faults)
+// Whether the scene can be opened: the wire fits into its catheter, and the segment exists. Its devices are those of the library.
+static bool is_valid(const char *library, const char *text, Faults *faults)
 {
-    char *path = text_file_in(folder, SCENE);
+    char *path = text_file_in(library ? library : ".", SCENE);
     Scene *scene = path ? scene_parse(text, strlen(text), path, faults) : NULL;
     if (!path)
-        faults_add(faults, folder, 0, 0, "out of memory");
+        faults_add(faults, SCENE, 0, 0, "out of memory");
     scene_free(scene);
     free(path);
     return scene != NULL;
@@ -271,36 +282,53 @@ static bool is_valid(const char *folder, const char *text, Faults *faults)
 
 static const char *choice(const char *option, const char *said) { return option && option[0] ? option : said && said[0] ? said : NULL; }
 
-static bool write_scene(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
+// What is written beside the model.
+typedef struct CaseTexts {
+    CaseDevice device, catheter;
+    char *scene;
+} CaseTexts;
+
+static void free_texts(CaseTexts *texts)
+{
+    free(texts->device.text);
+    free(texts->catheter.text);
+    free(texts->scene);
+}
+
+static bool prepare_texts(CaseTexts *texts, const CaseWork *work, const CaseOptions *options, Faults *faults)
 {
     char behind[PATH_MAX];
     const TraceCase *said = work->trace ? &work->trace->made : NULL;
-    const char *device = choice(options->device, said ? said->device : NULL), *catheter = choice(options->catheter, said ? said->catheter : NULL);
-    bool is_micro = false, is_wire = false;
+    *texts = (CaseTexts){.device.name = choice(options->device, said ? said->device : NULL),
+                         .catheter.name = choice(options->catheter, said ? said->catheter : NULL)};
     bool is_behind = options->is_behind || (said && said->is_behind);
     CaseScene scene = {.model = MODEL,
                        .contact = fit_model_is_swept(work->how.model) ? (ContactKind)(CONTACT_SWEEP + fit_model_section(work->how.model)) : CONTACT_LIM,
                        .frame = work->frame,
                        .behind = is_behind && path_resolve(options->input, behind) ? behind : NULL,
-                       .device = device,
-                       .catheter = catheter,
+                       .device = texts->device.name,
+                       .catheter = texts->catheter.name,
                        .anatomy = choice(options->anatomy, said ? said->anatomy : NULL),
                        .has_target = options->has_target || (said && said->has_target),
                        .target = options->has_target || !said ? options->target : said->target};
-    if ((device && !write_device(folder, options->library, device, &is_wire, faults)) ||
-        (catheter && !write_device(folder, options->library, catheter, &is_micro, faults)))
+    if (!read_device(&texts->device, options->library, faults) || !read_device(&texts->catheter, options->library, faults))
         return false;
-    scene.is_micro = is_micro;
-    char *text = case_scene_text(work->file.tree, &scene, faults);
-    bool good = text && is_valid(folder, text, faults) && write_text(folder, SCENE, text, faults);
-    free(text);
-    return good;
+    scene.is_micro = texts->catheter.name && texts->catheter.kind == TOOL_MICROCATHETER;
+    texts->scene = case_scene_text(work->file.tree, &scene, faults);
+    return texts->scene && is_valid(options->library, texts->scene, faults);
 }
 
 bool case_work_write(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
 {
-    return create_folder(folder, faults) && (!options->trace || write_text(folder, TRACE, options->trace, faults)) && write_model(work, folder, faults) &&
-           write_scene(work, folder, options, faults);
+    CaseTexts texts;
+    bool is_new, good = prepare_texts(&texts, work, options, faults) && create_folder(folder, &is_new, faults);
+    const CaseDevice *const device[] = {&texts.device, &texts.catheter};
+    good = good && (!options->trace || write_text(folder, TRACE, options->trace, faults)) && write_model(work, folder, faults);
+    for (int i = 0; good && i < 2; i++)
+        good = !device[i]->name || write_text(folder, device[i]->name, device[i]->text, faults);
+    good = good && write_text(folder, SCENE, texts.scene, faults);
+    free_texts(&texts);
+    return good;
 }
 
 void case_work_measure(const CaseWork *work, CaseFigures *figures)
@@ -328,8 +356,9 @@ bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figu
 {
     CaseWork work = {0};
     *figures = (CaseFigures){0};
+    bool is_new;
     // before the work that would be lost
-    if (!create_folder(folder, faults))
+    if (!create_folder(folder, &is_new, faults))
         return false;
     double start = clock_s(CLOCK_MONOTONIC);
     Volume *volume = options->trace ? volume_load(options->input, faults) : NULL;
@@ -342,5 +371,7 @@ bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figu
     if (work.file.tree)
         case_work_measure(&work, figures);
     case_work_free(&work);
+    if (!good && is_new)
+        rmdir(folder);       // unless something was written
     return good;
 }

@@ -45,7 +45,7 @@ typedef struct CaseWork {
 
 // Whether `folder` is a case. Its scene is written last.
 bool case_is_there(const char *folder);
-// Creates `folder`, unless it exists and is no case yet. Returns false with faults; files that were written before remain.
+// Creates `folder`, unless it exists and is no case yet. Returns false with faults: nothing is written, unless writing itself fails.
 bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figures, Faults *faults);
 
 // Reads the trace and tracks the volume (borrowed; NULL: the input is a tree, which is loaded). Without an entry the widest end of a vessel

@@ -8,6 +8,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
+// Only a session has a trainee and a date.
+static const char *device_of(const RecordedRun *run) { return run->trainee || run->date ? "not known: the session was interrupted" : "none: a scripted run"; }
+
 static bool save(const RecordedRun *run, const Scene *scene, const OpenVessel *open, const char *recording, void (*progress)(void *, double), void *context,
                  Faults *faults)
 {
@@ -31,8 +34,7 @@ static bool save(const RecordedRun *run, const Scene *scene, const OpenVessel *o
         faults_add(faults, recording, 0, 0, "cannot be scored: step %lld gives another state than the recorded one; see `seldinger replay --verify`",
                    (long long)rescore_first_different(rescore));
     else
-        good = session_files_save(scene, run->trainee ? run->trainee : "", "not known: the session was interrupted", date, rescore_score(rescore), recording,
-                                  faults);
+        good = session_files_save(scene, run->trainee ? run->trainee : "", device_of(run), date, rescore_score(rescore), recording, faults);
     rescore_free(rescore);
     return good;
 }

@@ -110,6 +110,8 @@ typedef struct Scene {
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
 Scene *scene_load(const char *path, Faults *faults);     // of a folder (sim/case_make.h): its scene.yaml
 void scene_free(Scene *scene);
+// The kind of the device that a device file (`text`, of `length` bytes) describes. False with faults.
+bool scene_device_kind(const char *text, size_t length, const char *path, ToolKind *kind, Faults *faults);
 // A tool's current options: scene->wire for the first; for the others their own, with start, direction, normal, sheath and gravity of scene->wire
 // (which `inlet: root` sets late).
 WireOptions scene_tool_wire(const Scene *scene, int tool);

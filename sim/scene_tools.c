@@ -265,6 +265,17 @@ static YamlMap device_map_of(YamlReader *reader)
     return yaml_map(root, keys);
 }
 
+bool scene_device_kind(const char *text, size_t length, const char *path, ToolKind *kind, Faults *faults)
+{
+    YamlReader *reader = yaml_reader_open(text, length, path, faults);
+    YamlMap map = reader ? device_map_of(reader) : (YamlMap){0};
+    YamlValue value = map.value.node ? yaml_get(&map, "kind", true) : (YamlValue){0};
+    int choice = value.node ? yaml_choice(value, tool_kind_name) : -1;
+    yaml_reader_close(reader);
+    *kind = choice >= 0 ? (ToolKind)choice : TOOL_WIRE;
+    return choice >= 0;
+}
+
 // Keys of a device file that describe the device. `bending_n_mm2` is the bending stiffness that its source gives for the first section: the section's modulus
 // and diameters must reproduce it.
 static void check_device(const ToolSource *source, const SceneTool *tool, bool sound)

@@ -8,6 +8,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-case-XXXXXX";
 #include "tests/folder.h"
@@ -75,10 +76,23 @@ static void a_case_has_a_catheter_and_an_anatomy(void **state)
         assert_true(strstr(text, "anatomy: basilar") && strstr(text, "name: catheter") && strstr(text, "name: wire"));
         free(text);
     }
-    // what does not fit is refused, and no case is left
+    // what does not fit is refused before anything is written
     snprintf(line, sizeof line, "case 'a tube.nrrd' --start 2,0,0 --tools %s --catheter microcatheter-angled.yaml --device wire-035-j.yaml -o thick", library);
     refused(line, "wire");
-    assert_int_equal(run_in("", "run thick --duration-s 0.05"), 2);
+    assert_int_equal(access(in_folder("thick"), F_OK), -1);
+    // a folder that was there stays as it was
+    snprintf(line, sizeof line,
+             "mkdir thick && echo mine > thick/notes && { %s case 'a tube.nrrd' --start 2,0,0 --tools %s --catheter microcatheter-angled.yaml "
+             "--device wire-035-j.yaml -o thick 2>/dev/null; [ $(ls thick) = notes ]; } &&",
+             SELDINGER_PROGRAM, library);
+    assert_int_equal(run_in(line, "--version"), 0);
+    // the kind of a catheter is what its file means, however it is written
+    snprintf(line, sizeof line,
+             "mkdir flow && sed 's/^kind: microcatheter.*/\"kind\":   microcatheter/' %s/microcatheter-angled.yaml > flow/micro.yaml && "
+             "grep -q '\"kind\": ' flow/micro.yaml &&",
+             library);
+    assert_int_equal(run_in(line, "case 'a tube.nrrd' --start 2,0,0 --tools flow --catheter micro.yaml -o flowing"), 0);
+    assert_int_equal(run_in("", "run flowing --duration-s 0.05"), 0);
     refused("case 'a tube.nrrd' --start 2,0,0 --anatomy knee -o none", "--anatomy takes the name of a segment");
 }
 
@@ -112,6 +126,7 @@ static void bad_cases_are_refused(void **state)
     refused("case 'a tube.nrrd' --start 0,0,900 -o outside", "--start");
     refused("case tree.h5 --target 0,0,90 -o far", "outside the nearest vessel");
     refused("case tree.h5 -o tree.h5", "cannot be created as a folder");
+    assert_int_equal(run_in("mkdir far &&", "--version"), 0);
     refused("run far", "far: is a folder without scene.yaml");
     // a folder without a scene is no case yet
     assert_int_equal(run_in("", "case tree.h5 --quiet -o far"), 0);

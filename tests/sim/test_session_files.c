@@ -151,6 +151,16 @@ static void the_session_file_is_of_its_recording(void **state)
     assert_true(strstr(session.scene_path, saved.scene_path) > session.scene_path);      // an absolute path
     memcpy(session.scene_path, saved.scene_path, sizeof saved.scene_path);
     assert_memory_equal(&session, &saved, sizeof session);
+    // a run without a session was not interrupted
+    snprintf(report, sizeof report,
+             "cd '%s' && printf 't_s,push_mm_s,twist_deg_s\\n0,10,0\\n0.1,0,0\\n' > push.csv && %s run %s/scenes/phantom/scene.yaml --script push.csv "
+             "--duration-s 0.1 --record scripted.h5 --quiet && %s report --quiet scripted.h5",
+             folder, SELDINGER_PROGRAM, SOURCE_DIR, SELDINGER_PROGRAM);
+    assert_int_equal(system(report), 0);
+    assert_true(session_load(in_folder("scripted.json"), &session, &faults));
+    assert_string_equal(session.device, "none: a scripted run");
+    remove(in_folder("scripted.json"));
+    remove(in_folder("scripted.h5"));
     // a recording that does not exist
     faults_clear(&faults);
     assert_false(session_files_save(it.scene, "Ada", "keyboard", "2023-11-14T22:13:20Z", score, in_folder("nowhere.h5"), &faults));
