@@ -417,7 +417,7 @@ static const char *check(void *structure)
 #define AT(member) OPTION_AT(PapersBench, member)
 static const Option options[] = {
     {"volume", "V", OPTION_FILE, AT(volume), "an angiogram, for the tables of distances from the segmentation's surface"},
-    {"tree", "F.h5", OPTION_FILE, AT(tree), "the tree segmented from it"},
+    {"tree", "F.h5", OPTION_FILE, AT(tree), "the tree segmented from it; of a case its CASE/model.h5"},
     {"threshold", "X", OPTION_NUMBER, AT(threshold), "value of the angiogram at the segmentation's surface", .least = -1e9, .most = 1e9},
     BENCH_OPTIONS(PapersBench, common, "not used"),
 };

@@ -15,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { FORMAT_VERSION = 1 };
 
@@ -173,9 +174,23 @@ VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, 
     return parse(bytes, length, false, name, info, faults);
 }
 
+// Whether this is the folder of a case (sim/case_make.h), which users may name instead of the file in it.
+static bool is_case(const char *path)
+{
+    struct stat status;
+    char *model = text_file_in(path, "model.h5");
+    bool has_model = model && stat(model, &status) == 0;
+    free(model);
+    return has_model;
+}
+
 VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 {
     size_t length;
+    if (is_case(path)) {
+        faults_add(faults, path, 0, 0, "is the folder of a case, which keeps its tree and model in the file model.h5; expected %s/model.h5", path);
+        return NULL;
+    }
     char *bytes = whole_file_read(path, &length, faults);
     VesselTree *tree = bytes ? parse(bytes, length, true, path, info, faults) : NULL;
     free(bytes);

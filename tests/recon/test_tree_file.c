@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <fcntl.h>
 #include <glob.h>
 #include <hdf5.h>
 #include <signal.h>
@@ -254,6 +255,11 @@ static void damaged_bytes_are_refused(void **state)
     assert_null(tree_file_parse(bytes, length, "magic.h5", NULL, &faults));
     free(bytes);
     expect_fault(in_folder("none.h5"), "cannot be opened");
+    // the folder of a case, instead of the file in it
+    assert_int_equal(mkdir(in_folder("case"), 0777), 0);
+    expect_fault(in_folder("case"), "not a regular file but a folder");
+    assert_int_equal(close(open(in_folder("case/model.h5"), O_CREAT | O_WRONLY, 0666)), 0);
+    expect_fault(in_folder("case"), "case/model.h5");
     expect_fault(folder, "regular file");
 }
 
