@@ -418,7 +418,8 @@ static const char *take_shape(void *structure, const Option *option, const char 
 #define AT(member) OPTION_AT(ModelsBench, member)
 static const char *const only_choices[] = {"lim", "lim-paper", "sweep", "raster", "rbf", "pas", "sweep-paper", "rbf-paper", "pas-paper", NULL};
 static const Option options[] = {
-    {"tree", "F.h5", OPTION_FILE, AT(tree), "a segmented tree instead of the shapes, of a case its CASE/model.h5; may be given several times", .take = take_path},
+    {"tree", "F.h5", OPTION_FILE, AT(tree), "a segmented tree instead of the shapes, of a case its CASE/model.h5; may be given several times",
+     .take = take_path},
     {"model", "NAME", OPTION_CHOICE, AT(only), "only this model", .choices = only_choices, .otherwise = "all"},
     {"case", "NAME", OPTION_TEXT, AT(shape), "only the cases whose names begin so; may be given several times", .otherwise = "all", .take = take_shape},
     {"picture", "F.svg", OPTION_FILE, AT(picture), "sections through all models, one row of cells for each case, fork and sac (at most eight)"},

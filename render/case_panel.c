@@ -145,7 +145,7 @@ static void show_acts(Gui *gui, CaseState *s)
     char text[160];
     heading(gui, "ACTS");
     for (int i = s->acts.count > SHOWN ? s->acts.count - SHOWN : 0; i < s->acts.count; i++) {
-        case_act_describe(&s->acts.act[i], text, sizeof text);
+        case_act_describe(&s->acts.act[i], tr, text, sizeof text);
         gui_text(gui, GUI_SMALL, gui_colors.text, text);
     }
     if (gui_button(gui, "undo", "Undo", "^Z", half, false).pressed)

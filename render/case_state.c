@@ -86,6 +86,7 @@ bool case_state_begin(CaseState *s, const CaseOptions *made)
 {
     *s = (CaseState){.made = *made, .mode = CASE_START, .forbid_radius = 3, .chosen_mark = -1, .view = CASE_PROJECTION, .turns = true};
     s->made.trace_path = ACTS;
+    s->made.words = tr;
     s->made.has_kind = false;        // the trace says it
     s->acts.model = made->has_kind ? model_names[made->kind] : NULL;
     list_choices(s);
@@ -206,7 +207,7 @@ static void add(CaseState *s, const CaseAct *act)
         say(s, true, "out of memory");
         return;
     }
-    case_act_describe(act, text, sizeof text);
+    case_act_describe(act, tr, text, sizeof text);
     if (edits > 0)
         say(s, true, "%s; the %d edits of the wall before it no longer count: Ctrl+Z brings them back", text, edits);
     else
@@ -250,7 +251,7 @@ static void undo_or_redo(CaseState *s, bool is_undo)
         return;
     }
     const CaseAct *act = &s->acts.act[s->acts.count - !is_undo];
-    case_act_describe(act, text, sizeof text);
+    case_act_describe(act, tr, text, sizeof text);
     say(s, false, is_undo ? N_("undone: %s") : N_("done again: %s"), text);
     if (s->editor && act->kind == CASE_EDIT && is_undo)
         edit_state_undo(&s->edit);

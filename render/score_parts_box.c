@@ -32,7 +32,7 @@ static void print_part(const Box *box, const ScoreFigures *f, const ScoreFigures
 {
     const ScorePartFigures *judged = &f->judged[part];
     char title[100], points[40], measured[60], other[100] = "", why[120];
-    snprintf(title, sizeof title, "%s [%s]", score_part_words[part].title, score_part_words[part].unit);
+    snprintf(title, sizeof title, "%s [%s]", tr(score_part_words[part].title), tr(score_part_words[part].unit));
     print_points(judged, points);
     if (judged->most > 0)
         snprintf(measured, sizeof measured, tr("%.3g (full up to %.3g)"), judged->measured, judged->par);

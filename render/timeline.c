@@ -149,7 +149,7 @@ static void draw_note(Gui *gui, const TimelineState *state, const WindowInput *i
 {
     char text[200];
     float width, height, pad = 8 * scale;
-    run_mark_text(state->marks, mark, text, sizeof text);
+    run_mark_text(state->marks, mark, tr, text, sizeof text);
     gui_text_extent(gui, GUI_NORMAL, text, &width, &height);
     GuiRect box = {place(state, bar, state->marks->mark[mark].time_s) - width / 2 - pad, 0, width + 2 * pad + 2, height + 2 * pad};
     box.x = fmaxf(0, fminf(box.x, (float)input->width - box.width));

@@ -85,16 +85,16 @@ static void tell_result(char *text, size_t capacity, const Scene *scene, const S
         if (!(part->most > 0))
             continue;
         score_part_reason(score, (ScorePart)i, why, sizeof why);
-        add_line(text, capacity, tr("- %s: %.1f of %.1f points"), words->title, part->points, part->most);
+        add_line(text, capacity, tr("- %s: %.1f of %.1f points"), tr(words->title), part->points, part->most);
         if (*why)
-            add_line(text, capacity, tr(" (%.3g %s, full points up to %.3g): %s"), part->measured, words->unit, part->par, why);
+            add_line(text, capacity, tr(" (%.3g %s, full points up to %.3g): %s"), part->measured, tr(words->unit), part->par, tr(why));
         add_line(text, capacity, ".\n");
     }
     if (score->state != SCORE_REACHED)
         add_line(text, capacity, tr("- Only %.0f %% of these points count: the target was not held.\n"), 100 * score_share(score));
     for (int i = 0; i < ERROR_COUNT; i++)
         if (score->error[i].count > 0)
-            add_line(text, capacity, tr("- %d \u00d7 %s: %.1f points lost.\n"), score->error[i].count, score_error_words[i],
+            add_line(text, capacity, tr("- %d \u00d7 %s: %.1f points lost.\n"), score->error[i].count, tr(score_error_words[i]),
                      score_error_points(scene->exercise, (ScoreError)i) * score->error[i].count);
     const Guide *guide = &scene->exercise->guide;
     for (int i = 0; i < guide->count; i++)
@@ -112,9 +112,9 @@ static void name_spots(TrainerPanel *panel, const ScoreFigures *score)
     for (int i = 0; i < score->mark_count; i++) {
         const ScoreMark *mark = &score->mark[i];
         if (mark->kind == ERROR_SPASM)
-            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], tr("%s: radius %.0f %%"), score_error_words[mark->kind], 100 * score->narrowest);
+            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], tr("%s: radius %.0f %%"), tr(score_error_words[mark->kind]), 100 * score->narrowest);
         else
-            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], "%s", score_error_words[mark->kind]);
+            snprintf(panel->spot_text[i], sizeof panel->spot_text[i], "%s", tr(score_error_words[mark->kind]));
     }
 }
 
@@ -142,7 +142,7 @@ static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigur
         if (error->count == 0)
             continue;
         char *text = panel->error_text[state->error_count];
-        snprintf(text, sizeof panel->error_text[0], tr("%s%s: %d, last at %.1f s"), error->is_on ? tr("NOW ") : "", score_error_words[i], error->count,
+        snprintf(text, sizeof panel->error_text[0], tr("%s%s: %d, last at %.1f s"), error->is_on ? tr("NOW ") : "", tr(score_error_words[i]), error->count,
                  error->last_s);
         panel->error[state->error_count++] = text;
     }

@@ -90,37 +90,39 @@ const char *case_acts_model(const CaseActs *acts)
     return strcmp(name, model_names[0]) ? name : "";
 }
 
-static void describe_edit(const SweepEdit *edit, char *out, size_t capacity)
+static void describe_edit(const SweepEdit *edit, Words words, char *out, size_t capacity)
 {
-    static const char *const name[EDIT_KINDS] = {"section", "section deleted", "smoothed", "blend", "new branch", "cut", "flow"};
+    static const char *const name[EDIT_KINDS] = {"edit: section", "edit: section deleted", "edit: smoothed", "edit: blend", "edit: new branch", "edit: cut",
+                                                 "edit: flow"};
     const bool is_placed = edit->kind != EDIT_BLEND && edit->kind != EDIT_TAG && (edit->kind != EDIT_SMOOTH || edit->extent == SMOOTH_SECTION);
     if (edit->kind == EDIT_SMOOTH && edit->extent == SMOOTH_TREE)
-        snprintf(out, capacity, "edit: %s", name[edit->kind]);
+        snprintf(out, capacity, "%s", words(name[edit->kind]));
     else if (is_placed)
-        snprintf(out, capacity, "edit: %s, branch %d at %.2f mm", name[edit->kind], edit->branch, edit->t);
+        snprintf(out, capacity, words("%s, branch %d at %.2f mm"), words(name[edit->kind]), edit->branch, edit->t);
     else
-        snprintf(out, capacity, "edit: %s, branch %d", name[edit->kind], edit->branch);
+        snprintf(out, capacity, words("%s, branch %d"), words(name[edit->kind]), edit->branch);
 }
 
-void case_act_describe(const CaseAct *act, char *out, size_t capacity)
+void case_act_describe(const CaseAct *act, Words words, char *out, size_t capacity)
 {
     static const char *const name[CASE_ACTS] = {"start",  "branch", "forbid",   "cut",     "end here",   "sac",   "entry",
                                                 "target", "tool",   "catheter", "anatomy", "background", "model", "edit"};
     Vec3 x = act->place;
+    words = words ? words : words_english;
     if (act->kind == CASE_DEVICE)
-        snprintf(out, capacity, "tool: %s", act->name[0] ? act->name : "a wire that suits the vessels");
+        snprintf(out, capacity, words("tool: %s"), act->name[0] ? act->name : words("a wire that suits the vessels"));
     else if (act->kind == CASE_CATHETER || act->kind == CASE_ANATOMY)
-        snprintf(out, capacity, "%s: %s", name[act->kind], act->name[0] ? act->name : "none");
+        snprintf(out, capacity, "%s: %s", words(name[act->kind]), act->name[0] ? act->name : words("none"));
     else if (act->kind == CASE_MODEL)
-        snprintf(out, capacity, "model: %s", act->name[0] ? act->name : model_names[0]);
+        snprintf(out, capacity, words("model: %s"), act->name[0] ? act->name : model_names[0]);
     else if (act->kind == CASE_EDIT)
-        describe_edit(&act->edit, out, capacity);
+        describe_edit(&act->edit, words, out, capacity);
     else if (act->kind == CASE_BEHIND)
-        snprintf(out, capacity, "background: %s", act->is_on ? "the volume" : "a plain patient");
+        snprintf(out, capacity, words("background: %s"), act->is_on ? words("the volume") : words("a plain patient"));
     else if (act->kind == CASE_FORBID)
-        snprintf(out, capacity, "forbid %.1f mm around %.1f, %.1f, %.1f", act->radius, x.x, x.y, x.z);
+        snprintf(out, capacity, words("forbid %.1f mm around %.1f, %.1f, %.1f"), act->radius, x.x, x.y, x.z);
     else
-        snprintf(out, capacity, "%s at %.1f, %.1f, %.1f", name[act->kind], x.x, x.y, x.z);
+        snprintf(out, capacity, words("%s at %.1f, %.1f, %.1f"), words(name[act->kind]), x.x, x.y, x.z);
 }
 
 // With as few digits as give the same number again.

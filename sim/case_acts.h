@@ -3,6 +3,7 @@
 #define SELDINGER_SIM_CASE_ACTS_H
 
 #include "recon/recon.h"
+#include "sim/words.h"
 
 #include <stdbool.h>
 
@@ -55,8 +56,8 @@ int case_acts_edits(const CaseActs *acts);   // their number
 const char *case_acts_model(const CaseActs *acts);       // one of model_names; "": the first
 // Whether an act changes the tree or its model, so that they have to be made again.
 bool case_act_changes_tree(CaseActKind kind);
-// One line for people.
-void case_act_describe(const CaseAct *act, char *out, size_t capacity);
+// One line for people, in their language: `words` translates; NULL: English.
+void case_act_describe(const CaseAct *act, Words words, char *out, size_t capacity);
 // The trace as YAML; the caller frees it. NULL if no start is given, or out of memory.
 char *case_acts_trace(const CaseActs *acts);
 

@@ -115,7 +115,7 @@ static void look(CaseBuilder *b)
     Missed missed;
     if (!missed_find(b->volume, b->work.file.tree, &missed))
         missed = (Missed){.held = 1};
-    int count = case_marks_find(&b->work, &b->wall, &missed, wire, b->mark);
+    int count = case_marks_find(&b->work, &b->wall, &missed, wire, b->options.words, b->mark);
     b->mark_count = count > 0 ? count : 0;
     pthread_mutex_lock(&b->lock);
     b->progress.held = missed.held;

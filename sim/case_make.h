@@ -6,6 +6,7 @@
 #define SELDINGER_SIM_CASE_MAKE_H
 
 #include "recon/recon.h"
+#include "sim/case_acts.h"
 #include "sim/case_scene.h"
 
 typedef struct CaseOptions {
@@ -23,6 +24,7 @@ typedef struct CaseOptions {
     const char *library;         // folder of device files; NULL: none
     int threads;                 // 0: all cores; the result does not depend on them
     const Progress *progress;    // may be NULL
+    Words words;             // translates the texts of marks, in the builder's thread; NULL: English
 } CaseOptions;
 
 typedef struct CaseFigures {

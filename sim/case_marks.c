@@ -8,6 +8,7 @@
 typedef struct Marks {
     CaseMark *mark;
     int count, of_kind[MARK_KINDS];
+    Words words;
 } Marks;
 
 static void add(Marks *marks, CaseMarkKind kind, const Vec3 *place, const char *format, ...) __attribute__((format(printf, 4, 5)));
@@ -21,7 +22,7 @@ static void add(Marks *marks, CaseMarkKind kind, const Vec3 *place, const char *
     marks->of_kind[kind]++;
     *mark = (CaseMark){.kind = kind, .has_place = place != NULL, .place = place ? *place : vec3(0, 0, 0)};
     va_start(arguments, format);
-    vsnprintf(mark->text, sizeof mark->text, format, arguments);
+    vsnprintf(mark->text, sizeof mark->text, marks->words(format), arguments);
     va_end(arguments);
 }
 
@@ -53,7 +54,7 @@ static bool add_stops(Marks *marks, const ModelField *wall, double tool_radius)
     Reach *reach = reach_create(wall, &options);
     for (int i = 0; reach && i < reach->stop_count; i++) {
         const ReachStop *s = &reach->stop[i];
-        const char *where = s->node == 0 ? "no tool enters" : "no tool goes on";
+        const char *where = marks->words(s->node == 0 ? "no tool enters" : "no tool goes on");
         if (s->apart)
             add(marks, MARK_NO_ENTRY, &s->place, "%s: the image shows no vessel in this gap; %.0f mm beyond", where, s->lost);
         else if (s->capped)
@@ -67,9 +68,9 @@ static bool add_stops(Marks *marks, const ModelField *wall, double tool_radius)
     return good;
 }
 
-int case_marks_find(const CaseWork *work, const ModelField *wall, const Missed *missed, double tool_radius, CaseMark *mark)
+int case_marks_find(const CaseWork *work, const ModelField *wall, const Missed *missed, double tool_radius, Words words, CaseMark *mark)
 {
-    Marks marks = {.mark = mark};
+    Marks marks = {.mark = mark, .words = words ? words : words_english};
     for (int i = 0; i < work->report.check.warning_count; i++)
         add(&marks, MARK_DOUBT, NULL, "%s", work->report.check.warning[i].text);
     for (int i = 0; i < work->report.junction_count; i++) {

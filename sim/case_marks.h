@@ -15,7 +15,7 @@ typedef struct CaseMark {
 } CaseMark;
 
 enum { CASE_MARKS = 64 };
-// Writes at most CASE_MARKS marks: of each kind the most important ones first. `tool_radius` [mm]. Returns their number; -1: out of memory.
-int case_marks_find(const CaseWork *work, const ModelField *wall, const Missed *missed, double tool_radius, CaseMark *mark);
+// Writes at most CASE_MARKS marks: of each kind the most important ones first. `tool_radius` [mm]; `words` translates, NULL: English. Returns their number; -1: out of memory.
+int case_marks_find(const CaseWork *work, const ModelField *wall, const Missed *missed, double tool_radius, Words words, CaseMark *mark);
 
 #endif

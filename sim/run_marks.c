@@ -123,19 +123,19 @@ int run_marks_at(const RunMarks *marks, double time_s)
     return -1;
 }
 
-void run_mark_text(const RunMarks *marks, int index, char *text, size_t capacity)
+void run_mark_text(const RunMarks *marks, int index, Words words, char *text, size_t capacity)
 {
     const RunMark *mark = &marks->mark[index];
     const char *tool = mark->tool >= 0 && mark->tool < marks->run->tool_count && marks->run->tool_count > 1 ? marks->run->tool[mark->tool].name : "";
     switch (mark->kind) {
     case RUN_MARK_ERROR:
-        snprintf(text, capacity, "%.2f s: %s%s%s%s", mark->time_s, score_error_words[mark->error], *tool ? " (" : "", tool, *tool ? ")" : "");
+        snprintf(text, capacity, "%.2f s: %s%s%s%s", mark->time_s, words(score_error_words[mark->error]), *tool ? " (" : "", tool, *tool ? ")" : "");
         break;
-    case RUN_MARK_BOOKMARK: snprintf(text, capacity, "%.2f s: bookmark %d", mark->time_s, mark->number); break;
+    case RUN_MARK_BOOKMARK: snprintf(text, capacity, words("%.2f s: bookmark %d"), mark->time_s, mark->number); break;
     case RUN_MARK_INJECTION:
-        snprintf(text, capacity, "%.2f s: injection %d, %.1f ml requested in %.1f s", mark->time_s, mark->number, mark->requested_ml, mark->seconds);
+        snprintf(text, capacity, words("%.2f s: injection %d, %.1f ml requested in %.1f s"), mark->time_s, mark->number, mark->requested_ml, mark->seconds);
         break;
-    case RUN_MARK_TARGET: snprintf(text, capacity, "%.2f s: target held", mark->time_s); break;
+    case RUN_MARK_TARGET: snprintf(text, capacity, words("%.2f s: target held"), mark->time_s); break;
     }
 }
 

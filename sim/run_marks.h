@@ -3,6 +3,7 @@
 #ifndef SELDINGER_SIM_RUN_MARKS_H
 #define SELDINGER_SIM_RUN_MARKS_H
 
+#include "sim/words.h"
 #include "sim/recording.h"
 #include "sim/score.h"
 
@@ -38,8 +39,8 @@ void run_marks_free(RunMarks *marks);
 int run_marks_after(const RunMarks *marks, double time_s);
 int run_marks_before(const RunMarks *marks, double time_s);
 int run_marks_at(const RunMarks *marks, double time_s);
-// "12.30 s: tip force above the limit (wire)".
-void run_mark_text(const RunMarks *marks, int mark, char *text, size_t capacity);
+// "12.30 s: tip force above the limit (wire)"; `words` translates.
+void run_mark_text(const RunMarks *marks, int mark, Words words, char *text, size_t capacity);
 // When the clock of the score begins: with the first step in which a tool is moved, the pedal is down or contrast agent is injected; the end if there is none.
 double run_first_action_s(const RecordedRun *run);
 

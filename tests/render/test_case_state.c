@@ -423,6 +423,23 @@ static void sections_are_edited_in_the_window(void **state)
     end(s);
 }
 
+static const char *shouted(const char *text)
+{
+    return !strcmp(text, "cut") ? "SCHNITT" : !strcmp(text, "%s at %.1f, %.1f, %.1f") ? "%s BEI %.1f, %.1f, %.1f" : text;
+}
+
+// What the simulator puts together is in the language of the window.
+static void acts_are_translated(void **state)
+{
+    (void)state;
+    char text[100];
+    CaseAct act = {.kind = CASE_CUT, .place = vec3(1, 2, 3)};
+    case_act_describe(&act, NULL, text, sizeof text);
+    assert_string_equal(text, "cut at 1.0, 2.0, 3.0");
+    case_act_describe(&act, shouted, text, sizeof text);
+    assert_string_equal(text, "SCHNITT BEI 1.0, 2.0, 3.0");
+}
+
 static void views_move_as_the_patient_lies(void **state)
 {
     (void)state;
@@ -447,7 +464,7 @@ int main(void)
         cmocka_unit_test(letters_are_the_patients),          cmocka_unit_test(a_click_in_a_projection_meets_the_vessel),
         cmocka_unit_test(views_move_as_the_patient_lies),    cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
         cmocka_unit_test(what_runs_is_stopped_at_once),      cmocka_unit_test(a_case_is_the_same_without_the_window),
-        cmocka_unit_test(sections_are_edited_in_the_window),
+        cmocka_unit_test(sections_are_edited_in_the_window), cmocka_unit_test(acts_are_translated),
     };
     return cmocka_run_group_tests(tests, make_volume, remove_folder);
 }

@@ -55,7 +55,7 @@ static void marks_are_at_their_times(void **state)
     for (int i = 0; i < COUNT; i++) {
         assert_int_equal(marks.mark[i].kind, expected[i].kind);
         assert_true(fabs(marks.mark[i].time_s - expected[i].time_s) < 1e-9);
-        run_mark_text(&marks, i, text, sizeof text);
+        run_mark_text(&marks, i, words_english, text, sizeof text);
         assert_string_equal(text, expected[i].text);
     }
     assert_int_equal(marks.xray_count, 2);
