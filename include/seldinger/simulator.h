@@ -33,6 +33,16 @@ SEL_API void sel_simulator_destroy(SelSimulator *simulator);
 // `flags`. Errors: SEL_ERROR_ARGUMENT (a command is not finite or out of range; no step was taken), SEL_ERROR_OUTPUT (the recording cannot be written; the step
 // was taken).
 SEL_API SelStatus sel_simulator_step(SelSimulator *simulator, const SelHand *hand);
+// Makes `count` steps with one command, as if sel_simulator_step() were called that often; stops at the first error.
+SEL_API SelStatus sel_simulator_repeat(SelSimulator *simulator, const SelHand *hand, int count);
+// Makes `count` steps with the commands of the scene's script.
+SEL_API SelStatus sel_simulator_follow(SelSimulator *simulator, int count);
+// Returns to time 0 of the scene, as if the simulator were created again. Allocates for a score only. Errors: SEL_ERROR_STATE (a recording runs; nothing was
+// done), SEL_ERROR_MEMORY (the simulator is at time 0, without a score).
+SEL_API SelStatus sel_simulator_reset(SelSimulator *simulator);
+// Makes a simulator a copy of another one of the same scene: the next steps of both are the same bit for bit. Neither may keep a score. Allocates. Errors:
+// SEL_ERROR_ARGUMENT (another scene), SEL_ERROR_STATE (a score is kept or a recording runs), SEL_ERROR_MEMORY.
+SEL_API SelStatus sel_simulator_copy(SelSimulator *simulator, const SelSimulator *from);
 // The command of the scene's script for the next step; zero if there is no script or it has ended.
 SEL_API SelStatus sel_simulator_script_hand(SelSimulator *simulator, SelHand *hand);
 
@@ -90,6 +100,10 @@ typedef struct SelNode {
 SEL_API int sel_simulator_node_capacity(const SelSimulator *simulator, int tool);
 // Writes up to `capacity` nodes of a tool and their number. Errors: SEL_ERROR_ARGUMENT (no such tool, or too little room).
 SEL_API SelStatus sel_simulator_nodes(SelSimulator *simulator, int tool, SelNode *node, int capacity, int *count);
+// The centreline that all tools share, from the sheath to the foremost tip, without a copy: (count, 3) positions [mm] and (count, 4) quaternions w, x, y, z
+// whose x axis points along it. The arrays live as long as the simulator and change in each step and reset; `count` is constant with one tool. Any pointer may
+// be NULL. Error: SEL_ERROR_ARGUMENT.
+SEL_API SelStatus sel_simulator_centreline(const SelSimulator *simulator, const double **position_mm, const double **quaternion, int *count);
 // The position of a tool's tip.
 SEL_API SelStatus sel_simulator_tip(SelSimulator *simulator, int tool, double position_mm[3]);
 

@@ -183,6 +183,18 @@ SelStatus sel_scene_entry(const SelScene *scene, double point_mm[3], double dire
     return SEL_OK;
 }
 
+int sel_scene_target_count(const SelScene *scene) { return scene ? scene->scene->target_count : 0; }
+
+SelStatus sel_scene_target(const SelScene *scene, int index, SelTarget *target)
+{
+    if (index < 0 || index >= sel_scene_target_count(scene) || !target)
+        return SEL_ERROR_ARGUMENT;
+    const SceneTarget *from = &scene->scene->target[index];
+    *target = (SelTarget){.name = from->name, .radius_mm = from->radius};
+    give_vector(from->point, target->point_mm);
+    return SEL_OK;
+}
+
 SelStatus sel_scene_query(SelContext *context, const SelScene *scene, int count, const double *point_mm, double *gap_mm, double *normal)
 {
     if (!context || !scene || count < 0 || !point_mm || !gap_mm)

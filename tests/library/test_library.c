@@ -686,6 +686,92 @@ static void versions_and_names(void **state)
     assert_string_equal(sel_status_name((SelStatus)(SEL_DIFFERENT + 1)), "unknown");
 }
 
+// --- again and beside ---
+
+static SelSimulator *without_score(void)
+{
+    SelSimulator *simulator = NULL;
+    SelSimulatorOptions options = sel_simulator_defaults();
+    options.keeps_score = 0;
+    good(sel_simulator_create(context, scene, &options, &simulator));
+    return simulator;
+}
+
+static void a_reset_is_a_new_beginning(void **state)
+{
+    (void)state;
+    SelSimulator *simulator = new_simulator(scene);
+    SelScore score, again;
+    good(sel_simulator_follow(simulator, 300));
+    assert_true(sel_simulator_hash(simulator) == hash_after(scene, 300));
+    good(sel_simulator_score(simulator, &score, sizeof score));
+    good(sel_simulator_reset(simulator));
+    assert_int_equal(sel_simulator_steps(simulator), 0);
+    assert_true(sel_simulator_hash(simulator) == hash_after(scene, 0));
+    good(sel_simulator_follow(simulator, 300));
+    assert_true(sel_simulator_hash(simulator) == hash_after(scene, 300));
+    good(sel_simulator_score(simulator, &again, sizeof again));
+    assert_memory_equal(&score, &again, sizeof score);
+    sel_simulator_destroy(simulator);
+    simulator = new_simulator(scene);
+    good(sel_simulator_record(simulator, in_folder("reset.h5"), NULL));
+    assert_int_equal(sel_simulator_reset(simulator), SEL_ERROR_STATE);
+    sel_simulator_destroy(simulator);
+}
+
+static void a_copy_goes_on_alike(void **state)
+{
+    (void)state;
+    SelSimulator *from = without_score(), *to = without_score(), *scored = new_simulator(scene);
+    const SelHand hand = {.tool = {{.push_mm_s = 25, .twist_deg_s = -90}}};
+    SelTargetReach reach[2];
+    good(sel_simulator_follow(from, 400));
+    good(sel_simulator_repeat(to, &hand, 100));
+    good(sel_simulator_copy(to, from));
+    good(sel_simulator_repeat(from, &hand, 200));
+    for (int i = 0; i < 200; i++)
+        good(sel_simulator_step(to, &hand));
+    assert_true(sel_simulator_hash(to) == sel_simulator_hash(from));
+    good(sel_simulator_target(from, 0, &reach[0]));
+    good(sel_simulator_target(to, 0, &reach[1]));
+    assert_true(reach[0].distance_mm == reach[1].distance_mm && reach[0].time_s == reach[1].time_s);
+    assert_int_equal(sel_simulator_copy(scored, from), SEL_ERROR_STATE);
+    assert_int_equal(sel_simulator_repeat(from, &hand, -1), SEL_ERROR_ARGUMENT);
+    sel_simulator_destroy(from);
+    sel_simulator_destroy(to);
+    sel_simulator_destroy(scored);
+}
+
+static void the_centreline_is_the_state(void **state)
+{
+    (void)state;
+    enum { NODES = 201 };
+    SelSimulator *simulator = new_simulator(scene);
+    const double *position = NULL, *quaternion = NULL;
+    SelNode node[NODES];
+    int count = 0, nodes = 0;
+    good(sel_simulator_centreline(simulator, &position, &quaternion, &count));
+    good(sel_simulator_follow(simulator, 500));
+    good(sel_simulator_nodes(simulator, 0, node, NODES, &nodes));
+    assert_int_equal(count, nodes);
+    for (int i = 0; i < count; i++) {
+        assert_memory_equal(position + 3 * i, node[i].position_mm, sizeof node[i].position_mm);
+        assert_memory_equal(quaternion + 4 * i, node[i].quaternion, sizeof node[i].quaternion);
+    }
+    sel_simulator_destroy(simulator);
+}
+
+static void targets_are_the_scenes(void **state)
+{
+    (void)state;
+    SelTarget target;
+    assert_int_equal(sel_scene_target_count(scene), 1);
+    good(sel_scene_target(scene, 0, &target));
+    assert_string_equal(target.name, "middle cerebral artery");
+    assert_true(target.radius_mm == 2 && target.point_mm[0] == 23.9);
+    assert_int_equal(sel_scene_target(scene, 1, &target), SEL_ERROR_ARGUMENT);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -705,6 +791,10 @@ int main(void)
         cmocka_unit_test(structures_may_grow),
         cmocka_unit_test(a_recording_is_replayed_bit_for_bit),
         cmocka_unit_test(an_unwritable_recording_is_an_error),
+        cmocka_unit_test(a_reset_is_a_new_beginning),
+        cmocka_unit_test(a_copy_goes_on_alike),
+        cmocka_unit_test(the_centreline_is_the_state),
+        cmocka_unit_test(targets_are_the_scenes),
         cmocka_unit_test(a_volume_becomes_a_model),
         cmocka_unit_test(files_are_those_of_the_program),
         cmocka_unit_test(bad_volumes_are_refused),

@@ -129,6 +129,8 @@ static SelStatus simulate(SelContext *context)
     status = run(simulator, status);
     if (status == SEL_OK)
         status = sel_simulator_end_recording(simulator);
+    if (status == SEL_OK)
+        status = sel_simulator_reset(simulator);
     sel_simulator_destroy(simulator);
     sel_scene_destroy(scene);
     return status;
