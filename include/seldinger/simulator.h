@@ -151,6 +151,30 @@ SEL_API SelStatus sel_simulator_score(const SelSimulator *simulator, SelScore *s
 // All figures, as `seldinger run --score` writes them: JSON, to be freed by sel_free().
 SEL_API SelStatus sel_simulator_score_json(const SelSimulator *simulator, char **json);
 
+// --- pictures ---
+
+// A plain X-ray picture of vessels and tools: transmission without anatomy and noise. The C-arm's geometry is the trainer's.
+typedef struct SelImageOptions {
+    size_t size;
+    double lao_deg;                  // C-arm: LAO > 0, RAO < 0; -90 to 90
+    double cra_deg;                  // cranial > 0, caudal < 0; -45 to 45
+    double field_mm;                 // side of the square seen at the isocentre, 40 to 400; 0 (default): all vessels are seen
+    int has_centre;                  // 1: the isocentre is centre_mm; 0 (default): the middle of the vessels
+    double centre_mm[3];
+    double contrast;                 // contrast agent in all vessels, 0 to 1 (undiluted); default 0.3
+    int pixels;                      // side of the picture, 8 to 4096; default 256
+} SelImageOptions;
+SEL_API void sel_image_options_init(SelImageOptions *options, size_t size);
+static inline SelImageOptions sel_image_defaults(void)
+{
+    SelImageOptions options;
+    sel_image_options_init(&options, sizeof options);
+    return options;
+}
+// Writes `pixel`, (pixels, pixels), the top row first: 255 exp(-attenuation), 255 where nothing attenuates. The vessels of a scene with a tree, or with a tube,
+// are shown; they are kept until another view is wanted. `options` may be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_MEMORY.
+SEL_API SelStatus sel_simulator_image(SelSimulator *simulator, const SelImageOptions *options, unsigned char *pixel);
+
 // --- recording ---
 
 typedef struct SelRecordingOptions {

@@ -370,6 +370,37 @@ class Simulator:
         finally:
             lib.sel_free(text[0])
 
+    # --- pictures ---
+
+    def image(self, lao_deg: float = 0.0, cran_deg: float = 0.0, size: int = 256, *, field_mm: float = 0.0, centre: Optional[ArrayLike] = None,
+              contrast: float = 0.3, out: Optional[NDArray[np.uint8]] = None) -> NDArray[np.uint8]:
+        """A plain X-ray picture of vessels and tools: transmission without anatomy and noise.
+
+        Args:
+            lao_deg: the C-arm to the patient's left, -90 to 90.
+            cran_deg: towards the head, -45 to 45.
+            size: side of the picture in pixels, 8 to 4096.
+            field_mm: side of the square seen at the isocentre, 40 to 400; 0: all vessels are seen.
+            centre: the isocentre, (3,) mm; None: the middle of the vessels.
+            contrast: contrast agent in all vessels, 0 to 1 (undiluted).
+            out: (size, size) uint8, to be overwritten and returned; None: a new array.
+
+        Returns:
+            (size, size) uint8, the top row first: 255 exp(-attenuation).
+        """
+        options = ffi.new("SelImageOptions *")
+        lib.sel_image_options_init(options, ffi.sizeof("SelImageOptions"))
+        options.lao_deg, options.cra_deg, options.field_mm, options.contrast, options.pixels = lao_deg, cran_deg, field_mm, contrast, size
+        if centre is not None:
+            options.has_centre, options.centre_mm = 1, np.asarray(centre, np.float64).reshape(3).tolist()
+        if out is None:
+            out = np.empty((max(size, 0), max(size, 0)), np.uint8)
+        elif out.shape != (size, size) or out.dtype != np.uint8 or not out.flags.c_contiguous:
+            raise ArgumentError(f"out is {out.dtype} of shape {out.shape}; expected a contiguous array of uint8, shape {(size, size)}")
+        with self._lock:
+            self._context.check(lib.sel_simulator_image(self.handle, options, ffi.from_buffer("unsigned char *", out)))
+        return out
+
     # --- recording ---
 
     def record(self, path: PathLike, *, frame_ms: float = 10.0, expected_s: float = 0.0) -> None:

@@ -2,6 +2,7 @@
 
 #include "base/base.h"
 #include "sim/library/context.h"
+#include "sim/library/simulator.h"
 #include "sim/session_tracker.h"
 
 #include <stdlib.h>
@@ -20,21 +21,6 @@ SAME_FLAG(MODEL_DISAGREES);
 SAME_FLAG(HAND_SLIPS);
 _Static_assert((int)SEL_SCORE_REACHED == (int)SCORE_REACHED && (int)SEL_SCORE_TIME_OUT == (int)SCORE_TIME_OUT, "public states are the score's");
 
-struct SelSimulator {
-    SelContext *context;
-    const SelScene *scene;
-    Simulator *simulator;
-    SessionTracker *tracker; // NULL: no score
-    Recording *recording;    // NULL: none
-    bool has_lost_rows;      // the recording's file cannot be written
-    int script_cursor;
-    int node_capacity;       // of the shared centreline
-    NodeReport *node;        // (node_capacity) scratch
-    int own_capacity;        // for the tool with the most nodes
-    ToolNode *own;           // (own_capacity) scratch
-    Checkpoint *start;       // the state at time 0
-};
-
 void sel_simulator_options_init(SelSimulatorOptions *options, size_t size)
 {
     SelSimulatorOptions own = {.keeps_score = 1};
@@ -50,6 +36,7 @@ static void free_simulator(SelSimulator *s)
     checkpoint_free(s->start);
     free(s->node);
     free(s->own);
+    image_memory_free(&s->image);
     scene_release(s->scene);
     context_release(s->context);
     free(s);

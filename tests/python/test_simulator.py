@@ -131,6 +131,40 @@ class Arrays(unittest.TestCase):
         self.assertEqual([(t.name, t.radius, list(t.point)) for t in scene.targets], [("end", 1.0, [40.0, 0.0, 0.0])])
 
 
+class Pictures(unittest.TestCase):
+    def test_attenuation_is_the_tools_volume(self):
+        """The sum over the picture is the tool's volume beyond the sheath times its attenuation, whatever the resolution and the angle."""
+        sim = seldinger.Simulator(TUBE)
+        sim.step([[50, 0]], n=500)                          # 30 mm inserted, straight, of which 3 are the marker
+        volume = np.pi / 4 * 0.36**2 * 30
+        for size, lao in ((128, 0), (512, 0), (256, 40)):
+            picture = sim.image(lao, 0, size, field_mm=100, centre=[0, 0, 0], contrast=0).astype(float)
+            area = (100 / size)**2
+            attenuation = -np.log(picture / 255)
+            got = attenuation[attenuation > 0.02].sum() * area
+            expected = np.pi / 4 * 0.36**2 * (27 * 0.55 + 3 * 1.2)
+            # the picture has steps of 1/255, and depth shows the pixels' area up to 3 % smaller or larger
+            self.assertLess(abs(got / expected - 1), 0.08, (size, lao, got, expected, volume))
+
+    def test_tools_and_vessels_lie_where_they_are_projected(self):
+        sim = seldinger.Simulator(PHANTOM)
+        sim.follow(2000)
+        size, field, centre = 400, 100.0, np.array([0.0, 0.0, 30.0])
+        bare = sim.image(0, 0, size, field_mm=field, centre=centre, contrast=0)
+        x, y, z = (sim.tip - centre)                        # to the patient's right, to the front, to the head, as the scene says; seen from the front
+        x, scale = -x, 785.0 / ((785.0 + y) * field)
+        column, row = (x * scale + 0.5) * size - 0.5, (0.5 - z * scale) * size - 0.5
+        rows, columns = np.nonzero(bare < 255)
+        self.assertLess(np.hypot(rows - row, columns - column).min(), 2)
+        self.assertLess(abs(rows.min() - row) if z > 20 else 0, 3)
+        self.assertTrue((sim.image(0, 0, size, field_mm=field, centre=centre) <= bare).all())
+        self.assertEqual(sim.image(30, -20, 64).shape, (64, 64))
+        with self.assertRaisesRegex(seldinger.ArgumentError, "lao_deg is not within"):
+            sim.image(100)
+        with self.assertRaisesRegex(seldinger.ArgumentError, "expected a contiguous array"):
+            sim.image(0, 0, 64, out=np.zeros((3, 3), np.uint8))
+
+
 class Recordings(unittest.TestCase):
     def test_a_recording_is_written(self):
         with tempfile.TemporaryDirectory() as folder:
