@@ -11,7 +11,7 @@ import sys
 
 import cffi
 
-HEADERS = ["base.h", "scene.h", "simulator.h", "recording.h", "recon.h"]
+HEADERS = ["base.h", "scene.h", "simulator.h", "batch.h", "recording.h", "recon.h"]
 
 
 def plain(text):

@@ -26,6 +26,8 @@ static inline SelSimulatorOptions sel_simulator_defaults(void)
 
 // Starts at time 0 of the scene. `options` may be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (the scene cannot be simulated), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_simulator_create(SelContext *context, const SelScene *scene, const SelSimulatorOptions *options, SelSimulator **simulator);
+// The context that keeps its faults; the one of sel_simulator_create(), or of the batch that made it. Lives as long as the simulator.
+SEL_API SelContext *sel_simulator_context(SelSimulator *simulator);
 // Ends a recording that is still running; its errors are then lost (use sel_simulator_end_recording()).
 SEL_API void sel_simulator_destroy(SelSimulator *simulator);
 

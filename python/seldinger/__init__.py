@@ -9,9 +9,10 @@ outermost first.
     print(sim.time_s, sim.tip, sim.hand_force)
 """
 from ._library import ArgumentError, Error, InputError, LibraryMemoryError, OutputError, StateError, version
+from .batch import ROW, Batch
 from .scene import Scene, Target
 from .simulator import CONTACT, NODE, Flag, Simulator
 
 __version__ = version()
-__all__ = ["ArgumentError", "CONTACT", "Error", "Flag", "InputError", "LibraryMemoryError", "NODE", "OutputError", "Scene", "Simulator",
+__all__ = ["ArgumentError", "Batch", "CONTACT", "Error", "Flag", "InputError", "LibraryMemoryError", "NODE", "OutputError", "ROW", "Scene", "Simulator",
            "StateError", "Target", "version"]

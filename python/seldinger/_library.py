@@ -79,7 +79,10 @@ _ERROR_OF = {lib.SEL_ERROR_ARGUMENT: ArgumentError, lib.SEL_ERROR_INPUT: InputEr
 class Context:
     """Keeps the faults of its last call. Handles that were made with it keep it alive."""
 
-    def __init__(self, options: Any = ffi.NULL) -> None:
+    def __init__(self, options: Any = ffi.NULL, borrowed: Any = None) -> None:
+        if borrowed is not None:
+            self.handle = borrowed
+            return
         handle = ffi.new("SelContext **")
         if lib.sel_context_create(options, handle) != lib.SEL_OK:
             raise LibraryMemoryError("not enough memory for a context")

@@ -69,13 +69,27 @@ class Simulator:
         self.scene: Scene = scene if isinstance(scene, Scene) else Scene(scene)
         self._context = Context()
         self._lock = threading.Lock()
-        self._keeps_score = bool(keeps_score)
         options = ffi.new("SelSimulatorOptions *")
         lib.sel_simulator_options_init(options, ffi.sizeof("SelSimulatorOptions"))
-        options.keeps_score = self._keeps_score
+        options.keeps_score = bool(keeps_score)
         handle = ffi.new("SelSimulator **")
         self._context.check(lib.sel_simulator_create(self._context.handle, self.scene.handle, options, handle))
-        self._handle: Any = ffi.gc(handle[0], lib.sel_simulator_destroy)
+        self._begin(ffi.gc(handle[0], lib.sel_simulator_destroy))
+        if record is not None:
+            self.record(record)
+
+    @classmethod
+    def _borrowed(cls, scene: Scene, batch: Any, index: int) -> "Simulator":
+        """A simulator of a batch, which keeps the batch alive."""
+        self = cls.__new__(cls)
+        self.scene, self._lock = scene, threading.Lock()
+        handle = lib.sel_batch_simulator(batch, index)
+        self._context = Context(borrowed=lib.sel_simulator_context(handle))
+        self._begin(ffi.gc(handle, lambda _: batch))
+        return self
+
+    def _begin(self, handle: Any) -> None:
+        self._handle: Any = handle
         self._is_recording = False
         self._hand = ffi.new("SelHand *")
         rates, holds, _ = hands_of(self._hand, 1)
@@ -83,8 +97,6 @@ class Simulator:
         self._table: dict[int, Any] = {}
         self._report = ffi.new("SelReport *")
         self._reported = -1
-        if record is not None:
-            self.record(record)
 
     # --- life ---
 
@@ -132,7 +144,7 @@ class Simulator:
         Raises:
             StateError: it keeps a score, or a recording runs.
         """
-        other = Simulator(self.scene, keeps_score=self._keeps_score)
+        other = Simulator(self.scene, keeps_score=False)
         other.copy_from(self)
         return other
 

@@ -106,6 +106,8 @@ SelStatus sel_simulator_create(SelContext *context, const SelScene *scene, const
     return status;
 }
 
+SelContext *sel_simulator_context(SelSimulator *s) { return s ? s->context : NULL; }
+
 void sel_simulator_destroy(SelSimulator *s)
 {
     if (!s)

@@ -772,6 +772,47 @@ static void targets_are_the_scenes(void **state)
     assert_int_equal(sel_scene_target(scene, 1, &target), SEL_ERROR_ARGUMENT);
 }
 
+// --- many at once ---
+
+static void a_batch_is_its_simulators_alone(void **state)
+{
+    (void)state;
+    enum { COUNT = 5, STEPS = 60 };
+    const SelScene *scenes[COUNT] = {scene, scene, scene, scene, scene};
+    SelHand hand[COUNT] = {0};
+    uint64_t alone[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        hand[i].tool[0] = (SelCommand){.push_mm_s = 10 * i, .twist_deg_s = 50};
+        SelSimulator *simulator = new_simulator(scene);
+        good(sel_simulator_repeat(simulator, &hand[i], STEPS));
+        alone[i] = sel_simulator_hash(simulator);
+        sel_simulator_destroy(simulator);
+    }
+    for (int threads = 1; threads <= 4; threads++) {
+        SelBatchOptions options = sel_batch_defaults();
+        SelBatch *batch = NULL;
+        options.threads = threads;
+        good(sel_batch_create(context, COUNT, scenes, &options, &batch));
+        good(sel_batch_hashes(batch, 1));
+        for (int k = 0; k < STEPS / 10; k++)
+            good(sel_batch_step(batch, hand, 10, NULL));
+        const SelBatchRow *row = sel_batch_rows(batch);
+        for (int i = 0; i < COUNT; i++) {
+            double tip[3];
+            assert_true(row[i].hash == alone[i]);
+            good(sel_simulator_tip(sel_batch_simulator(batch, i), 0, tip));
+            assert_memory_equal(tip, row[i].tip_mm, sizeof tip);
+        }
+        assert_null(sel_batch_simulator(batch, COUNT));
+        hand[3].tool[0].push_mm_s = 1e6;
+        assert_int_equal(sel_batch_step(batch, hand, 1, NULL), SEL_ERROR_ARGUMENT);
+        expect_fault("simulator 3: push_mm_s");
+        assert_true(row[0].time_s == 0.06);
+        hand[3].tool[0].push_mm_s = 30;
+        sel_batch_destroy(batch);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -795,6 +836,7 @@ int main(void)
         cmocka_unit_test(a_copy_goes_on_alike),
         cmocka_unit_test(the_centreline_is_the_state),
         cmocka_unit_test(targets_are_the_scenes),
+        cmocka_unit_test(a_batch_is_its_simulators_alone),
         cmocka_unit_test(a_volume_becomes_a_model),
         cmocka_unit_test(files_are_those_of_the_program),
         cmocka_unit_test(bad_volumes_are_refused),
