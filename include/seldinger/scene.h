@@ -175,6 +175,9 @@ SEL_API SelStatus sel_scene_parse(SelContext *context, const char *text, size_t 
 // exercises and exchanges have no structure here: use sel_scene_parse().
 SEL_API SelStatus sel_scene_build(SelContext *context, const SelSceneOptions *scene_options, const SelOpenOptions *options, SelScene **scene);
 SEL_API void sel_scene_destroy(SelScene *scene);
+// Scenes of one vessel share it, and the last four vessels that no scene needs stay open, so that opening a scene again takes milliseconds. A file that has
+// changed is read again. This closes those that no scene needs.
+SEL_API void sel_vessels_forget(void);
 
 // --- reading ---
 

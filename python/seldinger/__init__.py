@@ -10,9 +10,11 @@ outermost first.
 """
 from ._library import ArgumentError, Error, InputError, LibraryMemoryError, OutputError, StateError, version
 from .batch import ROW, Batch
+from .recon import TREE_NODE, DoubtWarning, Tree, Volume
+from .recording import Recording
 from .scene import Scene, Target
 from .simulator import CONTACT, NODE, Flag, Simulator
 
 __version__ = version()
-__all__ = ["ArgumentError", "Batch", "CONTACT", "Error", "Flag", "InputError", "LibraryMemoryError", "NODE", "OutputError", "ROW", "Scene", "Simulator",
-           "StateError", "Target", "version"]
+__all__ = ["ArgumentError", "Batch", "CONTACT", "DoubtWarning", "Error", "Flag", "InputError", "LibraryMemoryError", "NODE", "OutputError", "ROW", "Recording", "Scene", "Simulator",
+           "StateError", "TREE_NODE", "Target", "Tree", "Volume", "version"]

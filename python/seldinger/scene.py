@@ -67,6 +67,13 @@ class Scene:
         self._context.check(status)
         self._adopt(handle[0])
 
+    @classmethod
+    def _of(cls, context: Context, handle: Any) -> "Scene":
+        self = cls.__new__(cls)
+        self._context = context
+        self._adopt(handle)
+        return self
+
     def _adopt(self, handle: Any) -> None:
         self.handle = ffi.gc(handle, lib.sel_scene_destroy)
         #: The names of the tools, the outermost first.

@@ -210,6 +210,7 @@ static void all_memory_comes_from_the_host_and_goes_back(void **state)
         if (status != SEL_OK)
             fail_msg("story %d: %s", i, sel_fault(context, 0));
         sel_context_destroy(context);
+        sel_vessels_forget();
         print_message("story %d: %ld allocations, %ld are left\n", i, asked - before, live);
         assert_true(asked - before > 100);
         assert_int_equal(live, 0);
