@@ -22,7 +22,7 @@ typedef struct CaseState {
     BuildProgress progress;      // of the last frame
     bool has_volume;             // and all below is set
     const Volume *volume, *reduced;
-    PatientAxes axes;
+    VolumeAxes axes;
     double low, high;            // brightness shown as black and white
     double full_low, full_high;  // at first
     Vec3 cursor;                 // where the three slices cross

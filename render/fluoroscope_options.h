@@ -3,7 +3,6 @@
 #define SELDINGER_RENDER_FLUOROSCOPE_OPTIONS_H
 
 #include "geom/geom.h"
-#include "render/c_arm.h"
 #include "render/tool_look.h"
 #include "sim/sim.h"
 

@@ -2,8 +2,8 @@
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_TOOL_H
 #define SELDINGER_RENDER_FLUOROSCOPE_TOOL_H
 
-#include "render/c_arm.h"
 #include "render/tool_look.h"
+#include "sim/sim.h"
 
 typedef struct RibbonVertex {
     float place[2];          // [pixel] in the square, y up

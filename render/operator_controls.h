@@ -3,7 +3,6 @@
 #define SELDINGER_RENDER_OPERATOR_CONTROLS_H
 
 #include "input/input.h"
-#include "render/c_arm.h"
 #include "render/panel.h"
 #include "render/vessel_scene.h"
 #include "sim/sim.h"

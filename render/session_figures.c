@@ -2,7 +2,6 @@
 // the path, steps of viridis' darker part, whose lightness grows with time, which the colour-blind can distinguish, also in print.
 #include "render/session_figures.h"
 
-#include "render/c_arm.h"
 #include "render/camera.h"
 #include "render/page.h"
 #include "render/tick_step.h"

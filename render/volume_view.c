@@ -17,15 +17,15 @@ static bool axis_of(const char *frame, char positive, char negative, Vec3 *out)
     return false;
 }
 
-PatientAxes patient_axes(const char *frame)
+VolumeAxes patient_axes(const char *frame)
 {
-    PatientAxes a = {.is_known = true};
+    VolumeAxes a = {.is_known = true};
     if (strlen(frame) == 3 && axis_of(frame, 'L', 'R', &a.left) && axis_of(frame, 'P', 'A', &a.posterior) && axis_of(frame, 'S', 'I', &a.superior))
         return a;
-    return (PatientAxes){vec3(1, 0, 0), vec3(0, 1, 0), vec3(0, 0, 1), false};
+    return (VolumeAxes){vec3(1, 0, 0), vec3(0, 1, 0), vec3(0, 0, 1), false};
 }
 
-void patient_letters(const PatientAxes *axes, Vec3 direction, char out[4])
+void patient_letters(const VolumeAxes *axes, Vec3 direction, char out[4])
 {
     const double oblique = 0.4;
     static const char letter[3][2] = {{'L', 'R'}, {'P', 'A'}, {'S', 'I'}};
@@ -55,7 +55,7 @@ static double extent_along(const Volume *v, Vec3 direction)
     return sum;
 }
 
-Camera slice_camera(const PatientAxes *a, SliceView view, const Volume *volume, Vec3 center, double zoom, int width, int height)
+Camera slice_camera(const VolumeAxes *a, SliceView view, const Volume *volume, Vec3 center, double zoom, int width, int height)
 {
     Camera c = {.center = center, .width = width, .height = height};
     c.right = view == SLICE_SAGITTAL ? a->posterior : a->left;

@@ -6,17 +6,17 @@
 #include "render/camera.h"
 
 // The directions of the patient in the volume's space. If the header does not say them, those of LPS are assumed and letters are of the axes.
-typedef struct PatientAxes {
+typedef struct VolumeAxes {
     Vec3 left, posterior, superior;      // unit
     bool is_known;
-} PatientAxes;
-PatientAxes patient_axes(const char *frame);
+} VolumeAxes;
+VolumeAxes patient_axes(const char *frame);
 // The letter of the patient's side in this direction, and of a second one if it is oblique: "L", "RA"; without orientation "+x".
-void patient_letters(const PatientAxes *axes, Vec3 direction, char out[4]);
+void patient_letters(const VolumeAxes *axes, Vec3 direction, char out[4]);
 
 typedef enum { SLICE_AXIAL, SLICE_CORONAL, SLICE_SAGITTAL } SliceView;
 // As radiologists look: axial from the feet, coronal from the front, sagittal from the left. The volume fills a view of this size; `zoom` 1: whole.
-Camera slice_camera(const PatientAxes *axes, SliceView view, const Volume *volume, Vec3 center, double zoom, int width, int height);
+Camera slice_camera(const VolumeAxes *axes, SliceView view, const Volume *volume, Vec3 center, double zoom, int width, int height);
 Vec3 volume_middle(const Volume *volume);
 // The point [mm] of a pixel in the plane through `through` that is parallel to the picture.
 Vec3 camera_point(const Camera *camera, double x, double y, Vec3 through);

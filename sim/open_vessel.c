@@ -104,14 +104,15 @@ static bool turn_into_surface(const Scene *scene, const OpenVesselOptions *optio
     return out->vessel != NULL;
 }
 
-// The sheath's mouth must lie in the lumen: it does not if the mesh has another frame or unit.
-static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *faults)
+// A mouth outside the lumen shows that the mesh has another frame or unit.
+bool open_vessel_holds_entry(const Scene *scene, const OpenVessel *open, Faults *faults)
 {
+    const Vessel *vessel = open->vessel;
+    if (!scene->wire.has_sheath || scene->source != SOURCE_MESH)
+        return true;
     Vec3 x = vec3_add_scaled(scene->wire.start, fmax(scene->wire.inserted, 0.5), scene->wire.direction);
     VesselMemory memory = {.node = vessel->locate(vessel, x, -1)};
     VesselHit hit;
-    if (!scene->wire.has_sheath)
-        return true;
     vessel_query(vessel, 1, &x, 1, &memory, &hit);
     if (!(hit.flags & VESSEL_OPEN_END) && hit.gap > 0)
         return true;
@@ -132,7 +133,7 @@ static bool open_mesh(const Scene *scene, const OpenVesselOptions *options, Open
         out->vessel = contact_surface_vessel(CONTACT_GRID, mesh, out->mesh, cell, scene->mesh_path, faults);
         mesh->destroy(mesh);
     }
-    return out->vessel && entry_is_inside(scene, out->vessel, faults);
+    return out->vessel && open_vessel_holds_entry(scene, out, faults);
 }
 
 // A file that is not in the project is made by the script `prepare` in its folder. Any other missing file is left to its reader.

@@ -25,6 +25,8 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
 const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open);
 // If the scene has `inlet: root`, sets start and direction of the tool from the vessel's inlet. Returns false with a fault if the vessel has none.
 bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults);
+// For a wall that another scene opened: its sheath's mouth must lie in a mesh, as open_vessel() demands. Returns false with a fault.
+bool open_vessel_holds_entry(const Scene *scene, const OpenVessel *open, Faults *faults);
 void open_vessel_close(OpenVessel *open);
 
 #endif

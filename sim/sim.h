@@ -53,5 +53,7 @@
 #include "sim/shelf.h"
 #include "sim/xray.h"
 #include "sim/xray_tube.h"
+#include "sim/c_arm.h"
+#include "sim/xray_image.h"
 
 #endif

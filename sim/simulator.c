@@ -41,6 +41,13 @@ static void measure_targets(Simulator *simulator)
     }
 }
 
+static void begin_targets(Simulator *simulator)
+{
+    for (int i = 0; i < simulator->scene->target_count; i++)
+        simulator->target[i] = (TargetReach){.distance = HUGE_VAL};
+    measure_targets(simulator);
+}
+
 Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults)
 {
     char why[FAULT_LENGTH / 2] = "no memory";
@@ -78,10 +85,27 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
     }
     simulator->scene = scene;
     simulator->dt = scene->dt;
-    for (int i = 0; i < scene->target_count; i++)
-        simulator->target[i].distance = HUGE_VAL;
-    measure_targets(simulator);
+    begin_targets(simulator);
     return simulator;
+}
+
+void simulator_begin_again(Simulator *simulator, const Checkpoint *start)
+{
+    *simulator = (Simulator){.scene = simulator->scene, .stepper = simulator->stepper, .target = simulator->target, .dt = simulator->dt};
+    stepper_restore(simulator->stepper, start);
+    begin_targets(simulator);
+}
+
+void simulator_take_over(Simulator *simulator, const Simulator *from, const Checkpoint *state)
+{
+    SEL_ASSERT(simulator->scene == from->scene, "both simulate the same scene");
+    Stepper *stepper = simulator->stepper;
+    TargetReach *target = simulator->target;
+    *simulator = *from;
+    simulator->stepper = stepper;
+    simulator->target = target;
+    memcpy(target, from->target, (size_t)from->scene->target_count * sizeof *target);
+    stepper_restore(stepper, state);
 }
 
 void simulator_destroy(Simulator *simulator)

@@ -79,6 +79,11 @@ typedef struct Simulator Simulator;
 Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults);
 void simulator_destroy(Simulator *simulator);
 
+// Returns to the state of `start`, which stepper_save() made before the first step, and forgets all totals; the balance of energies is no longer watched.
+void simulator_begin_again(Simulator *simulator, const Checkpoint *start);
+// Takes over the state and the totals of `from`, of the same scene and vessel, which `state` holds; the next steps of both are the same bit for bit.
+void simulator_take_over(Simulator *simulator, const Simulator *from, const Checkpoint *state);
+
 void simulator_step_one_tool(Simulator *simulator, Command command);       // with several tools the inner ones are pinned
 void simulator_step(Simulator *simulator, const ToolCommands *commands);
 

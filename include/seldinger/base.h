@@ -14,7 +14,8 @@
 // Threads: use a context, and the handles created with it, in one thread at a time. Several contexts may work in several threads, except in functions that read
 // or write files: the HDF5 library that they use is not thread-safe, so call these one at a time. Simulators of one scene may step in several threads.
 //
-// Process-wide state: only the allocator, the choice of vector instructions (environment variable SELDINGER_SIMD) and the names of unfinished files.
+// Process-wide state: only the allocator, the choice of vector instructions (environment variable SELDINGER_SIMD), open vessels (sel_vessels_forget()) and the
+// names of unfinished files.
 // The library does not write to standard output or standard error, installs no signal handler and leaves the host's HDF5 settings and locale as they are.
 #ifndef SELDINGER_PUBLIC_BASE_H
 #define SELDINGER_PUBLIC_BASE_H

@@ -70,6 +70,11 @@ static inline SelFitOptions sel_fit_defaults(void)
 // Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (too few points), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_fit(SelContext *context, const SelTree *tree, const SelFitOptions *options, SelTree **model);
 
+// The tree of a surface in mm (STL, PLY, OBJ or VTP), as `seldinger import` makes it: with `count` files of centrelines with radii (.vtp, .mrk.json or .swc), or
+// with centrelines found from the surface if there are none; `centreline` may then be NULL. Defects of the mesh that were repaired are notes.
+// Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT, SEL_ERROR_MEMORY.
+SEL_API SelStatus sel_import_surface(SelContext *context, const char *surface, int count, const char *const *centreline, SelTree **tree);
+
 // Trees and models as files. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT or SEL_ERROR_OUTPUT, SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_tree_open(SelContext *context, const char *path, SelTree **tree);
 SEL_API SelStatus sel_tree_save(SelContext *context, const SelTree *tree, const char *path);
@@ -84,6 +89,8 @@ typedef struct SelTreeNode {
 } SelTreeNode;
 SEL_API int sel_tree_node_count(const SelTree *tree);
 SEL_API int64_t sel_tree_point_count(const SelTree *tree);
+// The points on the wall, (points, 3) [mm], those of a node one after the other. Error: SEL_ERROR_ARGUMENT.
+SEL_API SelStatus sel_tree_points(const SelTree *tree, double *point_mm);
 SEL_API int sel_tree_is_model(const SelTree *tree);                      // 1: it has a model of the wall
 SEL_API SelStatus sel_tree_node(const SelTree *tree, int index, SelTreeNode *node);
 // As sel_scene_query(), for a model. Error: SEL_ERROR_STATE (the tree has no model).

@@ -23,6 +23,10 @@ SEL_API SelStatus sel_recording_hand(const SelRecording *recording, int64_t step
 SEL_API SelStatus sel_recording_hash(const SelRecording *recording, int64_t step, uint64_t *hash);
 SEL_API SelStatus sel_recording_force(const SelRecording *recording, int64_t step, int tool, double *push_n, double *torque_n_mm);
 
+// All steps at once; any array may be NULL: (steps, tools, 2) push [mm/s] and twist [deg/s], (steps) hashes, (steps, tools) force [N] and torque [N mm] at the
+// hands. Error: SEL_ERROR_ARGUMENT.
+SEL_API SelStatus sel_recording_arrays(const SelRecording *recording, double *command, uint64_t *hash, double *push_n, double *torque_n_mm);
+
 // Frames: the centreline that all tools share, every 10 ms in a run's recording. `step`: the step that a frame shows; may be NULL. Writes up to `capacity`
 // points, xyz one after the other, and the number available, which may be larger. Error: SEL_ERROR_ARGUMENT.
 SEL_API int64_t sel_recording_frames(const SelRecording *recording);

@@ -175,6 +175,9 @@ SEL_API SelStatus sel_scene_parse(SelContext *context, const char *text, size_t 
 // exercises and exchanges have no structure here: use sel_scene_parse().
 SEL_API SelStatus sel_scene_build(SelContext *context, const SelSceneOptions *scene_options, const SelOpenOptions *options, SelScene **scene);
 SEL_API void sel_scene_destroy(SelScene *scene);
+// Scenes of one vessel share it, and the last four vessels that no scene needs stay open, so that opening a scene again takes milliseconds. A file that has
+// changed is read again. This closes those that no scene needs.
+SEL_API void sel_vessels_forget(void);
 
 // --- reading ---
 
@@ -185,6 +188,9 @@ SEL_API int sel_scene_tool_count(const SelScene *scene);
 SEL_API const char *sel_scene_tool_name(const SelScene *scene, int tool);        // "wire" of a scene with one unnamed tool; NULL: no such tool
 // Where the tools enter: the sheath's mouth and the unit direction of advance.
 SEL_API SelStatus sel_scene_entry(const SelScene *scene, double point_mm[3], double direction[3]);
+// A target of the scene; its name lives as long as the scene. Error: SEL_ERROR_ARGUMENT (no such target).
+SEL_API int sel_scene_target_count(const SelScene *scene);
+SEL_API SelStatus sel_scene_target(const SelScene *scene, int index, SelTarget *target);
 // For each of `count` points, xyz one after the other: the distance to the wall [mm], positive in the lumen, infinite beyond an open end, and the unit normal
 // into the lumen (zero where there is none). Far outside the wall the result depends on the contact: a grid is limited to its lattice's depth. `normal` may be
 // NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_STATE (the scene has no wall), SEL_ERROR_MEMORY.

@@ -26,6 +26,8 @@ static inline SelSimulatorOptions sel_simulator_defaults(void)
 
 // Starts at time 0 of the scene. `options` may be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (the scene cannot be simulated), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_simulator_create(SelContext *context, const SelScene *scene, const SelSimulatorOptions *options, SelSimulator **simulator);
+// The context that keeps its faults; the one of sel_simulator_create(), or of the batch that made it. Lives as long as the simulator.
+SEL_API SelContext *sel_simulator_context(SelSimulator *simulator);
 // Ends a recording that is still running; its errors are then lost (use sel_simulator_end_recording()).
 SEL_API void sel_simulator_destroy(SelSimulator *simulator);
 
@@ -33,6 +35,16 @@ SEL_API void sel_simulator_destroy(SelSimulator *simulator);
 // `flags`. Errors: SEL_ERROR_ARGUMENT (a command is not finite or out of range; no step was taken), SEL_ERROR_OUTPUT (the recording cannot be written; the step
 // was taken).
 SEL_API SelStatus sel_simulator_step(SelSimulator *simulator, const SelHand *hand);
+// Makes `count` steps with one command, as if sel_simulator_step() were called that often; stops at the first error.
+SEL_API SelStatus sel_simulator_repeat(SelSimulator *simulator, const SelHand *hand, int count);
+// Makes `count` steps with the commands of the scene's script.
+SEL_API SelStatus sel_simulator_follow(SelSimulator *simulator, int count);
+// Returns to time 0 of the scene, as if the simulator were created again. Allocates for a score only. Errors: SEL_ERROR_STATE (a recording runs; nothing was
+// done), SEL_ERROR_MEMORY (the simulator is at time 0, without a score).
+SEL_API SelStatus sel_simulator_reset(SelSimulator *simulator);
+// Makes a simulator a copy of another one of the same scene: the next steps of both are the same bit for bit. Neither may keep a score. Allocates. Errors:
+// SEL_ERROR_ARGUMENT (another scene), SEL_ERROR_STATE (a score is kept or a recording runs), SEL_ERROR_MEMORY.
+SEL_API SelStatus sel_simulator_copy(SelSimulator *simulator, const SelSimulator *from);
 // The command of the scene's script for the next step; zero if there is no script or it has ended.
 SEL_API SelStatus sel_simulator_script_hand(SelSimulator *simulator, SelHand *hand);
 
@@ -90,6 +102,10 @@ typedef struct SelNode {
 SEL_API int sel_simulator_node_capacity(const SelSimulator *simulator, int tool);
 // Writes up to `capacity` nodes of a tool and their number. Errors: SEL_ERROR_ARGUMENT (no such tool, or too little room).
 SEL_API SelStatus sel_simulator_nodes(SelSimulator *simulator, int tool, SelNode *node, int capacity, int *count);
+// The centreline that all tools share, from the sheath to the foremost tip, without a copy: (count, 3) positions [mm] and (count, 4) quaternions w, x, y, z
+// whose x axis points along it. The arrays live as long as the simulator and change in each step and reset; `count` is constant with one tool. Any pointer may
+// be NULL. Error: SEL_ERROR_ARGUMENT.
+SEL_API SelStatus sel_simulator_centreline(const SelSimulator *simulator, const double **position_mm, const double **quaternion, int *count);
 // The position of a tool's tip.
 SEL_API SelStatus sel_simulator_tip(SelSimulator *simulator, int tool, double position_mm[3]);
 
@@ -136,6 +152,30 @@ typedef struct SelScore {
 SEL_API SelStatus sel_simulator_score(const SelSimulator *simulator, SelScore *score, size_t size);
 // All figures, as `seldinger run --score` writes them: JSON, to be freed by sel_free().
 SEL_API SelStatus sel_simulator_score_json(const SelSimulator *simulator, char **json);
+
+// --- pictures ---
+
+// A plain X-ray picture of vessels and tools: transmission without anatomy and noise. The C-arm's geometry is the trainer's.
+typedef struct SelImageOptions {
+    size_t size;
+    double lao_deg;                  // C-arm: LAO > 0, RAO < 0; -90 to 90
+    double cra_deg;                  // cranial > 0, caudal < 0; -45 to 45
+    double field_mm;                 // side of the square seen at the isocentre, 40 to 400; 0 (default): all vessels are seen
+    int has_centre;                  // 1: the isocentre is centre_mm; 0 (default): the middle of the vessels
+    double centre_mm[3];
+    double contrast;                 // contrast agent in all vessels, 0 to 1 (undiluted); default 0.3
+    int pixels;                      // side of the picture, 8 to 4096; default 256
+} SelImageOptions;
+SEL_API void sel_image_options_init(SelImageOptions *options, size_t size);
+static inline SelImageOptions sel_image_defaults(void)
+{
+    SelImageOptions options;
+    sel_image_options_init(&options, sizeof options);
+    return options;
+}
+// Writes `pixel`, (pixels, pixels), the top row first: 255 exp(-attenuation), 255 where nothing attenuates. The vessels of a scene with a tree, or with a tube,
+// are shown; they are kept until another view is wanted. `options` may be NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_MEMORY.
+SEL_API SelStatus sel_simulator_image(SelSimulator *simulator, const SelImageOptions *options, unsigned char *pixel);
 
 // --- recording ---
 

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE   // fopencookie
+#define _GNU_SOURCE   // fopencookie, madvise
 #include "sim/library/allocator.h"
 
 #include "seldinger/base.h"
@@ -8,8 +8,11 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 // The linker's names of the original functions, and of the replacements.
 void *__real_malloc(size_t bytes);
@@ -57,8 +60,29 @@ void *__wrap_malloc(size_t bytes)
     return memory;
 }
 
+// Large arrays of a simulator, such as those for contacts of a tool with itself, are hardly used. calloc() would fill recycled memory with zeros and so make all
+// of it resident, 5 MB a simulator instead of 2.5: the pages are given back instead, and read as zeros when they are used.
+static size_t page_bytes(void) { return (size_t)sysconf(_SC_PAGESIZE); }
+
+static void *zeroed_pages(size_t bytes)
+{
+    unsigned char *memory = __real_malloc(bytes);
+    uintptr_t page = page_bytes(), skip = -(uintptr_t)memory & (page - 1);
+    size_t whole = (bytes - skip) / page * page;
+    if (!memory)
+        return NULL;
+    if (madvise(memory + skip, whole, MADV_DONTNEED) != 0)       // locked memory
+        return memset(memory, 0, bytes);
+    memset(memory, 0, skip);
+    memset(memory + skip + whole, 0, bytes - skip - whole);
+    return memory;
+}
+
 void *__wrap_calloc(size_t count, size_t size)
 {
+    enum { LARGE = 1 << 14 };
+    if (!has_host && size > 0 && count < SIZE_MAX / size && count * size >= LARGE && count * size > 2 * page_bytes())
+        return zeroed_pages(count * size);
     if (!has_host)
         return __real_calloc(count, size);
     if (size > 0 && count > SIZE_MAX / size) {

@@ -5,6 +5,7 @@
 #include "base/base.h"
 #include "recon/recon.h"
 #include "seldinger/recording.h"
+#include "sim/library/vessel_cache.h"
 #include "sim/open_vessel.h"
 #include "sim/recording.h"
 
@@ -19,7 +20,8 @@ struct SelContext {
 struct SelScene {
     atomic_int holders;
     Scene *scene;
-    OpenVessel open;
+    SharedVessel *shared;    // NULL: not open yet
+    OpenVessel open;         // what it holds
 };
 
 struct SelRecording {

@@ -80,6 +80,25 @@ SelStatus sel_recording_force(const SelRecording *recording, int64_t step, int t
     return SEL_OK;
 }
 
+SelStatus sel_recording_arrays(const SelRecording *recording, double *command, uint64_t *hash, double *push_n, double *torque_n_mm)
+{
+    int tools = sel_recording_tool_count(recording);
+    if (!recording)
+        return SEL_ERROR_ARGUMENT;
+    for (int64_t i = 0; i < sel_recording_steps(recording); i++) {
+        const ToolCommands commands = recorded_run_commands(recording->run, i);
+        if (hash)
+            hash[i] = recording->run->state_hash[i];
+        for (int k = 0; k < tools; k++) {
+            int64_t at = i * tools + k;
+            if (command)
+                command[2 * at] = commands.tool[k].push_mm_s, command[2 * at + 1] = commands.tool[k].twist_deg_s;
+            sel_recording_force(recording, i, k, push_n ? &push_n[at] : NULL, torque_n_mm ? &torque_n_mm[at] : NULL);
+        }
+    }
+    return SEL_OK;
+}
+
 SelStatus sel_recording_frame(const SelRecording *recording, int64_t frame, int64_t *step, double *position_mm, int capacity, int *count)
 {
     if (frame < 0 || frame >= sel_recording_frames(recording) || !count || (capacity > 0 && !position_mm))

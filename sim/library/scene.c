@@ -23,7 +23,7 @@ const SelScene *scene_held(const SelScene *scene)
 
 static void free_scene(SelScene *scene)
 {
-    open_vessel_close(&scene->open);
+    vessel_cache_release(scene->shared);
     scene_free(scene->scene);
     free(scene);
 }
@@ -71,8 +71,11 @@ static bool open_with(SelContext *context, SelScene *scene, const SelOpenOptions
         take_contact(scene->scene, options->contact, &context->faults);
     if (options->script)
         take_script(scene->scene, options->script, &context->faults);
-    return context->faults.count == 0 && open_vessel(scene->scene, &how, &scene->open, &context->faults) &&
-           open_vessel_inlet(scene->scene, &scene->open, &context->faults);
+    scene->shared = context->faults.count == 0 ? vessel_cache_open(scene->scene, &how, &context->faults) : NULL;
+    if (!scene->shared)
+        return false;
+    scene->open = *shared_vessel(scene->shared);
+    return open_vessel_inlet(scene->scene, &scene->open, &context->faults);
 }
 
 bool scene_open_parsed(SelContext *context, Scene *parsed, const SelOpenOptions *options, SelScene **out)
@@ -180,6 +183,18 @@ SelStatus sel_scene_entry(const SelScene *scene, double point_mm[3], double dire
         return SEL_ERROR_ARGUMENT;
     give_vector(scene->scene->wire.start, point_mm);
     give_vector(scene->scene->wire.direction, direction);
+    return SEL_OK;
+}
+
+int sel_scene_target_count(const SelScene *scene) { return scene ? scene->scene->target_count : 0; }
+
+SelStatus sel_scene_target(const SelScene *scene, int index, SelTarget *target)
+{
+    if (index < 0 || index >= sel_scene_target_count(scene) || !target)
+        return SEL_ERROR_ARGUMENT;
+    const SceneTarget *from = &scene->scene->target[index];
+    *target = (SelTarget){.name = from->name, .radius_mm = from->radius};
+    give_vector(from->point, target->point_mm);
     return SEL_OK;
 }
 

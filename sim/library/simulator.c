@@ -2,6 +2,7 @@
 
 #include "base/base.h"
 #include "sim/library/context.h"
+#include "sim/library/simulator.h"
 #include "sim/session_tracker.h"
 
 #include <stdlib.h>
@@ -20,20 +21,6 @@ SAME_FLAG(MODEL_DISAGREES);
 SAME_FLAG(HAND_SLIPS);
 _Static_assert((int)SEL_SCORE_REACHED == (int)SCORE_REACHED && (int)SEL_SCORE_TIME_OUT == (int)SCORE_TIME_OUT, "public states are the score's");
 
-struct SelSimulator {
-    SelContext *context;
-    const SelScene *scene;
-    Simulator *simulator;
-    SessionTracker *tracker; // NULL: no score
-    Recording *recording;    // NULL: none
-    bool has_lost_rows;      // the recording's file cannot be written
-    int script_cursor;
-    int node_capacity;       // of the shared centreline
-    NodeReport *node;        // (node_capacity) scratch
-    int own_capacity;        // for the tool with the most nodes
-    ToolNode *own;           // (own_capacity) scratch
-};
-
 void sel_simulator_options_init(SelSimulatorOptions *options, size_t size)
 {
     SelSimulatorOptions own = {.keeps_score = 1};
@@ -46,8 +33,10 @@ static void free_simulator(SelSimulator *s)
 {
     session_tracker_free(s->tracker);
     simulator_destroy(s->simulator);
+    checkpoint_free(s->start);
     free(s->node);
     free(s->own);
+    image_memory_free(&s->image);
     scene_release(s->scene);
     context_release(s->context);
     free(s);
@@ -58,6 +47,22 @@ typedef struct Making {
     SelSimulatorOptions options;
     SelSimulator *made;
 } Making;
+
+static Checkpoint *state_of(const SelSimulator *s)
+{
+    Checkpoint *state = stepper_save(simulator_stepper(s->simulator), NULL);
+    if (!state)
+        heap_is_empty(0, __FILE__);
+    return state;
+}
+
+static SessionTracker *new_tracker(const SelSimulator *s)
+{
+    SessionTracker *tracker = session_tracker_create(s->simulator, s->scene->open.tree);
+    if (!tracker)
+        heap_is_empty(0, __FILE__);
+    return tracker;
+}
 
 static void make_scratch(SelSimulator *s)
 {
@@ -81,8 +86,8 @@ static bool make(SelContext *context, void *what)
     if (!s->simulator)
         return false;
     make_scratch(s);
-    if (making->options.keeps_score && !(s->tracker = session_tracker_create(s->simulator, scene->open.tree)))
-        heap_is_empty(0, __FILE__);
+    s->start = state_of(s);
+    s->tracker = making->options.keeps_score ? new_tracker(s) : NULL;
     return true;
 }
 
@@ -100,6 +105,8 @@ SelStatus sel_simulator_create(SelContext *context, const SelScene *scene, const
         free_simulator(making.made);
     return status;
 }
+
+SelContext *sel_simulator_context(SelSimulator *s) { return s ? s->context : NULL; }
 
 void sel_simulator_destroy(SelSimulator *s)
 {
@@ -132,6 +139,77 @@ SelStatus sel_simulator_step(SelSimulator *s, const SelHand *hand)
     if (s->tracker)
         session_tracker_step(s->tracker, s->simulator, &commands, NULL);
     return record_step(s, &commands);
+}
+
+SelStatus sel_simulator_repeat(SelSimulator *s, const SelHand *hand, int count)
+{
+    if (!s || count < 0)
+        return context_refuse(s ? s->context : NULL, SEL_ERROR_ARGUMENT, __func__, "simulator is NULL, or count is negative");
+    SelStatus status = SEL_OK;
+    for (int i = 0; i < count && status == SEL_OK; i++)
+        status = sel_simulator_step(s, hand);
+    return status;
+}
+
+SelStatus sel_simulator_follow(SelSimulator *s, int count)
+{
+    if (!s || count < 0)
+        return context_refuse(s ? s->context : NULL, SEL_ERROR_ARGUMENT, __func__, "simulator is NULL, or count is negative");
+    SelStatus status = SEL_OK;
+    SelHand hand;
+    for (int i = 0; i < count && status == SEL_OK; i++) {
+        sel_simulator_script_hand(s, &hand);
+        status = sel_simulator_step(s, &hand);
+    }
+    return status;
+}
+
+// A tracker begins with the state at time 0.
+static bool begin_again(SelContext *context, void *what)
+{
+    (void)context;
+    SelSimulator *s = what;
+    bool keeps_score = s->tracker;
+    session_tracker_free(s->tracker);
+    s->tracker = NULL;
+    simulator_begin_again(s->simulator, s->start);
+    s->script_cursor = 0;
+    s->tracker = keeps_score ? new_tracker(s) : NULL;
+    return true;
+}
+
+SelStatus sel_simulator_reset(SelSimulator *s)
+{
+    if (!s)
+        return SEL_ERROR_ARGUMENT;
+    if (s->recording)
+        return context_refuse(s->context, SEL_ERROR_STATE, __func__, "a recording runs; end it first");
+    return context_call(s->context, begin_again, s, SEL_ERROR_MEMORY);
+}
+
+typedef struct Copying {
+    SelSimulator *to;
+    const SelSimulator *from;
+} Copying;
+
+static bool copy(SelContext *context, void *what)
+{
+    (void)context;
+    const Copying *copying = what;
+    Checkpoint *state = state_of(copying->from);
+    simulator_take_over(copying->to->simulator, copying->from->simulator, state);
+    copying->to->script_cursor = copying->from->script_cursor;
+    checkpoint_free(state);
+    return true;
+}
+
+SelStatus sel_simulator_copy(SelSimulator *s, const SelSimulator *from)
+{
+    if (!s || !from || s->scene != from->scene)
+        return context_refuse(s ? s->context : NULL, SEL_ERROR_ARGUMENT, __func__, "a simulator is NULL, or the two are of different scenes");
+    if (s->tracker || from->tracker || s->recording || from->recording)
+        return context_refuse(s->context, SEL_ERROR_STATE, __func__, "a simulator keeps a score or records; create both without");
+    return context_call(s->context, copy, &(Copying){.to = s, .from = from}, SEL_ERROR_MEMORY);
 }
 
 SelStatus sel_simulator_script_hand(SelSimulator *s, SelHand *hand)
@@ -208,6 +286,22 @@ SelStatus sel_simulator_nodes(SelSimulator *s, int tool, SelNode *node, int capa
     for (int i = 0; i < nodes; i++)
         node[i] = node_of(&s->own[i]);
     *count = nodes;
+    return SEL_OK;
+}
+
+_Static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Quat) == 4 * sizeof(double) && offsetof(Quat, w) == 0, "rows of a public array");
+
+SelStatus sel_simulator_centreline(const SelSimulator *s, const double **position_mm, const double **quaternion, int *count)
+{
+    if (!s)
+        return SEL_ERROR_ARGUMENT;
+    const WireState *state = simulator_state(s->simulator);
+    if (position_mm)
+        *position_mm = &state->position->x;
+    if (quaternion)
+        *quaternion = &state->orientation->w;
+    if (count)
+        *count = state->node_count;
     return SEL_OK;
 }
 

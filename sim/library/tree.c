@@ -4,6 +4,7 @@
 #include "sim/library/wall_query.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 SelTree *tree_handle(VesselTree *tree, TreeFileInfo info)
 {
@@ -71,6 +72,14 @@ SelStatus sel_tree_save(SelContext *context, const SelTree *tree, const char *pa
 
 int sel_tree_node_count(const SelTree *tree) { return tree ? tree->tree->node_count : 0; }
 int64_t sel_tree_point_count(const SelTree *tree) { return tree ? tree->tree->point_count : 0; }
+SelStatus sel_tree_points(const SelTree *tree, double *point_mm)
+{
+    if (!tree || !point_mm)
+        return SEL_ERROR_ARGUMENT;
+    memcpy(point_mm, tree->tree->point, (size_t)tree->tree->point_count * sizeof *tree->tree->point);
+    return SEL_OK;
+}
+
 int sel_tree_is_model(const SelTree *tree) { return tree && tree->vessel; }
 
 SelStatus sel_tree_node(const SelTree *tree, int index, SelTreeNode *node)

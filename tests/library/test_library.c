@@ -686,6 +686,133 @@ static void versions_and_names(void **state)
     assert_string_equal(sel_status_name((SelStatus)(SEL_DIFFERENT + 1)), "unknown");
 }
 
+// --- again and beside ---
+
+static SelSimulator *without_score(void)
+{
+    SelSimulator *simulator = NULL;
+    SelSimulatorOptions options = sel_simulator_defaults();
+    options.keeps_score = 0;
+    good(sel_simulator_create(context, scene, &options, &simulator));
+    return simulator;
+}
+
+static void a_reset_is_a_new_beginning(void **state)
+{
+    (void)state;
+    SelSimulator *simulator = new_simulator(scene);
+    SelScore score, again;
+    good(sel_simulator_follow(simulator, 300));
+    assert_true(sel_simulator_hash(simulator) == hash_after(scene, 300));
+    good(sel_simulator_score(simulator, &score, sizeof score));
+    good(sel_simulator_reset(simulator));
+    assert_int_equal(sel_simulator_steps(simulator), 0);
+    assert_true(sel_simulator_hash(simulator) == hash_after(scene, 0));
+    good(sel_simulator_follow(simulator, 300));
+    assert_true(sel_simulator_hash(simulator) == hash_after(scene, 300));
+    good(sel_simulator_score(simulator, &again, sizeof again));
+    assert_memory_equal(&score, &again, sizeof score);
+    sel_simulator_destroy(simulator);
+    simulator = new_simulator(scene);
+    good(sel_simulator_record(simulator, in_folder("reset.h5"), NULL));
+    assert_int_equal(sel_simulator_reset(simulator), SEL_ERROR_STATE);
+    sel_simulator_destroy(simulator);
+}
+
+static void a_copy_goes_on_alike(void **state)
+{
+    (void)state;
+    SelSimulator *from = without_score(), *to = without_score(), *scored = new_simulator(scene);
+    const SelHand hand = {.tool = {{.push_mm_s = 25, .twist_deg_s = -90}}};
+    SelTargetReach reach[2];
+    good(sel_simulator_follow(from, 400));
+    good(sel_simulator_repeat(to, &hand, 100));
+    good(sel_simulator_copy(to, from));
+    good(sel_simulator_repeat(from, &hand, 200));
+    for (int i = 0; i < 200; i++)
+        good(sel_simulator_step(to, &hand));
+    assert_true(sel_simulator_hash(to) == sel_simulator_hash(from));
+    good(sel_simulator_target(from, 0, &reach[0]));
+    good(sel_simulator_target(to, 0, &reach[1]));
+    assert_true(reach[0].distance_mm == reach[1].distance_mm && reach[0].time_s == reach[1].time_s);
+    assert_int_equal(sel_simulator_copy(scored, from), SEL_ERROR_STATE);
+    assert_int_equal(sel_simulator_repeat(from, &hand, -1), SEL_ERROR_ARGUMENT);
+    sel_simulator_destroy(from);
+    sel_simulator_destroy(to);
+    sel_simulator_destroy(scored);
+}
+
+static void the_centreline_is_the_state(void **state)
+{
+    (void)state;
+    enum { NODES = 201 };
+    SelSimulator *simulator = new_simulator(scene);
+    const double *position = NULL, *quaternion = NULL;
+    SelNode node[NODES];
+    int count = 0, nodes = 0;
+    good(sel_simulator_centreline(simulator, &position, &quaternion, &count));
+    good(sel_simulator_follow(simulator, 500));
+    good(sel_simulator_nodes(simulator, 0, node, NODES, &nodes));
+    assert_int_equal(count, nodes);
+    for (int i = 0; i < count; i++) {
+        assert_memory_equal(position + 3 * i, node[i].position_mm, sizeof node[i].position_mm);
+        assert_memory_equal(quaternion + 4 * i, node[i].quaternion, sizeof node[i].quaternion);
+    }
+    sel_simulator_destroy(simulator);
+}
+
+static void targets_are_the_scenes(void **state)
+{
+    (void)state;
+    SelTarget target;
+    assert_int_equal(sel_scene_target_count(scene), 1);
+    good(sel_scene_target(scene, 0, &target));
+    assert_string_equal(target.name, "middle cerebral artery");
+    assert_true(target.radius_mm == 2 && target.point_mm[0] == 23.9);
+    assert_int_equal(sel_scene_target(scene, 1, &target), SEL_ERROR_ARGUMENT);
+}
+
+// --- many at once ---
+
+static void a_batch_is_its_simulators_alone(void **state)
+{
+    (void)state;
+    enum { COUNT = 5, STEPS = 60 };
+    const SelScene *scenes[COUNT] = {scene, scene, scene, scene, scene};
+    SelHand hand[COUNT] = {0};
+    uint64_t alone[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        hand[i].tool[0] = (SelCommand){.push_mm_s = 10 * i, .twist_deg_s = 50};
+        SelSimulator *simulator = new_simulator(scene);
+        good(sel_simulator_repeat(simulator, &hand[i], STEPS));
+        alone[i] = sel_simulator_hash(simulator);
+        sel_simulator_destroy(simulator);
+    }
+    for (int threads = 1; threads <= 4; threads++) {
+        SelBatchOptions options = sel_batch_defaults();
+        SelBatch *batch = NULL;
+        options.threads = threads;
+        good(sel_batch_create(context, COUNT, scenes, &options, &batch));
+        good(sel_batch_hashes(batch, 1));
+        for (int k = 0; k < STEPS / 10; k++)
+            good(sel_batch_step(batch, hand, 10, NULL));
+        const SelBatchRow *row = sel_batch_rows(batch);
+        for (int i = 0; i < COUNT; i++) {
+            double tip[3];
+            assert_true(row[i].hash == alone[i]);
+            good(sel_simulator_tip(sel_batch_simulator(batch, i), 0, tip));
+            assert_memory_equal(tip, row[i].tip_mm, sizeof tip);
+        }
+        assert_null(sel_batch_simulator(batch, COUNT));
+        hand[3].tool[0].push_mm_s = 1e6;
+        assert_int_equal(sel_batch_step(batch, hand, 1, NULL), SEL_ERROR_ARGUMENT);
+        expect_fault("simulator 3: push_mm_s");
+        assert_true(row[0].time_s == 0.06);
+        hand[3].tool[0].push_mm_s = 30;
+        sel_batch_destroy(batch);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -705,6 +832,11 @@ int main(void)
         cmocka_unit_test(structures_may_grow),
         cmocka_unit_test(a_recording_is_replayed_bit_for_bit),
         cmocka_unit_test(an_unwritable_recording_is_an_error),
+        cmocka_unit_test(a_reset_is_a_new_beginning),
+        cmocka_unit_test(a_copy_goes_on_alike),
+        cmocka_unit_test(the_centreline_is_the_state),
+        cmocka_unit_test(targets_are_the_scenes),
+        cmocka_unit_test(a_batch_is_its_simulators_alone),
         cmocka_unit_test(a_volume_becomes_a_model),
         cmocka_unit_test(files_are_those_of_the_program),
         cmocka_unit_test(bad_volumes_are_refused),

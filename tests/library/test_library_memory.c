@@ -129,6 +129,8 @@ static SelStatus simulate(SelContext *context)
     status = run(simulator, status);
     if (status == SEL_OK)
         status = sel_simulator_end_recording(simulator);
+    if (status == SEL_OK)
+        status = sel_simulator_reset(simulator);
     sel_simulator_destroy(simulator);
     sel_scene_destroy(scene);
     return status;
@@ -208,6 +210,7 @@ static void all_memory_comes_from_the_host_and_goes_back(void **state)
         if (status != SEL_OK)
             fail_msg("story %d: %s", i, sel_fault(context, 0));
         sel_context_destroy(context);
+        sel_vessels_forget();
         print_message("story %d: %ld allocations, %ld are left\n", i, asked - before, live);
         assert_true(asked - before > 100);
         assert_int_equal(live, 0);

@@ -25,7 +25,7 @@ static Volume *ball_in(const char *frame, Vec3 *center)
     const int size[3] = {40, 50, 60};
     Vec3 axis[3] = {{1, 0, 0}, {0, 0.8, 0}, {0, 0, 0.7}};
     Volume *v = volume_create(size, vec3(-20, 7, 100), axis);
-    PatientAxes a = patient_axes(frame);
+    VolumeAxes a = patient_axes(frame);
     assert_non_null(v);
     snprintf(v->frame, sizeof v->frame, "%s", frame);
     *center = vec3_add(volume_middle(v), vec3_add(vec3_scale(a.left, 8), vec3_add(vec3_scale(a.posterior, -10), vec3_scale(a.superior, 12))));
@@ -61,7 +61,7 @@ static void letters_are_the_patients(void **state)
     for (int f = 0; f < 4; f++) {
         Vec3 center;
         Volume *v = ball_in(frame[f], &center);
-        PatientAxes a = patient_axes(v->frame);
+        VolumeAxes a = patient_axes(v->frame);
         assert_true(a.is_known);
         for (int view = 0; view < 3; view++) {
             char text[4];
@@ -85,11 +85,11 @@ static void letters_are_the_patients(void **state)
         volume_free(v);
     }
     char text[4];
-    PatientAxes none = patient_axes("scanner-xyz");
+    VolumeAxes none = patient_axes("scanner-xyz");
     assert_false(none.is_known);
     patient_letters(&none, vec3(0, -1, 0), text);
     assert_string_equal(text, "-y");
-    PatientAxes lps = patient_axes("LPS");
+    VolumeAxes lps = patient_axes("LPS");
     patient_letters(&lps, vec3_unit(vec3(-1, -0.8, 0.1)), text);
     assert_string_equal(text, "RA");
 }
@@ -99,7 +99,7 @@ static void a_click_in_a_projection_meets_the_vessel(void **state)
     (void)state;
     Vec3 center, place;
     Volume *v = ball_in("RAS", &center);
-    PatientAxes a = patient_axes(v->frame);
+    VolumeAxes a = patient_axes(v->frame);
     for (int view = 0; view < 3; view++) {
         Camera c = slice_camera(&a, (SliceView)view, v, volume_middle(v), 1, 200, 150);
         Vec3 p = camera_project(&c, center);

@@ -6,11 +6,12 @@
 // rotates the detector to the patient's left about the long axis, CRA towards the head.
 //
 // Models use the frame of their volume, which their files do not record: the caller gives the patient's axes; default LPS.
-#ifndef SELDINGER_RENDER_C_ARM_H
-#define SELDINGER_RENDER_C_ARM_H
+#ifndef SELDINGER_SIM_C_ARM_H
+#define SELDINGER_SIM_C_ARM_H
 
 #include "geom/geom.h"
-#include "sim/sim.h"
+#include "sim/xray.h"
+#include "sim/xray_tube.h"
 
 #define C_ARM_SOURCE_MM XRAY_SOURCE_MM // source to isocentre
 #define C_ARM_NEAREST_MM 20.0          // visible points must be further than this from the plane of the source

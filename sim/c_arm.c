@@ -1,7 +1,7 @@
 // With theta = LAO, phi = CRA, and the patient's left L, anterior A, superior S:
 //   towards = cos phi (cos theta A + sin theta L) + sin phi S,  right = cos theta L - sin theta A,  up = cos phi S - sin phi (cos theta A + sin theta L).
 // A point at p from the isocentre is projected to (right . p, up . p) D / ((D + towards . p) field), D the distance from source to isocentre.
-#include "render/c_arm.h"
+#include "sim/c_arm.h"
 
 #include <stdio.h>
 

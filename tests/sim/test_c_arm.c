@@ -1,5 +1,5 @@
 // The C-arm's projection, without GL.
-#include "render/c_arm.h"
+#include "sim/c_arm.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,0 +1,20 @@
+"""Seldinger: guide wires and catheters in blood vessels, in real time. A tool for training and research, not a medical device.
+
+Lengths mm, time s, force N, torque N mm, angles deg, speed mm/s and deg/s. Arrays are numpy's, float64; tools are counted from 0, the
+outermost first.
+
+    import seldinger
+    sim = seldinger.Simulator("scenes/phantom/scene.yaml")
+    sim.step([[20, 0]], n=500)
+    print(sim.time_s, sim.tip, sim.hand_force)
+"""
+from ._library import ArgumentError, Error, InputError, LibraryMemoryError, OutputError, StateError, version
+from .batch import ROW, Batch
+from .recon import TREE_NODE, DoubtWarning, Tree, Volume
+from .recording import Recording
+from .scene import Scene, Target
+from .simulator import CONTACT, NODE, Flag, Simulator
+
+__version__ = version()
+__all__ = ["ArgumentError", "Batch", "CONTACT", "DoubtWarning", "Error", "Flag", "InputError", "LibraryMemoryError", "NODE", "OutputError", "ROW", "Recording", "Scene", "Simulator",
+           "StateError", "TREE_NODE", "Target", "Tree", "Volume", "version"]
