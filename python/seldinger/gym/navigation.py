@@ -54,8 +54,8 @@ class Navigation(Env):
             "inserted": (tools,) mm beyond the sheath; "turned": (tools, 2), cosine and sine of each hand's turn;
             "force": (tools, 2), each hand's push [N] and torque [N mm];
             "image": (image_size, image_size) uint8, the X-ray picture.
-        reward: "score": the change of the exercise's points / 100, so that an episode's rewards add up to its score / 100; "steve":
-            as stEVE_bench has it, 1 at the target, 0.001 for each mm of the way to it that is gained, -0.005 a command.
+        reward: "score": the change of the exercise's points / 100, so that an episode's rewards add up to its score / 100, less what the
+            start had gained; "steve": as stEVE_bench has it, 1 at the target, 0.001 for each mm of the way to it that is gained, -0.005 a command.
         push_mm_s, twist_deg_s: the fastest hands.
         command_s: [s] for which a command holds; a multiple of the scene's step is taken.
         commands: after so many an episode is truncated; None: never.
