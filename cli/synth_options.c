@@ -115,11 +115,8 @@ static const char *check(void *structure)
 {
     SynthCommand *command = structure;
     const double *voxel = command->files.volume.voxel_mm;
-    static char missing[400];
-    if (!command->files.name) {
-        snprintf(missing, sizeof missing, "missing a shape: %s", shape_names());
-        return missing;
-    }
+    if (!command->files.name)
+        return "missing a shape: " SHAPE_NAMES;
     if (!command->output == !command->measure)
         return "give either -o F or --measure MODEL.h5";
     if (!take_grey_values(command))
@@ -139,7 +136,7 @@ const OptionTable synth_options = {
     .program = "seldinger synth",
     .does = "synthetic shapes with known truth",
     .usage = "SHAPE [options] -o F\nSHAPE [options] --measure MODEL.h5",
-    .intro = "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta, arch.\n"
+    .intro = "Shapes: " SHAPE_NAMES ".\n"
              "F.h5 is a tree of point sets, F.stl or F.ply the surface, F.nrrd a noisy volume; beside the last two stands the true centreline with exact "
              "surface points, F-truth.h5, and F-neighbour.h5 that of a kissing neighbour, which is no part of the truth.",
     .exits = CLI_BAD_INPUT_EXITS,

@@ -200,8 +200,6 @@ static bool build_twig(Shape *shape, const ShapeOptions *o)
 static const char *const names[] = {"capsule", "open-capsule", "arc",  "bifurcation", "spiral", "phantom", "helix",
                                     "y",       "kissing",      "bone", "twig",        "tree",   "aorta",   "arch"};
 
-const char *shape_names(void) { return "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta, arch"; }
-
 static bool parse_options(int count, const char (*option)[2][64], const char *file, ShapeOptions *out, Faults *faults)
 {
     const struct {
@@ -304,7 +302,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
     while (which < SHAPES && strcmp(name, names[which]))
         which++;
     if (which == SHAPES)
-        faults_add(faults, file, 0, 0, "unknown shape '%s'; expected %s", name, shape_names());
+        faults_add(faults, file, 0, 0, "unknown shape '%s'; expected " SHAPE_NAMES, name);
     // defaults that depend on the shape
     o.rise_mm = which == HELIX ? 12 : 0;
     o.gap_mm = which == KISSING ? 0.2 : 0;

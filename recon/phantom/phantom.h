@@ -38,8 +38,9 @@
 
 #include <stdint.h>
 
-// Returns the names of all shapes, separated by ", ", for messages and help.
-const char *shape_names(void);
+// The names of all shapes, for messages and help.
+#define SHAPE_NAMES "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta, arch"
+
 // Creates a shape. Returns NULL with a fault for each unknown key, value out of range or unknown name; `file` is the prefix of messages.
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 void shape_free(Shape *shape);
