@@ -52,7 +52,7 @@ static const Option options[] = {
     {"points", "N", OPTION_NUMBER, AT(option), "samples of a vessel node", .otherwise = "108", .take = take_shape_option, .group = "shape"},
     SHAPE("sac-points", "N", "1500", "samples of an aneurysm node"),
     SHAPE("noise-mm", "X", "0", "standard deviation of the samples' noise along the normal [mm]"),
-    SHAPE("seed", "N", "1", "of noise and of the samples' places"),
+    SHAPE("seed", "N", "1", "of noise and of the samples' places; tree, arch: of the vessels"),
     SHAPE("spacing", "X", "0.5", "distance of nodes in local radii"),
     SHAPE("blend-mm", "X", "0: 0.6 times the branch's radius", "width of the joints [mm]"),
     SHAPE("length-mm", "X", "4", "capsules: segment [mm]; y: trunk and daughters, twig: vessel"),
@@ -68,6 +68,9 @@ static const Option options[] = {
     SHAPE("gap-mm", "X", "0.2; bone, tree: from wall to block, default 0", "kissing: from wall to wall [mm]"),
     {"gap-voxels", "X", OPTION_NUMBER, AT(gap_voxels), "the same in voxels (the least edge)", .most = 100, .otherwise = ""},
     SHAPE("crossing-deg", "X", "0: side by side", "kissing: angle of the two vessels"),
+    SHAPE("arch-type", "N", "1", "arch: variant of the branches: 1 (usual), 2, 4, 5, 6, 7"),
+    SHAPE("spread", "X", "1", "arch: factor of the standard deviations; 0: the mean arch"),
+    SHAPE("diameter-scale", "X", "1", "arch: of all diameters"),
     SHAPE("scale", "X", "1", "of the whole shape"),
     {"cell-mm", "X", OPTION_NUMBER, AT(files.cell_mm), "grid of the triangles", .least = 0.005, .most = 10, .unit = "mm", .group = "surface"},
     {"voxel-mm", "X|X,Y,Z", OPTION_NUMBER, AT(files.volume.voxel_mm), "edges along the grid's axes", .unit = "mm", .otherwise = "0.2", .take = take_voxel,
@@ -112,11 +115,8 @@ static const char *check(void *structure)
 {
     SynthCommand *command = structure;
     const double *voxel = command->files.volume.voxel_mm;
-    static char missing[400];
-    if (!command->files.name) {
-        snprintf(missing, sizeof missing, "missing a shape: %s", shape_names());
-        return missing;
-    }
+    if (!command->files.name)
+        return "missing a shape: " SHAPE_NAMES;
     if (!command->output == !command->measure)
         return "give either -o F or --measure MODEL.h5";
     if (!take_grey_values(command))
@@ -136,7 +136,7 @@ const OptionTable synth_options = {
     .program = "seldinger synth",
     .does = "synthetic shapes with known truth",
     .usage = "SHAPE [options] -o F\nSHAPE [options] --measure MODEL.h5",
-    .intro = "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta.\n"
+    .intro = "Shapes: " SHAPE_NAMES ".\n"
              "F.h5 is a tree of point sets, F.stl or F.ply the surface, F.nrrd a noisy volume; beside the last two stands the true centreline with exact "
              "surface points, F-truth.h5, and F-neighbour.h5 that of a kissing neighbour, which is no part of the truth.",
     .exits = CLI_BAD_INPUT_EXITS,

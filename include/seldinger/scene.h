@@ -188,6 +188,8 @@ SEL_API int sel_scene_tool_count(const SelScene *scene);
 SEL_API const char *sel_scene_tool_name(const SelScene *scene, int tool);        // "wire" of a scene with one unnamed tool; NULL: no such tool
 // Where the tools enter: the sheath's mouth and the unit direction of advance.
 SEL_API SelStatus sel_scene_entry(const SelScene *scene, double point_mm[3], double direction[3]);
+// The view that the scene's `fluoroscopy:` asks for: angles of the C-arm, and the patient's axes as unit vectors; without it 0, 0 and those of LPS.
+SEL_API SelStatus sel_scene_view(const SelScene *scene, double *lao_deg, double *cra_deg, double anterior[3], double superior[3]);
 // A target of the scene; its name lives as long as the scene. Error: SEL_ERROR_ARGUMENT (no such target).
 SEL_API int sel_scene_target_count(const SelScene *scene);
 SEL_API SelStatus sel_scene_target(const SelScene *scene, int index, SelTarget *target);

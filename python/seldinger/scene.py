@@ -101,6 +101,14 @@ class Scene:
         lib.sel_scene_entry(self.handle, ffi.from_buffer("double *", point), ffi.from_buffer("double *", direction))
         return point, direction
 
+    @property
+    def view(self) -> tuple[float, float, NDArray[np.float64], NDArray[np.float64]]:
+        """The view that the scene asks for: the C-arm's LAO and CRA angles [deg], and the patient's axes forwards and headwards, (3,) each."""
+        angles, anterior, superior = np.zeros(2), np.empty(3), np.empty(3)
+        lao, cra = (ffi.from_buffer("double *", angles[i:i + 1]) for i in range(2))
+        lib.sel_scene_view(self.handle, lao, cra, ffi.from_buffer("double *", anterior), ffi.from_buffer("double *", superior))
+        return float(angles[0]), float(angles[1]), anterior, superior
+
     def query(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The wall at points.
 

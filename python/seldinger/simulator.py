@@ -415,6 +415,11 @@ class Simulator:
 
     # --- recording ---
 
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording runs."""
+        return self._is_recording
+
     def record(self, path: PathLike, *, frame_ms: float = 10.0, expected_s: float = 0.0) -> None:
         """Records all steps from now on to an HDF5 file, which ``Recording`` and ``seldinger replay`` read, also after a kill.
 

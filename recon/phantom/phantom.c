@@ -13,7 +13,7 @@
 
 typedef struct ShapeOptions {
     double points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, bend_radius_mm, rise_mm, scale;
-    double turns, angle_deg, branches, sacs, blocks, gap_mm, crossing_deg, twig_radius_mm;
+    double turns, angle_deg, branches, sacs, blocks, gap_mm, crossing_deg, twig_radius_mm, arch_type, spread, diameter_scale;
 } ShapeOptions;
 
 static bool build_capsule(Shape *shape, const ShapeOptions *o, bool open)
@@ -198,9 +198,7 @@ static bool build_twig(Shape *shape, const ShapeOptions *o)
 }
 
 static const char *const names[] = {"capsule", "open-capsule", "arc",  "bifurcation", "spiral", "phantom", "helix",
-                                    "y",       "kissing",      "bone", "twig",        "tree",   "aorta"};
-
-const char *shape_names(void) { return "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta"; }
+                                    "y",       "kissing",      "bone", "twig",        "tree",   "aorta",   "arch"};
 
 static bool parse_options(int count, const char (*option)[2][64], const char *file, ShapeOptions *out, Faults *faults)
 {
@@ -225,7 +223,10 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
                  {"blocks", &out->blocks, 0, 100},
                  {"gap_mm", &out->gap_mm, 0, 100},
                  {"crossing_deg", &out->crossing_deg, 0, 90},
-                 {"twig_radius_mm", &out->twig_radius_mm, 0.02, 50}};
+                 {"twig_radius_mm", &out->twig_radius_mm, 0.02, 50},
+                 {"arch_type", &out->arch_type, 1, 7},
+                 {"spread", &out->spread, 0, 1},
+                 {"diameter_scale", &out->diameter_scale, 0.5, 1.5}};
     int before = faults->count;
     for (int i = 0; i < count; i++) {
         size_t k = 0, n = sizeof known / sizeof known[0];
@@ -234,7 +235,8 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
         if (k == n) {
             faults_add(faults, file, 0, 0,
                        "unknown shape option '%s'; expected points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, "
-                       "bend_radius_mm, rise_mm, scale, turns, angle_deg, branches, sacs, blocks, gap_mm, crossing_deg, twig_radius_mm",
+                       "bend_radius_mm, rise_mm, scale, turns, angle_deg, branches, sacs, blocks, gap_mm, crossing_deg, twig_radius_mm, arch_type, spread, "
+                       "diameter_scale",
                        option[i][0]);
             continue;
         }
@@ -248,6 +250,8 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
     }
     if (out->bend_radius_mm <= 1.05 * out->radius_mm)
         faults_add(faults, file, 0, 0, "bend_radius_mm %g is not larger than the tube's radius_mm %g", out->bend_radius_mm, out->radius_mm);
+    if (out->arch_type != floor(out->arch_type) || out->arch_type == 3)
+        faults_add(faults, file, 0, 0, "shape option arch_type is %g; expected 1, 2, 4, 5, 6 or 7", out->arch_type);
     return faults->count == before;
 }
 
@@ -256,6 +260,12 @@ static bool build_tree(Shape *shape, const ShapeOptions *o, const char *file, Fa
     RandomTreeOptions tree = {
         .branches = (int)o->branches, .radius_mm = o->radius_mm, .seed = shape->seed, .sacs = (int)o->sacs, .blocks = (int)o->blocks, .gap_mm = o->gap_mm};
     return random_tree_grow(shape, &tree, file, faults);
+}
+
+static bool build_arch(Shape *shape, const ShapeOptions *o)
+{
+    ArchOptions arch = {.type = (int)o->arch_type, .spread = o->spread, .diameter_scale = o->diameter_scale, .seed = shape->seed};
+    return arch_grow(shape, &arch);
 }
 
 static bool scale_shape(Shape *shape, double scale)
@@ -272,7 +282,7 @@ static bool scale_shape(Shape *shape, double scale)
 
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults)
 {
-    enum { HELIX = 6, Y, KISSING, BONE, TWIG, TREE, AORTA, SHAPES };
+    enum { HELIX = 6, Y, KISSING, BONE, TWIG, TREE, AORTA, ARCH, SHAPES };
     ShapeOptions o = {.points = 108,
                       .sac_points = 1500,
                       .seed = 1,
@@ -284,12 +294,15 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
                       .turns = 2,
                       .angle_deg = 37.5,
                       .branches = 51,
-                      .twig_radius_mm = 0.2};
+                      .twig_radius_mm = 0.2,
+                      .arch_type = 1,
+                      .spread = 1,
+                      .diameter_scale = 1};
     int which = 0, before = faults->count;
     while (which < SHAPES && strcmp(name, names[which]))
         which++;
     if (which == SHAPES)
-        faults_add(faults, file, 0, 0, "unknown shape '%s'; expected %s", name, shape_names());
+        faults_add(faults, file, 0, 0, "unknown shape '%s'; expected " SHAPE_NAMES, name);
     // defaults that depend on the shape
     o.rise_mm = which == HELIX ? 12 : 0;
     o.gap_mm = which == KISSING ? 0.2 : 0;
@@ -324,6 +337,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
                  : which == BONE    ? build_bone(shape, &o)
                  : which == TWIG    ? build_twig(shape, &o)
                  : which == AORTA   ? aorta_grow(shape)
+                 : which == ARCH    ? build_arch(shape, &o)
                                     : build_tree(shape, &o, file, faults);
     built = built && scale_shape(shape, o.scale) && shape_finish(shape);
     if (built && shape->neighbour) {

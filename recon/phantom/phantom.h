@@ -1,4 +1,4 @@
-// Synthetic vessels whose geometry is known exactly: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree, aorta.
+// Synthetic vessels whose geometry is known exactly: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree, aorta, arch.
 //
 // A shape is a set of parts: tubes (the union of spheres of smoothly varying radius along a smooth curve) and ellipsoids (sacs). Each part's field is
 // its signed distance, > 0 inside; connected parts are joined by a smooth maximum of width `blend_mm`, parts that only lie side by side
@@ -24,6 +24,9 @@
 //   blocks       bone, tree: number of dense blocks beside the vessels (6, 0)
 //   gap_mm       kissing: distance from wall to wall (0.2); bone, tree: from wall to block (0: they touch)
 //   crossing_deg kissing: angle between the two vessels; 0: they run side by side for twelve radii (0)
+//   arch_type    arch: variant of its branches: 1 (usual), 2, 4, 5, 6 or 7 (1)
+//   spread       arch: factor of the standard deviations; 0: the mean arch of its type (1)
+//   diameter_scale  arch: factor of its diameters (1)
 //   scale        scale factor of the whole shape (1)
 #ifndef SELDINGER_RECON_PHANTOM_PHANTOM_H
 #define SELDINGER_RECON_PHANTOM_PHANTOM_H
@@ -35,8 +38,9 @@
 
 #include <stdint.h>
 
-// Returns the names of all shapes, separated by ", ", for messages and help.
-const char *shape_names(void);
+// The names of all shapes, for messages and help.
+#define SHAPE_NAMES "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta, arch"
+
 // Creates a shape. Returns NULL with a fault for each unknown key, value out of range or unknown name; `file` is the prefix of messages.
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 void shape_free(Shape *shape);

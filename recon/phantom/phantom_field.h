@@ -15,7 +15,7 @@ double shape_field_cut(const Shape *shape, Vec3 x);
 // Signed distance to the true surface [mm], > 0 inside; `foot` (may be NULL) is the closest surface point. Near the medial axis it is the distance of a local
 // closest point, which projection finds; it is never less than the field.
 double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot);
-// Returns true if x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom and aorta are open at the inlet; open-capsule at both ends). The
+// Returns true if x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom, aorta and arch are open at the inlet; open-capsule at both ends). The
 // surface there is not compared with a model, because the tube continues.
 bool shape_beyond_open_end(const Shape *shape, Vec3 x);
 // Axis-aligned box around the surface.

@@ -78,6 +78,14 @@ double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradi
 bool shape_add(Shape *shape, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4]);
 // Adds the parts of the shape `aorta`.
 bool aorta_grow(Shape *shape);
+typedef struct ArchOptions {
+    int type;                // 1, 2, 4, 5, 6, 7: variant of the branches
+    double spread;           // factor of all standard deviations; 0: the mean arch
+    double diameter_scale;   // factor of all diameters
+    uint64_t seed;
+} ArchOptions;
+// Adds the parts of the shape `arch`: the aorta first.
+bool arch_grow(Shape *shape, const ArchOptions *options);
 // Completes the shape after the last part: joints and octree. Returns false if out of memory.
 bool shape_finish(Shape *shape);
 // Like shape_field; also returns the part with the largest value there and its parameter.

@@ -186,6 +186,19 @@ SelStatus sel_scene_entry(const SelScene *scene, double point_mm[3], double dire
     return SEL_OK;
 }
 
+SelStatus sel_scene_view(const SelScene *scene, double *lao_deg, double *cra_deg, double anterior[3], double superior[3])
+{
+    if (!scene || !lao_deg || !cra_deg || !anterior || !superior)
+        return SEL_ERROR_ARGUMENT;
+    const Scene *read = scene->scene;
+    bool is_given = vec3_norm(read->patient_superior) > 0;
+    *lao_deg = read->lao;
+    *cra_deg = read->cra;
+    give_vector(is_given ? read->patient_anterior : vec3(0, -1, 0), anterior);
+    give_vector(is_given ? read->patient_superior : vec3(0, 0, 1), superior);
+    return SEL_OK;
+}
+
 int sel_scene_target_count(const SelScene *scene) { return scene ? scene->scene->target_count : 0; }
 
 SelStatus sel_scene_target(const SelScene *scene, int index, SelTarget *target)

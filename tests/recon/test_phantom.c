@@ -271,6 +271,68 @@ static void volume_holds_the_shape(void **state)
     volume_free(noisy);
 }
 
+// Arches are those of their published figures: the mean arch does not depend on the seed and passes through the mean points; the figures of many arches have the
+// published means and deviations; each type has its branches.
+static Shape *arch(int type, uint64_t seed, double spread)
+{
+    char option[3][2][64] = {{"arch_type"}, {"seed"}, {"spread"}};
+    snprintf(option[0][1], 64, "%d", type);
+    snprintf(option[1][1], 64, "%d", (int)seed);
+    snprintf(option[2][1], 64, "%g", spread);
+    faults_clear(&faults);
+    Shape *shape = shape_create("arch", 3, (const char(*)[2][64])option, "test", &faults);
+    assert_non_null(shape);
+    return shape;
+}
+
+static void arches_have_their_figures(void **state)
+{
+    (void)state;
+    static const int types[] = {1, 2, 4, 5, 6, 7};
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
+        Shape *mean = arch(types[i], 1, 0), *same = types[i] == 5 ? NULL : arch(types[i], 2, 0);
+        // a point of the descending aorta, 20 mm wide; it widens by 0.02 mm per mm, so that a sphere further on reaches a little further
+        double r = shape_field(mean, vec3(30, 0, 90), NULL);
+        assert_true(r >= 10 - 1e-3 && r < 10.05);
+        uint64_t seed = 9;
+        for (int k = 0; same && k < 100; k++) {     // type 5 has two forms
+            Vec3 x = vec3_add(vec3(0, -30, 130), random_in_box(&seed, 80));
+            assert_true(shape_field(mean, x, NULL) == shape_field(same, x, NULL));
+        }
+        VesselTree *tree = shape_sample(mean, &faults);
+        int ends = 0;
+        for (int n = 0; n < tree->node_count; n++) {
+            bool is_parent = false;
+            for (int m = n + 1; m < tree->node_count && !is_parent; m++)
+                is_parent = tree->parent[m] == n;
+            ends += !is_parent;
+        }
+        assert_int_equal(ends, 5);      // the heart, two carotid and two subclavian arteries
+        vessel_tree_free(tree);
+        shape_free(mean);
+        shape_free(same);
+    }
+    enum { MANY = 300 };
+    double sum = 0, square = 0, high = 0, low = HUGE_VAL;
+    for (int i = 0; i < MANY; i++) {
+        Shape *one = arch(5 - 4 * (i % 2), (uint64_t)i, 1);
+        Vec3 least, most;
+        double r = shape_field(one, vec3(0, 0, 0), NULL);      // half of 17 mm with a deviation of 1 mm
+        sum += r, square += r * r;
+        shape_bounds(one, &least, &most);
+        high = fmax(high, most.z), low = fmin(low, most.z);
+        shape_free(one);
+    }
+    double mean = sum / MANY, deviation = sqrt(square / MANY - mean * mean);
+    assert_true(fabs(mean - 8.5) < 4 * 0.5 / sqrt(MANY));
+    assert_true(fabs(deviation / 0.5 - 1) < 4 / sqrt(2.0 * MANY));
+    // the left carotid artery ends at z = 230 mm, rounded by its radius of at most 5.5 mm, and heights are stretched by 0.7 to 1.3
+    assert_true(low > 0.7 * 230 && low < 0.72 * 230 + 5.5 && high > 1.28 * 230 && high < 1.3 * 230 + 5.5);
+    faults_clear(&faults);
+    assert_null(shape_create("arch", 1, (const char[1][2][64]){{"arch_type", "3"}}, "test", &faults));
+    assert_string_equal(faults.text[0], "test: shape option arch_type is 3; expected 1, 2, 4, 5, 6 or 7");
+}
+
 static void bad_options_are_faults(void **state)
 {
     (void)state;
@@ -293,6 +355,7 @@ int main(void)
         cmocka_unit_test(noise_has_its_size_and_seed), cmocka_unit_test(spiral_is_the_papers),
         cmocka_unit_test(phantom_keeps_its_promises),  cmocka_unit_test(surface_is_closed_and_converges),
         cmocka_unit_test(volume_holds_the_shape),      cmocka_unit_test(bad_options_are_faults),
+        cmocka_unit_test(arches_have_their_figures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
