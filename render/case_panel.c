@@ -18,6 +18,7 @@ static const char *const key_help[][2] = {{"click", "does what is chosen on the 
                                           {"1 to 8, L", "what a click does; L: it only looks"},
                                           {"N, P", "next and previous mark"},
                                           {"W", "the wall instead of the projection"},
+                                          {"O", "bone in the projection of a CT, or not"},
                                           {"T, C (Shift: back)", "next wire; next catheter around it, or none"},
                                           {"A (Shift: back)", "which vessel of the body it is"},
                                           {"B", "what lies behind the vessels"},

@@ -352,6 +352,8 @@ void case_state_choose_mark(CaseState *s, int mark)
 
 // --- views ---
 
+const Volume *case_state_projected(const CaseState *s) { return volume_has_ct_numbers(s->volume) && !s->shows_bone ? s->reduced : s->volume; }
+
 Camera case_state_camera(const CaseState *s, int view, int width, int height)
 {
     if (view == CASE_PROJECTION)

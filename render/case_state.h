@@ -31,6 +31,7 @@ typedef struct CaseState {
     FreeCamera camera;           // of the projection
     bool turns;                  // the projection, by itself
     bool shows_wall;             // instead of the projection
+    bool shows_bone;             // of a CT, in the projection
     int view;                    // that has the keys
     int mode;                    // what a click does
     double forbid_radius;        // [mm]
@@ -74,6 +75,8 @@ void case_state_edit_end(CaseState *state);
 // … once this has taken them, after anything that may have changed `edit`.
 void case_state_edit_take(CaseState *state);
 
+// What the projection shows and a click in it meets: of a CT what is not bone, in `reduced`, unless the user wants it.
+const Volume *case_state_projected(const CaseState *state);
 // A view of this size; the projection at CASE_PROJECTION.
 Camera case_state_camera(const CaseState *state, int view, int width, int height);
 // Moves the slice of a view by voxels, and the cross-hair within a view by voxels to the right and up.

@@ -125,7 +125,7 @@ static bool update_picture(Picture *p, const CaseState *s, int view, GuiRect at,
     const int *size = s->volume->size;
     bool is_whole = !is_coarse && (size_t)size[0] * (size_t)size[1] * (size_t)size[2] <= voxels_most;
     if (is_projection)
-        volume_projection(is_whole ? s->volume : s->reduced, &camera, s->low, s->high, 2, p->grey);
+        volume_projection(is_whole || s->shows_bone ? case_state_projected(s) : s->reduced, &camera, s->low, s->high, 2, p->grey);
     else
         volume_slice(s->volume, &camera, s->cursor, s->low, s->high, p->grey);
     for (int i = 0; i < width * height; i++) {
@@ -410,9 +410,10 @@ static void draw_frame(const Over *o)
     letter(o, c->right, at.x + at.width - inset, at.y + at.height / 2);
     letter(o, c->up, at.x + at.width / 2, at.y + inset);
     letter(o, vec3_negate(c->up), at.x + at.width / 2, at.y + at.height - inset);
-    const char *title = !o->s->axes.is_known && o->view < CASE_PROJECTION ? "slice"
-                        : o->view == CASE_PROJECTION && o->s->shows_wall  ? "wall, by error"
-                                                                          : name[o->view];
+    const char *title = !o->s->axes.is_known && o->view < CASE_PROJECTION                          ? "slice"
+                        : o->view == CASE_PROJECTION && o->s->shows_wall                           ? "wall, by error"
+                        : o->view == CASE_PROJECTION && case_state_projected(o->s) != o->s->volume ? "projection without bone (O)"
+                                                                                                   : name[o->view];
     gui_draw_text(o->gui, at.x + 8 * k, at.y + 6 * k, GUI_SMALL, gui_colors.dim, title);
     // a scale of 10 mm, or a tenth or ten times that
     double bar = 10;

@@ -139,6 +139,10 @@ static void press_letter(CaseWindow *w, int key)
         s->shows_wall = !s->shows_wall;
         s->pictures++;
         break;
+    case 'O':
+        s->shows_bone = !s->shows_bone;
+        s->pictures++;
+        break;
     case 'T': case_state_next(s, CASE_WIRES, w->shift ? -1 : 1); break;
     case 'C': case_state_next(s, CASE_CATHETERS, w->shift ? -1 : 1); break;
     case 'A': case_state_next(s, CASE_SEGMENTS, w->shift ? -1 : 1); break;
@@ -201,7 +205,7 @@ static bool place_under(const CaseWindow *w, int view, double x, double y, Vec3 
     Camera camera = case_state_camera(s, view, (int)at.width, (int)at.height);
     x -= (double)at.x, y -= (double)at.y;
     if (view == CASE_PROJECTION)
-        return volume_pick(s->volume, &camera, x, y, place);
+        return volume_pick(case_state_projected(s), &camera, x, y, place);
     *place = camera_point(&camera, x, y, s->cursor);
     Vec3 v = volume_voxel_of(s->volume, *place);
     const int *size = s->volume->size;

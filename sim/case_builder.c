@@ -113,7 +113,8 @@ static void look(CaseBuilder *b)
 {
     const double wire = 0.18;        // [mm] radius of the thinnest wire
     Missed missed;
-    if (!missed_find(b->volume, b->work.file.tree, &missed))
+    // bone is as bright as vessels and much larger: a CT is searched without it
+    if (!missed_find(volume_has_ct_numbers(b->volume) ? b->reduced : b->volume, b->work.file.tree, &missed))
         missed = (Missed){.held = 1};
     int count = case_marks_find(&b->work, &b->wall, &missed, wire, b->options.words, b->mark);
     b->mark_count = count > 0 ? count : 0;
@@ -199,6 +200,19 @@ static void free_all(CaseBuilder *b)
     free(b);
 }
 
+// Of a CT what is not bone, from water on.
+static void find_brightness(CaseBuilder *b, const Volume *volume)
+{
+    if (!volume_has_ct_numbers(volume)) {
+        volume_brightness(volume, &b->low, &b->high);
+        return;
+    }
+    const float water = 0, faint = 300;      // [HU] faint: contrast agent at least
+    volume_brightness(b->reduced, &b->low, &b->high);
+    b->low = water;
+    b->high = b->high < faint ? faint : b->high;
+}
+
 static void load(CaseBuilder *b)
 {
     enum { REDUCED = 160 };          // voxels along an axis: a projection of them takes 20 ms of one core
@@ -208,8 +222,12 @@ static void load(CaseBuilder *b)
         volume_free(volume);
         volume = NULL;
     }
+    if (volume && volume_has_ct_numbers(volume) && !volume_hide_bone(b->reduced)) {
+        volume_free(volume);
+        volume = NULL;
+    }
     if (volume)
-        volume_brightness(volume, &b->low, &b->high);
+        find_brightness(b, volume);
     pthread_mutex_lock(&b->lock);
     b->volume = volume;
     b->progress.load_s = clock_s(CLOCK_MONOTONIC) - begun;

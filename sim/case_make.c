@@ -61,23 +61,31 @@ int case_tree_end_near(const VesselTree *tree, Vec3 x)
     return best;
 }
 
-// Mean radius of the last few nodes: the very last one is often cut by the border.
-static double radius_at_end(const VesselTree *tree, int end)
+// The widest neighbour that leads on; -1: the vessel ends, or a sac begins.
+static int node_ahead(const VesselTree *tree, int node, int from)
 {
-    enum { NODES = 4 };
-    double sum = 0;
-    int count = 0;
-    for (int node = end, from = -1; node >= 0 && count < NODES;) {
-        int next = -1;
-        sum += tree->radius[node];
-        count++;
-        for (int k = tree->neighbour_offset[node]; k < tree->neighbour_offset[node + 1]; k++)
-            if (tree->neighbour[k] != from && tree->kind[tree->neighbour[k]] == NODE_VESSEL && next < 0)
-                next = tree->neighbour[k];
-        from = node;
-        node = next;
+    int next = -1;
+    for (int k = tree->neighbour_offset[node]; k < tree->neighbour_offset[node + 1]; k++) {
+        int at = tree->neighbour[k];
+        if (at != from && tree->kind[at] == NODE_VESSEL && (next < 0 || tree->radius[at] > tree->radius[next]))
+            next = at;
     }
-    return sum / count;
+    return next;
+}
+
+// How wide the vessel is for a tool that enters at this end: the mean of the least radius passed so far, over six radii of the end (or to the vessel's other end). The very
+// last node is often cut by the border, and a short wide stub in a sac is no way in.
+static double width_at_end(const VesselTree *tree, int end)
+{
+    const double radii = 6;
+    double length = radii * tree->radius[end], way = 0, sum = 0, least = tree->radius[end];
+    for (int from = -1, node = end, next; way < length && (next = node_ahead(tree, node, from)) >= 0; from = node, node = next) {
+        double step = fmin(vec3_distance(tree->center[node], tree->center[next]), length - way);
+        least = way > 0 ? fmin(least, tree->radius[next]) : fmax(least, tree->radius[next]);
+        sum += step * least;
+        way += step;
+    }
+    return way > 0 ? sum / way : 0;
 }
 
 // Whether the end lies within two of its radii and two voxels of the border.
@@ -101,7 +109,7 @@ int case_tree_widest_end(const VesselTree *tree, const Volume *volume)
     int best = -1;
     double widest = 0;
     for (int i = 0; i < tree->node_count; i++) {
-        double width = case_tree_is_end(tree, i) ? radius_at_end(tree, i) * (is_at_border(tree, i, volume) ? BORDER : 1) : 0;
+        double width = case_tree_is_end(tree, i) ? width_at_end(tree, i) * (is_at_border(tree, i, volume) ? BORDER : 1) : 0;
         if (width > widest)
             widest = width, best = i;
     }

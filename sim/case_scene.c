@@ -107,21 +107,42 @@ static bool direction_in(const char *frame, char letter, char opposite, int axis
     return false;
 }
 
-// How the patient lies if the file does not say it: vessels lead upwards from where the tools enter, and reach further to the sides than forwards.
+// The centre of the vessels by length, less their centre by volume: it points to where they are thin. [mm]
+static Vec3 way_to_thin_vessels(const VesselTree *tree)
+{
+    Vec3 by_length = {0}, by_volume = {0};
+    double length = 0, volume = 0;
+    for (int i = 1; i < tree->node_count; i++) {
+        Vec3 a = tree->center[i], b = tree->center[tree->parent[i]];
+        double part = tree->kind[i] == NODE_VESSEL ? vec3_distance(a, b) : 0, size = part * tree->radius[i] * tree->radius[i];
+        by_length = vec3_add_scaled(by_length, part, vec3_mix(a, b, 0.5)), length += part;
+        by_volume = vec3_add_scaled(by_volume, size, vec3_mix(a, b, 0.5)), volume += size;
+    }
+    return length > 0 && volume > 0 ? vec3_sub(vec3_scale(by_length, 1 / length), vec3_scale(by_volume, 1 / volume)) : vec3(0, 0, 0);
+}
+
+// How the patient lies if the file does not say it: arteries of the trunk and the head become thinner upwards, and reach further to the sides than forwards. That does not
+// depend on the end where the tools enter. Where all are about equally wide, they lead upwards from there.
 static void guess_patient(const VesselTree *tree, int front[3], int up[3])
 {
-    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, sum[3] = {0};
+    const double even = 0.03;        // of the vessels' extent: less says nothing
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, extent = 0;
+    Vec3 thin = way_to_thin_vessels(tree), sum = {0};
     int along = 0;
     for (int i = 0; i < tree->node_count; i++) {
-        Vec3 x = tree->center[i], from = vec3_sub(x, tree->center[0]);
-        const double at[3] = {x.x, x.y, x.z}, way[3] = {from.x, from.y, from.z};
+        const double at[3] = {tree->center[i].x, tree->center[i].y, tree->center[i].z};
+        sum = vec3_add(sum, vec3_sub(tree->center[i], tree->center[0]));
         for (int k = 0; k < 3; k++)
-            low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]), sum[k] += way[k];
+            low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
     }
+    for (int k = 0; k < 3; k++)
+        extent = fmax(extent, high[k] - low[k]);
+    Vec3 upwards = vec3_norm(thin) > even * extent ? thin : sum;
+    const double way[3] = {upwards.x, upwards.y, upwards.z};
     for (int k = 1; k < 3; k++)
-        along = fabs(sum[k]) > fabs(sum[along]) ? k : along;
+        along = fabs(way[k]) > fabs(way[along]) ? k : along;
     int a = (along + 1) % 3, b = (along + 2) % 3;
-    up[along] = sum[along] < 0 ? -1 : 1;
+    up[along] = way[along] < 0 ? -1 : 1;
     front[high[a] - low[a] < high[b] - low[b] ? a : b] = 1;
 }
 

@@ -317,6 +317,21 @@ static void judge_ends(Tracker *t, int count)
     }
 }
 
+// Warns if the first branch of a CT is as bright as bone.
+static void judge_bone(Tracker *t, int count)
+{
+    char text[240];
+    int bright = 0;
+    for (int i = 0; i < count; i++)
+        bright += tracker_brightness(t, t->tree.node[i].cylinder.center) > (double)CT_NUMBER_BONE;
+    if (!volume_has_ct_numbers(t->volume) || 2 * bright <= count)
+        return;
+    snprintf(text, sizeof text,
+             "%.0f %% of the first branch has more than %.0f HU: bone? Vessels with contrast agent mostly have 150 to 600 HU; start in one of them",
+             100.0 * bright / count, (double)CT_NUMBER_BONE);
+    doubt(&t->check, RBT_BACKGROUND, (double)bright / count, 0.5, text);
+}
+
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
 {
     enum { ROOT = 3 };
@@ -343,6 +358,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
     }
     judge_background(t, count);
+    judge_bone(t, count);
     judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {

@@ -142,16 +142,25 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
 // --- the whole tree ---
 
 // Brightness range of a million samples: `low` is the first quartile, which is background (vessels fill less than three quarters of any angiogram), `high`
-// the 99.9th percentile. The extremes would be noise, air or metal: with them half of a noisy background was taken for vessel.
+// the 99.9th percentile. The extremes would be noise, air or metal: with them half of a noisy background was taken for vessel. Of CT numbers only those of soft
+// tissue and vessels count: a quarter of a CT is air, and more than a thousandth bone.
 static void brightness_range(const Volume *volume, double *low, double *high)
 {
     enum { BINS = 1 << 12 };
     static const double share[2] = {0.25, 0.999};
     long count[BINS] = {0}, total = 0, sum = 0;
     size_t voxels = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2], stride = voxels / 1000003 + 1;
-    double least = (double)volume->minimum, width = ((double)volume->maximum - least) / BINS;
-    for (size_t i = 0; i < voxels && width > 0; i += stride, total++)
-        count[(int)fmin(((double)volume->value[i] - least) / width, BINS - 1)]++;
+    const bool is_ct = volume_has_ct_numbers(volume);
+    double least = is_ct ? (double)CT_NUMBER_TISSUE : (double)volume->minimum, most = (double)volume->maximum;
+    most = is_ct ? fmin(most, (double)CT_NUMBER_BONE) : most;
+    double width = (most - least) / BINS;
+    for (size_t i = 0; i < voxels && width > 0; i += stride) {
+        double value = (double)volume->value[i];
+        if (value < least || value > most)
+            continue;
+        count[(int)fmin((value - least) / width, BINS - 1)]++;
+        total++;
+    }
     *low = *high = least;
     for (int bin = 0; bin < BINS; bin++) {
         sum += count[bin];
@@ -174,6 +183,8 @@ static bool check_point(Tracker *t, Vec3 x, const RbtSeed *seed, const char *wha
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
+    if (volume_has_ct_numbers(t->volume))
+        low = (double)CT_NUMBER_TISSUE, high = fmin(high, (double)CT_NUMBER_BONE);
     if (!(high > low) || (value < fmax(low + 0.1 * (high - low), t->dark) && !(seed ? rbt_stands_out(t, t->levels, seed) : t->is_noisy))) {
         faults_add(faults, path, line, column,
                    "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); expected a point inside a vessel, above %g",
@@ -276,10 +287,14 @@ static bool run_seed(Tracker *t, const Job *job, int i)
         return out_of_memory_at(job, i);
     if (t->refusal[0])
         return start_is_refused(t, &job->seed[i], i, job->path, job->faults);
+    double value = tracker_brightness(t, job->seed[i].start);
+    char bone[100] = "";
+    if (volume_has_ct_numbers(t->volume) && value > (double)CT_NUMBER_BONE)
+        snprintf(bone, sizeof bone, ", which has %.0f HU as bone has (vessels with contrast agent: 150 to 600)", value);
     faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column,
-               "nothing could be tracked from the start of branch %d (%s); expected a point well inside the vessel, "
+               "nothing could be tracked from the start of branch %d%s (%s); expected a point well inside the vessel, "
                "about its true radius and direction",
-               i + 1, t->why);
+               i + 1, bone, t->why);
     return false;
 }
 

@@ -38,4 +38,10 @@ static inline Vec3 volume_point_of(const Volume *v, Vec3 voxel)
     return vec3_add_scaled(vec3_add_scaled(vec3_add_scaled(v->origin, voxel.x, v->axis[0]), voxel.y, v->axis[1]), voxel.z, v->axis[2]);
 }
 
+// Whether the values are CT numbers [HU]: air is -1000, and no other image reaches far below 0.
+static inline bool volume_has_ct_numbers(const Volume *v) { return v->minimum < -200; }
+// CT numbers between which lie soft tissue and vessels with contrast agent; below lies air, above bone.
+#define CT_NUMBER_TISSUE (-200.0F)
+#define CT_NUMBER_BONE 600.0F
+
 #endif

@@ -16,6 +16,7 @@ enum Key {
     ELEMENT_SIZE,
     OFFSET,
     MATRIX,
+    ORIENTATION,
     BINARY,
     BIG_ENDIAN_KEY,
     COMPRESSED,
@@ -44,6 +45,7 @@ static const struct KeyName {
     {"TransformMatrix", MATRIX},
     {"Rotation", MATRIX},
     {"Orientation", MATRIX},
+    {"AnatomicalOrientation", ORIENTATION},
     {"BinaryData", BINARY},
     {"BinaryDataByteOrderMSB", BIG_ENDIAN_KEY},
     {"ElementByteOrderMSB", BIG_ENDIAN_KEY},
@@ -198,6 +200,20 @@ static bool read_encoding(const KeyValue *value, const char *path, VolumeHeader 
     return faults->count == before;
 }
 
+// Writers that know the patient's sides name those of the voxels' axes, and give places in LPS, as ITK does. Without such a name, or with "???", the frame is not
+// known.
+static bool names_the_sides(const KeyValue *value)
+{
+    static const char sides[3][2] = {{'R', 'L'}, {'A', 'P'}, {'I', 'S'}};
+    int seen = 0, letters = 0;
+    for (size_t i = 0; value->line && i < value->length; i++) {
+        letters += value->text[i] > ' ';
+        for (int k = 0; k < 3; k++)
+            seen |= value->text[i] == sides[k][0] || value->text[i] == sides[k][1] ? 1 << k : 0;
+    }
+    return letters == 3 && seen == 7;
+}
+
 Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults)
 {
     KeyValue value[KEY_COUNT] = {{0}};
@@ -206,6 +222,8 @@ Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults)
     if (!gather(file, value, &end, faults))
         return NULL;
     bool good = read_encoding(value, file->path, &header, faults);
+    if (names_the_sides(&value[ORIENTATION]))
+        snprintf(header.frame, sizeof header.frame, "LPS");
     good = read_grid(value, file->path, &header, faults) && good;
     if (!good)
         return NULL;

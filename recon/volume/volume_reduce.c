@@ -1,6 +1,7 @@
 #include "recon/volume/volume_reduce.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 static float brightest(const Volume *v, const int from[3], const int to[3])
 {
@@ -39,6 +40,73 @@ Volume *volume_reduced(const Volume *v, int most)
     out->minimum = v->minimum;
     out->maximum = v->maximum;
     return out;
+}
+
+// --- bone ---
+
+enum { SEEN = 1, BONE = 2 };
+typedef struct Bones {
+    const Volume *volume;
+    int64_t step[3];         // voxels between neighbours along each axis
+    uint8_t *mark;           // (voxels) SEEN, BONE
+    int64_t *list;           // (voxels) of the part that is being gathered
+} Bones;
+
+static bool is_bone(const Bones *b, int64_t at) { return b->volume->value[at] > CT_NUMBER_BONE && !b->mark[at]; }
+
+// Gathers what touches the first voxel. Returns the number of voxels in the list.
+static int64_t gather(const Bones *b, int64_t first)
+{
+    int64_t count = 0;
+    b->mark[first] = SEEN;
+    b->list[count++] = first;
+    for (int64_t next = 0; next < count; next++)
+        for (int k = 0; k < 3; k++) {
+            int64_t at = b->list[next], i = at / b->step[k] % b->volume->size[k];
+            for (int side = -1; side <= 1; side += 2)
+                if (i + side >= 0 && i + side < b->volume->size[k] && is_bone(b, at + side * b->step[k])) {
+                    b->mark[at + side * b->step[k]] = SEEN;
+                    b->list[count++] = at + side * b->step[k];
+                }
+        }
+    return count;
+}
+
+// Blackens the voxels within `reach` [mm] of this one.
+static void blacken_around(const Bones *b, Volume *v, int64_t at, double reach)
+{
+    int low[3], high[3];
+    for (int k = 0; k < 3; k++) {
+        int i = (int)(at / b->step[k] % v->size[k]), most = (int)(reach / vec3_norm(v->axis[k]));
+        low[k] = -(i < most ? i : most), high[k] = v->size[k] - 1 - i < most ? v->size[k] - 1 - i : most;
+    }
+    for (int z = low[2]; z <= high[2]; z++)
+        for (int y = low[1]; y <= high[1]; y++)
+            for (int x = low[0]; x <= high[0]; x++) {
+                Vec3 way = vec3_add_scaled(vec3_add_scaled(vec3_scale(v->axis[0], x), y, v->axis[1]), z, v->axis[2]);
+                if (vec3_norm2(way) <= reach * reach)
+                    v->value[at + x + y * b->step[1] + z * b->step[2]] = v->minimum;
+            }
+}
+
+bool volume_hide_bone(Volume *v)
+{
+    const double least_mm3 = 200, reach = 2;
+    const int64_t nx = v->size[0], plane = nx * v->size[1], voxels = plane * v->size[2];
+    Bones b = {v, {1, nx, plane}, calloc((size_t)voxels, 1), malloc((size_t)voxels * sizeof *b.list)};
+    bool good = b.mark && b.list;
+    double voxel_mm3 = fabs(vec3_dot(v->axis[0], vec3_cross(v->axis[1], v->axis[2])));
+    for (int64_t i = 0; good && i < voxels; i++) {
+        int64_t count = is_bone(&b, i) ? gather(&b, i) : 0;
+        for (int64_t k = 0; (double)count * voxel_mm3 >= least_mm3 && k < count; k++)
+            b.mark[b.list[k]] = BONE;
+    }
+    for (int64_t i = 0; good && i < voxels; i++)
+        if (b.mark[i] == BONE)
+            blacken_around(&b, v, i, reach);
+    free(b.mark);
+    free(b.list);
+    return good;
 }
 
 void volume_brightness(const Volume *v, float *low, float *high)

@@ -293,7 +293,22 @@ static void metaimage(void **state)
     assert_counting(v);
     // voxel i runs along +y, j along -x
     assert_near(volume_point_of(v, vec3(1, 1, 1)), vec3(1 - 0.5, 2 + 0.4, 3.6));
+    assert_string_equal(v->frame, "");
     volume_free(v);
+    // a name of the axes' sides means that places are in LPS
+    static const struct {
+        const char *name, *frame;
+    } sides[] = {{"RAI", "LPS"}, {"PSR", "LPS"}, {"???", ""}, {"RAR", ""}, {"RAIS", ""}, {"RA", ""}};
+    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
+        b.length = 0;
+        put_text(&b, "ObjectType = Image\nNDims = 3\nAnatomicalOrientation = %s\nDimSize = 2 3 4\nElementType = MET_USHORT\nElementDataFile = LOCAL\n",
+                 sides[i].name);
+        shorts(&b, false);
+        v = parse(&b);
+        assert_non_null(v);
+        assert_string_equal(v->frame, sides[i].frame);
+        volume_free(v);
+    }
     b.length = 0;
     shorts(&data, false);
     put_text(&b, start, "False", "True", "MET_SHORT");

@@ -140,6 +140,32 @@ static void the_widest_end_is_proposed(void **state)
     assert_int_equal(proposed(15, 25, 1, 2), 1);
 }
 
+// A vessel along x, of 1.5 mm, and in its middle a wide short stub, as where a sac was tracked as a vessel. Without a border nearby the vessel's end wins too.
+static void a_stub_in_a_sac_is_no_way_in(void **state)
+{
+    (void)state;
+    enum { NODES = 40, STUB = 4 };
+    Volume *v = make_volume(0.5, false);
+    for (int where = 0; where < 2; where++) {
+        VesselTree *t = vessel_tree_create(NODES + STUB, 0, 0);
+        assert_non_null(t);
+        for (int i = 0; i < NODES + STUB; i++) {
+            bool is_stub = i >= NODES;
+            double from = where ? 12 : 1, to = where ? 36 : 39, x = from + (to - from) * i / (NODES - 1);
+            t->center[i] = is_stub ? vec3(0.5 * (from + to), 20 + 2 * (i - NODES), 20) : vec3(x, 20, 20);
+            t->radius[i] = is_stub ? 6 : 1.5;
+            t->direction[i] = is_stub ? vec3(0, 1, 0) : vec3(1, 0, 0);
+            t->height[i] = 1;
+            t->parent[i] = i == NODES ? NODES / 2 : i - 1;
+        }
+        assert_true(vessel_tree_link(t));
+        int end = case_tree_widest_end(t, v);
+        assert_true(end == 0 || end == NODES - 1);
+        vessel_tree_free(t);
+    }
+    volume_free(v);
+}
+
 // A vessel of 60 mm along an axis, up or down it, with branches that reach 20 mm along the next axis.
 static void patient_of(int along, double sign, char *text, size_t capacity)
 {
@@ -179,13 +205,48 @@ static void vessels_lead_upwards(void **state)
         }
 }
 
+// A vessel that tapers from 4 to 1 mm along an axis, upwards: the patient lies the same way whichever end is the root.
+static void vessels_are_thin_at_the_head(void **state)
+{
+    (void)state;
+    enum { NODES = 60 };
+    for (int along = 0; along < 3; along++)
+        for (int sign = -1; sign <= 1; sign += 2)
+            for (int is_at_head = 0; is_at_head < 2; is_at_head++) {
+                Faults faults = {0};
+                char expected[60];
+                int up[3] = {0};
+                VesselTree *t = vessel_tree_create(NODES, 0, 0);
+                assert_non_null(t);
+                for (int i = 0; i < NODES; i++) {
+                    int from_feet = is_at_head ? NODES - 1 - i : i;
+                    double at[3] = {0, 0, 0};
+                    at[along] = sign * from_feet;
+                    t->center[i] = vec3(at[0], at[1], at[2]);
+                    t->direction[i] = vec3(along == 0, along == 1, along == 2);
+                    t->radius[i] = 4 - 3.0 * from_feet / (NODES - 1);
+                    t->height[i] = 1;
+                    t->parent[i] = i - 1;
+                }
+                assert_true(vessel_tree_link(t));
+                up[along] = sign;
+                snprintf(expected, sizeof expected, "superior: [%d, %d, %d]\n", up[0], up[1], up[2]);
+                char *scene = case_scene_text(t, &(CaseScene){.model = "model.h5", .frame = ""}, &faults);
+                assert_true(scene && strstr(scene, expected));
+                free(scene);
+                vessel_tree_free(t);
+            }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(volumes_are_those_of_the_shapes),
         cmocka_unit_test(a_whole_tree_misses_the_ball_alone),
         cmocka_unit_test(the_widest_end_is_proposed),
+        cmocka_unit_test(a_stub_in_a_sac_is_no_way_in),
         cmocka_unit_test(vessels_lead_upwards),
+        cmocka_unit_test(vessels_are_thin_at_the_head),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
