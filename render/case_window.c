@@ -356,7 +356,8 @@ static bool run_frames(CaseWindow *w, Faults *faults)
             take_input(w, input);
         if (w->desk)
             do_what_the_desk_wants(w);
-        if (w->state.turns && w->state.has_volume) {
+        // it stands still under the pointer: what moves cannot be clicked
+        if (w->state.turns && w->state.has_volume && view_at(w, input->mouse_x, input->mouse_y) != CASE_PROJECTION) {
             free_camera_orbit(&w->state.camera, turn, 0);
             w->state.turned++;
             w->still = 0;

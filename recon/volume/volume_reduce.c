@@ -91,7 +91,7 @@ static void blacken_around(const Bones *b, Volume *v, int64_t at, double reach)
 
 bool volume_hide_bone(Volume *v)
 {
-    const double least_mm3 = 200, reach = 2;
+    const double least_mm3 = 50, reach = 2;
     const int64_t nx = v->size[0], plane = nx * v->size[1], voxels = plane * v->size[2];
     Bones b = {v, {1, nx, plane}, calloc((size_t)voxels, 1), malloc((size_t)voxels * sizeof *b.list)};
     bool good = b.mark && b.list;

@@ -63,7 +63,7 @@ static void bone_is_hidden_and_nothing_else(void **state)
         else if (outside > reach + VOXEL)
             assert_true(v->value[at] >= before->value[at] && v->value[at] <= before->value[at]);
     }
-    // a speck of less than 0.2 cm3 is no bone
+    // a speck of less than 50 mm3 is no bone
     assert_true(value_at(v, in_plaque) > CT_NUMBER_BONE);
     volume_free(v);
     volume_free(before);
