@@ -82,7 +82,7 @@ static double width_at_end(const VesselTree *tree, int end)
     for (int from = -1, node = end, next; way < length && (next = node_ahead(tree, node, from)) >= 0; from = node, node = next) {
         double step = fmin(vec3_distance(tree->center[node], tree->center[next]), length - way);
         least = way > 0 ? fmin(least, tree->radius[next]) : fmax(least, tree->radius[next]);
-        sum += step * least;
+        sum += least < 0.5 * tree->radius[end] ? 0 : step * least;       // so soon no vessel narrows to half, but the way out of a sac does
         way += step;
     }
     return way > 0 ? sum / way : 0;

@@ -151,9 +151,9 @@ static void a_stub_in_a_sac_is_no_way_in(void **state)
         assert_non_null(t);
         for (int i = 0; i < NODES + STUB; i++) {
             bool is_stub = i >= NODES;
-            double from = where ? 12 : 1, to = where ? 36 : 39, x = from + (to - from) * i / (NODES - 1);
+            double from = where ? 12 : 1, to = where ? 34 : 39, x = from + (to - from) * i / (NODES - 1);
             t->center[i] = is_stub ? vec3(0.5 * (from + to), 20 + 2 * (i - NODES), 20) : vec3(x, 20, 20);
-            t->radius[i] = is_stub ? 6 : 1.5;
+            t->radius[i] = is_stub ? 4 : 1.5;
             t->direction[i] = is_stub ? vec3(0, 1, 0) : vec3(1, 0, 0);
             t->height[i] = 1;
             t->parent[i] = i == NODES ? NODES / 2 : i - 1;
