@@ -1,14 +1,15 @@
 # Rooms and what each may use: a room's own folder of links is all that its sources see of ours, so that a wrong include does not compile. Of another room they
 # see one header, ROOM/ROOM.h, and what that includes. tests/tools/arrows has the same table and tries each arrow.
-set(ROOMS base geom solver recon input sim render cli bench)
+set(ROOMS base geom solver recon input sim study render cli bench)
 set(ROOM_base)
 set(ROOM_geom base)
 set(ROOM_solver base geom)
 set(ROOM_recon base geom)
 set(ROOM_input base)
 set(ROOM_sim base geom solver recon input)
+set(ROOM_study base geom input recon sim)
 set(ROOM_render base geom recon input sim)
-set(ROOM_cli base geom solver recon input sim render)
+set(ROOM_cli base geom solver recon input sim study render)
 # bench measures the parts of all rooms and looks into them, as the tests do
 
 # what libseldinger.so is made of

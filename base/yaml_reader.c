@@ -360,6 +360,66 @@ const char *yaml_scalar(YamlValue value)
     return node && node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : NULL;
 }
 
+static void write_flow_text(FILE *out, const yaml_node_t *node)
+{
+    const char *text = (const char *)node->data.scalar.value;
+    bool is_plain = node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE && !strpbrk(text, ",[]{}\n");
+    if (is_plain) {
+        fputs(text, out);
+        return;
+    }
+    fputc('"', out);
+    for (; *text; text++) {
+        if (*text == '\n' || *text == '\t')
+            fputs(*text == '\n' ? "\\n" : "\\t", out);
+        else
+            fprintf(out, *text == '"' || *text == '\\' ? "\\%c" : "%c", *text);
+    }
+    fputc('"', out);
+}
+
+static bool write_flow(FILE *out, YamlValue value, int node_index, int depth)
+{
+    const yaml_node_t *node = yaml_document_get_node(&value.reader->document, node_index);
+    if (!node || depth > DEEPEST || !may_visit(value))
+        return false;
+    if (node->type == YAML_SCALAR_NODE) {
+        write_flow_text(out, node);
+        return true;
+    }
+    bool good = true, is_list = node->type == YAML_SEQUENCE_NODE;
+    fputc(is_list ? '[' : '{', out);
+    if (is_list)
+        for (yaml_node_item_t *item = node->data.sequence.items.start; good && item < node->data.sequence.items.top; item++) {
+            fputs(item > node->data.sequence.items.start ? ", " : "", out);
+            good = write_flow(out, value, *item, depth + 1);
+        }
+    else
+        for (yaml_node_pair_t *pair = node->data.mapping.pairs.start; good && pair < node->data.mapping.pairs.top; pair++) {
+            fputs(pair > node->data.mapping.pairs.start ? ", " : "", out);
+            good = write_flow(out, value, pair->key, depth + 1);
+            fputs(": ", out);
+            good = good && write_flow(out, value, pair->value, depth + 1);
+        }
+    fputc(is_list ? ']' : '}', out);
+    return good;
+}
+
+char *yaml_flow(YamlValue value)
+{
+    char *text = NULL;
+    size_t length;
+    FILE *out = open_memstream(&text, &length);
+    bool good = out && write_flow(out, value, value.node, 0);
+    if (out && fclose(out) != 0)
+        good = false;
+    if (good)
+        return text;
+    free(text);
+    yaml_fault(value, "'%s' cannot be written on one line; expected a number, a text, or a short list or map", value.name);
+    return NULL;
+}
+
 bool yaml_text(YamlValue value, const char **text)
 {
     const yaml_node_t *node = node_of(value);

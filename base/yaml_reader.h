@@ -51,6 +51,8 @@ YamlValue yaml_item(YamlValue list, int index);
 bool yaml_is_list(YamlValue value);
 bool yaml_is_map(YamlValue value);
 const char *yaml_scalar(YamlValue value);                  // the text of a scalar, NULL otherwise; adds no fault
+// The value, a list or map too, as one line of YAML in flow style, in which numbers stay as they were written. The caller frees it. NULL with a fault.
+char *yaml_flow(YamlValue value);
 bool yaml_text(YamlValue value, const char **text);        // adds a fault if it is not a scalar or is empty
 bool yaml_number(YamlValue value, NumberRange range, double *number);
 bool yaml_integer(YamlValue value, int least, int most, int *number);

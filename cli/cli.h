@@ -19,7 +19,7 @@ typedef struct Verb {
     VerbFunction *forward;   // instead of options and call: another program parses the options
 } Verb;
 extern const Verb run_verb, nav_verb, case_verb, check_verb, segment_verb, import_verb, fit_verb, synth_verb, query_verb, edit_verb, export_verb, info_verb,
-    replay_verb, report_verb, devices_verb, bench_verb;
+    replay_verb, report_verb, devices_verb, bench_verb, sweep_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 const Verb *cli_find_verb(const Verb *const *list, const char *name);    // NULL: no verb has this name
 // Prints one line per verb: its name, the first form of its usage in a column of `usage_width` characters (0: without it), what it does.

@@ -11,8 +11,8 @@ static const Verb *const verbs[] = {
 #ifdef SELDINGER_RENDER
     &nav_verb,
 #endif
-    &case_verb,   &check_verb, &segment_verb, &import_verb, &fit_verb,     &edit_verb,  &synth_verb, &query_verb,
-    &export_verb, &info_verb,  &replay_verb,  &report_verb, &devices_verb, &bench_verb, NULL,
+    &case_verb,  &check_verb,  &sweep_verb, &segment_verb, &import_verb, &fit_verb,     &edit_verb,  &synth_verb,
+    &query_verb, &export_verb, &info_verb,  &replay_verb,  &report_verb, &devices_verb, &bench_verb, NULL,
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] - 1 };
 

@@ -116,8 +116,7 @@ static void add_flags(cJSON *summary, const Simulator *simulator, const DriveRep
         cJSON_AddItemToArray(list, cJSON_CreateString("stopped"));
 }
 
-// Text of the summary (docs/scene-format.md, "Output files"); the caller frees it. NULL if out of memory.
-static char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node)
+char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node)
 {
     const RunTotals *totals = simulator_totals(simulator);
     const StepReport *last = simulator_last(simulator);

@@ -9,6 +9,8 @@
 // Returns whether a node left the vessel: beyond an open end, or so far outside the wall that the wall no longer holds it.
 bool run_left_vessel(const RunTotals *totals);
 
+// Text of the summary (docs/scene-format.md, "Output files"); the caller frees it. NULL if out of memory.
+char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node);
 // run_write_summary writes the JSON summary and run_write_final the CSV of the final state to a file ("-": standard output). Both return false with a fault.
 bool run_write_summary(const char *path, Simulator *simulator, const DriveReport *drive, const NodeReport *node, Faults *faults);
 bool run_write_final(const char *path, Simulator *simulator, const NodeReport *node, Faults *faults);

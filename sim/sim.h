@@ -46,6 +46,7 @@
 #include "sim/rescore.h"
 #include "sim/run_marks.h"
 #include "sim/score.h"
+#include "sim/score_json.h"
 #include "sim/score_points.h"
 #include "sim/session.h"
 #include "sim/session_archive.h"

@@ -34,6 +34,27 @@ static void values_are_replaced_where_they_stand(void **state)
     becomes("\xEF\xBB\xBF# \xC3\xA4\xC3\xB6\na: \xC3\xBC\nb: 1\n", "b", "2", "\xEF\xBB\xBF# \xC3\xA4\xC3\xB6\na: \xC3\xBC\nb: \"2\"\n");
 }
 
+static void becomes_flow(const char *text, const char *path, const char *flow, const char *expected)
+{
+    char *out = yaml_edit_flow(text, path, flow, true);
+    assert_non_null(out);
+    assert_string_equal(out, expected);
+    free(out);
+}
+
+static void values_in_flow_style_are_written(void **state)
+{
+    (void)state;
+    becomes_flow("a: {b: 1}   # c\nd: 2\n", "a.b", "[1, {x: y}]", "a: {b: [1, {x: y}]}   # c\nd: 2\n");
+    becomes_flow("a: [1, 2, 3]\n", "a.2", "0.5", "a: [1, 2, 0.5]\n");
+    becomes_flow("w:\n  - {e: 1}\n  - {e: 2}\n\n# of d\nd: 2\n", "w", "[{e: 3}]", "w:\n  [{e: 3}]\n\n# of d\nd: 2\n");
+    becomes_flow("w:\n  e: 1\nd: 2\n", "w.f", "80", "w:\n  f: 80\n  e: 1\nd: 2\n");
+    assert_null(yaml_edit_flow("a: 1\n", "a", "[1", true));
+    assert_null(yaml_edit_flow("a: {b: 1}\n", "a.b", "1, c: 2", true));
+    assert_null(yaml_edit_flow("a: 1\n", "a", "1 # 2", true));
+    assert_null(yaml_edit_flow("a: [1, 2]\n", "a.2", "3", true));
+}
+
 static void keys_are_added(void **state)
 {
     (void)state;
@@ -74,7 +95,7 @@ static void what_cannot_be_edited_is_reported(void **state)
     assert_null(yaml_edit("a: 1\n", "b", "2", false));
     assert_null(yaml_edit("a: 1\n", "a.b", "2", true));
     assert_null(yaml_edit("x: {a: 1}\n", "y.b", "2", true));
-    const char *const no_item[] = {"a.2.b", "a.x.b", "a.-1.b", "a..b", "a.1x.b", "a.0.b.c", "a.1"};
+    const char *const no_item[] = {"a.2.b", "a.x.b", "a.-1.b", "a..b", "a.1x.b", "a.0.b.c", "a.2"};
     for (size_t i = 0; i < sizeof no_item / sizeof *no_item; i++)
         assert_null(yaml_edit("a: [{b: 1}, {b: 2}]\n", no_item[i], "2", false));
     assert_null(yaml_edit("a: [1\n", "a", "2", true));
@@ -87,7 +108,8 @@ static void what_cannot_be_edited_is_reported(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(keys_are_added),
-                                       cmocka_unit_test(items_are_appended), cmocka_unit_test(what_cannot_be_edited_is_reported)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(values_in_flow_style_are_written),
+                                       cmocka_unit_test(keys_are_added), cmocka_unit_test(items_are_appended),
+                                       cmocka_unit_test(what_cannot_be_edited_is_reported)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
