@@ -50,13 +50,15 @@ static void print_end(const Sweep *sweep, const QueueState *state)
         fprintf(stderr, "%s/journal.txt: %lld damaged lines; their runs were repeated\n", sweep->options->output, (long long)state->damaged);
 }
 
-static void manage(Sweep *sweep)
+// Returns an exit code.
+static int manage(Sweep *sweep)
 {
     int64_t runs = (int64_t)sweep->study->runs;
     Journal *journal = journal_open(sweep->options->output, sweep->heading, runs, sweep->faults);
     bool good = journal && prepare_folder(sweep);
     if (sweep->ranks.count > 1)
         ranks_start(&sweep->ranks, good, sweep->heading_text);
+    int code = EXIT_DONE;
     Queue *queue = good ? queue_create(runs, journal, sweep->stop, sweep->faults) : NULL;
     if (queue) {
         bool shows = !sweep->options->quiet && isatty(STDERR_FILENO);
@@ -66,11 +68,14 @@ static void manage(Sweep *sweep)
             print_end(sweep, &state);
         if (state.finished == runs)
             table_write(sweep->options->output, sweep->study, journal, runs, sweep->faults);
-        else if (sweep->faults->count == 0)
+        else if (sweep->faults->count == 0) {
             fprintf(stderr, "seldinger sweep: stopped; the same command goes on\n");
+            code = EXIT_DIFFERENT;
+        }
     }
     queue_free(queue);
     journal_close(journal);
+    return code;
 }
 
 static int repeat(Sweep *sweep)
@@ -112,7 +117,7 @@ static int carry_out(Sweep *sweep)
     else if (faults->count == 0 && options->simulate_ranks > 0)
         return sweep_simulate_ranks(options, sweep->heading, (int64_t)sweep->study->runs, faults);
     else if (faults->count == 0)
-        manage(sweep);
+        return manage(sweep);
     return EXIT_DONE;
 }
 

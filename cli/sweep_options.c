@@ -37,7 +37,7 @@ const OptionTable sweep_options = {
         "Under mpirun (`mpirun -n 64 seldinger sweep …`, package seldinger-mpi) the runs are shared by the ranks; share/doc/seldinger/sweep.slurm is a batch "
         "file.",
     .notes = "A run that diverges, leaves the vessel or cannot be opened is a row of the table with that status; the sweep goes on.",
-    .exits = "0 all runs have a result; 2 wrong usage, bad input, or results that cannot be written; 130, 143 stopped by a signal: the same command goes on",
+    .exits = "0 all runs have a result; 1 stopped by SIGINT or SIGTERM: the same command goes on; 2 wrong usage, bad input, or results that cannot be written",
     CLI_OPTIONS(options, SweepOptions),
     .set_defaults = set_defaults,
     .check = check,

@@ -51,7 +51,6 @@ static void values_in_flow_style_are_written(void **state)
     becomes_flow("w:\n  e: 1\nd: 2\n", "w.f", "80", "w:\n  f: 80\n  e: 1\nd: 2\n");
     assert_null(yaml_edit_flow("a: 1\n", "a", "[1", true));
     assert_null(yaml_edit_flow("a: {b: 1}\n", "a.b", "1, c: 2", true));
-    assert_null(yaml_edit_flow("a: 1\n", "a", "1 # 2", true));
     assert_null(yaml_edit_flow("a: [1, 2]\n", "a.2", "3", true));
 }
 

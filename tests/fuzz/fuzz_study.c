@@ -1,0 +1,37 @@
+// Any bytes as the specification of a sweep: a result exactly if there is no fault, and then values of any run.
+// Covers: study/spec.c study/points.c study/distribution.c
+#include "study/points.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void use(const Study *study)
+{
+    char text[VARY_TEXT];
+    double last = study->runs - 1;
+    const int64_t run[] = {0, (int64_t)(last / 2), (int64_t)last};
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < study->factor_count; i++)
+            if (!*study_value(study, run[k], i, text) && study->factor[i].values.kind != VARY_VALUES)
+                __builtin_trap();
+        static Faults ignored;
+        faults_clear(&ignored);
+        free(study_scene_text(study, run[k], "seldinger: 1\nwire: {sections: [{length_mm: 1}, {length_mm: 2}]}\nvessel:\n  friction: 0\n", &ignored));
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static Faults faults;
+    faults_clear(&faults);
+    Study *study = study_parse((const char *)data, size, "fuzz.yaml", &faults);
+    if ((study != NULL) == (faults.count > 0))
+        __builtin_trap();
+    if (study)
+        use(study);
+    study_free(study);
+    return 0;
+}
