@@ -39,8 +39,9 @@ QueueForecast queue_forecast(const QueueModel *model)
         free_s = begin + model->service_s;
         busy_s += model->service_s;
         waited_s += free_s - heap[0].at_s + 2 * link;
-        work_s += model->run_s[run];
-        heap[0].at_s = free_s + model->run_s[run] + 2 * link;
+        double run_s = model->run_s[run % model->measured];
+        work_s += run_s;
+        heap[0].at_s = free_s + run_s + 2 * link;
         forecast.wall_s = fmax(forecast.wall_s, heap[0].at_s);
         sink(heap, model->ranks, 0);
     }

@@ -5,8 +5,8 @@
 #include <stdint.h>
 
 typedef struct QueueModel {
-    int64_t runs;
-    const double *run_s;     // (runs) processor time of each
+    int64_t runs, measured;
+    const double *run_s;     // (measured) processor time of each; further runs take these times again, in turn
     double service_s;        // the manager's, for each result
     double message_s;        // of a message between ranks
     int ranks;               // rank 0 works too, beside its service

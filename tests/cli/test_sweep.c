@@ -249,7 +249,7 @@ static void growth_is_forecast(void **state)
 {
     (void)state;
     assert_int_equal(run_in("", "sweep spec.yaml -o one --simulate-ranks 1000"), 0);
-    assert_non_null(strstr(output, "SIMULATED from the measured times of 24 runs"));
+    assert_non_null(strstr(output, "SIMULATED: 100000 runs with the measured times of 24 in turn"));
     assert_non_null(strstr(output, "\n   1000 "));
     assert_int_equal(run_in("", "sweep spec.yaml -o nothing --simulate-ranks 8"), 2);
 }

@@ -123,7 +123,7 @@ static void the_queue_model_has_its_limits(void **state)
     static double run_s[RUNS];
     for (int i = 0; i < RUNS; i++)
         run_s[i] = 0.5;
-    QueueModel model = {.runs = RUNS, .run_s = run_s, .service_s = 1e-3, .ranks = 1};
+    QueueModel model = {.runs = RUNS, .measured = RUNS, .run_s = run_s, .service_s = 1e-3, .ranks = 1};
     assert_true(fabs(queue_forecast(&model).wall_s - RUNS * 0.501) < 1e-6);
     model.ranks = 100;       // 100 ranks ask every 0.5 s: 200 a second, a fifth of what the manager can
     assert_true(fabs(queue_forecast(&model).wall_s - RUNS / 100 * 0.501) < 0.2);
