@@ -114,7 +114,8 @@ int sweep_simulate_ranks(const SweepOptions *options, const cJSON *heading, int6
         int64_t modelled = runs > 100 * (int64_t)options->simulate_ranks ? runs : 100 * (int64_t)options->simulate_ranks;
         QueueModel model = {.runs = modelled, .measured = runs, .run_s = times.run_s, .message_s = message_s + 100e-6};
         model.service_s = service_time(options->output, &times, heading, runs, faults);
-        printf("SIMULATED: %lld runs with the measured times of %lld in turn; measured: %.1f us of processor time of the manager for a result, %.0f bytes in the journal; "
+        printf("SIMULATED: %lld runs with the measured times of %lld in turn; measured: %.1f us of processor time of the manager for a result, %.0f bytes in "
+               "the journal; "
                "assumed: %.0f us for a "
                "message\n%7s %12s %11s %14s %12s %14s\n",
                (long long)modelled, (long long)runs, model.service_s * 1e6, (double)times.bytes / (double)runs, model.message_s * 1e6, "ranks", "time [s]",
