@@ -1,16 +1,20 @@
-// seldinger check: runs every scene with a golden tool path (X.yaml with X.golden.csv in the same folder) headless and compares the paths; measures every scene
-// with a
-// `verify:` key against its references (check_verify.c).
+// seldinger check: runs scenes headless and compares them with golden runs (golden_case.c), beside the scenes or in a baseline, or writes these; measures scenes
+// with a `verify:` key against their references (check_verify.c).
+#include "cli/check_files.h"
 #include "cli/check_golden.h"
+#include "cli/check_scenes.h"
 #include "cli/check_verify.h"
 
 #include "sim/sim.h"
 
-#include <sys/stat.h>
+#include <limits.h>
 
 typedef struct CheckOptions {
     char **path;
     int path_count;
+    bool update;
+    const char *tolerances, *store, *version, *against;
+    CheckFiles files;
     GoldenOptions golden;
 } CheckOptions;
 
@@ -18,78 +22,88 @@ typedef struct CheckOptions {
 static const Option rows[] = {
     {"tolerance-mm", "X", OPTION_NUMBER, AT(golden.tolerance_mm),
      "largest distance [mm] between golden and run that passes; rounding on other machines stays below the default, a change of a parameter by 1 % does not",
-     .most = 1e6},
-    {"update", NULL, OPTION_FLAG, AT(golden.update), "rewrites the golden paths; a scene given as PATH gets one if it has none"},
-    {"duration-s", "S", OPTION_NUMBER, AT(golden.duration_s), "with --update: simulated time [s] of the golden", .most = SCRIPT_LONGEST_S,
+     .most = 1e6, .otherwise = "that of the scene or of --tolerances, else 1e-05"},
+    {"tolerances", "F", OPTION_FILE, AT(tolerances), "tolerances by quantity, YAML; the key `check:` of a scene comes before them", .otherwise = ""},
+    {"update", NULL, OPTION_FLAG, AT(update), "rewrites the golden runs; a scene given as PATH gets one if it has none"},
+    {"duration-s", "S", OPTION_NUMBER, AT(golden.duration_s), "with --update or --store: simulated time [s] of the golden", .most = SCRIPT_LONGEST_S,
      .otherwise = "the script's, else the old golden's, else 1"},
     CLI_THREADS(CheckOptions, golden.threads),
     CLI_QUIET(CheckOptions, golden.quiet, "only what differs or misses its tolerance"),
+    {"json", "F", OPTION_FILE, AT(files.json), "writes all cases as JSON", .otherwise = "", .group = "Results for other programs and readers"},
+    {"junit", "F", OPTION_FILE, AT(files.junit), "writes all cases as JUnit XML, which GitLab, Jenkins and GitHub's actions show", .otherwise = ""},
+    {"page", "F", OPTION_FILE, AT(files.page), "writes a page (HTML) that shows where paths part", .otherwise = ""},
+    {"store", "FOLDER", OPTION_FOLDER, AT(store), "runs every scene below PATH and stores golden runs as the baseline FOLDER/VERSION", .otherwise = "",
+     .group = "Baselines of versions"},
+    {"as", "VERSION", OPTION_TEXT, AT(version), "with --store: the name of the baseline", .otherwise = "this program's version"},
+    {"against", "FOLDER/VERSION", OPTION_FOLDER, AT(against), "compares with that baseline instead of the golden runs beside the scenes", .otherwise = ""},
 };
 
-static void set_defaults(void *structure) { *(CheckOptions *)structure = (CheckOptions){.golden = {.tolerance_mm = COMPARE_TOLERANCE_MM, .duration_s = -1}}; }
+static void set_defaults(void *structure) { *(CheckOptions *)structure = (CheckOptions){.golden = {.tolerance_mm = -1, .duration_s = -1}}; }
+
+static const char *check_combination(void *structure)
+{
+    const CheckOptions *options = structure;
+    if (options->update + (options->store != NULL) + (options->against != NULL) > 1)
+        return "--update, --store and --against exclude each other";
+    return options->version && !options->store ? "--as needs --store" : NULL;
+}
 
 static const OptionTable table = {
     .program = "seldinger check",
     .does = "runs every scene that has a golden tool path and compares the paths",
     .usage = "PATH... [options]",
     .intro =
-        "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares the two paths point by point over time. The table shows "
-        "each scene, its worst distance, and the first time, node and distance beyond the tolerance.\n"
+        "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv), several at once, and compares the two paths point by point over "
+        "time, "
+        "and the figures if there are golden ones (X.golden-figures.csv). The table shows each scene, its worst distance, the first time, node and distance "
+        "beyond the tolerance, and the figures beyond theirs.\n"
         "Then every scene below PATH with the key `verify:` is measured against exact solutions, at several numbers of elements: case, reference, result, "
         "error, tolerance, and the order of convergence of the error. The key is described in scenes/verify/README.md.",
-    .notes = "Scenes whose vessel file is missing are skipped and listed.",
-    .exits = "0 all pass; 1 a path differs or a tolerance is missed; 2 wrong usage or a scene or golden that cannot be read; 3 a run diverged",
+    .notes = "Scenes whose vessel file is missing are skipped and listed. A scene that is missing, cannot be read or diverges is one case; the others go on. "
+             "Scenes are named in a baseline by their path below the current folder.",
+    .exits = "0 all pass; 1 a path or figure differs or a tolerance is missed; 2 wrong usage or a scene or golden that cannot be read; 3 a run diverged",
     CLI_OPTIONS(rows, CheckOptions),
     .set_defaults = set_defaults,
+    .check = check_combination,
     .takes_argument = true,
     .argument = offsetof(CheckOptions, path),
     .argument_count = offsetof(CheckOptions, path_count),
     .missing = "missing the scenes or folders to check",
 };
 
-static void gather(const CheckOptions *options, SceneList *list, Faults *faults)
-{
-    for (int i = 0; i < options->path_count; i++) {
-        const char *path = options->path[i];
-        struct stat status;
-        if (stat(path, &status) != 0)
-            faults_add(faults, path, 0, 0, "does not exist; give a scene (X.yaml) or a folder");
-        else if (S_ISDIR(status.st_mode))
-            scene_list_add_folder(list, path);
-        else if (options->golden.update || scene_has_golden(path) || scene_has_verify(path))
-            scene_list_add(list, path);
-        else
-            faults_add(faults, path, 0, 0, "has no golden tool path in its folder and no key `verify:`; `seldinger check --update` makes a golden path");
-    }
-}
-
 static int call(void *structure, Faults *faults)
 {
-    const CheckOptions *wanted = structure;
-    const GoldenOptions *options = &wanted->golden;
-    SceneList list = {0};
-    int worst = EXIT_DONE, code;
-    bool headed = options->quiet || options->update;
-    gather(wanted, &list, faults);
-    if (list.count == 0 && faults->count == 0) {
+    CheckOptions *options = structure;
+    GoldenOptions *golden = &options->golden;
+    CheckScenes scenes = {.update = options->update, .stores = options->store != NULL, .baseline = options->against};
+    CheckLog log = {0};
+    char baseline[PATH_MAX];
+    OutputPlan plan = {.faults = faults};
+    check_files_plan(&options->files, &plan);
+    output_plan_read(&plan, "--tolerances", options->tolerances);
+    golden->has_page = options->files.page != NULL;
+    golden->writes = options->update || options->store;
+    if (options->tolerances)
+        tolerances_load(options->tolerances, &golden->tolerances, faults);
+    if (options->against && baseline_check(options->against, faults))
+        golden->baseline = options->against;
+    if (options->store && faults->count == 0 && baseline_begin(options->store, options->version ? options->version : SELDINGER_VERSION, baseline, faults))
+        golden->baseline = baseline;
+    if (faults->count > 0)
+        return EXIT_BAD_INPUT;
+    int worst = check_scenes_gather(&scenes, options->path_count, options->path, &log), code = check_golden(&scenes.golden, golden, &log);
+    worst = code > worst ? code : worst;
+    code = check_verify(scenes.verify.count, scenes.verify.path, golden->threads, golden->quiet, &log, faults);
+    worst = code > worst ? code : worst;
+    if (log.count == 0) {
         // a check without any comparison has not passed
         fprintf(stderr, "seldinger check: no given scene or folder has a golden tool path or the key `verify:`; `--update SCENE` makes a golden path\n");
         worst = EXIT_BAD_INPUT;
     }
-    for (int i = 0; i < list.count; i++) {
-        // --update with a folder renews the existing golden paths; with a scene it also creates one
-        if (!scene_has_golden(list.path[i]) && scene_has_verify(list.path[i]))
-            continue;
-        if (!headed)
-            printf("%-44s %-9s %12s  %9s %5s %12s\n", "scene", "", "worst mm", "first s", "node", "by mm");
-        headed = true;
-        code = check_golden(list.path[i], options, faults);
-        worst = code > worst ? code : worst;
-        fflush(stdout);
-    }
-    code = options->update ? EXIT_DONE : check_verify(list.count, list.path, options->threads, options->quiet, faults);
-    scene_list_free(&list);
-    return code > worst ? code : worst;
+    check_files_write(&options->files, &log, faults);
+    check_log_free(&log);
+    check_scenes_free(&scenes);
+    return worst;
 }
 
 const Verb check_verb = {.options = &table, .call = call};

@@ -1,88 +1,86 @@
 #include "cli/check_golden.h"
 
-#include "cli/output_plan.h"
+#include "cli/check_rows.h"
+#include "cli/golden_case.h"
 #include "sim/sim.h"
 
 #include <stdlib.h>
-#include <unistd.h>
 
-static void print_row(const char *path, const Scene *scene, const PathDifference *difference, const GoldenOptions *options)
+// Each open scene belongs to one thread, so memory grows with the threads and not with the scenes.
+typedef struct Job {
+    CheckCase result;
+    char message[GOLDEN_MESSAGE];
+    char *row, *complaint;   // for standard output and standard error
+    size_t row_length;
+    ATOMIC(bool) is_done;
+} Job;
+
+typedef struct Check {
+    const GoldenOptions *options;
+    CheckLog *log;
+    pthread_mutex_t opening;
+    Job *job;
+    long printed;
+    int worst;
+} Check;
+
+enum { COMPLAINT = (FAULTS_CAPACITY + 1) * FAULT_LENGTH };
+
+static void check_job(void *context, long index)
 {
-    if (!difference->differs) {
-        if (!options->quiet)
-            printf("%-44s same      %12.7f\n", path, difference->worst_mm);
-        return;
+    Check *check = context;
+    Job *job = &check->job[index];
+    double begin = clock_s(CLOCK_MONOTONIC);
+    Faults *faults = HEAP_ZEROED(1, sizeof *faults);
+    FILE *row = open_memstream(&job->row, &job->row_length);
+    if (!row)
+        heap_is_empty(1, __FILE__);
+    golden_case(check->options, &check->opening, &job->result, job->message, row, faults);
+    fclose(row);
+    if (faults->count > 0) {
+        job->complaint = HEAP_ZEROED(COMPLAINT, 1);
+        faults_print(faults, job->complaint, COMPLAINT);
+        job->result.code = job->result.code > EXIT_BAD_INPUT ? job->result.code : EXIT_BAD_INPUT;
+        job->result.status = CHECK_ERROR;
     }
-    printf("%-44s DIFFERS   %12.7f", path, difference->worst_mm);
-    if (difference->first_node >= 0)
-        printf("  %9.3f %5d %12.7f", difference->first_t_s, difference->first_node, difference->first_mm);
-    else
-        printf("  %9s %5s %12s", "-", "-", "-");
-    if (difference->first_node >= 0 && scene->tool_count > 1 && difference->first_tool < scene->tool_count)
-        printf("  of %s", scene->tool[difference->first_tool].name);
-    printf("%s%s\n", difference->remark[0] ? "  " : "", difference->remark);
+    free(faults);
+    job->result.time_s = clock_s(CLOCK_MONOTONIC) - begin;
+    atomic_store(&job->is_done, true);
 }
 
-static int update(const char *golden_path, bool there, const Scene *scene, const ToolPath *run, Faults *faults)
+// Called by the thread that waits for the others.
+static void print_ready(void *context, long done, long total)
 {
-    int before = faults->count;
-    OutputPlan plan = {.faults = faults};
-    output_plan_write_file(&plan, "--update", golden_path);
-    output_plan_read_scene(&plan, scene);
-    if (faults->count == before)
-        golden_save(golden_path, run, faults);
-    if (faults->count > before)
-        return EXIT_BAD_INPUT;
-    printf("%-44s %s   %12s\n", scene->path, there ? "rewritten" : "written  ", "");
-    return EXIT_DONE;
+    Check *check = context;
+    (void)done;
+    for (; check->printed < total && atomic_load(&check->job[check->printed].is_done); check->printed++) {
+        Job *job = &check->job[check->printed];
+        CheckCase one = job->result;
+        fputs(job->row, stdout);
+        fflush(stdout);
+        if (job->complaint)
+            fputs(job->complaint, stderr);
+        else if (one.code == EXIT_UNTRUSTED)
+            fprintf(stderr, "%s: %s\n", one.scene, job->message);
+        one.message = job->complaint ? job->complaint : job->message;
+        check_log_add(check->log, &one);
+        check->worst = one.code > check->worst ? one.code : check->worst;
+        free(job->row);
+        free(job->complaint);
+    }
 }
 
-// Runs the scene and compares or writes its golden path; returns an exit code. The file `golden_path` may be missing.
-static int check_path(const GoldenOptions *options, Scene *scene, const char *golden_path, Faults *faults)
+int check_golden(const SceneList *list, const GoldenOptions *options, CheckLog *log)
 {
-    const char *path = scene->path;
-    bool there = access(golden_path, F_OK) == 0, diverged = false;
-    int before = faults->count, code = EXIT_BAD_INPUT;
-    ToolPath *golden = there ? golden_load(golden_path, faults) : NULL, *run = NULL;
-    OpenVessel open = {0};
-    // --update rewrites a golden path even if it cannot be read
-    if (options->update && !golden)
-        faults->count = before;
-    double duration = golden ? golden->duration_s : 1;
-    if (options->update)
-        duration = options->duration_s >= 0 ? options->duration_s : scene->script ? script_duration_s(scene->script) : duration;
-    if (faults->count == before && cli_open_scene(scene, options->threads, options->quiet, &open, faults))
-        run = golden_run(scene, &open, duration, &diverged, faults);
-    if (run && options->update) {
-        code = update(golden_path, there, scene, run, faults);
-    } else if (run && golden) {
-        PathDifference difference = tool_path_compare(golden, run, options->tolerance_mm);
-        print_row(path, scene, &difference, options);
-        code = difference.differs ? EXIT_DIFFERENT : EXIT_DONE;
-    }
-    if (diverged)
-        fprintf(stderr, "%s: the run diverged\n", path);
-    tool_path_free(run);
-    tool_path_free(golden);
-    open_vessel_close(&open);
-    return diverged ? EXIT_UNTRUSTED : code;
-}
-
-int check_golden(const char *path, const GoldenOptions *options, Faults *faults)
-{
-    int code = EXIT_BAD_INPUT;
-    char *golden_path = golden_path_of(path);
-    Scene *scene = scene_load(path, faults);
-    const char *needed = scene ? scene_needed_file(scene) : NULL;
-    if (!golden_path) {
-        faults_add(faults, path, 0, 0, "out of memory");
-    } else if (needed && access(needed, F_OK) != 0) {
-        printf("%-44s skipped   %s is missing\n", path, needed);
-        code = EXIT_DONE;
-    } else if (scene) {
-        code = check_path(options, scene, golden_path, faults);
-    }
-    scene_free(scene);
-    free(golden_path);
-    return code;
+    Check check = {.options = options, .log = log, .job = HEAP_ZEROED((size_t)list->count + 1, sizeof *check.job)};
+    for (int i = 0; i < list->count; i++)
+        check.job[i].result = (CheckCase){.scene = list->path[i], .name = "golden run", .status = CHECK_ERROR, .code = EXIT_BAD_INPUT};
+    if (list->count > 0 && !options->quiet && !options->writes)
+        printf("%-44s %-9s %12s  %9s %5s %12s\n", "scene", "", "worst mm", "first s", "node", "by mm");
+    pthread_mutex_init(&check.opening, NULL);
+    if (list->count > 0)
+        parallel_for(options->threads, list->count, check_job, &check, &(Progress){print_ready, &check, NULL});
+    pthread_mutex_destroy(&check.opening);
+    free(check.job);
+    return check.worst;
 }

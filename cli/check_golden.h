@@ -1,16 +1,20 @@
-// The rows of `seldinger check` for golden tool paths: a scene is run and compared with the golden path in its folder, or that path is rewritten.
+// `seldinger check` for golden runs: scenes are run in parallel and compared with their golden runs, or these are written.
 #ifndef SELDINGER_CLI_CHECK_GOLDEN_H
 #define SELDINGER_CLI_CHECK_GOLDEN_H
 
 #include "cli/cli.h"
 
 typedef struct GoldenOptions {
-    double tolerance_mm, duration_s;   // duration < 0: not given
-    bool update, quiet;
+    double tolerance_mm, duration_s;   // < 0: not given
+    Tolerances tolerances;             // of the command line; those of a scene come before them
+    const char *baseline;              // where the golden runs are; NULL: beside the scenes
+    bool writes, quiet;
+    bool has_page;                     // keep what its figures show
     int threads;
 } GoldenOptions;
 
-// Checks one scene and prints its row. Returns an exit code.
-int check_golden(const char *path, const GoldenOptions *options, Faults *faults);
+// Checks the scenes and prints their rows in order, each as soon as those before it are ready. A scene that cannot be checked is a case too; what is wrong with
+// it goes to standard error. Returns the worst exit code.
+int check_golden(const SceneList *list, const GoldenOptions *options, CheckLog *log);
 
 #endif

@@ -4,8 +4,11 @@
 
 // pages
 #include "render/archive_page.h"
+#include "render/check_junit.h"
+#include "render/check_page.h"
 #include "render/page_pdf.h"
 #include "render/session_report.h"
+#include "render/sweep_page.h"
 #include "render/tree_page.h"
 
 // pictures and films

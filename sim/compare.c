@@ -11,8 +11,7 @@ static const char header[] = "t_s,node,x_mm,y_mm,z_mm", tools_header[] = "t_s,to
 static const double sample_s = 0.05;
 enum { SAMPLED_NODES = 21 };
 
-// The value of a comment line "# name: value"; `missing` if there is none.
-static double comment_figure(const char *text, size_t length, const char *name, double missing)
+double golden_comment(const char *text, size_t length, const char *name, double missing)
 {
     char key[64];
     int key_length = snprintf(key, sizeof key, "# %s:", name);
@@ -47,7 +46,7 @@ static const char *nodes_key(const ToolPath *path, int tool, char text[40])
 // Reads the number of tools and the node count of each.
 static void parse_counts(const char *text, size_t length, const char *file, ToolPath *path, Faults *faults)
 {
-    double tools = comment_figure(text, length, "tools", 1);
+    double tools = golden_comment(text, length, "tools", 1);
     char key[40];
     if (tools < 1 || tools > STEP_TOOLS_MAX || tools != floor(tools)) {
         faults_add(faults, file, 1, 1, "has the comment '# tools: %g'; expected 1 to %d", tools, STEP_TOOLS_MAX);
@@ -56,7 +55,7 @@ static void parse_counts(const char *text, size_t length, const char *file, Tool
     path->tool_count = (int)tools;
     for (int k = 0; k < path->tool_count; k++) {
         const char *name = nodes_key(path, k, key);
-        double nodes = comment_figure(text, length, name, -1);
+        double nodes = golden_comment(text, length, name, -1);
         if (nodes < 2 || nodes > 1e6 || nodes != floor(nodes))
             faults_add(faults, file, 1, 1, "has no comment '# %s: N' with the tool's number of nodes; make the file with `seldinger check --update`", name);
         else
@@ -112,7 +111,7 @@ ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Fau
     if (!path || (table && !path->row))
         faults_add(faults, file, 0, 0, "not enough memory for its rows");
     if (table && path->row) {
-        path->duration_s = comment_figure(text, length, "duration_s", -1);
+        path->duration_s = golden_comment(text, length, "duration_s", -1);
         if (path->duration_s < 0 || path->duration_s > SCRIPT_LONGEST_S)
             faults_add(faults, file, 1, 1, "has no comment '# duration_s: S'; make the file with `seldinger check --update`");
         parse_rows(table, file, path, faults);

@@ -43,6 +43,8 @@ ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Fau
 // The text of the file; the caller frees it. NULL if out of memory.
 char *tool_path_print(const ToolPath *path, size_t *length);
 void tool_path_free(ToolPath *path);
+// The number in a comment line "# NAME: NUMBER" of a golden file; `missing` if no line has this form.
+double golden_comment(const char *text, size_t length, const char *name, double missing);
 // `X.golden.csv` of `X.yaml` (or .yml); the caller frees it.
 char *golden_path_of(const char *scene_path);
 

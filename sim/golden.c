@@ -7,20 +7,35 @@
 
 typedef struct Sampling {
     ToolPath *path;
+    GoldenFigures *figures;  // NULL: not kept
     bool no_memory;
 } Sampling;
+
+// The figures have the times of the path.
+static void sample(Sampling *sampling, Simulator *simulator, bool last)
+{
+    int before = sampling->path->row_count;
+    sampling->no_memory |= !tool_path_sample(sampling->path, simulator, last);
+    if (sampling->figures && sampling->path->row_count > before)
+        golden_figures_sample(sampling->figures, simulator);
+}
 
 static bool sample_step(void *context, Simulator *simulator, const ToolCommands *commands)
 {
     (void)commands;
     Sampling *sampling = context;
-    sampling->no_memory |= !tool_path_sample(sampling->path, simulator, false);
+    sample(sampling, simulator, false);
     return !sampling->no_memory;
 }
 
 ToolPath *golden_run(const Scene *scene, const OpenVessel *open, double duration_s, bool *diverged, Faults *faults)
 {
-    Sampling sampling = {0};
+    return golden_run_measured(scene, open, duration_s, NULL, diverged, faults);
+}
+
+ToolPath *golden_run_measured(const Scene *scene, const OpenVessel *open, double duration_s, GoldenFigures *figures, bool *diverged, Faults *faults)
+{
+    Sampling sampling = {.figures = figures};
     Simulator *simulator = simulator_create(scene, open->vessel, faults);
     if (simulator && (sampling.path = tool_path_create(simulator, duration_s))) {
         DriveOptions drive = drive_default_options();
@@ -29,7 +44,9 @@ ToolPath *golden_run(const Scene *scene, const OpenVessel *open, double duration
         drive.after_step = sample_step;
         drive.context = &sampling;
         *diverged = simulator_drive(simulator, &drive).end == DRIVE_DIVERGED;
-        sampling.no_memory |= !tool_path_sample(sampling.path, simulator, true);
+        sample(&sampling, simulator, true);
+        if (figures)
+            golden_figures_end(figures, simulator);
     }
     if (simulator && (!sampling.path || sampling.no_memory)) {
         faults_add(faults, scene->path, 0, 0, "not enough memory for its tool path");

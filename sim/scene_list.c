@@ -61,7 +61,7 @@ static int by_name(const void *a, const void *b) { return strcmp(*(char *const *
 enum { DEEPEST_FOLDER = 32 };
 
 // Symbolic links to folders are not followed, so there are no cycles.
-static void find_scenes(const char *folder, int depth, SceneList *list)
+static void find_files(const char *folder, int depth, const char *ending, bool (*is_wanted)(const char *path), SceneList *list)
 {
     DIR *open = depth < DEEPEST_FOLDER ? opendir(folder) : NULL;
     for (struct dirent *entry; open && (entry = readdir(open));) {
@@ -73,8 +73,8 @@ static void find_scenes(const char *folder, int depth, SceneList *list)
         bool slash = ends_with(folder, "/");
         snprintf(path, capacity, "%s%s%s", folder, slash ? "" : "/", entry->d_name);
         if (lstat(path, &status) == 0 && S_ISDIR(status.st_mode))
-            find_scenes(path, depth + 1, list);
-        else if ((ends_with(path, ".yaml") || ends_with(path, ".yml")) && (scene_has_golden(path) || scene_has_verify(path)))
+            find_files(path, depth + 1, ending, is_wanted, list);
+        else if (ends_with(path, ending) && (!is_wanted || is_wanted(path)))
             scene_list_add(list, path);
         free(path);
     }
@@ -82,10 +82,20 @@ static void find_scenes(const char *folder, int depth, SceneList *list)
         closedir(open);
 }
 
+void scene_list_add_files(SceneList *list, const char *folder, const char *ending, bool (*is_wanted)(const char *path))
+{
+    int before = list->count;
+    find_files(folder, 0, ending, is_wanted, list);
+    qsort(list->path + before, (size_t)(list->count - before), sizeof *list->path, by_name);
+}
+
+static bool can_be_checked(const char *path) { return scene_has_golden(path) || scene_has_verify(path); }
+
 void scene_list_add_folder(SceneList *list, const char *folder)
 {
     int before = list->count;
-    find_scenes(folder, 0, list);
+    find_files(folder, 0, ".yaml", can_be_checked, list);
+    find_files(folder, 0, ".yml", can_be_checked, list);
     qsort(list->path + before, (size_t)(list->count - before), sizeof *list->path, by_name);
 }
 

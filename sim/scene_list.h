@@ -12,6 +12,8 @@ typedef struct SceneList {
 void scene_list_add(SceneList *list, const char *path);
 // Adds all such scenes below a folder, by name; links to folders are not followed.
 void scene_list_add_folder(SceneList *list, const char *folder);
+// Adds all files below a folder with that ending for which `is_wanted` (NULL: all), by name.
+void scene_list_add_files(SceneList *list, const char *folder, const char *ending, bool (*is_wanted)(const char *path));
 void scene_list_free(SceneList *list);
 
 // Returns whether X.golden.csv exists next to X.yaml.

@@ -1,6 +1,7 @@
 // YAML text to a Scene in internal units: mm, g, ms (N, MPa, mJ), rad. The only place where a scene's units are converted. One function per part of
 // the file; each continues after a fault, so one pass finds all.
 #include "sim/scene_reading.h"
+#include "sim/tolerances.h"
 
 #include "base/base.h"
 #include "sim/yaml_vector.h"
@@ -468,8 +469,8 @@ static void read_fluoroscopy(Reading *reading, YamlValue value)
 
 static void read_scene(Reading *reading)
 {
-    static const char *const keys[] = {"seldinger", "vessel",  "wire",     "tools",       "sheath",  "rig",    "simulation",
-                                       "script",    "targets", "exercise", "fluoroscopy", "anatomy", "verify", NULL};
+    static const char *const keys[] = {"seldinger", "vessel",   "wire",        "tools",   "sheath", "rig",   "simulation", "script",
+                                       "targets",   "exercise", "fluoroscopy", "anatomy", "verify", "check", NULL};
     YamlValue root = yaml_root(reading->reader);
     YamlMap map = yaml_map(root, keys);
     int version;
@@ -507,6 +508,9 @@ static void read_scene(Reading *reading)
         scene_read_anatomy(reading, yaml_get(&map, "anatomy", false));
     if (yaml_has(&map, "verify"))
         read_verify(reading, yaml_get(&map, "verify", false), yaml_has(&map, "script"));
+    // only checked here: tolerances_of_scene() reads them for the one verb that needs them
+    if (yaml_has(&map, "check"))
+        tolerances_read(yaml_get(&map, "check", false), &(Tolerances){0});
 }
 
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults)

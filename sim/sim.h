@@ -24,6 +24,10 @@
 #include "sim/run_summary.h"
 #include "sim/compare.h"
 #include "sim/golden.h"
+#include "sim/baseline.h"
+#include "sim/check_case.h"
+#include "sim/first_order.h"
+#include "sim/sweep_results.h"
 #include "sim/verify_run.h"
 
 // hands in real time

@@ -50,7 +50,9 @@ static void drive(VerifyRun *run, const Scene *scene, Simulator *simulator)
         options.duration_s += plan->rest_s;
     else
         watch.driven_s = HUGE_VAL;
-    run->diverged = simulator_drive(simulator, &options).end == DRIVE_DIVERGED;
+    DriveReport report = simulator_drive(simulator, &options);
+    run->diverged = report.end == DRIVE_DIVERGED;
+    run->wall_s = report.wall_s;
     run->rested = !settles || watch.rested;
     run->flags = simulator_totals(simulator)->flags;
     verify_measure_step(watch.measure, true);

@@ -16,6 +16,7 @@ typedef struct VerifyRun {   // a scene with one number of elements
     double result[VERIFY_MOST_CASES];
     unsigned flags;
     bool diverged, rested;
+    double wall_s;           // time that the run took
     Faults faults;
 } VerifyRun;
 
