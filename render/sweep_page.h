@@ -10,6 +10,7 @@ typedef struct SweepPage {
     const char *folder;          // RESULTS
     const SweepResults *results;
     const char *specification;   // the text of spec.yaml
+    const char *path;            // of the specification itself, for commands: the copy's relative paths do not hold; NULL: unknown
 } SweepPage;
 
 // A self-contained HTML document without a date: the same results give the same page. Recordings of the worst runs are read from FOLDER/recordings.

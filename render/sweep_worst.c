@@ -121,8 +121,8 @@ static void print_run(FILE *out, const SweepPage *page, const Ranked *ranked, in
         fprintf(out, "</dt><dd>%.6g</dd>", results->column[by].value[row]);
     }
     fprintf(out, "</dl><pre>seldinger sweep ");
-    page_text(out, page->folder);
-    fprintf(out, "/spec.yaml --run %d -o run-%d</pre></article>\n", row, row);
+    page_text(out, page->path ? page->path : "SPEC.yaml");
+    fprintf(out, " --run %d -o run-%d</pre></article>\n", row, row);
 }
 
 void sweep_worst_section(FILE *out, const SweepPage *page)

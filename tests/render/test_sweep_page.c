@@ -48,7 +48,7 @@ static char *page_of(const SweepResults *table)
     char *text = NULL;
     size_t length;
     FILE *out = open_memstream(&text, &length);
-    sweep_page(out, &(SweepPage){"results", table, "scene: a.yaml\nvary: {k: [1, 2]} # <&>\n"});
+    sweep_page(out, &(SweepPage){"results", table, "scene: a.yaml\nvary: {k: [1, 2]} # <&>\n", "my/spec.yaml"});
     fclose(out);
     return text;
 }
@@ -101,7 +101,7 @@ static void indices_and_worst_runs(void **unused)
     // left before diverged, as the section says, then by distance
     char *left = strstr(page, "Run 8: left"), *diverged = strstr(page, "Run 7: diverged");
     assert_true(left && diverged && left < diverged);
-    assert_non_null(strstr(page, "seldinger sweep results/spec.yaml --run 8 -o run-8"));
+    assert_non_null(strstr(page, "seldinger sweep my/spec.yaml --run 8 -o run-8"));
     int articles = 0;
     for (char *at = page; (at = strstr(at, "<article")); at++)
         articles++;
