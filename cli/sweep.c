@@ -3,6 +3,7 @@
 
 #include "cli/cli.h"
 #include "cli/sweep_forecast.h"
+#include "cli/sweep_report.h"
 #include "study/study.h"
 
 #include <errno.h>
@@ -125,6 +126,8 @@ static int call(void *structure, Faults *faults)
 {
     Sweep sweep = {.options = structure, .faults = faults};
     int code = EXIT_BAD_INPUT;
+    if (sweep.options->report)
+        return sweep_report(sweep.options, faults);
     recording_prepare_process();
     sweep.stop = process_stop_in_order();
     if (sweep.options->output)

@@ -6,6 +6,7 @@
 
 typedef struct SweepOptions {
     const char *spec, *output;
+    const char *report;      // the folder of results to report of; NULL: none
     double run;              // -1: all
     int threads, simulate_ranks;
     bool dry_run, quiet;
