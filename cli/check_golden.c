@@ -1,7 +1,6 @@
 #include "cli/check_golden.h"
 
 #include "cli/check_rows.h"
-#include "cli/golden_case.h"
 #include "sim/sim.h"
 
 #include <stdlib.h>

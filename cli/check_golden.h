@@ -2,16 +2,7 @@
 #ifndef SELDINGER_CLI_CHECK_GOLDEN_H
 #define SELDINGER_CLI_CHECK_GOLDEN_H
 
-#include "cli/cli.h"
-
-typedef struct GoldenOptions {
-    double tolerance_mm, duration_s;   // < 0: not given
-    Tolerances tolerances;             // of the command line; those of a scene come before them
-    const char *baseline;              // where the golden runs are; NULL: beside the scenes
-    bool writes, quiet;
-    bool has_page;                     // keep what its figures show
-    int threads;
-} GoldenOptions;
+#include "cli/golden_case.h"
 
 // Checks the scenes and prints their rows in order, each as soon as those before it are ready. A scene that cannot be checked is a case too; what is wrong with
 // it goes to standard error. Returns the worst exit code.

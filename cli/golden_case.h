@@ -2,9 +2,18 @@
 #ifndef SELDINGER_CLI_GOLDEN_CASE_H
 #define SELDINGER_CLI_GOLDEN_CASE_H
 
-#include "cli/check_golden.h"
+#include "cli/cli.h"
 
 #include <pthread.h>
+
+typedef struct GoldenOptions {
+    double tolerance_mm, duration_s;   // < 0: not given
+    Tolerances tolerances;             // of the command line; those of a scene come before them
+    const char *baseline;              // where the golden runs are; NULL: beside the scenes
+    bool writes, quiet;
+    bool has_page;                     // keep what its figures show
+    int threads;
+} GoldenOptions;
 
 enum { GOLDEN_MESSAGE = 1000 };
 

@@ -2,7 +2,6 @@
 
 #include "render/page.h"
 #include "render/sweep_figures.h"
-#include "render/sweep_worst.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,7 +2,17 @@
 #ifndef SELDINGER_RENDER_SWEEP_WORST_H
 #define SELDINGER_RENDER_SWEEP_WORST_H
 
-#include "render/sweep_page.h"
+#include "sim/sim.h"
+
+#include <stdio.h>
+
+// What the report shows.
+typedef struct SweepPage {
+    const char *folder;          // RESULTS
+    const SweepResults *results;
+    const char *specification;   // the text of spec.yaml
+    const char *path;            // of the specification itself, for commands: the copy's relative paths do not hold; NULL: unknown
+} SweepPage;
 
 enum { SWEEP_WORST_MOST = 10 };
 
