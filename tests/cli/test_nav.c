@@ -193,7 +193,8 @@ static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
 // In practice all views are seen from the start; in an examination the 3D view is refused, and the session says what it was.
 static const char examined_hand[] =
     "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
-    "xdotool key 6; sleep 0.3; xdotool key e; xdotool keydown Up; sleep 1; xdotool keyup Up; "
+    "xdotool key 6; sleep 0.3; xdotool key e; "
+    "xdotool keydown Up; until $TEST_NAV --moved \"$(ls examined/*.h5 2>/dev/null)\" 8 -1; do sleep 0.3; done; xdotool keyup Up; "
     "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
 static void an_examination_hides_the_3d_view(void **state)
