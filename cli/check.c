@@ -21,7 +21,8 @@ typedef struct CheckOptions {
 #define AT(member) OPTION_AT(CheckOptions, member)
 static const Option rows[] = {
     {"tolerance-mm", "X", OPTION_NUMBER, AT(golden.tolerance_mm),
-     "largest distance [mm] between golden and run that passes; rounding on other machines stays below the default, a change of a parameter by 1 % does not",
+     "largest distance [mm] between golden and run that passes; rounding on other machines stays below the default, a change of a parameter by 1 % does not. "
+     "If it is given, paths alone are compared",
      .most = 1e6, .otherwise = "that of the scene or of --tolerances, else 1e-05"},
     {"tolerances", "F", OPTION_FILE, AT(tolerances), "tolerances by quantity, YAML; the key `check:` of a scene comes before them", .otherwise = ""},
     {"update", NULL, OPTION_FLAG, AT(update), "rewrites the golden runs; a scene given as PATH gets one if it has none"},

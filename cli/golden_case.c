@@ -76,7 +76,7 @@ static void simulate(One *one)
     bool there = access(one->golden_path, F_OK) == 0;
     if (there && !(one->golden = golden_load(one->golden_path, one->faults)) && options->writes)
         one->faults->count = before;     // a golden path that cannot be read is rewritten
-    if (!options->writes && access(one->figures_path, F_OK) == 0)
+    if (!options->writes && options->tolerance_mm < 0 && access(one->figures_path, F_OK) == 0)
         one->has_figures = golden_figures_load(one->figures_path, &one->golden_figures, one->faults);
     double duration = one->golden ? one->golden->duration_s : 1;
     if (options->writes)
