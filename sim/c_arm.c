@@ -24,12 +24,12 @@ CArm c_arm_place(const XrayControl *xray, const PatientAxes *axes)
     XrayControl usual = xray_default_control();
     double theta = within(xray->lao_deg, -90, 90, 0) * PI / 180, phi = within(xray->cra_deg, -45, 45, 0) * PI / 180;
     Vec3 left = vec3_negate(axes->right);
-    Vec3 level = vec3_add_scaled(vec3_scale(axes->anterior, cos(theta)), sin(theta), left);
+    Vec3 level = vec3_add_scaled(vec3_scale(axes->anterior, same_cos(theta)), same_sin(theta), left);
     CArm c_arm = {
         .isocentre = {within(xray->table_mm[0], -1e6, 1e6, 0), within(xray->table_mm[1], -1e6, 1e6, 0), within(xray->table_mm[2], -1e6, 1e6, 0)},
-        .right = vec3_add_scaled(vec3_scale(left, cos(theta)), -sin(theta), axes->anterior),
-        .up = vec3_add_scaled(vec3_scale(axes->superior, cos(phi)), -sin(phi), level),
-        .towards = vec3_add_scaled(vec3_scale(level, cos(phi)), sin(phi), axes->superior),
+        .right = vec3_add_scaled(vec3_scale(left, same_cos(theta)), -same_sin(theta), axes->anterior),
+        .up = vec3_add_scaled(vec3_scale(axes->superior, same_cos(phi)), -same_sin(phi), level),
+        .towards = vec3_add_scaled(vec3_scale(level, same_cos(phi)), same_sin(phi), axes->superior),
         .field_mm = within(xray->field_mm, 40, 400, usual.field_mm),
     };
     c_arm.handedness = vec3_dot(vec3_cross(c_arm.right, c_arm.up), c_arm.towards) < 0 ? -1 : 1;

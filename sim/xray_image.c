@@ -84,7 +84,7 @@ static bool is_before_source(const Spot *spot) { return spot->depth > C_ARM_NEAR
 // Samples of the way from a to b, at most half a pixel apart.
 static int samples_between(const Plane *plane, const Spot *a, const Spot *b)
 {
-    double way = hypot(b->column - a->column, b->row - a->row);
+    double way = same_hypot(b->column - a->column, b->row - a->row);
     return 1 + (int)fmin(2 * way, 4.0 * plane->pixels);
 }
 
