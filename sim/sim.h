@@ -9,6 +9,7 @@
 #include "sim/scene_list.h"
 #include "sim/patient_landmarks.h"
 #include "sim/open_vessel.h"
+#include "sim/vessel_cache.h"
 #include "sim/surface_cache.h"
 #include "sim/case_acts.h"
 #include "sim/case_builder.h"

@@ -14,7 +14,7 @@ typedef struct Run {
     OpenStudy *open;
     int64_t number;
     Scene *scene;
-    const OpenVessel *vessel;
+    SharedVessel *vessel;
     HeadlessOptions options;
     HeadlessRun headless;
     ToolPath *golden, *path;
@@ -59,8 +59,8 @@ static bool prepare(Run *run)
     run->options.scores = study->keeps_score;
     if (run->golden && run->options.duration_s < 0)
         run->options.duration_s = run->golden->duration_s;
-    return run->scene && run->faults.count == 0 && (run->vessel = vessel_store_take(run->open->vessels, run->scene, &run->faults)) &&
-           open_vessel_inlet(run->scene, run->vessel, &run->faults);
+    return run->scene && run->faults.count == 0 && (run->vessel = open_study_vessel(run->open, run->scene, &run->faults)) &&
+           open_vessel_inlet(run->scene, shared_vessel(run->vessel), &run->faults);
 }
 
 // --- during ---
@@ -75,7 +75,7 @@ static void sample(void *context, const HeadlessRun *headless)
 // False with faults.
 static bool simulate(Run *run)
 {
-    if (!headless_open(&run->headless, &run->options, run->scene, run->vessel, &run->faults))
+    if (!headless_open(&run->headless, &run->options, run->scene, shared_vessel(run->vessel), &run->faults))
         return false;
     if (run->golden)
         run->path = tool_path_create(run->headless.simulator, run->options.duration_s);
@@ -172,8 +172,7 @@ static void close_run(Run *run)
     tool_path_free(run->path);
     tool_path_free(run->golden);
     headless_close(&run->headless);
-    if (run->vessel)
-        vessel_store_give(run->open->vessels, run->vessel);
+    vessel_cache_release(run->vessel, IDLE_VESSELS_MOST);
     scene_free(run->scene);
     cJSON_Delete(run->figures);
     free(run);

@@ -96,7 +96,6 @@ OpenStudy *open_study(const Study *study, Faults *faults)
     open->scene_text = HEAP_ZEROED((size_t)count, sizeof *open->scene_text);
     open->inputs = cJSON_CreateObject();
     pthread_mutex_init(&open->files, NULL);
-    open->vessels = vessel_store_create(&open->files);
     for (int i = 0; i < count; i++)
         open_scene(open, study->scene ? study->scene : study->factor[0].values.value[i], faults);
     bool has_scenes = faults->count == before;
@@ -116,7 +115,7 @@ void open_study_close(OpenStudy *open)
         free(open->scene_path[i]);
         free(open->scene_text[i]);
     }
-    vessel_store_free(open->vessels);
+    vessel_cache_forget();
     pthread_mutex_destroy(&open->files);
     cJSON_Delete(open->inputs);
     free(open->scene_path);
@@ -130,6 +129,14 @@ const char *open_study_scene_text(const OpenStudy *open, const char *path)
         if (!strcmp(open->scene_path[i], path))
             return open->scene_text[i];
     return NULL;
+}
+
+SharedVessel *open_study_vessel(OpenStudy *open, const Scene *scene, Faults *faults)
+{
+    pthread_mutex_lock(&open->files);
+    SharedVessel *vessel = vessel_cache_open(scene, &(OpenVesselOptions){0}, faults);
+    pthread_mutex_unlock(&open->files);
+    return vessel;
 }
 
 cJSON *open_study_heading(const OpenStudy *open)

@@ -5,7 +5,7 @@
 #include "base/base.h"
 #include "recon/recon.h"
 #include "seldinger/recording.h"
-#include "sim/library/vessel_cache.h"
+#include "sim/vessel_cache.h"
 #include "sim/open_vessel.h"
 #include "sim/recording.h"
 

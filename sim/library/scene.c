@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { IDLE_MOST = 4 };      // vessels that stay open while no scene needs them
+
 void sel_open_options_init(SelOpenOptions *options, size_t size)
 {
     SelOpenOptions own = {0};
@@ -23,7 +25,7 @@ const SelScene *scene_held(const SelScene *scene)
 
 static void free_scene(SelScene *scene)
 {
-    vessel_cache_release(scene->shared);
+    vessel_cache_release(scene->shared, IDLE_MOST);
     scene_free(scene->scene);
     free(scene);
 }
@@ -219,3 +221,5 @@ SelStatus sel_scene_query(SelContext *context, const SelScene *scene, int count,
         return context_refuse(context, SEL_ERROR_STATE, __func__, "the scene has no wall");
     return wall_query(context, scene->open.vessel, count, point_mm, gap_mm, normal);
 }
+
+void sel_vessels_forget(void) { vessel_cache_forget(); }
