@@ -31,7 +31,8 @@ typedef struct CaseWindow {
     int width, height;           // of the window in the last frame
     unsigned buttons;            // pressed in the last frame
     double x, y, travel;         // of the mouse; [pixel] since it was pressed
-    bool shift, control, shows_help, ends;
+    WindowModifiers modifiers;
+    bool shows_help, ends;
     int still;                   // frames since something moved …
     int unchanged;               // … and since anything may look different
     char *steer;
@@ -115,7 +116,7 @@ static void do_what_the_desk_wants(CaseWindow *w)
 static void arrow(CaseWindow *w, double right, double up)
 {
     const double fast = 10;
-    double way = w->shift ? fast : 1;
+    double way = w->modifiers.shift ? fast : 1;
     case_state_move(&w->state, w->state.view, way * right, way * up);
     w->still = 0;
 }
@@ -125,7 +126,7 @@ static void page(CaseWindow *w, double by)
     if (w->state.view == CASE_PROJECTION)
         case_state_zoom(&w->state, CASE_PROJECTION, by);
     else
-        case_state_scroll(&w->state, w->state.view, w->shift ? 10 * by : by);
+        case_state_scroll(&w->state, w->state.view, w->modifiers.shift ? 10 * by : by);
 }
 
 static void press_letter(CaseWindow *w, int key)
@@ -143,11 +144,11 @@ static void press_letter(CaseWindow *w, int key)
         s->shows_bone = !s->shows_bone;
         s->pictures++;
         break;
-    case 'T': case_state_next(s, CASE_WIRES, w->shift ? -1 : 1); break;
-    case 'C': case_state_next(s, CASE_CATHETERS, w->shift ? -1 : 1); break;
-    case 'A': case_state_next(s, CASE_SEGMENTS, w->shift ? -1 : 1); break;
+    case 'T': case_state_next(s, CASE_WIRES, w->modifiers.shift ? -1 : 1); break;
+    case 'C': case_state_next(s, CASE_CATHETERS, w->modifiers.shift ? -1 : 1); break;
+    case 'A': case_state_next(s, CASE_SEGMENTS, w->modifiers.shift ? -1 : 1); break;
     case 'B': case_state_turn_background(s); break;
-    case 'M': case_state_next(s, CASE_MODELS, w->shift ? -1 : 1); break;
+    case 'M': case_state_next(s, CASE_MODELS, w->modifiers.shift ? -1 : 1); break;
     case 'E': open_desk(w); break;
     case 'H': w->shows_help = !w->shows_help; break;
     case 'S': steer(w); break;
@@ -172,7 +173,7 @@ static void press(CaseWindow *w, int key)
     CaseState *s = &w->state;
     switch (key) {
     case WINDOW_KEY_ESCAPE: leave(w); break;
-    case WINDOW_KEY_TAB: s->view = (s->view + (w->shift ? CASE_VIEWS - 1 : 1)) % CASE_VIEWS; break;
+    case WINDOW_KEY_TAB: s->view = (s->view + (w->modifiers.shift ? CASE_VIEWS - 1 : 1)) % CASE_VIEWS; break;
     case WINDOW_KEY_LEFT: arrow(w, -1, 0); break;
     case WINDOW_KEY_RIGHT: arrow(w, 1, 0); break;
     case WINDOW_KEY_UP: arrow(w, 0, 1); break;
@@ -264,7 +265,7 @@ static void scroll(CaseWindow *w, double notches, double x, double y)
     if (view >= CASE_VIEWS || notches == 0)
         return;
     w->state.view = view;
-    if (w->control || view == CASE_PROJECTION)
+    if (w->modifiers.control || view == CASE_PROJECTION)
         case_state_zoom(&w->state, view, notches);
     else
         case_state_scroll(&w->state, view, notches > 0 ? 1 : -1);
@@ -275,13 +276,7 @@ static void take_input(CaseWindow *w, const WindowInput *input)
 {
     for (int i = 0; i < input->event_count; i++) {
         const WindowEvent *event = &input->event[i];
-        if (event->kind == WINDOW_KEY_DOWN_EVENT || event->kind == WINDOW_KEY_UP_EVENT) {
-            bool is_down = event->kind == WINDOW_KEY_DOWN_EVENT;
-            w->shift = event->key == WINDOW_KEY_SHIFT ? is_down : w->shift;
-            w->control = event->key == WINDOW_KEY_CTRL ? is_down : w->control;
-        } else if (event->kind == WINDOW_FOCUS_LOST_EVENT) {
-            w->shift = w->control = false;
-        }
+        window_modifiers_take(&w->modifiers, event);
         if (event->kind == WINDOW_SCROLL_EVENT)
             scroll(w, (double)event->scroll_y, input->mouse_x, input->mouse_y);
         else if (event->kind == WINDOW_KEY_DOWN_EVENT && (event->modifiers & WINDOW_CTRL))

@@ -22,7 +22,7 @@ struct EditDesk {
     Over held;               // where the mouse was pressed
     unsigned buttons;        // pressed in the last frame
     double x, y, travel;     // of the mouse; [pixel] since it was pressed
-    bool shift, control;     // held down
+    WindowModifiers modifiers;
     bool drags_handle, draws_stroke, moves_blend, shows_help;
     bool has_left;           // the last key was to leave
     EditDeskWants wants;
@@ -107,7 +107,7 @@ static bool press_pen(EditDesk *w, int key)
     Camera camera = edit_scene_projection(w->scene, w->scene_at);
     const Vec3 right = s->draws_branch ? camera.right : vec3(1, 0, 0), up = s->draws_branch ? camera.up : vec3(0, 1, 0);
     const Vec3 near = s->draws_branch ? camera.back : vec3(0, 0, 0);
-    const double step = (s->draws_branch ? 0.1 : 0.05) * (w->shift ? 10 : 1);    // [mm]
+    const double step = (s->draws_branch ? 0.1 : 0.05) * (w->modifiers.shift ? 10 : 1);    // [mm]
     const float wider = 0.05f;
     switch (key) {
     case WINDOW_KEY_LEFT: edit_state_pen_move(s, vec3_scale(right, -step)); break;
@@ -276,22 +276,16 @@ void edit_desk_take_input(EditDesk *w, const WindowInput *input)
     double x = input->mouse_x, y = input->mouse_y;
     for (int i = 0; i < input->event_count; i++) {
         const WindowEvent *event = &input->event[i];
-        if (event->kind == WINDOW_KEY_DOWN_EVENT || event->kind == WINDOW_KEY_UP_EVENT) {
-            bool is_down = event->kind == WINDOW_KEY_DOWN_EVENT;
-            w->shift = event->key == WINDOW_KEY_SHIFT ? is_down : w->shift;
-            w->control = event->key == WINDOW_KEY_CTRL ? is_down : w->control;
-        } else if (event->kind == WINDOW_FOCUS_LOST_EVENT) {
-            w->shift = w->control = false;
-        }
+        window_modifiers_take(&w->modifiers, event);
         if (event->kind == WINDOW_SCROLL_EVENT)
-            scroll(w, event, x, y, w->control);
+            scroll(w, event, x, y, w->modifiers.control);
         else if (event->kind == WINDOW_KEY_DOWN_EVENT && (event->modifiers & WINDOW_CTRL))
             press_control(w, event->key);
         else if (event->kind == WINDOW_KEY_DOWN_EVENT)
             press(w, event->key);
     }
     if (input->mouse_buttons && !w->buttons)
-        mouse_down(w, input, x, y, w->shift);
+        mouse_down(w, input, x, y, w->modifiers.shift);
     if (input->mouse_buttons)
         mouse_move(w, input, x, y);
     if (!input->mouse_buttons && w->buttons)

@@ -256,6 +256,17 @@ bool window_next_frame(Window *w, const WindowInput **input)
     return !(*input)->is_iconified && (*input)->width > 0 && (*input)->height > 0;
 }
 
+void window_modifiers_take(WindowModifiers *modifiers, const WindowEvent *event)
+{
+    if (event->kind == WINDOW_KEY_DOWN_EVENT || event->kind == WINDOW_KEY_UP_EVENT) {
+        bool is_down = event->kind == WINDOW_KEY_DOWN_EVENT;
+        modifiers->shift = event->key == WINDOW_KEY_SHIFT ? is_down : modifiers->shift;
+        modifiers->control = event->key == WINDOW_KEY_CTRL ? is_down : modifiers->control;
+    } else if (event->kind == WINDOW_FOCUS_LOST_EVENT) {
+        *modifiers = (WindowModifiers){0};
+    }
+}
+
 void window_swap(Window *w)
 {
     if (!glfwGetWindowAttrib(w->window, GLFW_VISIBLE))

@@ -95,6 +95,11 @@ void window_destroy(Window *window);   // restores signal handlers and the previ
 // Sleeps until the deadline of the next frame (absolute: a late frame does not shift later ones; whole periods are skipped if needed), then polls. Returns
 // false if nothing should be drawn: iconified or of zero size. *input is valid until the next call.
 bool window_next_frame(Window *window, const WindowInput **input);
+// Keys that change what other keys and the mouse do.
+typedef struct WindowModifiers {
+    bool shift, control;     // held down
+} WindowModifiers;
+void window_modifiers_take(WindowModifiers *modifiers, const WindowEvent *event);
 void window_swap(Window *window);   // the first call also shows the window, which is hidden until then
 const char *window_dropped(const Window *window);   // the path of the file that was dropped last; "" if none was
 int64_t window_frames_skipped(const Window *window);   // periods skipped because a frame took longer
