@@ -9,23 +9,7 @@
 #include <stdlib.h>
 #include <time.h>
 
-enum { TEXT_MAX = 4096, UNSEEN_MAX_PERCENT = 10 };
-
-static CurveSet *get_curves(const ImportCommand *command, const SurfaceMesh *mesh, ImportReport *report, Faults *faults)
-{
-    if (command->centreline_count == 0)
-        return mesh_centreline(mesh, &command->options, report, command->surface, faults);
-    CurveSet *set = curve_set_create();
-    bool good = set != NULL;
-    for (int i = 0; set && i < command->centreline_count; i++)
-        good = centreline_load(command->centreline[i], set, faults) && good;
-    if (!set)
-        faults_add(faults, command->surface, 0, 0, "out of memory");
-    if (good && import_place_curves(mesh, command->scale, set, report, command->centreline[0], faults))
-        return set;
-    curve_set_free(set);
-    return NULL;
-}
+enum { TEXT_MAX = 4096 };
 
 static bool write_curves(const ImportCommand *command, const CurveSet *set, Faults *faults)
 {
@@ -43,13 +27,6 @@ static bool save(const ImportCommand *command, const VesselTree *tree, Faults *f
              command->centreline_count, command->scale, command->options.spacing, command->options.points_per_node);
     TreeFileInfo info = {.source = source, .parameters = parameters, .created_by = created_by};
     return tree_file_save(tree, &info, command->output, faults);
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 static bool write_figures(const ImportCommand *command, const ImportFigures *figures, Faults *faults)
@@ -81,13 +58,14 @@ static void plan_files(const ImportCommand *command, Faults *faults)
 // Makes the tree of `mesh` and writes it; false with faults.
 static bool import(const ImportCommand *command, const SurfaceMesh *mesh, ImportFigures *found, Faults *faults)
 {
-    CurveSet *set = get_curves(command, mesh, &found->report, faults);
+    CurveSet *set =
+        import_load_curves(mesh, command->scale, command->centreline_count, command->centreline, &command->options, &found->report, command->surface, faults);
     VesselTree *tree = set ? import_surface(mesh, set, &command->options, &found->report, command->surface, faults) : NULL;
-    double unseen = 100.0 * (double)found->report.left_points / (double)(found->report.sampled_points + 1);
-    if (tree && found->computed && unseen > UNSEEN_MAX_PERCENT)
+    const double left = import_left_percent(&found->report);
+    if (tree && found->computed && left > IMPORT_LEFT_MOST_PERCENT)
         faults_add(faults, command->surface, 0, 0,
-                   "the computed centrelines miss %.0f %% of the surface, more than %d %%: no tree is written; give --centerline F", unseen,
-                   UNSEEN_MAX_PERCENT);
+                   "the computed centrelines miss %.0f %% of the surface, more than %d %%: no tree is written; give --centerline F", left,
+                   IMPORT_LEFT_MOST_PERCENT);
     bool good = tree && faults->count == 0 && save(command, tree, faults) && (!command->centreline_out || write_curves(command, set, faults));
     if (good) {
         found->curve_count = set->curve_count;
@@ -104,11 +82,11 @@ static int call(void *structure, Faults *faults)
     const ImportCommand *command = structure;
     ImportFigures found = {.computed = command->centreline_count == 0, .report = {.curves_scaled = 1, .inside_percent = 100}};
     plan_files(command, faults);
-    double start = seconds();
+    double start = clock_s(CLOCK_MONOTONIC);
     SurfaceMesh *mesh =
         faults->count == 0 ? mesh_load_repaired(command->surface, command->has_scale ? command->scale : 0, "--scale ", &found.check, faults) : NULL;
     bool good = mesh && import(command, mesh, &found, faults);
-    found.seconds = seconds() - start;
+    found.seconds = clock_s(CLOCK_MONOTONIC) - start;
     if (good)
         write_figures(command, &found, faults);
     surface_free(mesh);

@@ -10,13 +10,6 @@
 #include <stdlib.h>
 #include <time.h>
 
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 // Prints what makes the result doubtful on standard error, even with --quiet.
 static void print_warnings(const char *volume, const RbtStartCheck *check)
 {
@@ -90,19 +83,19 @@ static int call(void *structure, Faults *faults)
 {
     const SegmentCommand *command = structure;
     plan_files(command, faults);
-    double start = seconds();
+    double start = clock_s(CLOCK_MONOTONIC);
     Trace *trace = trace_of(command, faults);
     Volume *volume = volume_load(command->volume, faults);
     RbtReport report = {0};
     VesselTree *tree = NULL;
-    double load_s = seconds() - start;
+    double load_s = clock_s(CLOCK_MONOTONIC) - start;
     if (trace && volume && faults->count == 0) {
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "tracking", command->quiet);
         tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count, command->threads, &progress,
                          &report, command->start ? "--start" : command->trace, faults);
     }
-    double track_s = seconds() - start - load_s;
+    double track_s = clock_s(CLOCK_MONOTONIC) - start - load_s;
     bool good = tree && save(command, trace, &report, volume, tree, faults) && (!command->json || write_json(command, tree, &report, load_s, track_s, faults));
     if (good && !command->quiet && !cli_is_standard_output(command->json))
         segment_report_print(stdout, tree, &report, load_s, track_s);

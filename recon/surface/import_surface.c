@@ -8,6 +8,7 @@
 
 #include "base/base.h"
 #include "recon/surface/import_ostia.h"
+#include "recon/surface/mesh_centreline.h"
 #include "recon/surface/mesh_tree.h"
 
 #include <stdlib.h>
@@ -614,3 +615,22 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const
     curve_set_free(set);
     return tree;
 }
+
+CurveSet *import_load_curves(const SurfaceMesh *mesh, double scale, int count, const char *const *file, const ImportOptions *options, ImportReport *report,
+                             const char *name, Faults *faults)
+{
+    if (count == 0)
+        return mesh_centreline(mesh, options, report, name, faults);
+    CurveSet *set = curve_set_create();
+    bool is_good = set != NULL;
+    for (int i = 0; set && i < count; i++)
+        is_good = centreline_load(file[i], set, faults) && is_good;
+    if (!set)
+        faults_add(faults, name, 0, 0, "out of memory");
+    if (is_good && import_place_curves(mesh, scale, set, report, file[0], faults))
+        return set;
+    curve_set_free(set);
+    return NULL;
+}
+
+double import_left_percent(const ImportReport *report) { return 100.0 * (double)report->left_points / (double)(report->sampled_points + 1); }

@@ -17,4 +17,11 @@ ImportOptions import_default_options(void);
 // Returns NULL with faults. `name` is used in messages.
 VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults);
 
+// The curves of `count` files, moved into the mesh's frame (`scale`: see import_place_curves), or of none the computed centrelines. Returns NULL with faults.
+CurveSet *import_load_curves(const SurfaceMesh *mesh, double scale, int count, const char *const *file, const ImportOptions *options, ImportReport *report,
+                             const char *name, Faults *faults);
+// Percentage of the points sampled on the surface that belong to no node. Computed centrelines that leave more than IMPORT_LEFT_MOST_PERCENT are no tree.
+double import_left_percent(const ImportReport *report);
+enum { IMPORT_LEFT_MOST_PERCENT = 10 };
+
 #endif

@@ -7,7 +7,7 @@
 #ifndef SELDINGER_RECON_SURFACE_MESH_CENTRELINE_H
 #define SELDINGER_RECON_SURFACE_MESH_CENTRELINE_H
 
-#include "recon/surface/import_surface.h"
+#include "recon/surface/import_curves.h"
 
 // Returns curves with inscribed radii; each except the first begins at a point of an earlier one; the first begins at the widest end, or at the end nearest
 // to options->root. `mesh` must be repaired. Of several lumens the largest is used, or the one nearest to options->root. Pinched loops are added to the

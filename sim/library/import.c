@@ -13,20 +13,6 @@ typedef struct Importing {
     SelTree *tree;
 } Importing;
 
-static CurveSet *curves_of(const Importing *what, const SurfaceMesh *mesh, const ImportOptions *options, ImportReport *report, Faults *faults)
-{
-    if (what->count == 0)
-        return mesh_centreline(mesh, options, report, what->surface, faults);
-    CurveSet *set = curve_set_create();
-    bool is_good = set != NULL;
-    for (int i = 0; set && i < what->count; i++)
-        is_good = centreline_load(what->centreline[i], set, faults) && is_good;
-    if (is_good && import_place_curves(mesh, 1, set, report, what->centreline[0], faults))
-        return set;
-    curve_set_free(set);
-    return NULL;
-}
-
 static TreeFileInfo info_of(const Importing *what)
 {
     char parameters[512];
@@ -37,19 +23,19 @@ static TreeFileInfo info_of(const Importing *what)
 
 static bool import(SelContext *context, void *argument)
 {
-    enum { TEXT_MAX = 4096, UNSEEN_MAX_PERCENT = 10 };
+    enum { TEXT_MAX = 4096 };
     Importing *what = argument;
     char text[TEXT_MAX];
     MeshCheck check = {0};
     const ImportOptions options = import_default_options();
     ImportReport report = {.curves_scaled = 1, .inside_percent = 100};
     SurfaceMesh *mesh = mesh_load_repaired(what->surface, 0, "", &check, &context->faults);
-    CurveSet *set = mesh ? curves_of(what, mesh, &options, &report, &context->faults) : NULL;
+    CurveSet *set = mesh ? import_load_curves(mesh, 1, what->count, what->centreline, &options, &report, what->surface, &context->faults) : NULL;
     VesselTree *tree = set ? import_surface(mesh, set, &options, &report, what->surface, &context->faults) : NULL;
-    double unseen = 100.0 * (double)report.left_points / (double)(report.sampled_points + 1);
-    if (tree && what->count == 0 && unseen > UNSEEN_MAX_PERCENT)
-        faults_add(&context->faults, what->surface, 0, 0, "the computed centrelines miss %.0f %% of the surface, more than %d %%; give centrelines", unseen,
-                   UNSEEN_MAX_PERCENT);
+    const double left = import_left_percent(&report);
+    if (tree && what->count == 0 && left > IMPORT_LEFT_MOST_PERCENT)
+        faults_add(&context->faults, what->surface, 0, 0, "the computed centrelines miss %.0f %% of the surface, more than %d %%; give centrelines", left,
+                   IMPORT_LEFT_MOST_PERCENT);
     if (tree && context->faults.count == 0) {
         mesh_check_text(&check, true, text, sizeof text);
         context_message(context, SEL_NOTE, what->surface, text);
