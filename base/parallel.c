@@ -18,8 +18,6 @@ typedef struct Pool {
     atomic_size_t lacking;   // … and what broke off a thread of this pool [bytes]; 0: nothing did
 } Pool;
 
-enum { MAX_THREADS = 256 };
-
 static void do_jobs(void *argument)
 {
     Pool *pool = argument;
@@ -43,18 +41,17 @@ static void *work(void *argument)
     return NULL;
 }
 
-// For 0: one for each processor.
-static int parallel_thread_count(int threads)
+int parallel_thread_count(int threads)
 {
     if (threads <= 0)
         threads = (int)sysconf(_SC_NPROCESSORS_ONLN);
-    return threads < 1 ? 1 : threads > MAX_THREADS ? MAX_THREADS : threads;
+    return threads < 1 ? 1 : threads > PARALLEL_THREADS_MOST ? PARALLEL_THREADS_MOST : threads;
 }
 
 void parallel_for(int threads, long count, void (*job)(void *, long), void *context, const Progress *progress)
 {
     Pool pool = {.count = count, .job = job, .context = context, .is_tried = heap_is_tried()};
-    pthread_t thread[MAX_THREADS];
+    pthread_t thread[PARALLEL_THREADS_MOST];
     int wanted = parallel_thread_count(threads), started = 0;
     if (wanted > count)
         wanted = count > 0 ? (int)count : 1;

@@ -18,4 +18,8 @@ static inline bool progress_is_stopped(const Progress *progress) { return progre
 
 void parallel_for(int threads, long count, void (*job)(void *context, long index), void *context, const Progress *progress);
 
+enum { PARALLEL_THREADS_MOST = 256 };
+// How many threads `threads` stands for: 1 to PARALLEL_THREADS_MOST; 0: one per processor.
+int parallel_thread_count(int threads);
+
 #endif

@@ -26,7 +26,7 @@ static double cpu_of(const char *line)
 int sweep_dry_run(OpenStudy *open, const SweepOptions *options, Faults *faults)
 {
     const Study *study = open->study;
-    long cores = options->threads > 0 ? options->threads : sysconf(_SC_NPROCESSORS_ONLN);
+    const int cores = parallel_thread_count(options->threads);
     double sum = 0;
     int tried = study->runs < 3 ? (int)study->runs : 3;
     printf("%s: %.0f runs of %d scene%s, %d varied key%s%s\n", study->path, study->runs, open->scene_count, open->scene_count == 1 ? "" : "s",
@@ -47,7 +47,7 @@ int sweep_dry_run(OpenStudy *open, const SweepOptions *options, Faults *faults)
     double each = sum / (tried > 1 ? tried - 1 : 1);
     printf("about %.3g s of a core each: ", each);
     print_time(each * study->runs / (double)cores);
-    printf(" on %ld core%s\n", cores, cores == 1 ? "" : "s");
+    printf(" on %d core%s\n", cores, cores == 1 ? "" : "s");
     return EXIT_DONE;
 }
 

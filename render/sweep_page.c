@@ -19,8 +19,8 @@ static void print_head(FILE *out, const SweepPage *page)
     fprintf(out, "<dl><dt>Results</dt><dd>");
     page_text(out, page->folder);
     fprintf(out, "</dd><dt>Report by</dt><dd>seldinger %s</dd><dt>Runs</dt><dd>%d: ", SELDINGER_VERSION, results->row_count);
-    for (int k = 0; sweep_status_name[k]; k++)
-        fprintf(out, "%s%d %s", k > 0 ? ", " : "", sweep_results_count(results, sweep_status_name[k]), sweep_status_name[k]);
+    for (int k = 0; run_status_name[k]; k++)
+        fprintf(out, "%s%d %s", k > 0 ? ", " : "", sweep_results_count(results, run_status_name[k]), run_status_name[k]);
     fprintf(out, "</dd><dt>Varied</dt><dd>");
     for (int k = 0; k < results->key_count; k++) {
         fprintf(out, "%s", k > 0 ? ", " : "");

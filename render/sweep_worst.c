@@ -35,7 +35,7 @@ static int compare_runs(const void *a, const void *b)
 static int status_of(const SweepResults *results, int row)
 {
     int k = 0;
-    while (sweep_status_name[k] && strcmp(sweep_status_name[k], results->column[results->status].text[row]))
+    while (run_status_name[k] && strcmp(run_status_name[k], results->column[results->status].text[row]))
         k++;
     return k;
 }

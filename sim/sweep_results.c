@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const sweep_status_name[] = {"done", "diverged", "left", "failed", NULL};
+const char *const run_status_name[RUN_STATUS_COUNT + 1] = {"done", "diverged", "left", "failed", NULL};
 
 // --- CSV ---
 
@@ -70,8 +70,8 @@ static bool read_row(Cursor *cursor, Cells *cells)
 
 static int find_status(const char *text)
 {
-    for (int k = 0; sweep_status_name[k]; k++)
-        if (!strcmp(text, sweep_status_name[k]))
+    for (int k = 0; run_status_name[k]; k++)
+        if (!strcmp(text, run_status_name[k]))
             return k;
     return -1;
 }

@@ -36,6 +36,7 @@ int sweep_results_find(const SweepResults *results, const char *name);   // -1: 
 int sweep_results_count(const SweepResults *results, const char *status);
 bool sweep_results_is_figure(const SweepResults *results, int column);   // a figure with numbers
 
-extern const char *const sweep_status_name[];    // done, diverged, left, failed; NULL at the end
+typedef enum { RUN_DONE, RUN_DIVERGED, RUN_LEFT, RUN_FAILED, RUN_STATUS_COUNT } RunStatus;
+extern const char *const run_status_name[RUN_STATUS_COUNT + 1];      // NULL at the end
 
 #endif

@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const run_status_name[RUN_STATUS_COUNT + 1] = {"done", "diverged", "left", "failed", NULL};
-
 typedef struct Run {
     OpenStudy *open;
     int64_t number;

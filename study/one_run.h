@@ -6,9 +6,6 @@
 
 #include <signal.h>
 
-typedef enum { RUN_DONE, RUN_DIVERGED, RUN_LEFT, RUN_FAILED, RUN_STATUS_COUNT } RunStatus;
-extern const char *const run_status_name[RUN_STATUS_COUNT + 1];
-
 // Simulates run `run`. Returns its result, one line of JSON without a line break:
 //   {"run":7,"status":"done","message":"","state_hash":"7101e2090e328aed","cpu_s":0.53,"figures":{"steps":6500,…}}
 // All but cpu_s, the processor time that it took, is the same on every machine. The caller frees it. A scene that cannot be opened is a result too ("failed"). NULL if

@@ -3,9 +3,6 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <unistd.h>
-
-enum { THREADS_MOST = 256 };
 
 struct Workers {
     OpenStudy *open;
@@ -14,7 +11,7 @@ struct Workers {
     const volatile sig_atomic_t *stop;
     atomic_int busy;
     int count;
-    pthread_t thread[THREADS_MOST];
+    pthread_t thread[PARALLEL_THREADS_MOST];
 };
 
 static void *work(void *argument)
@@ -37,16 +34,15 @@ static void *work(void *argument)
 Workers *workers_start(OpenStudy *open, Queue *queue, int threads, const char *recordings, const volatile sig_atomic_t *stop)
 {
     Workers *workers = HEAP_ZEROED(1, sizeof *workers);
-    long wanted = threads > 0 ? threads : sysconf(_SC_NPROCESSORS_ONLN);
-    wanted = wanted < 1 ? 1 : wanted > THREADS_MOST ? THREADS_MOST : wanted;
+    const int wanted = parallel_thread_count(threads);
     workers->open = open;
     workers->queue = queue;
     workers->recordings = recordings;
     workers->stop = stop;
-    atomic_store(&workers->busy, (int)wanted);
+    atomic_store(&workers->busy, wanted);
     while (workers->count < wanted && pthread_create(&workers->thread[workers->count], NULL, work, workers) == 0)
         workers->count++;
-    atomic_fetch_sub(&workers->busy, (int)wanted - workers->count);
+    atomic_fetch_sub(&workers->busy, wanted - workers->count);
     if (workers->count == 0) {       // no thread can be started: this one works
         atomic_store(&workers->busy, 1);
         work(workers);

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-enum { THREADS_MOST = 256, COUNT_MOST = 1000000 };
+enum { COUNT_MOST = 1000000 };
 
 struct SelBatch {
     SelContext *context;
@@ -31,7 +31,7 @@ struct SelBatch {
     int busy;                 // … and threads still at it
     bool is_over;
     int thread_count;         // without the caller's
-    pthread_t thread[THREADS_MOST];
+    pthread_t thread[PARALLEL_THREADS_MOST];
     pid_t process;            // a forked child has no threads
 };
 
@@ -209,8 +209,7 @@ static SelBatch *new_batch(SelContext *context, int count)
 // With fewer threads than wanted it is slower, no more.
 static void start_threads(SelBatch *b, int threads)
 {
-    long cores = threads > 0 ? threads : sysconf(_SC_NPROCESSORS_ONLN);
-    int wanted = (int)(cores < 1 ? 1 : cores > THREADS_MOST ? THREADS_MOST : cores);
+    int wanted = parallel_thread_count(threads);
     if (wanted > b->count)
         wanted = b->count;
     while (b->thread_count < wanted - 1 && pthread_create(&b->thread[b->thread_count], NULL, work, b) == 0)
@@ -222,7 +221,7 @@ SelStatus sel_batch_create(SelContext *context, int count, const SelScene *const
     SelBatchOptions own = {.keeps_score = 1};
     if (!context || !scene || !batch || count < 1 || count > COUNT_MOST)
         return context_refuse(context, SEL_ERROR_ARGUMENT, __func__, "context, scene or batch is NULL, or count is not within 1 to 1000000");
-    if (!options_take(&own, sizeof own, options) || own.threads < 0 || own.threads > THREADS_MOST)
+    if (!options_take(&own, sizeof own, options) || own.threads < 0 || own.threads > PARALLEL_THREADS_MOST)
         return context_refuse(context, SEL_ERROR_ARGUMENT, __func__, "the size of options is not set, or threads is not within 0 to 256");
     SelBatch *b = new_batch(context, count);
     if (!b)
