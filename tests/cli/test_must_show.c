@@ -24,7 +24,6 @@ static char folder[] = "/tmp/seldinger-must-XXXXXX";
 static Faults faults;
 #include "tests/folder.h"
 #include "tests/cli/program.h"
-#include "tests/short_run.h"
 
 // Runs `seldinger ARGUMENTS` in the folder with its output in `output`. Fails if the exit code is not 0.
 static void run(const char *arguments)
@@ -77,14 +76,14 @@ static void segment_and_fit_do_not_depend_on_threads(void **state)
     fprintf(trace, "branches: [{start_mm: [%.6f, %.6f, %.6f], toward_mm: [%.6f, %.6f, %.6f], radius_mm: 1.2}]\n", a.x, a.y, a.z, b.x, b.y, b.z);
     assert_int_equal(fclose(trace), 0);
     vessel_tree_free(truth);
-    for (int threads = 1; threads <= 3; threads += WHOLE_OR_SHORT(1, 2)) {
+    for (int threads = 1; threads <= 3; threads++) {
         char arguments[200];
         snprintf(arguments, sizeof arguments, "segment arc.nrrd --trace arc.yaml -o tree%d.h5 --threads %d", threads, threads);
         run(arguments);
         snprintf(arguments, sizeof arguments, "fit tree1.h5 -o model%d.h5 --threads %d", threads, threads);
         run(arguments);
     }
-    for (int threads = WHOLE_OR_SHORT(2, 3); threads <= 3; threads++) {
+    for (int threads = 2; threads <= 3; threads++) {
         char tree[20], model[20];
         snprintf(tree, sizeof tree, "tree%d.h5", threads);
         snprintf(model, sizeof model, "model%d.h5", threads);
@@ -191,7 +190,6 @@ static const Motion still = {.turn = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, .sign 
 static void a_mirrored_scene_gives_the_mirrored_path(void **state)
 {
     (void)state;
-    NEED_WHOLE_RUNS();
     RecordedRun *plain = run_moved("plain", &still, AT_ENTRY, 5);
     for (int axis = 0; axis < 3; axis++) {
         Motion m = mirror(axis);
@@ -209,7 +207,7 @@ static void an_inlet_mirrors_too(void **state)
 {
     (void)state;
     RecordedRun *plain = run_moved("plain", &still, AT_ROOT, 0.6);
-    for (int axis = 0; axis < WHOLE_OR_SHORT(3, 1); axis++) {
+    for (int axis = 0; axis < 3; axis++) {
         Motion m = mirror(axis);
         RecordedRun *image = run_moved("image", &m, AT_ROOT, 0.6);
         assert_true(parting(plain, &m, image, 0.6) < 1e-6);
@@ -221,7 +219,6 @@ static void an_inlet_mirrors_too(void **state)
 static void a_turned_and_shifted_scene_gives_the_same_path_there(void **state)
 {
     (void)state;
-    NEED_WHOLE_RUNS();
     Vec3 e1 = vec3_unit(vec3(0.3, -0.8, 0.52)), e2 = vec3_unit(vec3_cross(e1, vec3(0.1, 0.2, 0.9)));
     Motion m = {.turn = mat3_from_columns(e1, e2, vec3_cross(e1, e2)), .shift = {-17.3, 41.1, 8.9}, .sign = 1};
     RecordedRun *plain = run_moved("plain", &still, AT_ENTRY_WITH_NORMAL, 1), *image = run_moved("image", &m, AT_ENTRY_WITH_NORMAL, 1);

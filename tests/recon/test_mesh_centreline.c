@@ -3,7 +3,6 @@
 #include "recon/phantom/phantom.h"
 #include "recon/surface/import_surface.h"
 #include "recon/surface/mesh_centreline.h"
-#include "tests/short_run.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -99,7 +98,7 @@ static void check_shape(const char *name, const char *key, const char *value, do
     Shape *shape = shape_create(name, key[0] ? 1 : 0, (const char(*)[2][64])option, "test", &faults);
     VesselTree *truth = shape_sample(shape, &faults);
     assert_non_null(truth);
-    for (int turn = 0; turn < WHOLE_OR_SHORT(2, 1); turn++) {
+    for (int turn = 0; turn < 2; turn++) {
         SurfaceMesh *mesh = mesh_of(shape, cell, turn);
         ImportOptions options = import_default_options();
         ImportReport report = {0};
@@ -140,7 +139,7 @@ static void test_tubes(void **state)
 {
     (void)state;
     check_shape("open-capsule", "", "", 0.3, 0.02);
-    for (int k = 0; k < WHOLE_OR_SHORT(2, 0); k++)       // only printed
+    for (int k = 0; k < 2; k++)       // only printed
         check_shape(k ? "helix" : "arc", "", "", k ? 0.4 : 0.3, 0.02);
 }
 
@@ -178,7 +177,7 @@ static void test_sacs(void **state)
     VesselTree *truth = shape_sample(plain, &faults);
     assert_non_null(truth);
     count_tree(truth, &ends, &branches);
-    for (int turn = 0; turn < WHOLE_OR_SHORT(2, 1); turn++) {
+    for (int turn = 0; turn < 2; turn++) {
         ImportReport report = {0};
         VesselTree *tree = import_alone(mesh_of(shape, 0.5, turn), "sacs", &report);
         print_message("two sacs%s: ends %d of %d without sacs\n", turn ? " turned" : "", report.end_count, ends);
@@ -217,7 +216,7 @@ static SurfaceMesh *stenosis(double least)
 static void test_stenosis(void **state)
 {
     (void)state;
-    for (double least = WHOLE_OR_SHORT(0.6, 0.2); least > 0.1; least -= 0.2) {
+    for (double least = 0.6; least > 0.1; least -= 0.2) {
         ImportReport report = {0};
         faults_clear(&faults);
         VesselTree *tree = import_alone(stenosis(least), "stenosis", &report);
