@@ -266,6 +266,17 @@ static void report_cut_forces(Stepper *s, double part)
     s->report.proximal_force = fmax(-most, fmin(most, force));
 }
 
+// Where a position is rounded by more than 1e-7 mm, lengths and strains of elements mean nothing.
+static const double FARTHEST = 1e9;          // [mm]
+
+static bool is_within_reach(const Stepper *s)
+{
+    bool is_near = true;         // false for NaN, too
+    for (int i = 0; i < s->state.node_count; i++)
+        is_near &= fabs(s->state.position[i].x) < FARTHEST && fabs(s->state.position[i].y) < FARTHEST && fabs(s->state.position[i].z) < FARTHEST;
+    return is_near;
+}
+
 void step_correct(Stepper *s)
 {
     s->state.time += s->dt;
@@ -274,6 +285,7 @@ void step_correct(Stepper *s)
         if (s->progress.was_held)
             s->report.flags |= STEP_NOT_CONVERGED;
         double part = s->progress.is_blocked ? 0 : stepper_follow(s, false);
+        s->progress.has_failed |= !is_within_reach(s);
         if (part < 1)
             report_cut_forces(s, part);
         set_velocities(s);

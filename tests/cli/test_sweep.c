@@ -14,15 +14,13 @@
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-sweep-XXXXXX";
 #include "tests/folder.h"
 #include "tests/cli/program.h"
+#include "tests/cli/sweep_files.h"
 
-// Open MPI frees not all that it allocates.
-static const char mpirun[] = "ASAN_OPTIONS=$ASAN_OPTIONS:detect_leaks=0 mpirun --allow-run-as-root --oversubscribe --mca btl_vader_single_copy_mechanism none";
 // 24 runs of 0.3 s of simulated time.
 static const char spec[] =
     "sweep: 1\nscene: tube-scene.yaml\nvary:\n  wire.sections[0].young_modulus_gpa: {loguniform: [5, 200]}\n  vessel.friction: {uniform: [0, 0.15]}\n"
@@ -32,20 +30,9 @@ static int make_files(void **state)
 {
     if (make_folder_with_cache(state) != 0)
         return -1;
-    char *scene = text_of(SOURCE_DIR "/scenes/sweep/tube-scene.yaml");
-    put("tube-scene.yaml", scene);
-    free(scene);
+    put_scene_of_tube();
     put("spec.yaml", spec);
     return run_in("", "sweep spec.yaml -o one --threads 1 --quiet");
-}
-
-static void same_file(const char *a, const char *b)
-{
-    char *x = text_of(in_folder(a)), *y = text_of(in_folder(b));
-    if (strcmp(x, y) != 0)
-        fail_msg("%s and %s differ", a, b);
-    free(x);
-    free(y);
 }
 
 static void same_bytes(const char *other)
@@ -54,23 +41,6 @@ static void same_bytes(const char *other)
     same_file("one/table.csv", other);
     snprintf(command, sizeof command, "cd '%s' && cmp one/table.h5 $(dirname %s)/table.h5", folder, other);
     assert_int_equal(system(command), 0);
-}
-
-static void refused(const char *arguments, const char *words)
-{
-    int code = run_in("", arguments);
-    if (code != 2 || !strstr(output, words))
-        fail_msg("`%s` ended with %d and printed: %s(expected 2 and '%s')", arguments, code, output, words);
-}
-
-static int lines_of(const char *name)
-{
-    char *text = text_of(in_folder(name));
-    int lines = 0;
-    for (const char *c = text; *c; c++)
-        lines += *c == '\n';
-    free(text);
-    return lines;
 }
 
 static void threads_give_the_same_table(void **state)
@@ -86,10 +56,7 @@ static void threads_give_the_same_table(void **state)
 static void ranks_give_the_same_table(void **state)
 {
     (void)state;
-    if (access(SELDINGER_PLUGIN, R_OK) != 0 || system("mpirun --version >/dev/null 2>&1") != 0) {
-        print_message("skipped: mpirun is not installed, or this build has no seldinger-mpi.so\n");
-        skip();
-    }
+    skip_without_mpirun();
     for (int ranks = 2; ranks <= 4; ranks += 2) {
         char before[300], arguments[80], table[40];
         snprintf(before, sizeof before, "%s -n %d", mpirun, ranks);
@@ -107,15 +74,13 @@ static void ranks_give_the_same_table(void **state)
     assert_null(strstr(strstr(output, "missing.yaml: cannot be opened") + 1, "missing.yaml: cannot be opened"));
 }
 
-static void pause_ms(long ms) { nanosleep(&(struct timespec){.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000}, NULL); }
-
 // Starts the sweep and kills it once it has written `results` more lines.
 static void kill_after(const char *name, int results)
 {
     char path[120], journal[60];
     snprintf(path, sizeof path, "%s", in_folder(name));
     snprintf(journal, sizeof journal, "%s/journal.txt", name);
-    int before = access(in_folder(journal), R_OK) == 0 ? lines_of(journal) : 0;
+    int before = lines_of(journal);
     pid_t child = fork();
     if (child == 0) {
         if (chdir(folder) == 0)
@@ -123,7 +88,7 @@ static void kill_after(const char *name, int results)
         _exit(127);
     }
     for (int i = 0; i < 6000 && waitpid(child, NULL, WNOHANG) == 0; i++, pause_ms(5))
-        if (access(in_folder(journal), R_OK) == 0 && lines_of(journal) >= before + results)
+        if (lines_of(journal) >= before + results)
             kill(child, SIGKILL);
     assert_true(lines_of(journal) >= before + results);
 }
