@@ -64,8 +64,8 @@ static void kill_rank(const char *name, int rank)
 {
     char command[1200], journal[60];
     snprintf(command, sizeof command,
-             "cd '%s' && exec env %s -n %d sh -c 'echo $$ >rank$OMPI_COMM_WORLD_RANK; exec %s sweep spec.yaml -o %s --quiet' >%s.txt 2>&1", folder, mpirun, RANKS,
-             SELDINGER_PROGRAM, name, name);
+             "cd '%s' && exec env %s -n %d sh -c 'echo $$ >rank$OMPI_COMM_WORLD_RANK; exec %s sweep spec.yaml -o %s --quiet' >%s.txt 2>&1", folder, mpirun,
+             RANKS, SELDINGER_PROGRAM, name, name);
     snprintf(journal, sizeof journal, "%s/journal.txt", name);
     pid_t child = fork();
     if (child == 0) {
