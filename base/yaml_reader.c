@@ -170,7 +170,7 @@ YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, 
     if (!loaded)
         fault_syntax(&parser, text, length, file, faults);
     else if (!yaml_document_get_root_node(&reader->document))
-        faults_add(faults, file, 1, 1, "is empty; expected a first line such as 'seldinger: 1'");
+        faults_add(faults, file, 1, 1, "is empty; expected YAML keys and values");
     else {
         yaml_document_t second;
         int line = (int)parser.mark.line + 1;

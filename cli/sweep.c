@@ -106,8 +106,8 @@ static int carry_out(Sweep *sweep)
     if (sweep->open && options->run >= 0)
         return repeat(sweep);
     if (sweep->open && sweep->study->runs > (double)STUDY_RUNS_MOST)
-        faults_add(faults, options->spec, 0, 0, "has %.0f runs; expected at most %lld (divide it into several specifications)", sweep->study->runs,
-                   (long long)STUDY_RUNS_MOST);
+        faults_add(faults, options->spec, sweep->study->runs_line, sweep->study->runs_column,
+                   "has %.0f runs; expected at most %lld (divide it into several specifications)", sweep->study->runs, (long long)STUDY_RUNS_MOST);
     if (sweep->ranks.rank > 0) {
         int code = ranks_work(&sweep->ranks, sweep->open, faults->count == 0 ? sweep->heading_text : NULL, faults->text[0], sweep->recordings, sweep->stop);
         faults_clear(faults);        // rank 0 prints them

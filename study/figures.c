@@ -60,3 +60,9 @@ void figures_add(cJSON *to, const cJSON *from, const char *prefix)
         add_value(to, item, name);
     }
 }
+
+bool figure_is_named(const char *name, const char *wanted)
+{
+    size_t length = strlen(wanted);
+    return !strncmp(name, wanted, length) && (!name[length] || name[length] == '.' || name[length] == '[');
+}

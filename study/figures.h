@@ -3,9 +3,12 @@
 #define SELDINGER_STUDY_FIGURES_H
 
 #include <cJSON.h>
+#include <stdbool.h>
 
 // Adds the numbers of `from`, an object of objects, lists and numbers, to the flat object `to`, by their path: "contacts.max", "tip_mm[0]"; true is 1; each of a
 // list of words ("flags") is "flags.WORD": 1. Other texts, and times that depend on the computer, are left out. `prefix` ("" or "score.") begins each name.
 void figures_add(cJSON *to, const cJSON *from, const char *prefix);
+// Whether `name` is the figure `wanted` or one below it: "tip_mm[0]" of "tip_mm".
+bool figure_is_named(const char *name, const char *wanted);
 
 #endif

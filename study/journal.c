@@ -179,6 +179,13 @@ static bool is_same(const Journal *journal, const cJSON *was, const cJSON *is, F
     return true;
 }
 
+// Cuts the file. What the reader holds of it would be read again after a seek, so it begins anew.
+static bool cut(Journal *journal, int64_t length)
+{
+    journal->end = length;
+    return ftruncate(journal->file, (off_t)length) == 0 && (journal->reader = freopen(journal->path, "rb", journal->reader));
+}
+
 static bool begin_or_go_on(Journal *journal, const cJSON *heading, Faults *faults)
 {
     cJSON *was = NULL;
@@ -186,7 +193,9 @@ static bool begin_or_go_on(Journal *journal, const cJSON *heading, Faults *fault
     if (length == 0 || (!was && fseeko(journal->reader, 0, SEEK_END) == 0 && ftello(journal->reader) == (off_t)length)) {
         // new, or killed in its first line
         char *text = cJSON_PrintUnformatted(heading);
-        bool good = ftruncate(journal->file, 0) == 0 && append(journal, text, faults);
+        bool is_cut = cut(journal, 0), good = is_cut && append(journal, text, faults);
+        if (!is_cut)
+            faults_add(faults, journal->path, 0, 0, "cannot be begun anew: %s", strerror(errno));
         free(text);
         return good;
     }
@@ -197,7 +206,7 @@ static bool begin_or_go_on(Journal *journal, const cJSON *heading, Faults *fault
     if (!good)
         return false;
     read_lines(journal, length, NULL, NULL);
-    if (ftruncate(journal->file, journal->end) == 0)
+    if (cut(journal, journal->end))
         return true;
     faults_add(faults, journal->path, 0, 0, "cannot be cut to its last whole line: %s", strerror(errno));
     return false;

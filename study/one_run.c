@@ -110,11 +110,9 @@ static void add_golden(Run *run)
 
 static bool is_kept(const Study *study, const char *name)
 {
-    for (int i = 0; i < study->figure_count; i++) {
-        size_t length = strlen(study->figure[i]);
-        if (!strncmp(name, study->figure[i], length) && (!name[length] || name[length] == '.' || name[length] == '['))
+    for (int i = 0; i < study->figure_count; i++)
+        if (figure_is_named(name, study->figure[i]))
             return true;
-    }
     return study->figure_count == 0;
 }
 
@@ -205,8 +203,11 @@ static char *run_recorded(OpenStudy *open, int64_t number, const char *record, c
     *status = run->status;
     // a recording that cannot be written is the fault of the folder, not of the run
     bool is_lost = record && run->headless.simulator && run->faults.count > 0, is_stopped = stop && *stop;
-    if (is_lost)
-        faults_add(faults, record, 0, 0, "%.400s", run->faults.text[0]);
+    if (is_lost) {
+        const char *why = run->faults.text[0];       // FILE: reason
+        size_t length = strlen(record);
+        faults_add(faults, record, 0, 0, "%.400s; the same command goes on", strncmp(why, record, length) ? why : why + length + strspn(why + length, ": "));
+    }
     char *line = is_lost || is_stopped ? NULL : result_line(run, clock_s(CLOCK_THREAD_CPUTIME_ID) - begin);
     close_run(run);
     return line;

@@ -2,6 +2,7 @@
 
 #include "study/points.h"
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -66,6 +67,11 @@ static void try_factor(OpenStudy *open, int factor, Faults *faults)
 static void open_scene(OpenStudy *open, const char *path, Faults *faults)
 {
     const Study *study = open->study;
+    if (access(path, R_OK) != 0) {
+        faults_add(faults, study->path, study->scene_line, study->scene_column, "the scene %.300s cannot be read: %s; expected a path relative to this file",
+                   path, strerror(errno));
+        return;
+    }
     Scene *scene = scene_load(path, faults);
     if (!scene)
         return;

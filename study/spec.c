@@ -23,7 +23,9 @@ static bool is_path(const char *path)
     for (const char *c = path; *c; c++) {
         if (*c == '[') {
             size_t digits = strspn(c + 1, "0123456789");
-            if (starts || digits == 0 || digits > 5 || c[digits + 1] != ']' || (c[digits + 2] && c[digits + 2] != '.' && c[digits + 2] != '['))
+            bool is_spelled_twice = c[1] == '0' && digits > 1;        // [0] and [00]
+            if (starts || digits == 0 || digits > 5 || is_spelled_twice || c[digits + 1] != ']' ||
+                (c[digits + 2] && c[digits + 2] != '.' && c[digits + 2] != '['))
                 return false;
             c += digits + 1;
         } else if (*c == '.') {
@@ -140,6 +142,7 @@ static char *resolved(const Reading *reading, YamlValue value)
 static void read_scenes(Reading *reading, YamlValue value)
 {
     Study *study = reading->study;
+    yaml_place(value, &study->scene_line, &study->scene_column);
     if (!yaml_is_list(value)) {
         study->scene = resolved(reading, value);
         return;
@@ -247,6 +250,32 @@ static void read_sampling(Reading *reading, YamlValue value)
     } else if (yaml_number(runs, (NumberRange){1, 4294967295.0, false}, &study->runs) && study->runs != floor(study->runs)) {
         yaml_fault(runs, "'runs' is %g; expected a whole number", study->runs);
     }
+    yaml_place(runs.node ? runs : value, &study->runs_line, &study->runs_column);
+}
+
+// --- what cannot be meant together ---
+
+// Whether `path` is `part` of, or the same as, `whole`: vessel.tube.radius_mm of vessel.tube.
+static bool is_part_of(const char *path, const char *whole)
+{
+    size_t length = strlen(whole);
+    return !strncmp(path, whole, length) && (path[length] == 0 || path[length] == '.' || path[length] == '[');
+}
+
+static void check_together(const Reading *reading)
+{
+    const Study *study = reading->study;
+    for (int i = 0; i < study->factor_count; i++) {
+        const Factor *f = &study->factor[i];
+        if (study->hands.wanted && is_part_of(f->path, "script"))
+            faults_add(reading->faults, reading->path, f->line, f->column, "'%s' is varied, but random 'hands' replace the script; expected one of them",
+                       f->path);
+        for (int k = 0; k < i; k++)
+            if (is_part_of(study->factor[k].path, f->path))
+                faults_add(reading->faults, reading->path, f->line, f->column,
+                           "'%s' replaces '%s', which is set before it and would have no effect; expected it first, or only one of them", f->path,
+                           study->factor[k].path);
+    }
 }
 
 static void read_study(Reading *reading, YamlReader *reader)
@@ -257,7 +286,7 @@ static void read_study(Reading *reading, YamlReader *reader)
     snprintf(root.name, sizeof root.name, "sweep");
     YamlMap map = yaml_map(root, keys);
     NumberRange seconds = {0, 86400, false};
-    int version;
+    int version, before = reading->faults->count;
     if (!map.value.node)
         return;
     yaml_integer(yaml_get(&map, "sweep", true), 1, 1, &version);
@@ -271,10 +300,11 @@ static void read_study(Reading *reading, YamlReader *reader)
     if (yaml_has(&map, "keep"))
         read_keep(reading, yaml_get(&map, "keep", false));
     read_sampling(reading, yaml_get(&map, "sampling", true));
-    if (study->factor_count == 0 && !study->hands.wanted)
+    if (study->factor_count == 0 && !study->hands.wanted && reading->faults->count == before)
         yaml_fault(root, "nothing varies; expected 'vary', 'hands' or several scenes");
     if (study->keeps_golden && study->hands.wanted)
         yaml_fault(yaml_get(&map, "keep", false), "'golden' compares with the path of the scene's script, which random 'hands' replace; expected one of them");
+    check_together(reading);
 }
 
 Study *study_parse(const char *text, size_t length, const char *path, Faults *faults)

@@ -34,6 +34,7 @@ typedef struct Study {
     char *path, *text;       // of the specification
     size_t length;
     char *scene;             // resolved against its folder; NULL if factor 0 is "scene"
+    int scene_line, scene_column, runs_line, runs_column;      // places in the file, for messages
     int factor_count;        // "scene" first, then those of `vary:` in their order
     Factor factor[STUDY_FACTORS];
     RandomHands hands;

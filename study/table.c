@@ -3,6 +3,7 @@
 #include "study/table.h"
 
 #include "recon/recon.h"
+#include "study/figures.h"
 #include "study/points.h"
 #include "study/table_file.h"
 
@@ -15,6 +16,7 @@ typedef struct Table {
     Journal *journal;
     int64_t runs, *offset;   // (runs) of its line in the journal
     size_t message_width;
+    bool has_ends;           // a run that did not fail
     cJSON *columns;          // object: name of figure -> number of column
     Faults *faults;
 } Table;
@@ -53,6 +55,7 @@ static bool find_columns(Table *table)
             return false;
         size_t width = strlen(text_in(result, "message")) + 1;
         table->message_width = width > table->message_width ? width : table->message_width;
+        table->has_ends |= *text_in(result, "state_hash") != 0;
         const cJSON *figures = cJSON_GetObjectItemCaseSensitive(result, "figures");
         for (const cJSON *item = figures ? figures->child : NULL; item; item = item->next)
             if (!cJSON_GetObjectItemCaseSensitive(table->columns, item->string))
@@ -118,6 +121,20 @@ static void write_heading(Table *table, TableFile *file)
         table_file_column(file, column->string, 0);
 }
 
+// What is to be kept and no run has is likely to be misspelt.
+static void warn_of_figures(const Table *table)
+{
+    const Study *study = table->study;
+    for (int i = 0; i < study->figure_count; i++) {
+        const cJSON *column = table->columns->child;
+        while (column && !figure_is_named(column->string, study->figure[i]))
+            column = column->next;
+        if (!column && table->has_ends && !figure_is_named(study->figure[i], "flags"))
+            fprintf(stderr, "%s: warning: no run has a figure '%.100s' of keep.figures; table.csv names those that there are if 'figures' is left out\n",
+                    study->path, study->figure[i]);
+    }
+}
+
 static bool write_file(Table *table, TableFile *file)
 {
     bool good = file != NULL;
@@ -136,7 +153,10 @@ bool table_write(const char *folder, const Study *study, Journal *journal, int64
     snprintf(csv, sizeof csv, "%.4000s/table.csv", folder);
     snprintf(h5, sizeof h5, "%.4000s/table.h5", folder);
     journal_read(journal, note_offset, &table);
-    bool good = find_columns(&table) && write_file(&table, table_csv(csv, faults)) && write_file(&table, table_hdf5(h5, study->text, runs, faults));
+    bool good = find_columns(&table);
+    if (good)
+        warn_of_figures(&table);
+    good = good && write_file(&table, table_csv(csv, faults)) && write_file(&table, table_hdf5(h5, study->text, runs, faults));
     free(table.offset);
     cJSON_Delete(table.columns);
     return good;

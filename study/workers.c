@@ -22,7 +22,7 @@ static void *work(void *argument)
         faults_clear(faults);
         char *line = one_run(workers->open, run, workers->recordings, workers->stop, faults);
         if (faults->count > 0)
-            queue_break(workers->queue, workers->recordings, faults->text[0]);
+            queue_break(workers->queue, "seldinger sweep", faults->text[0]);
         queue_finish(workers->queue, line);
         free(line);
     }

@@ -98,8 +98,100 @@ static void every_kind_of_end_is_a_row(void **state)
     assert_true(ends[0] == 3 && ends[1] == 6 && ends[2] == 3 && ends[3] == 4);
 }
 
+static void what_cannot_be_meant_is_refused(void **state)
+{
+    (void)state;
+    put("a.csv", "t_s,push_mm_s,twist_deg_s\n0,10,0\n0.01,0,0\n");
+    put("script.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary: {script: {values: [a.csv]}}\nhands: {seed: 1}\nsampling: {kind: random, runs: 3}\n");
+    refused("sweep script.yaml -o r", "script.yaml:3:16: 'script' is varied, but random 'hands' replace the script; expected one of them");
+    put("order.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary:\n  vessel.friction: {uniform: [0, 1]}\n  vessel: {values: [{plane: {normal: [0, 0, 1]}}]}\n"
+                      "sampling: {kind: random, runs: 3}\n");
+    refused("sweep order.yaml -o r", "order.yaml:5:11: 'vessel' replaces 'vessel.friction', which is set before it");
+    put("many.yaml", "sweep: 1\nscene: tube-scene.yaml\nhands: {}\nsampling: {kind: random, runs: 1e9}\n");
+    refused("sweep many.yaml -o r", "many.yaml:4:32: has 1000000000 runs; expected at most 10000000");
+    put("lost.yaml", "sweep: 1\nscene: [tube-scene.yaml, lost/scene.yaml]\nhands: {}\nsampling: {kind: random, runs: 3}\n");
+    refused("sweep lost.yaml -o r",
+            "lost.yaml:2:8: the scene lost/scene.yaml cannot be read: No such file or directory; expected a path relative to this file");
+    put("value.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary: {\"targets[0].name\": {values: [\"\\0\"]}}\nsampling: {kind: random, runs: 3}\n");
+    refused("sweep value.yaml -o r", "value.yaml:3:27: with targets[0].name:");
+    put("levels.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary: {vessel.friction: {uniform: [0, .inf], levels: 0}}\nsampling: grid\n");
+    refused("sweep levels.yaml -o r", "levels.yaml:3:39: 'sweep.vary.vessel.friction.uniform[1]' is '.inf', not a number");
+    assert_non_null(strstr(output, "levels.yaml:3:54: 'sweep.vary.vessel.friction.levels' is 0"));
+    assert_int_equal(access(in_folder("r"), F_OK), -1);
+}
+
+static const char small[] = "sweep: 1\nscene: tube-scene.yaml\nvary: {vessel.friction: {uniform: [0, 0.1]}}\nduration_s: 0.05\n"
+                            "sampling: {kind: random, runs: 6}\nkeep: {recordings: all, figures: [steps, tip_m, flags]}\n";
+
+// A figure that no run has is probably misspelt: the table is written, with a warning.
+static void a_misspelt_figure_is_named(void **state)
+{
+    (void)state;
+    put("small.yaml", small);
+    assert_int_equal(run_in("", "sweep small.yaml -o small --quiet"), 0);
+    assert_non_null(strstr(output, "small.yaml: warning: no run has a figure 'tip_m' of keep.figures"));
+    assert_null(strstr(output, "'steps'"));
+}
+
+static void unwritable_folders_are_refused(void **state)
+{
+    (void)state;
+    put("file", "");
+    refused("sweep small.yaml -o file", "file: cannot be created: ");
+    assert_non_null(strstr(output, "expected a folder for the results"));
+    refused("sweep small.yaml -o /proc/results", "/proc/results: cannot be created: No such file or directory; expected a folder for the results");
+}
+
+// Files of at most 16 kB, as on a full disk: no recording fits. Without the limit the same command goes on to the same bytes.
+static void recordings_that_do_not_fit_stop_the_sweep(void **state)
+{
+    (void)state;
+    int code = run_in("ulimit -f 16;", "sweep small.yaml -o full --threads 1 --quiet");
+    if (code != 2 || !strstr(output, "full/recordings/0.h5: ") || !strstr(output, "the same command goes on"))
+        fail_msg("%d: %s", code, output);
+    assert_int_not_equal(access(in_folder("full/recordings/0.h5"), F_OK), 0);
+    assert_int_not_equal(access(in_folder("full/table.csv"), F_OK), 0);
+    assert_int_equal(run_in("", "sweep small.yaml -o full --quiet"), 0);
+    same_file("small/table.csv", "full/table.csv");
+    assert_int_equal(access(in_folder("full/recordings/5.h5"), R_OK), 0);
+}
+
+// The heading of a journal with another `key`, and its right checksum: as another version of the program or another machine's files would have written it.
+static void change_heading(const char *pattern)
+{
+    char command[1000];
+    snprintf(command, sizeof command,
+             "cd '%s' && mkdir -p old && line=$(head -1 small/journal.txt | cut -f1 | sed '%s') && { printf '%%s\\t%%s\\n' \"$line\" "
+             "\"$(printf %%s \"$line\" | sha256sum | cut -c1-16)\"; tail -n +2 small/journal.txt; } >old/journal.txt && cp old/journal.txt old/kept",
+             folder, pattern);
+    assert_int_equal(system(command), 0);
+}
+
+static void a_changed_program_is_refused(void **state)
+{
+    (void)state;
+    change_heading("");
+    assert_int_equal(run_in("", "sweep small.yaml -o old --quiet"), 0);     // the test's own heading is a valid one
+    change_heading("s/\"version\":\"[^\"]*/\"version\":\"0.0.7/");
+    refused("sweep small.yaml -o old", "old/journal.txt: the version was 0.0.7 when the sweep began and is ");
+    assert_non_null(strstr(output, "take a new folder"));
+    change_heading("s/\"program\":\"[^\"]*/\"program\":\"beef/");
+    refused("sweep small.yaml -o old", "old/journal.txt: the program was beef when the sweep began and is ");
+    refused("sweep small.yaml -o old --simulate-ranks 4", "the program was beef");
+    change_heading("s/tube-scene.yaml\":\"[^\"]*/tube-scene.yaml\":\"beef/");
+    refused("sweep small.yaml -o old", "old/journal.txt: the file tube-scene.yaml has changed since the sweep began");
+    same_file("old/journal.txt", "old/kept");
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_kind_of_end_is_a_row)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_kind_of_end_is_a_row),
+        cmocka_unit_test(what_cannot_be_meant_is_refused),
+        cmocka_unit_test(a_misspelt_figure_is_named),
+        cmocka_unit_test(unwritable_folders_are_refused),
+        cmocka_unit_test(recordings_that_do_not_fit_stop_the_sweep),
+        cmocka_unit_test(a_changed_program_is_refused),
+    };
     return cmocka_run_group_tests(tests, make_files, remove_folder);
 }

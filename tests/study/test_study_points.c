@@ -111,6 +111,14 @@ static void bad_specifications_are_refused(void **state)
     refused(HEAD "vary: {a: {uniform: [0, 1]}}\nsampling: {kind: sobol}\n", "no key 'runs'");
     refused(HEAD "vary: {a: {integer: [0, 1]}}\nsampling: {kind: grid, runs: 3}\n", "as many runs as combinations");
     refused(HEAD TAIL, "nothing varies");
+    refused(HEAD "vary: {\"a[00].b\": {values: [1]}}\n" TAIL, "not the path");
+    refused(HEAD "vary: {a: {uniform: [.nan, 1]}}\n" TAIL, "spec.yaml:3:22: 'sweep.vary.a.uniform[0]' is '.nan', not a number");
+    refused(HEAD "vary: {a: {uniform: [0, .inf]}}\n" TAIL, "is '.inf', not a number");
+    refused(HEAD "vary: {a: {uniform: [0, 1], levels: 0}}\n" TAIL, "'sweep.vary.a.levels' is 0; expected a whole number from 1");
+    refused(HEAD "vary: {a: {values: [1]}, a: {values: [2]}}\n" TAIL, "duplicate key 'a'");
+    refused(HEAD "vary: &x {a: *x}\n" TAIL, "unknown key 'a'");
+    refused(HEAD "vary: {\"a.b[0]\": {values: [1]}, a.b: {values: [[2]]}}\n" TAIL, "spec.yaml:3:38: 'a.b' replaces 'a.b[0]'");
+    refused(HEAD "vary: {script: {values: [a.csv]}}\nhands: {}\n" TAIL, "'script' is varied, but random 'hands' replace the script");
     refused("sweep: 2\nscene: s.yaml\nhands: {}\n" TAIL, "expected a whole number from 1 to 1");
 }
 
