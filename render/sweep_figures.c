@@ -103,7 +103,7 @@ void sweep_scatter(FILE *out, const SweepResults *results, int key, int figure, 
 
 void sweep_index_bar(FILE *out, const FirstOrder *index)
 {
-    enum { WIDTH = 120, HEIGHT = 14 };
+    enum { WIDTH = 110, HEIGHT = 14 };
     double at = WIDTH * fmin(fmax(index->index, 0), 1), low = WIDTH * fmin(fmax(index->low, 0), 1), high = WIDTH * fmin(fmax(index->high, 0), 1);
     fprintf(out,
             "<svg class=\"index\" aria-hidden=\"true\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\"><rect class=\"c2\" x=\"0\" y=\"3\" width=\"%.1f\" "

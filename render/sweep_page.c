@@ -11,7 +11,11 @@ static const char own_style[] =
     ".vessel{stroke:var(--ink);fill:var(--ink);opacity:.12;stroke-linecap:round}.dots{fill:var(--o1);fill-opacity:.55}\n"
     "svg.index{background:none;margin:0;vertical-align:middle}.worst{display:flex;flex-wrap:wrap;gap:1.5rem}.run{width:20rem;break-inside:avoid}\n"
     "h3{font-size:1rem;margin:.5rem 0}.run dl{font-size:.8rem;grid-template-columns:1fr}.run pre{margin:.4rem 0}\n"
-    ".faint{color:var(--muted)}td.index{white-space:nowrap}section{break-inside:auto}\n";
+    ".faint{color:var(--muted)}td.index{white-space:nowrap}td.index svg{display:block;margin-left:auto}section{break-inside:auto}\n"
+    "@media print{.scroll{overflow:visible}table{font-size:8pt}.worst{display:block}.run{display:inline-block;width:48%;vertical-align:top}.plots "
+    "figure{width:32%}}\n";
+
+enum { FEW_RUNS = 400 };     // the index is too low by at most 0.05
 
 static void print_head(FILE *out, const SweepPage *page)
 {
@@ -72,17 +76,45 @@ static bool find_index(const SweepResults *results, int key, int figure, FirstOr
     return good;
 }
 
+// A path that may be broken behind each dot.
+static void print_path(FILE *out, const char *path)
+{
+    for (size_t length; *path; path += length) {
+        char part[200];
+        length = strcspn(path, ".");
+        length += path[length] == '.';
+        length = length < sizeof part ? length : sizeof part - 1;
+        snprintf(part, sizeof part, "%.*s", (int)length, path);
+        page_text(out, part);
+        fprintf(out, "<wbr/>");
+    }
+}
+
+// On evenly spread points the index is too low by at most (classes - 1) / (runs - classes), with sqrt(N) classes 1 / sqrt(N): sim/first_order.h.
+static void print_trust(FILE *out, const SweepResults *results)
+{
+    int done = 0;
+    for (int i = 0; i < results->row_count; i++)
+        done += results->is_done[i];
+    bool is_few = done < FEW_RUNS;
+    fprintf(
+        out, "<p%s>%s%d runs are done: on a grid or on Sobol's points an index can be too low by up to %.2f (1/√N), which the interval does not contain. %s",
+        is_few ? " class=\"notice\"" : "", is_few ? "Few runs. " : "", done, done > 0 ? 1 / sqrt(done) : 1.0,
+        "With 400 runs this is 0.05, with 2,500 it is 0.02, with 10,000 it is 0.01. Not known: the interval is wider than 1, because few runs differ.</p>\n");
+}
+
 static void print_sensitivity(FILE *out, const SweepResults *results)
 {
     fprintf(
         out,
         "<section id=\"sensitivity\"><h2>Sensitivity</h2>\n<p>First-order Sobol index: the share of a figure's variance that one key explains alone, with an "
         "interval of at least 95 %%. Faint: the interval holds 0. What the indices of a row leave of 1 is interaction of keys, other causes such as random "
-        "hands, and error. Estimated from the runs that are done by the correlation ratio of classes (Plischke, Borgonovo, Smith 2013).</p>\n"
-        "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Figure</th>");
+        "hands, and error. Estimated from the runs that are done by the correlation ratio of classes (Plischke, Borgonovo, Smith 2013).</p>\n");
+    print_trust(out, results);
+    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Figure</th>");
     for (int k = 0; k < results->key_count; k++) {
         fprintf(out, "<th scope=\"col\">");
-        page_text(out, results->column[results->key_first + k].name);
+        print_path(out, results->column[results->key_first + k].name);
         fprintf(out, "</th>");
     }
     fprintf(out, "</tr></thead><tbody>\n");
@@ -96,6 +128,10 @@ static void print_sensitivity(FILE *out, const SweepResults *results)
             FirstOrder index;
             if (!find_index(results, results->key_first + k, c, &index)) {
                 fprintf(out, "<td class=\"faint\">too few runs</td>");
+                continue;
+            }
+            if (index.high - index.low > 1) {
+                fprintf(out, "<td class=\"faint\">not known</td>");
                 continue;
             }
             fprintf(out, "<td class=\"index%s\">", index.low <= 0 ? " faint" : "");

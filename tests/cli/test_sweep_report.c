@@ -31,10 +31,39 @@ static void a_finished_sweep_is_reported(void **state)
     char *page = text_of(in_folder("res/report.html"));
     assert_non_null(strstr(page, "16: 13 done, 1 diverged, 1 left, 1 failed"));
     assert_non_null(strstr(page, "seldinger sweep my/spec.yaml --run 7 -o run-7"));
+    assert_non_null(strstr(page, "<p class=\"notice\">Few runs. 13 runs are done"));
     assert_non_null(strstr(page, "scene: a.yaml # &lt;kept&gt;"));
     free(page);
     assert_int_equal(run("sweep --report res --quiet"), 0);
     assert_string_equal(output, "");
+}
+
+// The command beside a worst run, as it stands on the page, repeats it; the pictures of all recorded runs are there.
+static void the_commands_of_a_page_repeat(void **state)
+{
+    (void)state;
+    char *scene = text_of(SOURCE_DIR "/scenes/sweep/tube-scene.yaml"), command[200] = "";
+    put("tube-scene.yaml", scene);
+    put("tube.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary: {vessel.friction: {uniform: [0, 0.1]}}\nduration_s: 0.1\n"
+                     "sampling: {kind: sobol, runs: 12}\nkeep: {recordings: all}\n");
+    free(scene);
+    assert_int_equal(run("sweep tube.yaml -o tube --quiet"), 0);
+    assert_int_equal(run("sweep tube.yaml --report tube"), 0);
+    char *page = text_of(in_folder("tube/report.html"));
+    int pictures = 0;
+    for (const char *at = strstr(page, "<article"); at; at = strstr(at + 1, "<article"))
+        pictures += strstr(at, "<svg") != NULL && strstr(at, "<svg") < strstr(at, "</article>");
+    assert_int_equal(pictures, 10);
+    assert_int_equal(sscanf(strstr(page, "seldinger sweep tube.yaml --run "), "seldinger %199[^<\n]", command), 1);
+    assert_int_equal(run(command), 0);
+    int number = atoi(strstr(command, "--run ") + 6);
+    char row[40];
+    snprintf(row, sizeof row, "{\"run\":%d,", number);
+    char *journal = text_of(in_folder("tube/journal.txt")), *kept = strstr(journal, row), hash[64] = "";
+    assert_int_equal(sscanf(strstr(kept, "\"state_hash\""), "\"state_hash\":\"%60[0-9a-f]", hash), 1);
+    assert_non_null(strstr(output, hash));
+    free(journal);
+    free(page);
 }
 
 static void unfinished_and_broken_ones_are_refused(void **state)
@@ -53,6 +82,7 @@ static void unfinished_and_broken_ones_are_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_finished_sweep_is_reported), cmocka_unit_test(unfinished_and_broken_ones_are_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_finished_sweep_is_reported), cmocka_unit_test(the_commands_of_a_page_repeat),
+                                       cmocka_unit_test(unfinished_and_broken_ones_are_refused)};
     return cmocka_run_group_tests(tests, make_folder_with_cache, remove_folder);
 }

@@ -106,6 +106,7 @@ static void indices_and_worst_runs(void **unused)
     for (char *at = page; (at = strstr(at, "<article")); at++)
         articles++;
     assert_int_equal(articles, 10);
+    assert_non_null(strstr(page, "<p>598 runs are done: on a grid or on Sobol's points an index can be too low by up to 0.04"));
     free(page);
     sweep_results_free(table);
 }
