@@ -1,5 +1,5 @@
 // Any bytes as the figures of a golden run: accepted ones do not differ from themselves.
-// Covers: sim/golden_figures.c sim/tolerances.c
+// Covers: sim/golden_figures.c
 #include "sim/golden_figures.h"
 
 #include <stdint.h>

@@ -1,5 +1,6 @@
-// Any bytes as the specification of a sweep: a result exactly if there is no fault, and then values of any run.
+// Any bytes as the specification of a sweep: a result exactly if there is no fault, and then values of any run, and hands that are a valid script.
 // Covers: study/spec.c study/points.c study/distribution.c
+#include "input/input.h"
 #include "study/points.h"
 
 #include <stdint.h>
@@ -8,8 +9,24 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
+static void use_hands(const RandomHands *hands)
+{
+    static const ToolNames tools = {.count = 2, .name = {"a", "b"}};
+    static Faults faults;
+    faults_clear(&faults);
+    if (!hands->wanted || hands->duration_s > 100 * hands->hold_least)
+        return;
+    char *text = study_hands(hands, hands->seed, &tools);
+    Script *script = text ? script_parse(text, strlen(text), "hands", &tools, &faults) : NULL;
+    if (!script)
+        __builtin_trap();
+    script_free(script);
+    free(text);
+}
+
 static void use(const Study *study)
 {
+    use_hands(&study->hands);
     char text[VARY_TEXT];
     double last = study->runs - 1;
     const int64_t run[] = {0, (int64_t)(last / 2), (int64_t)last};
