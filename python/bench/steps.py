@@ -14,7 +14,7 @@ import numpy as np
 
 import seldinger
 
-SCENE = "scenes/phantom/scene.yaml"
+SCENE = seldinger.scene_path("phantom/scene.yaml")
 
 
 def resident_mb():

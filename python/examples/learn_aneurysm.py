@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A hand that learns to steer a wire into the phantom's aneurysm, by the cross-entropy method: a few minutes of processor time.
 
-    learn_aneurysm.py -o out/agent          # from the project's root, with the package seldinger on the path
+    learn_aneurysm.py -o out/agent
 
 The hand turns the wire to an angle, pushes it fast up to one insertion and slowly up to another, and stops earlier where the X-ray picture
 shows the tip at the target. These five figures are learned. A generation of hands is drawn from a normal distribution, each hand plays
@@ -25,10 +25,10 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 from numpy.typing import NDArray
 
-from seldinger import Scene
+from seldinger import Scene, scene_path
 from seldinger.gym import Navigation, Start
 
-SCENE = "scenes/exercises/aneurysm.yaml"
+SCENE = scene_path("exercises/aneurysm.yaml")
 START = Start(inserted_mm=(0, 5), turned_deg=(-180, 180), push_gain=(0.9, 1.1), twist_gain=(0.9, 1.1))
 OPTIONS: dict[str, Any] = {"start": START, "push_mm_s": 20.0, "twist_deg_s": 180.0, "commands": 80, "observe": ("tip", "target", "inserted", "turned")}
 FIGURES = ("angle_deg", "fast_until_mm", "slow_until_mm", "slow_mm_s", "near_mm")

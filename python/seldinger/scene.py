@@ -3,12 +3,13 @@ from __future__ import annotations
 
 import json
 import os
+from pathlib import Path
 from typing import Any, Mapping, NamedTuple, Optional, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._library import Context, PathLike, ffi, file_lock, lib, path_bytes, text_of
+from ._library import Context, InputError, PathLike, ffi, file_lock, lib, path_bytes, text_of
 
 
 class Target(NamedTuple):
@@ -17,6 +18,20 @@ class Target(NamedTuple):
     name: str
     point: NDArray[np.float64]     #: (3,) mm
     radius: float                  #: mm
+
+
+def scene_path(name: str) -> str:
+    """The path of a scene that comes with the program, such as "phantom/scene.yaml" or "exercises/aneurysm.yaml".
+
+    Raises:
+        InputError: there is no such scene.
+    """
+    here = Path(__file__)
+    folders = (here.resolve().parents[2] / "scenes", here.parents[4] / "share/seldinger/scenes")       # of the source tree, or installed
+    for folder in folders:
+        if (folder / name).is_file():
+            return str(folder / name)
+    raise InputError(f"there is no scene {name!r} in {' or '.join(map(str, folders))}; expected a name such as 'phantom/scene.yaml'")
 
 
 def _plain(value: Any) -> Any:

@@ -28,7 +28,7 @@ class Wheel(unittest.TestCase):
     def test_it_holds_all(self):
         with tempfile.TemporaryDirectory() as folder:
             built = pathlib.Path(seldinger.__file__).parent.parent
-            made = [subprocess.run([sys.executable, ROOT / "python/make_wheel.py", built, "1.2.3", folder], check=True, capture_output=True, text=True).stdout.strip()
+            made = [subprocess.run([sys.executable, ROOT / "python/make_wheel.py", built, ROOT / "scenes", "1.2.3", folder], check=True, capture_output=True, text=True).stdout.strip()
                     for _ in range(2)]
             with zipfile.ZipFile(made[1]) as wheel:
                 wheel.extractall(folder + "/site")
