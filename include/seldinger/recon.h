@@ -4,6 +4,7 @@
 #define SELDINGER_PUBLIC_RECON_H
 
 #include "base.h"
+#include "scene.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -80,13 +81,6 @@ SEL_API SelStatus sel_tree_open(SelContext *context, const char *path, SelTree *
 SEL_API SelStatus sel_tree_save(SelContext *context, const SelTree *tree, const char *path);
 SEL_API void sel_tree_destroy(SelTree *tree);
 
-typedef struct SelTreeNode {
-    double center_mm[3];
-    double direction[3];         // unit, from the parent towards the children
-    double radius_mm;
-    int parent;                  // index of an earlier node; -1: the root
-    int is_aneurysm;
-} SelTreeNode;
 SEL_API int sel_tree_node_count(const SelTree *tree);
 SEL_API int64_t sel_tree_point_count(const SelTree *tree);
 // The points on the wall, (points, 3) [mm], those of a node one after the other. Error: SEL_ERROR_ARGUMENT.

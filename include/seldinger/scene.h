@@ -198,6 +198,25 @@ SEL_API SelStatus sel_scene_target(const SelScene *scene, int index, SelTarget *
 // NULL. Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_STATE (the scene has no wall), SEL_ERROR_MEMORY.
 SEL_API SelStatus sel_scene_query(SelContext *context, const SelScene *scene, int count, const double *point_mm, double *gap_mm, double *normal);
 
+// A node of the vessels' centrelines.
+typedef struct SelTreeNode {
+    double center_mm[3];
+    double direction[3]; // unit, from the parent towards the children
+    double radius_mm;
+    int parent; // index of an earlier node; -1: the root
+    int is_aneurysm;
+} SelTreeNode;
+// The centrelines of a vessel that is a model or a shape; 0 nodes of any other. Error: SEL_ERROR_ARGUMENT (no such node).
+SEL_API int sel_scene_node_count(const SelScene *scene);
+SEL_API SelStatus sel_scene_node(const SelScene *scene, int index, SelTreeNode *node);
+
+// --- other values ---
+
+// The text of a scene with another value of a key, the rest as it is. `key` has names and indices from the root, such as "vessel.shape.seed" or
+// "targets.0.point_mm"; `value` is one line of YAML, such as "7" or "[1, 0, 0]". The key's last name may be missing: then it is added. Free the text with
+// sel_free(). Errors: SEL_ERROR_ARGUMENT, SEL_ERROR_INPUT (there is no such key, or the value is not YAML), SEL_ERROR_MEMORY.
+SEL_API SelStatus sel_scene_text_with(SelContext *context, const char *text, const char *key, const char *value, char **changed);
+
 #ifdef __cplusplus
 }
 #endif

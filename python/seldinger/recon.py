@@ -8,12 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._library import ArgumentError, Context, PathLike, ffi, file_lock, lib, path_bytes, text_of
-from .scene import query_wall
+from .scene import TREE_NODE, query_wall
 from .simulator import Floats
-
-#: A node of a tree: fields ``center_mm`` (3), ``direction`` (3, unit, away from the root), ``radius_mm``, ``parent`` (-1: the root), ``is_aneurysm``.
-TREE_NODE = np.dtype([("center_mm", "f8", 3), ("direction", "f8", 3), ("radius_mm", "f8"), ("parent", "i4"), ("is_aneurysm", "i4")])
-assert TREE_NODE.itemsize == ffi.sizeof("SelTreeNode")
 
 #: Called about ten times a second with the finished part and the whole.
 Progress = Callable[[int, int], None]

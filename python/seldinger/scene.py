@@ -12,6 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from ._library import Context, InputError, PathLike, ffi, file_lock, lib, path_bytes, text_of
 
 
+#: A node of a tree: fields ``center_mm`` (3), ``direction`` (3, unit, away from the root), ``radius_mm``, ``parent`` (-1: the root), ``is_aneurysm``.
+TREE_NODE = np.dtype([("center_mm", "f8", 3), ("direction", "f8", 3), ("radius_mm", "f8"), ("parent", "i4"), ("is_aneurysm", "i4")])
+assert TREE_NODE.itemsize == ffi.sizeof("SelTreeNode")
+
+
 class Target(NamedTuple):
     """A place that a tool has to reach."""
 
@@ -49,7 +54,7 @@ def scene_text(scene: Mapping[str, Any]) -> str:
 
 
 class Scene:
-    """What is simulated. A scene does not change; any number of simulators, in any threads, may share one.
+    """What is simulated. A scene does not change (``with_values`` makes another one); any number of simulators, in any threads, may share one.
 
     Args:
         scene: the path of a scene file or of a case's folder, or a dictionary with the keys of a scene file
@@ -65,27 +70,59 @@ class Scene:
 
     def __init__(self, scene: Union[PathLike, Mapping[str, Any]], *, folder: PathLike = ".", contact: Optional[str] = None,
                  script: Optional[PathLike] = None, threads: int = 0) -> None:
+        self._options: dict[str, Any] = {"contact": contact, "script": script, "threads": threads}
+        if isinstance(scene, Mapping):
+            self._path = os.path.join(os.fspath(folder), "scene.yaml")
+            self._open(scene_text(scene))
+        else:
+            self._path = os.fspath(scene)
+            self._open(None)
+
+    def _open(self, text: Optional[str]) -> None:
+        """Opens the text of a scene, whose relative files are looked for beside the path; None: the file at the path."""
         self._context = Context()
         options = ffi.new("SelOpenOptions *")
         lib.sel_open_options_init(options, ffi.sizeof("SelOpenOptions"))
+        contact, script = self._options["contact"], self._options["script"]
         texts = [ffi.new("char[]", contact.encode()) if contact else ffi.NULL, ffi.new("char[]", path_bytes(script)) if script else ffi.NULL]
         options.contact, options.script = texts
-        options.threads = threads
+        options.threads = self._options["threads"]
         handle = ffi.new("SelScene **")
         with file_lock:
-            if isinstance(scene, Mapping):
-                text = scene_text(scene).encode()
-                path = path_bytes(os.path.join(os.fspath(folder), "scene.yaml"))
-                status = lib.sel_scene_parse(self._context.handle, text, len(text), path, options, handle)
+            if text is None:
+                status = lib.sel_scene_open(self._context.handle, path_bytes(self._path), options, handle)
             else:
-                status = lib.sel_scene_open(self._context.handle, path_bytes(scene), options, handle)
+                data = text.encode()
+                status = lib.sel_scene_parse(self._context.handle, data, len(data), path_bytes(self._path), options, handle)
         self._context.check(status)
         self._adopt(handle[0])
+
+    def with_values(self, values: Mapping[str, Any]) -> "Scene":
+        """The same scene with other values.
+
+        Args:
+            values: by key, with names and indices from the root: ``{"vessel.friction": 0.1, "targets.0.point_mm": [1, 2, 3]}``.
+
+        Raises:
+            InputError: there is no such key, or the scene is not valid with its value.
+        """
+        text, context = self.text, Context()
+        for key, value in values.items():
+            changed = ffi.new("char **")
+            context.check(lib.sel_scene_text_with(context.handle, text.encode(), key.encode(), json.dumps(value, default=_plain, allow_nan=False).encode(), changed))
+            text = text_of(changed[0])
+            lib.sel_free(changed[0])
+        other = Scene.__new__(Scene)
+        other._options = self._options
+        other._path = os.path.join(self._path, "scene.yaml") if os.path.isdir(self._path) else self._path
+        other._open(text)
+        return other
 
     @classmethod
     def _of(cls, context: Context, handle: Any) -> "Scene":
         self = cls.__new__(cls)
-        self._context = context
+        self._context, self._path = context, "scene.yaml"
+        self._options = {"contact": None, "script": None, "threads": 0}
         self._adopt(handle)
         return self
 
@@ -108,6 +145,15 @@ class Scene:
     def text(self) -> str:
         """The scene's YAML."""
         return text_of(lib.sel_scene_text(self.handle))
+
+    @property
+    def nodes(self) -> NDArray[np.void]:
+        """The centrelines of a vessel that is a model or a shape, (n,) of type ``TREE_NODE``, parents before children; of any other vessel n is 0."""
+        nodes = np.zeros(lib.sel_scene_node_count(self.handle), TREE_NODE)
+        memory = ffi.from_buffer("SelTreeNode[]", nodes) if len(nodes) else None
+        for i in range(len(nodes)):
+            lib.sel_scene_node(self.handle, i, ffi.addressof(memory, i))
+        return nodes
 
     @property
     def entry(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

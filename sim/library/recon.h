@@ -19,5 +19,6 @@ struct SelTree {
 
 // Takes ownership of the tree and of the texts of `info`; aborts the call if out of memory.
 SelTree *tree_handle(VesselTree *tree, TreeFileInfo info);
+SelTreeNode tree_node(const VesselTree *tree, int index);
 
 #endif

@@ -1,5 +1,6 @@
 #include "base/base.h"
 #include "sim/library/context.h"
+#include "sim/library/recon.h"
 #include "sim/library/scene_text.h"
 #include "sim/library/wall_query.h"
 
@@ -220,6 +221,45 @@ SelStatus sel_scene_query(SelContext *context, const SelScene *scene, int count,
     if (!scene->open.vessel)
         return context_refuse(context, SEL_ERROR_STATE, __func__, "the scene has no wall");
     return wall_query(context, scene->open.vessel, count, point_mm, gap_mm, normal);
+}
+
+int sel_scene_node_count(const SelScene *scene) { return scene && scene->open.tree ? scene->open.tree->node_count : 0; }
+
+SelStatus sel_scene_node(const SelScene *scene, int index, SelTreeNode *node)
+{
+    if (index < 0 || index >= sel_scene_node_count(scene) || !node)
+        return SEL_ERROR_ARGUMENT;
+    *node = tree_node(scene->open.tree, index);
+    return SEL_OK;
+}
+
+// --- other values ---
+
+typedef struct Change {
+    const char *text, *key, *value;
+    char *changed;
+} Change;
+
+static bool change_text(SelContext *context, void *what)
+{
+    Change *change = what;
+    change->changed = yaml_edit_flow(change->text, change->key, change->value, true);
+    if (!change->changed)
+        faults_add(&context->faults, "scene", 0, 0,
+                   "cannot set '%.80s' to '%.80s'; expected a key that the scene has, such as vessel.friction, and one line of YAML", change->key,
+                   change->value);
+    return change->changed != NULL;
+}
+
+SelStatus sel_scene_text_with(SelContext *context, const char *text, const char *key, const char *value, char **changed)
+{
+    if (!context || !text || !key || !value || !changed)
+        return context_refuse(context, SEL_ERROR_ARGUMENT, __func__, "context, text, key, value or changed is NULL");
+    Change change = {.text = text, .key = key, .value = value};
+    SelStatus status = context_call(context, change_text, &change, SEL_ERROR_INPUT);
+    if (status == SEL_OK)
+        *changed = change.changed;
+    return status;
 }
 
 void sel_vessels_forget(void) { vessel_cache_forget(); }

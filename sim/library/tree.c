@@ -82,17 +82,21 @@ SelStatus sel_tree_points(const SelTree *tree, double *point_mm)
 
 int sel_tree_is_model(const SelTree *tree) { return tree && tree->vessel; }
 
+SelTreeNode tree_node(const VesselTree *t, int index)
+{
+    Vec3 c = t->center[index], d = t->direction[index];
+    return (SelTreeNode){.center_mm = {c.x, c.y, c.z},
+                         .direction = {d.x, d.y, d.z},
+                         .radius_mm = t->radius[index],
+                         .parent = t->parent[index],
+                         .is_aneurysm = t->kind[index] == NODE_ANEURYSM};
+}
+
 SelStatus sel_tree_node(const SelTree *tree, int index, SelTreeNode *node)
 {
     if (index < 0 || index >= sel_tree_node_count(tree) || !node)
         return SEL_ERROR_ARGUMENT;
-    const VesselTree *t = tree->tree;
-    Vec3 c = t->center[index], d = t->direction[index];
-    *node = (SelTreeNode){.center_mm = {c.x, c.y, c.z},
-                          .direction = {d.x, d.y, d.z},
-                          .radius_mm = t->radius[index],
-                          .parent = t->parent[index],
-                          .is_aneurysm = t->kind[index] == NODE_ANEURYSM};
+    *node = tree_node(tree->tree, index);
     return SEL_OK;
 }
 

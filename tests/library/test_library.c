@@ -772,6 +772,46 @@ static void targets_are_the_scenes(void **state)
     assert_int_equal(sel_scene_target(scene, 1, &target), SEL_ERROR_ARGUMENT);
 }
 
+static void the_centrelines_are_in_the_vessel(void **state)
+{
+    (void)state;
+    int count = sel_scene_node_count(scene);
+    assert_true(count > 100);
+    for (int i = 0; i < count; i++) {
+        SelTreeNode node;
+        double gap;
+        good(sel_scene_node(scene, i, &node));
+        assert_true(node.parent < i && (i > 0) == (node.parent >= 0));
+        good(sel_scene_query(context, scene, 1, node.center_mm, &gap, NULL));
+        assert_true(gap > 0.3 * node.radius_mm && gap < 1.7 * node.radius_mm);
+    }
+    SelTreeNode none;
+    assert_int_equal(sel_scene_node(scene, count, &none), SEL_ERROR_ARGUMENT);
+}
+
+static void a_scene_takes_other_values(void **state)
+{
+    (void)state;
+    char *first = NULL, *text = NULL;
+    good(sel_scene_text_with(context, sel_scene_text(scene), "targets.0.point_mm", "[1, 2.5, -3]", &first));
+    good(sel_scene_text_with(context, first, "simulation", "{step_ms: 2}", &text)); // a key that the scene lacks
+    SelScene *other = NULL;
+    SelTarget target;
+    good(sel_scene_parse(context, text, strlen(text), phantom, NULL, &other));
+    good(sel_scene_target(other, 0, &target));
+    assert_true(target.point_mm[0] == 1 && target.point_mm[1] == 2.5 && target.point_mm[2] == -3 && target.radius_mm == 2);
+    assert_true(sel_scene_step_s(other) == 0.002);
+    sel_scene_destroy(other);
+    sel_free(first);
+    sel_free(text);
+    const char *const wrong[][2] = {
+        {"targets.7.point_mm", "[1, 2, 3]"}, {"vessel.colour.red", "1"}, {"vessel.friction", "[1, 2"}, {"vessel.friction", "1\nx: 2"}};
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(sel_scene_text_with(context, sel_scene_text(scene), wrong[i][0], wrong[i][1], &text), SEL_ERROR_INPUT);
+        assert_non_null(strstr(sel_fault(context, 0), wrong[i][0]));
+    }
+}
+
 // --- many at once ---
 
 static void a_batch_is_its_simulators_alone(void **state)
@@ -836,6 +876,8 @@ int main(void)
         cmocka_unit_test(a_copy_goes_on_alike),
         cmocka_unit_test(the_centreline_is_the_state),
         cmocka_unit_test(targets_are_the_scenes),
+        cmocka_unit_test(the_centrelines_are_in_the_vessel),
+        cmocka_unit_test(a_scene_takes_other_values),
         cmocka_unit_test(a_batch_is_its_simulators_alone),
         cmocka_unit_test(a_volume_becomes_a_model),
         cmocka_unit_test(files_are_those_of_the_program),

@@ -5,8 +5,8 @@ import unittest
 import numpy as np
 
 import seldinger
-from seldinger.gym import Navigation, Start, VectorNavigation, check_environment, has_gymnasium
-from seldinger.gym import spaces
+from seldinger.gym import (ENVIRONMENTS, Navigation, Start, VectorNavigation, arch_variety, basic_wire_nav, check_environment, check_vector_environment,
+                           dual_device_nav, has_gymnasium, spaces, steve)
 
 TUBE = {"vessel": {"tube": {"start_mm": [0, 0, 0], "direction": [0, 0, 1], "normal": [0, -1, 0], "radius_mm": 2.0,
                             "path": [{"line_mm": 20}, {"arc": {"radius_mm": 20, "angle_deg": 60}}, {"line_mm": 20}]}, "contact": "tube", "friction": 0.1},
@@ -34,33 +34,111 @@ class Contract(unittest.TestCase):
     def test_the_package_agrees(self):
         if not has_gymnasium:
             self.skipTest("gymnasium is not installed")
+        import gymnasium
         from gymnasium.utils.env_checker import check_env
-        check_env(tube(), skip_render_check=True)
+        check_env(tube(render_mode="rgb_array", image_size=32))
+        for name in ENVIRONMENTS:
+            options = {"scene": TUBE, "reward": "steve"} if "Navigation-" in name else {}
+            env = gymnasium.make(name, render_mode="rgb_array", **options)
+            check_env(env.unwrapped)
+            env.close()
 
     def test_the_checker_finds_what_is_broken(self):
+        def changed(**changes):                 # an environment whose step() returns something else: name -> function of it
+            class Changed(Navigation):
+                def step(self, action):
+                    names = ("observation", "reward", "terminated", "truncated", "info")
+                    return tuple(changes[name](value) if name in changes else value for name, value in zip(names, super().step(action)))
+            return Changed
+
         class Forgets(Navigation):              # a seed that does nothing
             def reset(self, *, seed=None, options=None):
                 return super().reset(options=options)
 
+        class Reseeds(Navigation):              # always the same random numbers
+            def reset(self, *, seed=None, options=None):
+                return super().reset(seed=1, options=options)
+
         class Overwrites(Navigation):           # one array for all observations
-            def judge(self):
-                observation, *rest = super().judge()
+            def step(self, action):
+                observation, *rest = super().step(action)
                 self.kept = getattr(self, "kept", observation)
                 for key in observation:
                     self.kept[key][...] = observation[key]
                 return (self.kept, *rest)
 
-        class Strays(Navigation):               # an observation outside the space
-            def judge(self):
-                observation, *rest = super().judge()
-                return (dict(observation, tip=observation["tip"] + 5000), *rest)
+        class Changes(Navigation):              # the caller's action
+            def step(self, action):
+                action *= 0.5
+                return super().step(action)
 
         class Old(Navigation):                  # four results, as before 0.26
             def step(self, action):
                 return super().step(action)[:4]
-        for broken, words in ((Forgets, "same seed|differ"), (Overwrites, "overwrites"), (Strays, "not in observation_space"), (Old, "does not return")):
-            with self.subTest(broken.__name__), self.assertRaisesRegex(AssertionError, words):
-                check_environment(broken(TUBE, reward="steve", start=Start(inserted_mm=(0, 5))))
+
+        class OldSeed(Navigation):
+            def seed(self, seed=None):
+                return [seed]
+
+        class OldReset(Navigation):
+            def reset(self, *, seed=None, options=None, return_info=True):
+                return super().reset(seed=seed, options=options)
+
+        class Usual(Navigation):                # the same episode if no seed is given
+            def reset(self, *, seed=5, options=None):
+                return super().reset(seed=seed, options=options)
+
+        class NoInfo(Navigation):
+            def reset(self, *, seed=None, options=None):
+                return super().reset(seed=seed, options=options)[0]
+
+        class Pace(Navigation):
+            def reset(self, *, seed=None, options=None):
+                self.metadata = {"render_modes": ["rgb_array"]}
+                return super().reset(seed=seed, options=options)
+
+        class Grey(Navigation):
+            def render(self):
+                return super().render()[:, :, 0]
+
+        class Once(Navigation):                 # close() can be called only once
+            def close(self):
+                if self._sim is None:
+                    raise AssertionError("closed twice")
+                super().close()
+
+        class Endless(Navigation):              # a space without bounds
+            def __init__(self, *given, **options):
+                super().__init__(*given, **options)
+                self.observation_space = spaces.OwnDict({"tip": spaces.OwnBox(-np.inf, np.inf, (1, 2))}) if not has_gymnasium else self.observation_space
+
+        tip = lambda change: lambda observation: dict(observation, tip=change(observation["tip"]))
+        cases = [(Forgets, "np_random_seed|same seed|differ"), (Reseeds, "np_random_seed|another seed"), (Overwrites, "overwrites"), (Changes, "changes the action"),
+                 (Old, "does not return"), (OldSeed, "dropped"), (OldReset, "dropped"), (Usual, "default 5"), (NoInfo, "does not return"), (Pace, "render_fps"),
+                 (Grey, "uint8"), (Once, "closed twice"),
+                 (changed(observation=tip(lambda x: x + 5000)), "not in its space"), (changed(observation=tip(lambda x: x.astype(np.float64))), "type float64"),
+                 (changed(observation=tip(lambda x: x.tolist())), "expected an array"), (changed(observation=tip(lambda x: x[0])), "shape"),
+                 (changed(observation=tip(lambda x: np.repeat(x, 2, axis=1)[:, ::2])), "contiguous"),
+                 (changed(observation=lambda x: dict(x, more=x["tip"])), "keys"), (changed(observation=lambda x: x["tip"]), "expected a dictionary"),
+                 (changed(reward=lambda x: float("nan")), "finite float"), (changed(reward=np.float32), "finite float"), (changed(terminated=np.bool_), "no bool"),
+                 (changed(truncated=int), "no bool"), (changed(info=lambda x: None), "no dictionary")]
+        if not has_gymnasium:
+            cases.append((Endless, "not finite"))
+        for broken, words in cases:
+            with self.subTest(words), self.assertRaisesRegex(AssertionError, words):
+                check_environment(broken(TUBE, reward="steve", start=Start(inserted_mm=(0, 5)), render_mode="rgb_array", image_size=32), commands=3)
+
+    def test_random_numbers_may_be_replaced(self):
+        env = tube(start=Start(inserted_mm=(0, 5)))
+        env.np_random = np.random.default_rng(8)
+        self.assertEqual(env.np_random_seed, -1)
+        expected = np.random.default_rng(8).uniform(0, 5)
+        self.assertEqual(env.reset()[1]["start"]["inserted_mm"], expected)
+        self.assertTrue(env.has_wrapper_attr("scene") and not env.has_wrapper_attr("colour"))
+        self.assertTrue(env.set_wrapper_attr("colour", 1) and env.get_wrapper_attr("colour") == 1 and not env.set_wrapper_attr("size", 1, force=False))
+
+    def test_pictures_a_second_are_commands_a_second(self):
+        self.assertAlmostEqual(tube(command_s=0.2).metadata["render_fps"], 5)
 
     def test_before_and_after_an_episode(self):
         env = tube(commands=2)
@@ -193,10 +271,12 @@ class Episodes(unittest.TestCase):
         scene["tools"] = [{"name": "catheter", "kind": "microcatheter", **outer}, {"name": "wire", "kind": "wire", **tool}]
         with Navigation(scene, reward="steve") as env:
             self.assertEqual(env.action_space.shape, (2, 2))
-            check_environment(env)
             env.reset()
             observation, *_ = env.step([[0, 0], [30, 0]])
             np.testing.assert_allclose(observation["inserted"], [5, 8], atol=1e-4)
+            check_environment(env)
+            with self.assertRaisesRegex(seldinger.StateError, "closed"):
+                env.reset()
 
     def test_recordings_replay(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -235,6 +315,116 @@ class Vector(unittest.TestCase):
                 self.assertTrue(np.array_equal(env.reset(seed=5 + i)[0]["tip"], runs[0][0, i]))
         with self.assertRaisesRegex(seldinger.ArgumentError, "seeds"):
             VectorNavigation(TUBE, 2, **options).reset(seed=[1])
+        for count in (0, None):
+            with self.assertRaisesRegex(seldinger.ArgumentError, "at least 1"):
+                VectorNavigation(TUBE, count, **options)
+
+    def test_each_mode_keeps_the_contract(self):
+        for mode in ("NextStep", "SameStep", "Disabled"):
+            with self.subTest(mode):
+                envs = VectorNavigation(TUBE, 3, reward="steve", commands=2, autoreset_mode=mode, start=Start(inserted_mm=(0, 5)), render_mode="rgb_array", image_size=32)
+                check_vector_environment(envs, commands=5)
+        with self.assertRaisesRegex(seldinger.ArgumentError, "NextStep, SameStep, Disabled"):
+            VectorNavigation(TUBE, 1, reward="steve", autoreset_mode="Never")
+
+    def test_a_mask_begins_some(self):
+        envs = VectorNavigation([tube(commands=2), tube(commands=3)], autoreset_mode="Disabled")
+        with self.assertRaisesRegex(seldinger.StateError, "reset"):
+            envs.reset(options={"reset_mask": np.array([True, False])})
+        envs.reset(seed=1)
+        push = np.full(envs.action_space.shape, 10, np.float32)
+        envs.step(push)
+        observation, _, _, truncated, _ = envs.step(push)
+        self.assertEqual(truncated.tolist(), [True, False])
+        with self.assertRaisesRegex(seldinger.StateError, "reset_mask"):
+            envs.step(push)
+        again, info = envs.reset(options={"reset_mask": truncated})
+        self.assertEqual(info["_time_s"].tolist(), [True, False])
+        self.assertTrue(np.array_equal(again["tip"][1], observation["tip"][1]) and not np.array_equal(again["tip"][0], observation["tip"][0]))
+        *_, truncated, info = envs.step(push)
+        self.assertEqual((truncated.tolist(), np.round(info["time_s"], 6).tolist()), ([False, True], [0.1, 0.3]))
+        for mask in ([True], [False, False], [1, 0]):
+            with self.subTest(mask), self.assertRaisesRegex(seldinger.ArgumentError, "reset_mask"):
+                envs.reset(options={"reset_mask": np.array(mask)})
+        envs.close()
+
+    def test_the_same_step_gives_the_last_observation_and_the_first(self):
+        with tube(commands=2) as alone:
+            first, _ = alone.reset(seed=1)
+            alone.step([[10, 0]])
+            last, *_, info = alone.step([[10, 0]])
+        envs = VectorNavigation(TUBE, 1, reward="steve", commands=2, autoreset_mode="SameStep")
+        envs.reset(seed=1)
+        push = np.array([[[10, 0]]], np.float32)
+        envs.step(push)
+        observation, _, _, truncated, infos = envs.step(push)
+        self.assertTrue(truncated[0] and np.array_equal(observation["tip"][0], first["tip"]) and np.array_equal(infos["final_obs"][0]["tip"], last["tip"]))
+        self.assertEqual(infos["final_info"]["distance_mm"][0], info["distance_mm"])
+        envs.close()
+
+
+class Steve(unittest.TestCase):
+    """The tasks of stEVE_bench: its figures, and targets that a seed draws from the branches that it names."""
+
+    def test_figures(self):
+        for make, train, test, tools in ((basic_wire_nav, 150, 450, 1), (dual_device_nav, 500, 1000, 2), (arch_variety, 150, 450, 1)):
+            with self.subTest(make.__name__), make() as env:
+                self.assertEqual((env._commands, env.action_space.shape), (train, (tools, 2)))
+                np.testing.assert_allclose(env.action_space.high, np.tile([35, 180], (tools, 1)))
+                self.assertAlmostEqual(env.metadata["render_fps"], 7.5, delta=0.02)        # a whole number of steps of 1 ms
+                self.assertEqual(env.scene.targets[0].radius, 5)
+            with make("test") as env:
+                self.assertEqual(env._commands, test)
+        with self.assertRaisesRegex(seldinger.ArgumentError, "train or test"):
+            basic_wire_nav("play")
+
+    def test_targets_are_in_the_branches(self):
+        for task in (steve.BASIC_WIRE_NAV, steve.DUAL_DEVICE_NAV):
+            scene = seldinger.Scene(seldinger.scene_path(task.scene))
+            nodes, branch = scene.nodes, steve.branch_of(scene.nodes)
+            targets = steve.possible_targets(scene, task.branches)
+            self.assertTrue(np.all(scene.query(targets)[0] > 0.5))          # in the lumen
+            of = {tuple(node["center_mm"]): k for node, k in zip(nodes, branch)}
+            self.assertEqual({of[tuple(point)] for point in targets}, set(task.branches))
+            for point in targets:                                           # none in a branch without targets, computed one by one
+                for node, k in zip(nodes, branch):
+                    self.assertTrue(k in task.branches or np.linalg.norm(point - node["center_mm"]) >= node["radius_mm"])
+
+    def test_a_seed_draws_the_target(self):
+        with basic_wire_nav() as env:
+            points = []
+            for seed in (*range(12), 0):
+                env.reset(seed=seed)
+                points.append(env.scene.targets[0].point)
+            self.assertTrue(np.array_equal(points[0], points[-1]))
+            self.assertGreater(len({tuple(point) for point in points}), 8)
+            env.reset()                                                     # goes on with the random numbers
+            self.assertFalse(np.array_equal(env.scene.targets[0].point, points[-1]))
+            observation, *_ = env.step([[35, 0]])
+            np.testing.assert_allclose(observation["target"], env._c_arm.project(env.scene.targets[0].point), rtol=1e-6)
+
+    def test_a_seed_draws_the_arch(self):
+        with arch_variety(arches=2) as env:
+            seen = {}
+            for seed in (0, 1, 2, 3, 4, 5, 0):
+                env.reset(seed=seed)
+                seen.setdefault(seed, []).append((env.scene.text.split("seed:")[1].split(",")[0].strip(" }"), tuple(env.scene.targets[0].point)))
+            self.assertEqual({arch for (arch, _), *_ in seen.values()}, {"1", "2"})
+            self.assertEqual(seen[0][0], seen[0][1])
+            self.assertTrue(np.all(env.scene.query([env.scene.targets[0].point])[0] > 0.5))
+
+    def test_they_keep_the_contract(self):
+        for make in (basic_wire_nav, dual_device_nav):
+            with self.subTest(make.__name__):
+                check_environment(make(), commands=3)
+        check_vector_environment(VectorNavigation([basic_wire_nav(), basic_wire_nav()]), commands=3)
+
+    def test_a_recorded_episode_has_the_drawn_target(self):
+        with tempfile.TemporaryDirectory() as folder, basic_wire_nav(commands=2) as env:
+            env.reset(seed=3, options={"record": f"{folder}/a.h5"})
+            for _ in range(2):
+                env.step([[35, 0]])
+            np.testing.assert_allclose(seldinger.Recording(f"{folder}/a.h5").scene().targets[0].point, env.scene.targets[0].point)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,14 @@
 import importlib.util
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 import zipfile
+
+import numpy as np
 
 import seldinger
 
@@ -22,6 +25,28 @@ class Tutorial(unittest.TestCase):
                 data = (pathlib.Path(folder) / name).read_bytes()
                 self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
                 self.assertGreater(len(data), 5000)
+
+
+class Vtk(unittest.TestCase):
+    def test_it_shows_vessel_and_wire(self):
+        for name, has_it in (("python3-vtk9", importlib.util.find_spec("vtkmodules")), ("xvfb", shutil.which("xvfb-run"))):
+            if not has_it:
+                self.skipTest(f"{name} is not installed")
+        with tempfile.TemporaryDirectory() as folder:
+            said = subprocess.run(["xvfb-run", "-a", sys.executable, ROOT / "python/examples/vessel_3d.py", folder + "/a.png"], check=True, capture_output=True,
+                                  text=True).stdout
+            self.assertRegex(said, "^[1-9][0-9]{3,} triangles of the wall, [1-9][0-9]+ nodes of wire")
+            from matplotlib.image import imread
+            red, green, blue = np.moveaxis(imread(folder + "/a.png")[:, :, :3], 2, 0)
+            is_wall, is_wire = (red > green + 0.1) & (red > blue + 0.1), (red < 0.55) & (red + green + blue < 1.2)
+            self.assertGreater(is_wall.mean(), 0.02)
+            self.assertGreater(is_wire.mean(), 0.0005)
+            white = (red == 1) & (green == 1) & (blue == 1)
+            self.assertGreater(white.mean(), 0.5)
+            rows, columns = np.nonzero(is_wire)                    # the wire goes up through much of the picture, and lies in the wall
+            self.assertGreater(np.ptp(rows), 0.3 * len(red))
+            near = [is_wall[r - 12:r + 13, c - 12:c + 13].any() for r, c in zip(rows, columns)]
+            self.assertGreater(np.mean(near), 0.95)
 
 
 class Wheel(unittest.TestCase):

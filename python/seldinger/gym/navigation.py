@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,11 +42,15 @@ class Start:
                                     + ("" if least < 0 else " and at least 0"))
 
 
+SceneOrDraw = Union[Scene, PathLike, Mapping[str, Any], Callable[[np.random.Generator], Scene]]
+
+
 class Navigation(Env):
     """Steer the tools of a scene to its target: an environment with the interface of Gymnasium.
 
     Args:
-        scene: a ``Scene``, a path or a dictionary, with a target; for the reward "score" with an ``exercise:``.
+        scene: a ``Scene``, a path or a dictionary, with a target; for the reward "score" with an ``exercise:``. Or a function that draws the
+            scene of each episode from the environment's random numbers (numpy.random.Generator); all have the same tools.
         observe: the parts of an observation, a dictionary with these keys and float32 arrays:
             "tip": (tools, 2) mm, the tips in the C-arm's plane, from the middle between entry and target;
             "shaft": (shaft_points, 2) mm, points of the innermost tool behind its tip, in the same plane;
@@ -63,7 +67,6 @@ class Navigation(Env):
         shaft_points, shaft_spacing_mm: number and distance of the shaft's points.
         image_size: side of pictures in pixels, 8 to 4096.
         render_mode: "rgb_array", or None.
-        simulator: one of a ``Batch`` of this scene; None: a new one.
 
     An action is a float32 array (tools, 2), push [mm/s] and twist [deg/s] of each tool, the outermost first; what is beyond the fastest
     hands is cut. An episode ends (terminated) when the target is reached; it is truncated after `commands`, at the exercise's time limit and
@@ -78,10 +81,13 @@ class Navigation(Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
-    def __init__(self, scene: Union[Scene, PathLike, Mapping[str, Any]], *, observe: Sequence[str] = ("tip", "shaft", "target", "inserted", "turned", "force"),
+    def __init__(self, scene: SceneOrDraw, *, observe: Sequence[str] = ("tip", "shaft", "target", "inserted", "turned", "force"),
                  reward: str = "score", push_mm_s: float = 35.0, twist_deg_s: float = 180.0, command_s: float = 0.1, commands: Optional[int] = None,
                  start: Optional[Start] = None, shaft_points: int = 3, shaft_spacing_mm: float = 2.0, image_size: int = 128,
-                 render_mode: Optional[str] = None, simulator: Optional[Simulator] = None) -> None:
+                 render_mode: Optional[str] = None) -> None:
+        self._draw = scene if callable(scene) else None
+        if callable(scene):
+            scene = scene(np.random.default_rng(0))         # any: spaces are alike
         self.scene: Scene = scene if isinstance(scene, Scene) else Scene(scene)
         unknown = [name for name in observe if name not in OBSERVATIONS]
         if unknown or not observe:
@@ -95,14 +101,14 @@ class Navigation(Env):
         if commands is not None and not commands >= 1:
             raise ArgumentError(f"commands is {commands}; expected at least 1, or None")
         self.render_mode = render_mode
-        self._sim = simulator or Simulator(self.scene)
+        self._sim: Any = Simulator(self.scene)
         if reward == "score" and not self._sim.score()["way_mm"] > 0:
             raise ArgumentError("the scene has no exercise, so that there is no score; expected `exercise:` in it, or reward='steve'")
         self._reward, self._observe, self._start, self._image_size = reward, tuple(observe), start or Start(), image_size
         self._commands, self._steps = commands, max(1, round(command_s / self.scene.step_s))
         self._spacing, self._shaft_points = shaft_spacing_mm, shaft_points
-        self._target = self.scene.targets[0]
-        self._c_arm = CArm(self.scene, 0.5 * (self.scene.entry[0] + self._target.point))
+        self.metadata = dict(self.metadata, render_fps=1 / (self._steps * self.scene.step_s))
+        self._look()
         tools = len(self.scene.tools)
         fastest = np.tile(np.array([push_mm_s, twist_deg_s], np.float32), (tools, 1))
         self.action_space = Box(-fastest, fastest, dtype=np.float32)
@@ -138,7 +144,13 @@ class Navigation(Env):
         if given:
             raise ArgumentError(f"unknown options {', '.join(given)}; expected {', '.join(drawn)} or record")
         self._end_recording()
-        self._sim.reset()
+        if self._draw is None:
+            self.simulator.reset()
+        else:
+            self.simulator.close()
+            self.scene = self._draw(self.np_random)
+            self._sim = Simulator(self.scene)
+            self._look()
         if record is not None:
             self._sim.record(record)
         self._drawn = drawn
@@ -161,8 +173,19 @@ class Navigation(Env):
             StateError: before ``reset``, or after the end of an episode.
             ArgumentError: the action has another shape, or is not finite.
         """
-        self._sim.step(self.command_of(action), n=self._steps)
-        return self.judge()
+        self._sim.step(self._command_of(action), n=self._steps)
+        before = self._worth
+        self._taken += 1
+        self._measure()
+        reward = self._worth - before
+        if self._reward == "steve":
+            reward += self._success - 0.005
+        is_late = self._score["state"] == "time_out" or (self._commands is not None and self._taken >= self._commands)
+        truncated = bool(not self._success and (is_late or self._diverged))
+        self._is_running = not (self._success or truncated)
+        if not self._is_running:
+            self._end_recording()
+        return self._observation(), float(reward), bool(self._success), truncated, self._info()
 
     def render(self) -> Optional[NDArray[np.uint8]]:
         """The X-ray picture as (image_size, image_size, 3) uint8; None if there is no ``render_mode``."""
@@ -177,21 +200,21 @@ class Navigation(Env):
             self._sim.close()
         self._sim, self._is_running = None, False
 
-    # --- the two halves of step(), between which a vectorised form makes the steps of all its environments at once ---
-
     @property
     def simulator(self) -> Simulator:
-        """The simulator of the environment; to read, not to step."""
+        """The simulator of the episode; to read, not to step."""
         if self._sim is None:
             raise StateError("the environment is closed")
         return self._sim
 
-    @property
-    def steps_per_command(self) -> int:
-        """Steps of the simulator for each command."""
-        return self._steps
+    # --- parts ---
 
-    def command_of(self, action: ArrayLike) -> NDArray[np.float64]:
+    def _look(self) -> None:
+        """Points the C-arm at the scene."""
+        self._target = self.scene.targets[0]
+        self._c_arm = CArm(self.scene, 0.5 * (self.scene.entry[0] + self._target.point))
+
+    def _command_of(self, action: ArrayLike) -> NDArray[np.float64]:
         """The command of an action, (tools, 2): cut at the fastest hands, times the gains of this episode's hand."""
         if not self._is_running:
             raise StateError("no episode is running; call reset() first")
@@ -200,23 +223,6 @@ class Navigation(Env):
             raise ArgumentError(f"the action is {action!r}; expected {self.action_space.shape} finite numbers: push [mm/s] and twist [deg/s] of "
                                 + ", ".join(self.scene.tools))
         return np.clip(given, self.action_space.low, self.action_space.high) * self._gain
-
-    def judge(self) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """What ``step`` returns, after the steps of a command were made."""
-        before = self._worth
-        self._taken += 1
-        self._measure()
-        reward = self._worth - before
-        if self._reward == "steve":
-            reward += self._success - 0.005
-        is_late = self._score["state"] == "time_out" or (self._commands is not None and self._taken >= self._commands)
-        truncated = bool(not self._success and (is_late or self._diverged))
-        self._is_running = not (self._success or truncated)
-        if not self._is_running:
-            self._end_recording()
-        return self._observation(), float(reward), bool(self._success), truncated, self._info()
-
-    # --- parts ---
 
     def _move_to_start(self) -> None:
         """Pushes and turns the innermost tool at an easy pace, 20 mm/s and 180 deg/s."""
@@ -277,5 +283,5 @@ class Navigation(Env):
                 "time_s": self._sim.time_s, "diverged": self._diverged, "start": dict(self._drawn)}
 
     def _end_recording(self) -> None:
-        if self._sim.is_recording:
-            self._sim.end_recording()
+        if self.simulator.is_recording:
+            self.simulator.end_recording()

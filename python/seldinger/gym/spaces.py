@@ -40,6 +40,11 @@ class _Space:
     def __contains__(self, x: Any) -> bool:
         return self.contains(x)
 
+    @property
+    def is_np_flattenable(self) -> bool:
+        """Whether a value can be made one flat array."""
+        return True
+
     def contains(self, x: Any) -> bool:
         raise NotImplementedError
 
@@ -126,24 +131,23 @@ class OwnDict(_Space):
         return f"Dict({self.spaces})"
 
 
-class OwnEnv:
-    """The members of ``gymnasium.Env`` that every environment has, where that package is not installed."""
+class _Random:
+    """Random numbers that ``reset(seed=)`` begins anew."""
 
-    metadata: dict[str, Any] = {"render_modes": []}
-    render_mode: Optional[str] = None
-    spec: Any = None
-    action_space: Any
-    observation_space: Any
     _np_random: Optional[np.random.Generator] = None
     _np_random_seed: Optional[int] = None
 
     @property
     def np_random(self) -> np.random.Generator:
-        """The environment's random numbers; ``reset(seed=)`` begins them anew."""
+        """The environment's random numbers. They may be replaced; then the seed is unknown, -1."""
         if self._np_random is None:
             self._seed(None)
         assert self._np_random is not None
         return self._np_random
+
+    @np_random.setter
+    def np_random(self, numbers: np.random.Generator) -> None:
+        self._np_random, self._np_random_seed = numbers, -1
 
     @property
     def np_random_seed(self) -> int:
@@ -169,8 +173,33 @@ class OwnEnv:
         """The environment itself: it is no wrapper."""
         return self
 
+
+class OwnEnv(_Random):
+    """The members of ``gymnasium.Env`` that every environment has, where that package is not installed."""
+
+    metadata: dict[str, Any] = {"render_modes": []}
+    render_mode: Optional[str] = None
+    spec: Any = None
+    action_space: Any
+    observation_space: Any
+
     def close(self) -> None:
         pass
+
+    def has_wrapper_attr(self, name: str) -> bool:
+        """Whether the environment has a member."""
+        return hasattr(self, name)
+
+    def get_wrapper_attr(self, name: str) -> Any:
+        """A member of the environment."""
+        return getattr(self, name)
+
+    def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
+        """Sets a member; without `force` only one that exists. Returns whether it was set."""
+        if not force and not hasattr(self, name):
+            return False
+        setattr(self, name, value)
+        return True
 
     def __enter__(self) -> Any:
         return self
@@ -180,10 +209,44 @@ class OwnEnv:
         return False
 
 
+class OwnVectorEnv(_Random):
+    """The members of ``gymnasium.vector.VectorEnv``, where that package is not installed."""
+
+    metadata: dict[str, Any] = {}
+    render_mode: Optional[str] = None
+    spec: Any = None
+    closed: bool = False
+    num_envs: int
+    action_space: Any
+    observation_space: Any
+    single_action_space: Any
+    single_observation_space: Any
+
+    def close(self, **given: Any) -> None:
+        """Frees what the environments hold. May be called twice."""
+        if not self.closed:
+            self.close_extras(**given)
+            self.closed = True
+
+    def close_extras(self, **given: Any) -> None:
+        pass
+
+
 Box: Any = gymnasium.spaces.Box if gymnasium else OwnBox
 Dict: Any = gymnasium.spaces.Dict if gymnasium else OwnDict
 Env: Any = gymnasium.Env if gymnasium else OwnEnv
-VectorEnv: Any = gymnasium.vector.VectorEnv if gymnasium else object
+VectorEnv: Any = gymnasium.vector.VectorEnv if gymnasium else OwnVectorEnv
+
+
+def autoreset_mode_of(name: str) -> Any:
+    """Gymnasium's mode of this name; the name itself where that package, or the mode in it, is missing."""
+    return gymnasium.vector.AutoresetMode(name) if hasattr(getattr(gymnasium, "vector", None), "AutoresetMode") else name
+
+
+def register(name: str, entry_point: str) -> None:
+    """Tells Gymnasium of an environment, if it is installed and does not know it yet."""
+    if gymnasium and name not in gymnasium.registry:
+        gymnasium.register(id=name, entry_point=entry_point)
 
 
 def batch(space: Any, count: int) -> Any:

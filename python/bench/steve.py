@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
-"""How fast stEVE_bench's tasks are simulated, on one core: the scenes of this folder with their scripts, by processor time. From the project's root, with the
-package seldinger: PYTHONPATH=build/release/python scenes/steve/speed.py"""
-import pathlib
+"""How fast stEVE_bench's tasks are simulated, on one core: the scenes of scenes/steve with their scripts, by processor time.
+
+usage: PYTHONPATH=build/release/python python3 python/bench/steve.py
+"""
 import time
 
 import seldinger
 
-here = pathlib.Path(__file__).resolve().parent
 REPEATS = 3                # the median is printed
 COMMAND_S = 1 / 7.5        # of stEVE_bench
 
 print("task               steps of 1 ms   steps/s   times real time   commands/s")
 for name in ("basic-wire-nav", "arch-variety", "dual-device-nav"):
-    sim = seldinger.Simulator(here / f"{name}.yaml")
+    sim = seldinger.Simulator(seldinger.scene_path(f"steve/{name}.yaml"))
     count = round(sim.scene.script_s / sim.scene.step_s)
     seconds = []
     for _ in range(REPEATS):
