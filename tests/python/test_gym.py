@@ -413,6 +413,13 @@ class Steve(unittest.TestCase):
             self.assertEqual(seen[0][0], seen[0][1])
             self.assertTrue(np.all(env.scene.query([env.scene.targets[0].point])[0] > 0.5))
 
+    def test_scripts_reach_the_targets_of_the_scenes(self):
+        for name in ("basic-wire-nav", "dual-device-nav"):
+            with self.subTest(name), seldinger.Simulator(seldinger.scene_path(f"steve/{name}.yaml")) as sim:
+                sim.follow(round(sim.scene.script_s / sim.scene.step_s))
+                self.assertEqual(sim.score()["state"], "reached")
+                self.assertFalse(sim.flags_ever & seldinger.Flag.DIVERGED)
+
     def test_they_keep_the_contract(self):
         for make in (basic_wire_nav, dual_device_nav):
             with self.subTest(make.__name__):
