@@ -414,7 +414,7 @@ class Steve(unittest.TestCase):
             self.assertTrue(np.all(env.scene.query([env.scene.targets[0].point])[0] > 0.5))
 
     def test_scripts_reach_the_targets_of_the_scenes(self):
-        for name in ("basic-wire-nav", "dual-device-nav"):
+        for name in ("basic-wire-nav", "arch-variety", "dual-device-nav"):
             with self.subTest(name), seldinger.Simulator(seldinger.scene_path(f"steve/{name}.yaml")) as sim:
                 sim.follow(round(sim.scene.script_s / sim.scene.step_s))
                 self.assertEqual(sim.score()["state"], "reached")
