@@ -93,7 +93,10 @@ void contact_solver_destroy(ContactSolver *s)
     free(s);
 }
 
-bool contact_needs_factor(const ContactSet *set, const ContactOptions *options) { return set->slide_count == 0 || options->form == CONTACT_POINTWISE; }
+bool contact_needs_factor(const ContactSet *set, const ContactOptions *options)
+{
+    return set->count + set->slide_count + set->pair_count == 0 || options->form == CONTACT_POINTWISE;
+}
 
 static void take_forces(const ContactSolver *solver, int count, ContactSet *set)
 {
@@ -159,8 +162,8 @@ ContactReport contact_solve(const ContactProblem *problem)
         report = contact_pointwise(solver, chain, factor, b, count, options, u);
     else if (count < all)
         report = contact_slides(solver, chain, b, count, all, options, u);
-    else if (!contact_condensed(solver, chain, b, count, options, u, &report))
-        report = contact_newton(solver, chain, factor, b, count, options, u);
+    else if (!contact_walls(solver, chain, b, count, options, u, &report))
+        return (ContactReport){.singular = true};
     if (!by_points)
         contact_cut(solver, count, &report);
     take_forces(solver, all, set);

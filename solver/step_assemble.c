@@ -209,6 +209,7 @@ static void tip_at_mouth(Stepper *s)
 void step_assemble(Stepper *s)
 {
     SEL_ASSERT(s->dt > 0, "a step takes time");
+    s->system.is_factored = false;
     SEL_ASSERT(s->first_free >= 0 && s->first_free <= s->system.chain.count, "the sheath holds nodes of the chain");
     double h = s->dt, scale = 1 + s->damping_stiffness / h, inertia = 1 / (h * h) + s->damping_mass / h;
     if (s->tools.count > 1) {

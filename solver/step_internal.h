@@ -143,6 +143,7 @@ typedef struct WallQueries {
 typedef struct StepSystem {
     BlockChain chain;
     BlockFactor *factor;
+    bool is_factored;        // `factor` is that of `chain`
     ContactSolver *solver;
     ContactSet set;
     double *b, *u;           // (M, 6)

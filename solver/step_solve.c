@@ -64,6 +64,7 @@ void step_factor(Stepper *s)
     if (!contact_needs_factor(&s->system.set, &s->contact))
         return;
     double share = 0;
+    s->system.is_factored = true;
     while (!s->progress.has_failed && !block_chain_factor(&s->system.chain, s->system.factor))
         s->progress.has_failed = !firmer(s, &share);
 }
@@ -71,6 +72,8 @@ void step_factor(Stepper *s)
 ContactProblem step_contacts(Stepper *s)
 {
     SEL_ASSERT(s->system.set.count <= s->system.set.capacity, "detection found no more contacts than there is room for");
+    if (!s->system.is_factored)      // where no contact is left
+        step_factor(s);
     return (ContactProblem){.solver = s->system.solver,
                             .chain = &s->system.chain,
                             .factor = s->progress.has_failed ? NULL : s->system.factor,
