@@ -18,6 +18,9 @@ typedef struct BlockChain {
     int size;                // n, unknowns per node
     double *diag;            // (M, n, n)
     double *lower;           // (M-1, n, n)
+    // The first `slim` nodes have only their unknowns 0 and 3 coupled, to each other and to those of the neighbours; the others have unit rows. With n = 6 only,
+    // for speed: results are the same with 0.
+    int slim;
 } BlockChain;
 
 typedef struct BlockFactor BlockFactor;   // two-ended LDL^T factor of a chain

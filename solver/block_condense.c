@@ -34,7 +34,7 @@ static size_t node_doubles(int size)
 static size_t inverse_at(int size) { return node_doubles(size) - (size == 6 ? (size_t)BLOCK_COLUMN(6) : (size_t)((size + 7) / 8 * 8)); }
 
 struct BlockCondenser {
-    int count, capacity, size, middle;
+    int count, capacity, size, middle, slim;
     bool *keep;
     int *place;                  // (M) index in the condensed chain, -1: eliminated …
     unsigned char *live;         // … number of leading coupled unknowns of each node there; the remaining ones have unit rows
@@ -245,6 +245,7 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
     SEL_REQUIRE(chain->count > 0 && chain->count <= k->capacity && chain->size == k->size, "the condenser is large enough for the chain");
     const size_t n = (size_t)k->size, block = n * n;
     k->count = chain->count;
+    k->slim = k->size == 6 ? chain->slim : 0;
     choose_middle(k);
     k->small.count = 0;
     for (int i = 0; i < k->count; i++) {

@@ -223,6 +223,7 @@ void step_assemble(Stepper *s)
         }
         sheath_nodes(s, scale, inertia);
     }
+    s->system.chain.slim = s->tools.count == 1 && s->first_free > 1 ? s->first_free - 1 : 0;     // not the node behind the mouth
     if (s->first_free == s->system.chain.count)
         tip_at_mouth(s);
     contact_add_curvature(&s->system.set, &s->system.chain, s->system.b);

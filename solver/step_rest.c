@@ -11,8 +11,7 @@
 // oscillation of angular frequency w is then within X / (w h)^2 of its equilibrium. Rule 1 stops a creep of time constant T within X T / h of its end. Below
 // steps of 1 ms, X shrinks by (h / 1 ms)^2, so that the forces are balanced as well as at 1 ms.
 //
-// X was chosen by measurement: in 20 scenes of all kinds (coils, jams, slipping hands, two tools) the trembling is 1e-14 to 9e-10 mm a step, and no motion
-// that a hand, a load or a spring causes has been seen below 1e-9 for longer than a moment.
+// X was chosen by measurement: in 20 scenes (coils, slipping hands, one to three tools) the median of the trembling is 1e-14 to 9e-10 mm a step.
 #include "base/base.h"
 #include "solver/tools_internal.h"
 

@@ -442,8 +442,10 @@ static void condensed_with_unknowns_left_out(void **state)
         }
         for (int i = 0; i < M * N; i++)
             b[i] = uniform();
-        for (int level = 0; level < SIMD_COUNT; level++) {
+        for (int run = 0; run < 2 * SIMD_COUNT; run++) {
+            int level = run / 2;
             simd_force((SimdLevel)level);
+            a.slim = N == 6 && run % 2 ? M / 5 - 1 : 0;      // the same bits
             for (int i = trial % 7; i < M; i += 1 + trial % 9)
                 block_condenser_keep(k)[i] = true;
             block_condenser_survey(k, &a);
@@ -459,6 +461,7 @@ static void condensed_with_unknowns_left_out(void **state)
             block_condenser_expand(k, small, y[level]);
             assert_memory_equal(y[0], y[level], sizeof y[0]);
         }
+        a.slim = 0;
         simd_force(level_given);
         assert_true(block_chain_factor_solve(&a, f, b, x));
         for (int i = 0; i < M * N; i++)
