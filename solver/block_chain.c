@@ -25,15 +25,6 @@ struct BlockFactor {
     double *t, *z, *inverse;
 };
 
-static double *aligned_zeros(size_t count)
-{
-    size_t bytes = (count * sizeof(double) + 63) / 64 * 64;
-    double *p = aligned_alloc(64, bytes);
-    if (p)
-        memset(p, 0, bytes);
-    return p;
-}
-
 bool block_size_is_known(int size) { return size == 6 || size == 8 || size == 10 || size == 12; }
 
 bool block_chain_create(BlockChain *chain, int count, int size)
@@ -43,8 +34,8 @@ bool block_chain_create(BlockChain *chain, int count, int size)
         return false;
     chain->count = count;
     chain->size = size;
-    chain->diag = aligned_zeros(block_doubles(count, size));
-    chain->lower = aligned_zeros(block_doubles(count, size));
+    chain->diag = block_zeros(block_doubles(count, size));
+    chain->lower = block_zeros(block_doubles(count, size));
     if (!chain->diag || !chain->lower) {
         block_chain_destroy(chain);
         return false;
@@ -54,8 +45,8 @@ bool block_chain_create(BlockChain *chain, int count, int size)
 
 void block_chain_destroy(BlockChain *chain)
 {
-    free(chain->diag);
-    free(chain->lower);
+    block_zeros_free(chain->diag);
+    block_zeros_free(chain->lower);
     *chain = (BlockChain){0};
 }
 
@@ -67,9 +58,9 @@ BlockFactor *block_factor_create(int count, int size)
     size_t m = (size_t)count;
     f->count = f->capacity = count;
     f->size = size;
-    f->t = aligned_zeros(m * (size_t)BLOCK_PANEL(size));
-    f->z = aligned_zeros(m * (size_t)BLOCK_PANEL(size));
-    f->inverse = aligned_zeros(m * (size_t)BLOCK_COLUMN(size));
+    f->t = block_zeros(m * (size_t)BLOCK_PANEL(size));
+    f->z = block_zeros(m * (size_t)BLOCK_PANEL(size));
+    f->inverse = block_zeros(m * (size_t)BLOCK_COLUMN(size));
     if (!f->t || !f->z || !f->inverse) {
         block_factor_destroy(f);
         return NULL;
@@ -81,9 +72,9 @@ void block_factor_destroy(BlockFactor *factor)
 {
     if (!factor)
         return;
-    free(factor->t);
-    free(factor->z);
-    free(factor->inverse);
+    block_zeros_free(factor->t);
+    block_zeros_free(factor->z);
+    block_zeros_free(factor->inverse);
     free(factor);
 }
 

@@ -50,7 +50,7 @@ BlockCondenser *block_condenser_create(int count, int size)
     BlockCondenser *k = count < 1 || !block_size_is_known(size) ? NULL : calloc(1, sizeof *k);
     if (!k)
         return NULL;
-    size_t m = (size_t)count, bytes = m * node_doubles(size) * sizeof *k->node;
+    size_t m = (size_t)count;
     k->count = k->capacity = count;
     k->size = size;
     k->keep = calloc(m, sizeof *k->keep);
@@ -59,12 +59,11 @@ BlockCondenser *block_condenser_create(int count, int size)
     k->live = calloc(m, sizeof *k->live);
     k->side = calloc((size_t)size * m, sizeof *k->side);
     k->shape = calloc(m, sizeof *k->shape);
-    k->node = aligned_alloc(64, bytes);
+    k->node = block_zeros(m * node_doubles(size));
     if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->live || !k->side || !k->shape || !k->node) {
         block_condenser_destroy(k);
         return NULL;
     }
-    memset(k->node, 0, bytes);
     return k;
 }
 
@@ -79,7 +78,7 @@ void block_condenser_destroy(BlockCondenser *k)
     free(k->live);
     free(k->side);
     free(k->shape);
-    free(k->node);
+    block_zeros_free(k->node);
     free(k);
 }
 

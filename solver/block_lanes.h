@@ -5,6 +5,8 @@
 #include "base/base.h"
 
 #include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
 
 // Loops over the columns must be unrolled; otherwise small blocks do not stay in registers.
 #if defined(__GNUC__) && !defined(__clang__)
@@ -25,6 +27,22 @@
     {                                                                                                                                                          \
         SIMD_FORMS(name##_6), SIMD_FORMS(name##_8), SIMD_FORMS(name##_10), SIMD_FORMS(name##_12)                                                               \
     }
+// Zeroed doubles, aligned to 64 bytes. As calloc() gives them, so that pages that are never used take no memory: many nodes are never factored.
+static inline double *block_zeros(size_t count)
+{
+    enum { ALIGN = 64 };
+    char *all = calloc(count * sizeof(double) + 2 * ALIGN, 1);
+    if (!all)
+        return NULL;
+    char *at = all + ALIGN + (ALIGN - (uintptr_t)all % ALIGN) % ALIGN;
+    ((void **)(void *)at)[-1] = all;
+    return (double *)(void *)at;
+}
+static inline void block_zeros_free(double *zeros)
+{
+    if (zeros)
+        free(((void **)zeros)[-1]);
+}
 enum { BLOCK_SIZES = 4 };
 static inline int block_size_index(int size) { return (size - 6) / 2; }
 

@@ -35,10 +35,10 @@ BlockLu *block_lu_create(int count, int size)
     BlockLu *lu = count < 1 || !block_size_is_known(size) ? NULL : calloc(1, sizeof *lu);
     if (!lu)
         return NULL;
-    size_t m = (size_t)count, bytes = m * node_doubles(size) * sizeof *lu->node;
+    size_t m = (size_t)count;
     lu->count = lu->capacity = count;
     lu->size = size;
-    lu->node = aligned_alloc(64, bytes);
+    lu->node = block_zeros(m * node_doubles(size));
     lu->live = calloc(m, 1);
     lu->rest = calloc(2 * m * (size_t)size, sizeof *lu->rest);
     if (!lu->node || !lu->rest || !lu->live) {
@@ -46,7 +46,6 @@ BlockLu *block_lu_create(int count, int size)
         return NULL;
     }
     lu->change = lu->rest + m * (size_t)size;
-    memset(lu->node, 0, bytes);
     return lu;
 }
 
@@ -54,7 +53,7 @@ void block_lu_destroy(BlockLu *lu)
 {
     if (!lu)
         return;
-    free(lu->node);
+    block_zeros_free(lu->node);
     free(lu->live);
     free(lu->rest);
     free(lu);
