@@ -89,7 +89,7 @@ static void fault_unknown_key(YamlValue key, const char *name, const char *map_n
         yaml_fault(key, "unknown key '%.60s'; did you mean '%s'?", name, keys[nearest]);
         return;
     }
-    char all[320];
+    char all[FAULT_LENGTH - 80];
     list_names(keys, all, sizeof all);
     yaml_fault(key, "unknown key '%.60s' in '%s'; expected %s", name, map_name, all);
 }

@@ -1,32 +1,23 @@
 // See case_panel.h.
 #include "render/case_panel.h"
+#include "render/key_list.h"
 #include "render/translation.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-static const char *const key_help[][2] = {{"click", "does what is chosen on the right; else looks there"},
-                                          {"wheel, Page Up, Page Down", "next slice; zooms the projection"},
-                                          {"Ctrl and wheel, + and -", "zooms"},
-                                          {"right drag, [ ] and , .", "brightness: level and width; 0 as at first"},
-                                          {"left drag", "moves the cross-hair; turns the projection"},
-                                          {"Tab", "gives the keys to the next view"},
-                                          {"arrows (Shift: ten times)", "moves the cross-hair; turns the projection"},
-                                          {"Enter", "a click at the cross-hair"},
-                                          {"Space", "the projection turns by itself, or stops"},
-                                          {"1 to 8, L", "what a click does; L: it only looks"},
-                                          {"N, P", "next and previous mark"},
-                                          {"W", "the wall instead of the projection"},
-                                          {"O", "bone in the projection of a CT, or not"},
-                                          {"T, C (Shift: back)", "next wire; next catheter around it, or none"},
-                                          {"A (Shift: back)", "which vessel of the body it is"},
-                                          {"B", "what lies behind the vessels"},
-                                          {"M (Shift: back)", "the kind of the wall's model; a new kind is fitted"},
-                                          {"E", "edits sections and branches of a swept model (sweep); Esc leads back"},
-                                          {"Ctrl+Z, Ctrl+Y", "undoes, does again"},
-                                          {"S", "saves the case and steers in it"},
-                                          {"Esc", "stops what is being made; leaves"}};
+static const char *const mouse_help[][2] = {{"click", "does what is chosen on the right; else looks there"},
+                                            {"left drag", "moves the cross-hair; turns the projection"},
+                                            {"right drag", "brightness: level and width"},
+                                            {"wheel (with Ctrl: zooms)", "next slice; zooms the projection"}};
+
+// A button with its key.
+static bool key_button(Gui *gui, const char *id, const char *label, CaseKey key, float width, bool is_on)
+{
+    char text[KEY_BINDING_TEXT];
+    return gui_button(gui, id, label, key_sheet_text(SHEET_CASE, (int)key, text, sizeof text), width, is_on).pressed;
+}
 
 static void heading(Gui *gui, const char *text)
 {
@@ -70,14 +61,11 @@ static void show_volume(Gui *gui, const CaseState *s)
 
 static void show_modes(Gui *gui, CaseState *s)
 {
-    static const struct {
-        const char *label, *key;
-    } mode[CASE_TARGET + 1] = {{"New start", "1"}, {"Add branch", "2"}, {"Forbid", "3"}, {"Cut", "4"},
-                               {"End here", "5"},  {"Mark sac", "6"},   {"Entry", "7"},  {"Target", "8"}};
+    static const char *const mode[CASE_TARGET + 1] = {"New start", "Add branch", "Forbid", "Cut", "End here", "Mark sac", "Entry", "Target"};
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
     heading(gui, "A CLICK");
     for (int i = 0; i <= CASE_TARGET; i++) {
-        if (gui_button(gui, mode[i].label, mode[i].label, mode[i].key, half, s->mode == i).pressed)
+        if (key_button(gui, mode[i], mode[i], (CaseKey)(CASE_KEY_START + i), half, s->mode == i))
             case_state_mode(s, s->mode == i ? CASE_LOOK : i);
         if (i % 2 == 0)
             gui_beside(gui, gap);
@@ -98,22 +86,21 @@ static bool show_choices(Gui *gui, CaseState *s)
     const CaseAct *behind = case_acts_last(&s->acts, CASE_BEHIND);
     char label[120];
     heading(gui, "TOOLS, PATIENT AND WALL");
-    static const struct {
-        const char *none, *key;
-    } list[CASE_LISTS] = {
-        {N_("wire that suits the vessels"), "T"}, {N_("no catheter"), "C"}, {N_("which vessel it is: not said"), "A"}, {N_("wall of local models"), "M"}};
+    static const char *const none[CASE_LISTS] = {N_("wire that suits the vessels"), N_("no catheter"), N_("which vessel it is: not said"),
+                                                 N_("wall of local models")};
     for (int i = 0; i < CASE_LISTS; i++) {
         const int chosen = s->list[i].chosen;
-        const char *name = chosen > 0 ? s->list[i].name[chosen] : tr(list[i].none);
+        const char *name = chosen > 0 ? s->list[i].name[chosen] : tr(none[i]);
         snprintf(label, sizeof label, i == CASE_MODELS && chosen > 0 ? tr("wall: %.*s") : "%.*s", (int)strcspn(name, "."), name);
         const bool has_neighbour = i == CASE_MODELS && is_swept;
-        if (gui_button(gui, list[i].key, label, list[i].key, has_neighbour ? half : 0, chosen > 0).pressed)
+        if (key_button(gui, none[i], label, (CaseKey)(CASE_KEY_WIRE + i), has_neighbour ? half : 0, chosen > 0))
             case_state_next(s, (CaseListId)i, 1);
         if (has_neighbour)
             gui_beside(gui, gap);
     }
-    bool edits = is_swept && gui_button(gui, "edit", "Edit sections", "E", half, false).pressed;
-    if (gui_button(gui, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", "B", 0, behind && behind->is_on).pressed)
+    bool edits = is_swept && key_button(gui, "edit", "Edit sections", CASE_KEY_EDIT, half, false);
+    if (key_button(gui, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", CASE_KEY_BACKGROUND, 0,
+                   behind && behind->is_on))
         case_state_turn_background(s);
     return edits;
 }
@@ -125,7 +112,9 @@ static void show_marks(Gui *gui, CaseState *s, GuiRect at)
     const CaseMark *mark;
     int count = case_builder_marks(s->builder, &mark);
     gui_window_begin(gui, "marks", at, 0);
-    gui_text(gui, GUI_SMALL, gui_colors.dim, count > 0 ? "MARKS (N, P)" : s->progress.stage == BUILD_DONE ? "NO MARKS" : "MARKS COME AFTER THE WALL");
+    char title[80];
+    key_sheet_fill(SHEET_CASE, tr("MARKS ({mark_next}, {mark_before})"), title, sizeof title);
+    gui_text(gui, GUI_SMALL, gui_colors.dim, count > 0 ? title : s->progress.stage == BUILD_DONE ? "NO MARKS" : "MARKS COME AFTER THE WALL");
     for (int i = 0; i < count; i++) {
         char id[20], text[240];
         snprintf(id, sizeof id, "mark %d", i);
@@ -149,10 +138,10 @@ static void show_acts(Gui *gui, CaseState *s)
         case_act_describe(&s->acts.act[i], tr, text, sizeof text);
         gui_text(gui, GUI_SMALL, gui_colors.text, text);
     }
-    if (gui_button(gui, "undo", "Undo", "^Z", half, false).pressed)
+    if (key_button(gui, "undo", "Undo", CASE_KEY_UNDO, half, false))
         case_state_undo(s);
     gui_beside(gui, gap);
-    if (gui_button(gui, "redo", "Redo", "^Y", half, false).pressed)
+    if (key_button(gui, "redo", "Redo", CASE_KEY_REDO, half, false))
         case_state_redo(s);
 }
 
@@ -161,19 +150,20 @@ CasePanelActions case_panel_draw(Gui *gui, CaseState *s, GuiRect at, bool shows_
     CasePanelActions actions = {0};
     float k = gui_scale(gui), gap = floorf(6 * k), low = floorf(fmaxf(0.2f * at.height, at.height - 590 * k));
     bool can_steer = case_builder_work(s->builder) != NULL;
+    char text[800];
     gui_window_begin(gui, "panel", (GuiRect){at.x, at.y, at.width, at.height - low}, 0);
     show_volume(gui, s);
-    gui_text_wrapped(gui, GUI_NORMAL, gui_colors.accent, case_state_hint(s));
+    gui_text_wrapped(gui, GUI_NORMAL, gui_colors.accent, key_sheet_fill(SHEET_CASE, tr(case_state_hint(s)), text, sizeof text));
     show_modes(gui, s);
     actions.edit = show_choices(gui, s);
     show_acts(gui, s);
     gui_space(gui, floorf(4 * k));
     float half = floorf((gui_width(gui) - gap) / 2);
-    actions.steer = gui_button(gui, "steer", can_steer ? "Steer" : "Steer: not yet", "S", 0, can_steer).pressed;
-    actions.help = gui_button(gui, "help", "All keys", "H", half, shows_help).pressed;
+    actions.steer = key_button(gui, "steer", can_steer ? "Steer" : "Steer: not yet", CASE_KEY_STEER, 0, can_steer);
+    actions.help = key_button(gui, "help", "All keys", CASE_KEY_HELP, half, shows_help);
     gui_beside(gui, gap);
-    actions.leave = gui_button(gui, "leave", "Leave", "Esc", half, false).pressed;
-    gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, s->message);
+    actions.leave = key_button(gui, "leave", "Leave", CASE_KEY_LEAVE, half, false);
+    gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, key_sheet_fill(SHEET_CASE, s->message, text, sizeof text));
     gui_window_end(gui);
     show_marks(gui, s, (GuiRect){at.x, at.y + at.height - low, at.width, low});
     return actions;
@@ -181,12 +171,6 @@ CasePanelActions case_panel_draw(Gui *gui, CaseState *s, GuiRect at, bool shows_
 
 void case_panel_help(Gui *gui, const WindowInput *input)
 {
-    enum { ROWS = sizeof key_help / sizeof key_help[0] };
-    float k = gui_scale(gui), width = floorf(560 * k), height = floorf((gui_line_height(gui, GUI_NORMAL) + 3 * k) * ROWS + 50 * k);
-    GuiRect at = {floorf(((float)input->width - width) / 2), floorf(((float)input->height - height) / 2), width, height};
-    gui_window_begin(gui, "keys", at, GUI_ON_TOP | GUI_FRAMED);
-    gui_text(gui, GUI_LARGE, gui_colors.text, "Keys and mouse");
-    for (int i = 0; i < ROWS; i++)
-        gui_row(gui, GUI_NORMAL, key_help[i][0], gui_colors.text, key_help[i][1]);
-    gui_window_end(gui);
+    static const KeySheet sheet[] = {SHEET_CASE};
+    key_list_draw(gui, input, sizeof mouse_help / sizeof *mouse_help, mouse_help, 1, sheet);
 }

@@ -163,7 +163,7 @@ bool case_state_frame(CaseState *s)
         say(s, false, "the wall is fitted: choose a target, or steer");
     if (is_new && now->stage == BUILD_DONE && now->held < LEAST_HELD)
         say(s, true,
-            "the tree holds %.0f %% of what is as bright as its vessels; the marks list the rest. To begin elsewhere, press 1 and click a wider vessel",
+            "the tree holds %.0f %% of what is as bright as its vessels; the marks list the rest. To begin elsewhere, press {start} and click a wider vessel",
             100 * now->held);
     s->pictures += is_new;
     return is_new || now->seen != before.seen || fabs(now->part - before.part) > 0.004;
@@ -209,7 +209,7 @@ static void add(CaseState *s, const CaseAct *act)
     }
     case_act_describe(act, tr, text, sizeof text);
     if (edits > 0)
-        say(s, true, "%s; the %d edits of the wall before it no longer count: Ctrl+Z brings them back", text, edits);
+        say(s, true, "%s; the %d edits of the wall before it no longer count: {undo} brings them back", text, edits);
     else
         say(s, false, "%s", text);
     follow(s, act->kind);
@@ -271,7 +271,7 @@ void case_state_cancel(CaseState *s)
     case_builder_request(s->builder, NULL);
     s->mode = case_acts_last(&s->acts, CASE_START) ? CASE_LOOK : CASE_START;
     s->pictures++;
-    say(s, false, "stopped; Ctrl+Y begins it again");
+    say(s, false, "stopped; {redo} begins it again");
 }
 
 void case_state_next(CaseState *s, CaseListId list, int by)
@@ -294,7 +294,7 @@ bool case_state_edit_begin(CaseState *s)
         return false;
     }
     if (work->how.model != FIT_MODEL_SWEEP) {
-        say(s, true, "the sections of a swept model can be edited: M chooses the model of the wall");
+        say(s, true, "the sections of a swept model can be edited: {model} chooses the model of the wall");
         return false;
     }
     bool good = (s->editor = sweep_editor_create(case_work_sweep(work))) != NULL;
@@ -437,12 +437,12 @@ const char *case_state_hint(const CaseState *s)
                                                       "Click into the sac",
                                                       "Click the end where the tools enter",
                                                       "Click where the tip has to go",
-                                                      [CASE_LOOK] = "Click to look there; 1 to 8 choose what a click does; S steers"};
+                                                      [CASE_LOOK] = "Click to look there; {start} to {target} choose what a click does; {steer} steers"};
     switch (s->progress.stage) {
-    case BUILD_LOADING: return "The volume is being loaded; Esc leaves";
-    case BUILD_TRACKING: return "The tree grows; Esc stops it";
-    case BUILD_FITTING: return "The wall is fitted to the image; Esc stops it";
-    default: return s->has_volume ? clicks[s->mode] : "The volume cannot be read; Esc leaves";
+    case BUILD_LOADING: return "The volume is being loaded; {leave} leaves";
+    case BUILD_TRACKING: return "The tree grows; {leave} stops it";
+    case BUILD_FITTING: return "The wall is fitted to the image; {leave} stops it";
+    default: return s->has_volume ? clicks[s->mode] : "The volume cannot be read; {leave} leaves";
     }
 }
 

@@ -2,8 +2,10 @@
 #include "render/case_views.h"
 
 #include "render/gl_canvas.h"
+#include "render/key_sheet.h"
 #include "render/message.h"
 #include "render/surface_view.h"
+#include "render/translation.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -410,10 +412,12 @@ static void draw_frame(const Over *o)
     letter(o, c->right, at.x + at.width - inset, at.y + at.height / 2);
     letter(o, c->up, at.x + at.width / 2, at.y + inset);
     letter(o, vec3_negate(c->up), at.x + at.width / 2, at.y + at.height - inset);
-    const char *title = !o->s->axes.is_known && o->view < CASE_PROJECTION                          ? "slice"
-                        : o->view == CASE_PROJECTION && o->s->shows_wall                           ? "wall, by error"
-                        : o->view == CASE_PROJECTION && case_state_projected(o->s) != o->s->volume ? "projection without bone (O)"
-                                                                                                   : name[o->view];
+    char without[80];
+    const char *title = !o->s->axes.is_known && o->view < CASE_PROJECTION ? "slice"
+                        : o->view == CASE_PROJECTION && o->s->shows_wall  ? "wall, by error"
+                        : o->view == CASE_PROJECTION && case_state_projected(o->s) != o->s->volume
+                            ? key_sheet_fill(SHEET_CASE, tr("projection without bone ({bone})"), without, sizeof without)
+                            : name[o->view];
     gui_draw_text(o->gui, at.x + 8 * k, at.y + 6 * k, GUI_SMALL, gui_colors.dim, title);
     // a scale of 10 mm, or a tenth or ten times that
     double bar = 10;

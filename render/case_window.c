@@ -7,6 +7,7 @@
 #include "render/edit_desk.h"
 #include "render/gl_canvas.h"
 #include "render/gui.h"
+#include "render/key_sheet.h"
 #include "render/png_file.h"
 #include "render/window.h"
 
@@ -129,72 +130,65 @@ static void page(CaseWindow *w, double by)
         case_state_scroll(&w->state, w->state.view, w->modifiers.shift ? 10 * by : by);
 }
 
-static void press_letter(CaseWindow *w, int key)
+static void show_otherwise(CaseWindow *w, bool *what)
+{
+    *what = !*what;
+    w->state.pictures++;
+}
+
+static void press_view_key(CaseWindow *w, CaseKey key)
 {
     CaseState *s = &w->state;
     switch (key) {
-    case 'L': case_state_mode(s, CASE_LOOK); break;
-    case 'N': case_state_choose_mark(s, s->chosen_mark + 1); break;
-    case 'P': case_state_choose_mark(s, s->chosen_mark - 1); break;
-    case 'W':
-        s->shows_wall = !s->shows_wall;
-        s->pictures++;
-        break;
-    case 'O':
-        s->shows_bone = !s->shows_bone;
-        s->pictures++;
-        break;
-    case 'T': case_state_next(s, CASE_WIRES, w->modifiers.shift ? -1 : 1); break;
-    case 'C': case_state_next(s, CASE_CATHETERS, w->modifiers.shift ? -1 : 1); break;
-    case 'A': case_state_next(s, CASE_SEGMENTS, w->modifiers.shift ? -1 : 1); break;
-    case 'B': case_state_turn_background(s); break;
-    case 'M': case_state_next(s, CASE_MODELS, w->modifiers.shift ? -1 : 1); break;
-    case 'E': open_desk(w); break;
-    case 'H': w->shows_help = !w->shows_help; break;
-    case 'S': steer(w); break;
-    case '[': case_state_window(s, 1, -0.02); break;
-    case ']': case_state_window(s, 1, 0.02); break;
-    case ',': case_state_window(s, 1 / 1.05, 0); break;
-    case '.': case_state_window(s, 1.05, 0); break;
-    case '0': s->low = s->full_low, s->high = s->full_high, s->pictures++; break;
-    case '=':
-    case WINDOW_KEY_KEYPAD_ADD: case_state_zoom(s, s->view, 1); break;
-    case '-':
-    case WINDOW_KEY_KEYPAD_SUBTRACT: case_state_zoom(s, s->view, -1); break;
-    default:
-        if (key >= '1' && key <= '1' + CASE_TARGET)
-            case_state_mode(s, key - '1');
-        break;
+    case CASE_KEY_LEFT: arrow(w, -1, 0); break;
+    case CASE_KEY_RIGHT: arrow(w, 1, 0); break;
+    case CASE_KEY_UP: arrow(w, 0, 1); break;
+    case CASE_KEY_DOWN: arrow(w, 0, -1); break;
+    case CASE_KEY_SLICE_NEXT: page(w, 1); break;
+    case CASE_KEY_SLICE_BEFORE: page(w, -1); break;
+    case CASE_KEY_NEARER: case_state_zoom(s, s->view, 1); break;
+    case CASE_KEY_FARTHER: case_state_zoom(s, s->view, -1); break;
+    case CASE_KEY_DARKER: case_state_window(s, 1, 0.02); break;
+    case CASE_KEY_BRIGHTER: case_state_window(s, 1, -0.02); break;
+    case CASE_KEY_NARROWER: case_state_window(s, 1 / 1.05, 0); break;
+    case CASE_KEY_WIDER: case_state_window(s, 1.05, 0); break;
+    case CASE_KEY_RESET_BRIGHTNESS: s->low = s->full_low, s->high = s->full_high, s->pictures++; break;
+    case CASE_KEY_NEXT_VIEW: s->view = (s->view + (w->modifiers.shift ? CASE_VIEWS - 1 : 1)) % CASE_VIEWS; break;
+    case CASE_KEY_TURN: s->turns = !s->turns; break;
+    case CASE_KEY_MARK_NEXT: case_state_choose_mark(s, s->chosen_mark + 1); break;
+    case CASE_KEY_MARK_BEFORE: case_state_choose_mark(s, s->chosen_mark - 1); break;
+    case CASE_KEY_WALL: show_otherwise(w, &s->shows_wall); break;
+    case CASE_KEY_BONE: show_otherwise(w, &s->shows_bone); break;
+    default: break;
     }
 }
 
 static void press(CaseWindow *w, int key)
 {
     CaseState *s = &w->state;
+    if (key >= CASE_KEY_START && key <= CASE_KEY_LOOK) {
+        case_state_mode(s, key == CASE_KEY_LOOK ? CASE_LOOK : key - CASE_KEY_START);
+        return;
+    }
+    if (key >= CASE_KEY_WIRE && key <= CASE_KEY_MODEL) {
+        case_state_next(s, (CaseListId)(key - CASE_KEY_WIRE), w->modifiers.shift ? -1 : 1);
+        return;
+    }
     switch (key) {
-    case WINDOW_KEY_ESCAPE: leave(w); break;
-    case WINDOW_KEY_TAB: s->view = (s->view + (w->modifiers.shift ? CASE_VIEWS - 1 : 1)) % CASE_VIEWS; break;
-    case WINDOW_KEY_LEFT: arrow(w, -1, 0); break;
-    case WINDOW_KEY_RIGHT: arrow(w, 1, 0); break;
-    case WINDOW_KEY_UP: arrow(w, 0, 1); break;
-    case WINDOW_KEY_DOWN: arrow(w, 0, -1); break;
-    case WINDOW_KEY_PAGE_UP: page(w, 1); break;
-    case WINDOW_KEY_PAGE_DOWN: page(w, -1); break;
-    case WINDOW_KEY_ENTER:
+    case CASE_KEY_LEAVE: leave(w); break;
+    case CASE_KEY_CLICK:
         if (s->has_volume)
             case_state_click(s, s->cursor);
         break;
-    case WINDOW_KEY_SPACE: s->turns = !s->turns; break;
-    default: press_letter(w, key); break;
+    case CASE_KEY_BACKGROUND: case_state_turn_background(s); break;
+    case CASE_KEY_EDIT: open_desk(w); break;
+    case CASE_KEY_UNDO: case_state_undo(s); break;
+    case CASE_KEY_REDO: case_state_redo(s); break;
+    case CASE_KEY_HELP: w->shows_help = !w->shows_help; break;
+    case CASE_KEY_STEER: steer(w); break;
+    case -1: break;
+    default: press_view_key(w, (CaseKey)key); break;
     }
-}
-
-static void press_control(CaseWindow *w, int key)
-{
-    if (key == 'Z')
-        case_state_undo(&w->state);
-    else if (key == 'Y')
-        case_state_redo(&w->state);
 }
 
 // --- mouse ---
@@ -279,10 +273,8 @@ static void take_input(CaseWindow *w, const WindowInput *input)
         window_modifiers_take(&w->modifiers, event);
         if (event->kind == WINDOW_SCROLL_EVENT)
             scroll(w, (double)event->scroll_y, input->mouse_x, input->mouse_y);
-        else if (event->kind == WINDOW_KEY_DOWN_EVENT && (event->modifiers & WINDOW_CTRL))
-            press_control(w, event->key);
-        else if (event->kind == WINDOW_KEY_DOWN_EVENT)
-            press(w, event->key);
+        else
+            press(w, key_sheet_pressed(SHEET_CASE, event, i > 0 ? event - 1 : NULL));
     }
     take_mouse(w, input);
 }

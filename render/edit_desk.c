@@ -3,6 +3,7 @@
 
 #include "render/edit_panel.h"
 #include "render/edit_scene.h"
+#include "render/key_sheet.h"
 #include "render/section_view.h"
 #include "sim/sim.h"
 #include "render/translation.h"
@@ -59,27 +60,6 @@ void edit_desk_leave(EditDesk *w)
 
 // --- keys ---
 
-static void press_control(EditDesk *w, int key)
-{
-    const double turn = 12;  // [pixel] of the mouse's way for a key
-    FreeCamera *camera = edit_scene_camera(w->scene);
-    switch (key) {
-    case WINDOW_KEY_LEFT: free_camera_orbit(camera, -turn, 0); break;
-    case WINDOW_KEY_RIGHT: free_camera_orbit(camera, turn, 0); break;
-    case WINDOW_KEY_UP: free_camera_orbit(camera, 0, -turn); break;
-    case WINDOW_KEY_DOWN: free_camera_orbit(camera, 0, turn); break;
-    case '=':
-    case WINDOW_KEY_KEYPAD_ADD: free_camera_zoom(camera, 1, 50, 50, 100, 100); break;
-    case '-':
-    case WINDOW_KEY_KEYPAD_SUBTRACT: free_camera_zoom(camera, -1, 50, 50, 100, 100); break;
-    default: break;
-    }
-    edit_scene_redraw(w->scene);
-    w->wants.undo |= key == 'Z';
-    w->wants.redo |= key == 'Y';
-    w->wants.save |= key == 'S';
-}
-
 static void nudge(EditState *s, double by)
 {
     Vec3 p = s->contour[s->handle * (EDIT_CONTOUR / EDIT_HANDLES)];
@@ -100,8 +80,8 @@ static void change_blend(EditState *s, float by)
     edit_state_blend(s, true);
 }
 
-// While a branch or a contour is drawn. A branch goes parallel to the screen, and towards and away from the viewer. False: not a key of the pen.
-static bool press_pen(EditDesk *w, int key)
+// While a branch or a contour is drawn. A branch goes parallel to the screen, and towards and away from the viewer.
+static void press_pen(EditDesk *w, PenKey key)
 {
     EditState *s = w->state;
     Camera camera = edit_scene_projection(w->scene, w->scene_at);
@@ -110,74 +90,98 @@ static bool press_pen(EditDesk *w, int key)
     const double step = (s->draws_branch ? 0.1 : 0.05) * (w->modifiers.shift ? 10 : 1);    // [mm]
     const float wider = 0.05f;
     switch (key) {
-    case WINDOW_KEY_LEFT: edit_state_pen_move(s, vec3_scale(right, -step)); break;
-    case WINDOW_KEY_RIGHT: edit_state_pen_move(s, vec3_scale(right, step)); break;
-    case WINDOW_KEY_UP: edit_state_pen_move(s, vec3_scale(up, step)); break;
-    case WINDOW_KEY_DOWN: edit_state_pen_move(s, vec3_scale(up, -step)); break;
-    case WINDOW_KEY_PAGE_UP: edit_state_pen_move(s, vec3_scale(near, step)); break;
-    case WINDOW_KEY_PAGE_DOWN: edit_state_pen_move(s, vec3_scale(near, -step)); break;
-    case WINDOW_KEY_SPACE: edit_state_pen_add(s); break;
-    case WINDOW_KEY_BACKSPACE: edit_state_pen_back(s); break;
-    case WINDOW_KEY_ENTER: edit_state_pen_end(s, true); break;
-    case '=':
-    case WINDOW_KEY_KEYPAD_ADD: s->drawn_radius += wider; break;
-    case '-':
-    case WINDOW_KEY_KEYPAD_SUBTRACT: s->drawn_radius = fmaxf(0.1f, s->drawn_radius - wider); break;
-    default: return false;
+    case PEN_KEY_LEFT: edit_state_pen_move(s, vec3_scale(right, -step)); break;
+    case PEN_KEY_RIGHT: edit_state_pen_move(s, vec3_scale(right, step)); break;
+    case PEN_KEY_UP: edit_state_pen_move(s, vec3_scale(up, step)); break;
+    case PEN_KEY_DOWN: edit_state_pen_move(s, vec3_scale(up, -step)); break;
+    case PEN_KEY_NEARER: edit_state_pen_move(s, vec3_scale(near, step)); break;
+    case PEN_KEY_FARTHER: edit_state_pen_move(s, vec3_scale(near, -step)); break;
+    case PEN_KEY_ADD: edit_state_pen_add(s); break;
+    case PEN_KEY_BACK: edit_state_pen_back(s); break;
+    case PEN_KEY_END: edit_state_pen_end(s, true); break;
+    case PEN_KEY_WIDER: s->drawn_radius += wider; break;
+    case PEN_KEY_NARROWER: s->drawn_radius = fmaxf(0.1f, s->drawn_radius - wider); break;
+    case PEN_KEY_DROP: edit_desk_leave(w); break;
+    case PEN_KEYS: break;
     }
     edit_scene_redraw(w->scene);
-    return true;
 }
 
-static void press_section_key(EditState *s, int key)
+static void press_section_key(EditState *s, EditKey key)
 {
     switch (key) {
-    case WINDOW_KEY_TAB: edit_state_handle(s, (s->handle + 1) % EDIT_HANDLES); break;
-    case WINDOW_KEY_UP: nudge(s, 0.02); break;
-    case WINDOW_KEY_DOWN: nudge(s, -0.02); break;
-    case '=':
-    case WINDOW_KEY_KEYPAD_ADD: edit_state_scale(s, 1.02); break;
-    case '-':
-    case WINDOW_KEY_KEYPAD_SUBTRACT: edit_state_scale(s, 1 / 1.02); break;
-    case WINDOW_KEY_DELETE: edit_state_delete(s); break;
-    case 'O': s->shape = s->shape == SMOOTH_CIRCLE ? SMOOTH_ELLIPSE : SMOOTH_CIRCLE; break;
-    case 'E': s->extent = s->extent == SMOOTH_SECTION ? SMOOTH_BRANCH : s->extent == SMOOTH_BRANCH ? SMOOTH_TREE : SMOOTH_SECTION; break;
-    case ',': change_strength(s, -0.1f); break;
-    case '.': change_strength(s, 0.1f); break;
-    case 'A': edit_state_smooth(s, true); break;
+    case EDIT_KEY_HANDLE: edit_state_handle(s, (s->handle + 1) % EDIT_HANDLES); break;
+    case EDIT_KEY_OUTWARDS: nudge(s, 0.02); break;
+    case EDIT_KEY_INWARDS: nudge(s, -0.02); break;
+    case EDIT_KEY_LARGER: edit_state_scale(s, 1.02); break;
+    case EDIT_KEY_SMALLER: edit_state_scale(s, 1 / 1.02); break;
+    case EDIT_KEY_DELETE: edit_state_delete(s); break;
+    case EDIT_KEY_SHAPE: s->shape = s->shape == SMOOTH_CIRCLE ? SMOOTH_ELLIPSE : SMOOTH_CIRCLE; break;
+    case EDIT_KEY_EXTENT: s->extent = s->extent == SMOOTH_SECTION ? SMOOTH_BRANCH : s->extent == SMOOTH_BRANCH ? SMOOTH_TREE : SMOOTH_SECTION; break;
+    case EDIT_KEY_WEAKER: change_strength(s, -0.1f); break;
+    case EDIT_KEY_STRONGER: change_strength(s, 0.1f); break;
+    case EDIT_KEY_SMOOTH: edit_state_smooth(s, true); break;
     default: break;
     }
 }
 
-static void press(EditDesk *w, int key)
+static void press_view_key(EditDesk *w, EditKey key)
+{
+    const double turn = 12;  // [pixel] of the mouse's way for a key
+    FreeCamera *camera = edit_scene_camera(w->scene);
+    switch (key) {
+    case EDIT_KEY_TURN_LEFT: free_camera_orbit(camera, -turn, 0); break;
+    case EDIT_KEY_TURN_RIGHT: free_camera_orbit(camera, turn, 0); break;
+    case EDIT_KEY_TURN_UP: free_camera_orbit(camera, 0, -turn); break;
+    case EDIT_KEY_TURN_DOWN: free_camera_orbit(camera, 0, turn); break;
+    case EDIT_KEY_ZOOM_IN: free_camera_zoom(camera, 1, 50, 50, 100, 100); break;
+    case EDIT_KEY_ZOOM_OUT: free_camera_zoom(camera, -1, 50, 50, 100, 100); break;
+    case EDIT_KEY_FOCUS: edit_scene_focus(w->scene, edit_state_in_space(w->state, vec3(0, 0, 0))); break;
+    case EDIT_KEY_WHOLE: free_camera_reset(camera); break;
+    default: break;
+    }
+    edit_scene_redraw(w->scene);
+}
+
+static void press(EditDesk *w, EditKey key)
 {
     EditState *s = w->state;
-    w->has_left &= key == WINDOW_KEY_ESCAPE;
-    if (edit_state_draws(s) && press_pen(w, key))
+    w->has_left &= key == EDIT_KEY_LEAVE;
+    if (key >= EDIT_KEY_TURN_LEFT && key <= EDIT_KEY_WHOLE) {
+        press_view_key(w, key);
         return;
+    }
     switch (key) {
-    case WINDOW_KEY_ESCAPE: edit_desk_leave(w); break;
-    case WINDOW_KEY_PAGE_UP: edit_state_step(s, 1); break;
-    case WINDOW_KEY_PAGE_DOWN: edit_state_step(s, -1); break;
-    case WINDOW_KEY_RIGHT: edit_state_move(s, 0.1); break;
-    case WINDOW_KEY_LEFT: edit_state_move(s, -0.1); break;
-    case ']': edit_state_branch(s, 1); break;
-    case '[': edit_state_branch(s, -1); break;
-    case WINDOW_KEY_ENTER: edit_state_keep(s); break;
-    case 'J': change_blend(s, -0.05f); break;
-    case 'K': change_blend(s, 0.05f); break;
-    case 'B': edit_state_draw_begin(s); break;
-    case 'D': edit_state_contour_begin(s); break;
-    case 'X': edit_state_cut(s); break;
-    case 'T': edit_state_flip(s); break;
-    case 'H': w->shows_help = !w->shows_help; break;
-    case 'F': edit_scene_focus(w->scene, edit_state_in_space(s, vec3(0, 0, 0))); break;
-    case WINDOW_KEY_HOME:
-        free_camera_reset(edit_scene_camera(w->scene));
-        edit_scene_redraw(w->scene);
-        break;
+    case EDIT_KEY_LEAVE: edit_desk_leave(w); break;
+    case EDIT_KEY_STATION_NEXT: edit_state_step(s, 1); break;
+    case EDIT_KEY_STATION_BEFORE: edit_state_step(s, -1); break;
+    case EDIT_KEY_ON: edit_state_move(s, 0.1); break;
+    case EDIT_KEY_BACK: edit_state_move(s, -0.1); break;
+    case EDIT_KEY_BRANCH_NEXT: edit_state_branch(s, 1); break;
+    case EDIT_KEY_BRANCH_BEFORE: edit_state_branch(s, -1); break;
+    case EDIT_KEY_KEEP: edit_state_keep(s); break;
+    case EDIT_KEY_BLEND_NARROWER: change_blend(s, -0.05f); break;
+    case EDIT_KEY_BLEND_WIDER: change_blend(s, 0.05f); break;
+    case EDIT_KEY_DRAW: edit_state_draw_begin(s); break;
+    case EDIT_KEY_CONTOUR: edit_state_contour_begin(s); break;
+    case EDIT_KEY_CUT: edit_state_cut(s); break;
+    case EDIT_KEY_FLIP: edit_state_flip(s); break;
+    case EDIT_KEY_HELP: w->shows_help = !w->shows_help; break;
+    case EDIT_KEY_UNDO: w->wants.undo = true; break;
+    case EDIT_KEY_REDO: w->wants.redo = true; break;
+    case EDIT_KEY_SAVE: w->wants.save = true; break;
     default: press_section_key(s, key); break;
     }
+}
+
+static void take_key(EditDesk *w, const WindowEvent *event, const WindowEvent *before)
+{
+    const int pen = edit_state_draws(w->state) ? key_sheet_pressed(SHEET_PEN, event, before) : -1;
+    const int key = pen < 0 ? key_sheet_pressed(SHEET_EDIT, event, before) : -1;
+    if (pen >= 0)
+        press_pen(w, (PenKey)pen);
+    else if (key >= 0)
+        press(w, (EditKey)key);
 }
 
 // --- mouse ---
@@ -279,10 +283,8 @@ void edit_desk_take_input(EditDesk *w, const WindowInput *input)
         window_modifiers_take(&w->modifiers, event);
         if (event->kind == WINDOW_SCROLL_EVENT)
             scroll(w, event, x, y, w->modifiers.control);
-        else if (event->kind == WINDOW_KEY_DOWN_EVENT && (event->modifiers & WINDOW_CTRL))
-            press_control(w, event->key);
-        else if (event->kind == WINDOW_KEY_DOWN_EVENT)
-            press(w, event->key);
+        else
+            take_key(w, event, i > 0 ? event - 1 : NULL);
     }
     if (input->mouse_buttons && !w->buttons)
         mouse_down(w, input, x, y, w->modifiers.shift);

@@ -1,5 +1,6 @@
 // See edit_panel.h.
 #include "render/edit_panel.h"
+#include "render/key_list.h"
 #include "render/translation.h"
 
 #include <math.h>
@@ -8,34 +9,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const key_help[][2] = {{"click on the wall", "goes there"},
-                                          {"left, right drag, wheel", "turns, moves, zooms the surface"},
-                                          {"wheel on the section", "next station (with Ctrl: zooms)"},
-                                          {"Page Up, Page Down", "next station"},
-                                          {"Left, Right", "0.1 mm along the branch"},
-                                          {"[ and ]", "next branch"},
-                                          {"drag a handle", "moves the contour"},
-                                          {"Tab, then Up, Down", "chooses a handle, moves it by 0.02 mm; Enter keeps it"},
-                                          {"Shift and drag", "draws a new contour around the vessel"},
-                                          {"D", "draws a new contour by keys, from the handle"},
-                                          {"+ and -", N_("makes the section 2 % larger, smaller")},
-                                          {"Delete", "deletes the section"},
-                                          {"E, O", "extent and shape of the smoothing"},
-                                          {N_(", and ."), "weaker, stronger; A applies it"},
-                                          {"J, K", "narrower, wider blend at the fork"},
-                                          {"B", "draws a new branch from the point clicked, or the handle"},
-                                          {"while drawing: arrows", "move the pen (Shift: ten times)"},
-                                          {"Page Up, Page Down", "move the pen of a branch to and from the viewer"},
-                                          {"Space, Backspace", "adds a point, takes it back"},
-                                          {"Enter, Esc", "ends, drops what is drawn"},
-                                          {N_("+ and -"), "wider, narrower branch"},
-                                          {N_("Ctrl and arrows, + and -"), "turns, zooms the surface"},
-                                          {"X", "cuts the branch here"},
-                                          {"T", "turns the flow of the nearer end"},
-                                          {"Ctrl+Z, Ctrl+Y", "undoes, does again"},
-                                          {"Ctrl+S", "saves"},
-                                          {"F, Home", "looks at the place, at everything"},
-                                          {"Esc", "leaves"}};
+static const char *const mouse_help[][2] = {{"click on the wall", "goes there"},
+                                            {"left, right drag, wheel", "turns, moves, zooms the surface"},
+                                            {"wheel on the section", "next station (with Ctrl: zooms)"},
+                                            {"drag a handle", "moves the contour"},
+                                            {"Shift and drag", "draws a new contour around the vessel"}};
+
+// A button with its key.
+static bool key_button(Gui *gui, const char *id, const char *label, EditKey key, float width, bool is_on)
+{
+    char text[KEY_BINDING_TEXT];
+    return gui_button(gui, id, label, key_sheet_text(SHEET_EDIT, (int)key, text, sizeof text), width, is_on).pressed;
+}
 
 static void row(Gui *gui, const char *label, const char *format, ...) __attribute__((format(printf, 3, 4)));
 static void row(Gui *gui, const char *label, const char *format, ...)
@@ -74,10 +59,10 @@ static void show_smoothing(Gui *gui, EditState *s)
     static const char *const extents[] = {"section", "", "branch", "tree"};
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2), third = floorf((gui_width(gui) - 2 * gap) / 3);
     heading(gui, "SMOOTH TOWARDS");
-    if (gui_button(gui, "circle", "Circle", "O", half, s->shape == SMOOTH_CIRCLE).pressed)
+    if (key_button(gui, "circle", "Circle", EDIT_KEY_SHAPE, half, s->shape == SMOOTH_CIRCLE))
         s->shape = SMOOTH_CIRCLE;
     gui_beside(gui, gap);
-    if (gui_button(gui, "ellipse", "Ellipse", "O", half, s->shape == SMOOTH_ELLIPSE).pressed)
+    if (key_button(gui, "ellipse", "Ellipse", EDIT_KEY_SHAPE, half, s->shape == SMOOTH_ELLIPSE))
         s->shape = SMOOTH_ELLIPSE;
     for (int i = 0; i < 4; i++) {
         if (i == SMOOTH_RANGE)
@@ -89,13 +74,14 @@ static void show_smoothing(Gui *gui, EditState *s)
     }
     if (gui_slider(gui, "strength", &s->strength, 0, 1, "strength %.2f", 0))
         edit_state_smooth(s, false);
-    if (gui_button(gui, "smooth", "Smooth", "A", 0, false).pressed)
+    if (key_button(gui, "smooth", "Smooth", EDIT_KEY_SMOOTH, 0, false))
         edit_state_smooth(s, true);
 }
 
 static void show_fork(Gui *gui, EditState *s)
 {
-    heading(gui, "BLEND AT THE FORK (J, K)");
+    char text[80];
+    heading(gui, key_sheet_fill(SHEET_EDIT, tr("BLEND AT THE FORK ({blend_narrower}, {blend_wider})"), text, sizeof text));
     if (sweep_editor_model(s->editor)->branch[s->branch].parent < 0)
         gui_text(gui, GUI_NORMAL, gui_colors.dim, "this branch is the root");
     else if (gui_slider(gui, "blend", &s->blend, 0, 2, "%.2f radii", 0))
@@ -106,21 +92,24 @@ static void show_branches(Gui *gui, EditState *s)
 {
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
     heading(gui, "BRANCHES");
-    if (gui_button(gui, "draw", s->draws_branch ? "End the branch" : "Draw one", s->draws_branch ? "Enter" : "B", half, s->draws_branch).pressed) {
+    char end[KEY_BINDING_TEXT];
+    key_sheet_text(SHEET_PEN, PEN_KEY_END, end, sizeof end);
+    if (s->draws_branch ? gui_button(gui, "draw", "End the branch", end, half, true).pressed
+                        : key_button(gui, "draw", "Draw one", EDIT_KEY_DRAW, half, false)) {
         if (s->draws_branch)
             edit_state_draw_end(s, true);
         else
             edit_state_draw_begin(s);
     }
     gui_beside(gui, gap);
-    if (gui_button(gui, "cut", "Cut here", "X", half, false).pressed)
+    if (key_button(gui, "cut", "Cut here", EDIT_KEY_CUT, half, false))
         edit_state_cut(s);
     if (s->draws_branch)
         gui_slider(gui, "radius", &s->drawn_radius, 0.1f, 5, "radius %.2f mm", 0);
-    if (gui_button(gui, "delete", "Delete section", "Del", half, false).pressed)
+    if (key_button(gui, "delete", "Delete section", EDIT_KEY_DELETE, half, false))
         edit_state_delete(s);
     gui_beside(gui, gap);
-    if (gui_button(gui, "flip", "Flip the flow", "T", half, false).pressed)
+    if (key_button(gui, "flip", "Flip the flow", EDIT_KEY_FLIP, half, false))
         edit_state_flip(s);
 }
 
@@ -154,14 +143,16 @@ EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_
     snprintf(title, sizeof title, is_of_case ? tr("EDITS: %d") : edits == s->saved_count ? tr("EDITS: %d, saved") : tr("EDITS: %d, not saved"), edits);
     heading(gui, title);
     float third = floorf((gui_width(gui) - 2 * gap) / 3);
-    actions.undo = gui_button(gui, "undo", "Undo", "^Z", third, false).pressed;
+    actions.undo = key_button(gui, "undo", "Undo", EDIT_KEY_UNDO, third, false);
     gui_beside(gui, gap);
-    actions.redo = gui_button(gui, "redo", "Redo", "^Y", third, false).pressed;
+    actions.redo = key_button(gui, "redo", "Redo", EDIT_KEY_REDO, third, false);
     gui_beside(gui, gap);
-    actions.save = gui_button(gui, "save", is_of_case ? "Done" : "Save", "^S", third, false).pressed;
-    actions.help = gui_button(gui, "help", "All keys", "H", 0, shows_help).pressed;
+    actions.save = key_button(gui, "save", is_of_case ? "Done" : "Save", EDIT_KEY_SAVE, third, false);
+    actions.help = key_button(gui, "help", "All keys", EDIT_KEY_HELP, 0, shows_help);
     gui_space(gui, floorf(2 * k));
-    gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, s->message);
+    char message[800], pen[800];
+    key_sheet_fill(SHEET_PEN, s->message, pen, sizeof pen);
+    gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, key_sheet_fill(SHEET_EDIT, pen, message, sizeof message));
     gui_window_end(gui);
     show_edits(gui, s, (GuiRect){at.x, at.y + at.height - list_height, at.width, list_height});
     return actions;
@@ -169,12 +160,6 @@ EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_
 
 void edit_panel_help(Gui *gui, const WindowInput *input)
 {
-    enum { ROWS = sizeof key_help / sizeof key_help[0] };
-    float k = gui_scale(gui), width = floorf(520 * k), height = floorf((gui_line_height(gui, GUI_NORMAL) + 3 * k) * ROWS + 50 * k);
-    GuiRect at = {floorf(((float)input->width - width) / 2), floorf(((float)input->height - height) / 2), width, height};
-    gui_window_begin(gui, "keys", at, GUI_ON_TOP | GUI_FRAMED);
-    gui_text(gui, GUI_LARGE, gui_colors.text, "Keys and mouse");
-    for (int i = 0; i < ROWS; i++)
-        gui_row(gui, GUI_NORMAL, key_help[i][0], gui_colors.text, key_help[i][1]);
-    gui_window_end(gui);
+    static const KeySheet sheet[] = {SHEET_EDIT, SHEET_PEN};
+    key_list_draw(gui, input, sizeof mouse_help / sizeof *mouse_help, mouse_help, 2, sheet);
 }

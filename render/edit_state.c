@@ -73,7 +73,7 @@ bool edit_state_begin(EditState *s, SweepEditor *editor)
     if (s->mesh)
         edit_state_go(s, 0, 0.5 * curve(s, 0)->length);
     edit_state_step(s, 1);
-    edit_state_say(s, false, "click on the wall, or move along the branch with the wheel or Page Up and Page Down");
+    edit_state_say(s, false, "click on the wall, or move along the branch with the wheel or {station_next} and {station_before}");
     return s->mesh != NULL;
 }
 
@@ -219,7 +219,7 @@ void edit_state_drag(EditState *s, Vec3 nb)
     s->is_moved = true;
     show_contour(s, false);
     if (s->looks)
-        edit_state_say(s, false, "Enter keeps the contour, Esc drops it");
+        edit_state_say(s, false, "{keep} keeps the contour, {leave} drops it");
 }
 
 void edit_state_scale(EditState *s, double factor)
@@ -278,7 +278,7 @@ void edit_state_contour_begin(EditState *s)
     s->draws_contour = true;
     s->draws_branch = false;
     s->pen = s->contour[s->handle * (EDIT_CONTOUR / EDIT_HANDLES)];
-    edit_state_say(s, false, "arrows move the pen, Space adds a point, Backspace takes it back; Enter closes the contour, Esc drops it");
+    edit_state_say(s, false, "{left} {right} {up} {down} move the pen, {add} adds a point, {back} takes it back; {end} closes the contour, {drop} drops it");
 }
 
 bool edit_state_draws(const EditState *s) { return s->draws_contour || s->draws_branch; }
@@ -333,7 +333,7 @@ void edit_state_smooth(EditState *s, bool is_kept)
                       .amount = floor((double)s->strength * 100 + 0.5) / 100};
     apply(s, &edit, is_kept);
     if (s->looks)
-        edit_state_say(s, false, "A keeps the smoothed wall, Esc drops it");
+        edit_state_say(s, false, "{smooth} keeps the smoothed wall, {leave} drops it");
     if (!is_kept)
         take_points(s);
 }
@@ -366,8 +366,9 @@ void edit_state_draw_begin(EditState *s)
     s->draws_contour = false;
     s->stroke_count = s->drawn_count = 0;
     edit_state_draw_add(s, s->wall);
-    edit_state_say(s, false,
-                   "click points of the new branch, or arrows and Page Up and Page Down move the pen and Space adds a point; Enter ends it, Esc drops it");
+    edit_state_say(
+        s, false,
+        "click points of the new branch, or {left} {right} {up} {down} {nearer} {farther} move the pen and {add} adds a point; {end} ends it, {drop} drops it");
 }
 
 void edit_state_draw_add(EditState *s, Vec3 x)

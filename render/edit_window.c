@@ -49,7 +49,7 @@ static void do_what_is_wanted(EditWindow *w)
     if (wants.leave && (is_saved || wants.leave_again))
         w->ends = true;
     else if (wants.leave)
-        edit_state_say(s, true, "there are edits that are not saved: Ctrl+S saves them, Esc once more leaves without");
+        edit_state_say(s, true, "there are edits that are not saved: {save} saves them, {leave} once more leaves without");
 }
 
 static bool take_picture(const EditWindow *w, const WindowInput *input, Faults *faults)

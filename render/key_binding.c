@@ -54,7 +54,8 @@ static const char *key_name(int key, char *text, size_t capacity)
 const char *key_binding_text(KeyBinding binding, char *text, size_t capacity)
 {
     char one[16];
-    const char *key = key_name(binding.key, one, sizeof one), *alt = binding.modifiers & WINDOW_ALT ? "Alt+" : "";
+    static const char *const held[] = {"", "Ctrl+", "Alt+", "Ctrl+Alt+"};
+    const char *key = key_name(binding.key, one, sizeof one), *alt = held[(binding.modifiers & WINDOW_CTRL ? 1 : 0) + (binding.modifiers & WINDOW_ALT ? 2 : 0)];
     if (is_keypad_sign(binding))
         snprintf(text, capacity, "%s%c", alt, binding.character);
     else if (binding.character)
@@ -85,8 +86,12 @@ bool key_binding_parse(const char *text, KeyBinding *binding)
 {
     KeyBinding read = {0};
     char name[KEY_BINDING_TEXT];
+    if (!strncasecmp(text, "Ctrl+", 5) && text[5]) {
+        read.modifiers = WINDOW_CTRL;
+        text += 5;
+    }
     if (!strncasecmp(text, "Alt+", 4) && text[4]) {
-        read.modifiers = WINDOW_ALT;
+        read.modifiers |= WINDOW_ALT;
         text += 4;
     }
     size_t length = strlen(text);
@@ -108,8 +113,43 @@ bool key_binding_parse(const char *text, KeyBinding *binding)
     return read.key != 0;
 }
 
-bool key_binding_clash(KeyBinding a, KeyBinding b)
+// The sign that is typed; with Ctrl none is.
+static unsigned typed(KeyBinding b) { return b.modifiers & WINDOW_CTRL ? 0 : (unsigned)b.character; }
+
+// With Ctrl: the sign's place on a US keyboard.
+static int placed(KeyBinding b) { return !(b.modifiers & WINDOW_CTRL) ? 0 : b.character == '+' ? '=' : b.character; }
+
+static bool means_too(KeyBinding a, KeyBinding b)
 {
-    return (a.key == b.key && a.modifiers == b.modifiers) || (a.character && a.character == b.character) ||
-           (a.character && a.character == b.key && !b.modifiers) || (b.character && b.character == a.key && !a.modifiers);
+    return (typed(a) && (typed(a) == typed(b) || ((int)typed(a) == b.key && !b.modifiers))) || (placed(a) && placed(a) == b.key && a.modifiers == b.modifiers);
+}
+
+bool key_binding_clash(KeyBinding a, KeyBinding b) { return (a.key == b.key && a.modifiers == b.modifiers) || means_too(a, b) || means_too(b, a); }
+
+bool key_binding_is_pressed(KeyBinding binding, const WindowEvent *event)
+{
+    if (event->kind == WINDOW_TEXT_EVENT)
+        return typed(binding) && event->character == typed(binding);
+    return event->kind == WINDOW_KEY_DOWN_EVENT && !(event->modifiers & WINDOW_SUPER) && (event->modifiers & (WINDOW_ALT | WINDOW_CTRL)) == binding.modifiers &&
+           (event->key == binding.key || event->key == placed(binding));
+}
+
+char *key_binding_fill(const char *(*key_of_name)(int table, const char *name, size_t length, char *text, size_t capacity), int table, const char *from,
+                       char *text, size_t capacity)
+{
+    size_t used = 0;
+    while (*from && used + 1 < capacity) {
+        char one[KEY_BINDING_TEXT];
+        const size_t length = *from == '{' ? strcspn(from + 1, "}") : 0;
+        const char *key = length > 0 && from[1 + length] ? key_of_name(table, from + 1, length, one, sizeof one) : NULL;
+        if (!key) {
+            text[used++] = *from++;
+            continue;
+        }
+        int more = snprintf(text + used, capacity - used, "%s", key);
+        used = used + (size_t)more < capacity ? used + (size_t)more : capacity - 1;
+        from += length + 2;
+    }
+    text[used] = 0;
+    return text;
 }

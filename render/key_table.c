@@ -116,32 +116,16 @@ void key_table_bind(const KeyBinding *binding)
 
 const char *key_table_text(ActionId id, char *text, size_t capacity) { return key_binding_text(key_table_binding(id), text, capacity); }
 
-static const KeyAction *action_named(const char *name, size_t length)
+static const char *key_of_name(int table, const char *name, size_t length, char *text, size_t capacity)
 {
+    (void)table;
     for (int i = 0; i < ACTION_COUNT; i++)
         if (strlen(key_table[i].name) == length && !strncmp(key_table[i].name, name, length))
-            return &key_table[i];
+            return key_table_text((ActionId)i, text, capacity);
     return NULL;
 }
 
-char *key_table_fill(const char *from, char *text, size_t capacity)
-{
-    size_t used = 0;
-    while (*from && used + 1 < capacity) {
-        char key[KEY_BINDING_TEXT];
-        const size_t length = *from == '{' ? strcspn(from + 1, "}") : 0;
-        const KeyAction *action = length > 0 && from[1 + length] ? action_named(from + 1, length) : NULL;
-        if (!action) {
-            text[used++] = *from++;
-            continue;
-        }
-        int more = snprintf(text + used, capacity - used, "%s", key_table_text(action->id, key, sizeof key));
-        used = used + (size_t)more < capacity ? used + (size_t)more : capacity - 1;
-        from += length + 2;
-    }
-    text[used] = 0;
-    return text;
-}
+char *key_table_fill(const char *from, char *text, size_t capacity) { return key_binding_fill(key_of_name, 0, from, text, capacity); }
 
 // Related keys share a line in the list.
 static const struct {

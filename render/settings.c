@@ -90,22 +90,44 @@ static const char *const action_name[ACTION_COUNT + 1] = {
     [ACTION_QUIT] = "quit",
 };
 
+const char *settings_action_name(ActionId id) { return action_name[id] ? action_name[id] : ""; }
+
+// --- sets of keys ---
+
+int settings_key_count(int set) { return set == 0 ? ACTION_COUNT : key_sheet_count((KeySheet)(set - 1)); }
+
+KeyBinding *settings_key(Settings *settings, int set, int key) { return set == 0 ? &settings->key[key] : &settings->sheet_key[set - 1][key]; }
+
+KeyBinding settings_key_default(int set, int key) { return set == 0 ? key_table_default((ActionId)key) : key_sheet_row((KeySheet)(set - 1), key)->key; }
+
+static const char *section_of(int set) { return set == 0 ? "keys" : key_sheet_section((KeySheet)(set - 1)); }
+
+static const char *name_of(int set, int key) { return set == 0 ? action_name[key] : key_sheet_row((KeySheet)(set - 1), key)->name; }
+
 Settings settings_default(void)
 {
     Settings settings = {.speed = {.insertion = 1, .rotation = 1, .c_arm = 1}, .interface_scale = 1};
-    for (int i = 0; i < ACTION_COUNT; i++)
-        settings.key[i] = key_table_default((ActionId)i);
+    for (int set = 0; set < KEY_SETS; set++)
+        for (int i = 0; i < settings_key_count(set); i++)
+            *settings_key(&settings, set, i) = settings_key_default(set, i);
     return settings;
 }
 
-const char *settings_action_name(ActionId id) { return action_name[id] ? action_name[id] : ""; }
-
-int settings_clash(const Settings *settings, ActionId id)
+int settings_clash(const Settings *settings, int set, int key)
 {
-    for (int i = 0; i < ACTION_COUNT; i++)
-        if (i != (int)id && key_binding_clash(settings->key[i], settings->key[id]))
+    const KeyBinding *row = set == 0 ? settings->key : settings->sheet_key[set - 1];
+    for (int i = 0; i < settings_key_count(set); i++)
+        if (i != key && key_binding_clash(row[i], row[key]))
             return i;
     return -1;
+}
+
+const char *settings_key_refused(int set, KeyBinding binding)
+{
+    if (set == 0)
+        return binding.modifiers & WINDOW_CTRL ? "Ctrl makes the tool slower in the trainer and is no part of a key there; Alt may be" : NULL;
+    const bool is_held = binding.key == WINDOW_KEY_SHIFT || binding.key == WINDOW_KEY_CTRL || binding.key == WINDOW_KEY_ALT;
+    return is_held ? "Shift, Ctrl and Alt are held together with other keys in this window; they are no keys of their own" : NULL;
 }
 
 // --- reading ---
@@ -131,32 +153,44 @@ static void read_speeds(const YamlMap *map, SpeedSettings *speed)
     read_flag(&inverted, "c_arm_tilt", &speed->tilt_inverted);
 }
 
-// Keys are read together, so that two actions can exchange theirs. Where two share one afterwards, those from the file get their defaults back, and so on until
-// none do: the defaults differ from each other.
-static void read_keys(YamlValue value, Settings *settings)
+// Keys of a set are read together, so that two actions can exchange theirs. Where two share one afterwards, those from the file get their defaults back, and so on
+// until none do: the defaults differ from each other.
+static void read_keys(YamlValue value, int set, Settings *settings)
 {
-    YamlMap map = yaml_map(value, action_name);
-    bool is_own[ACTION_COUNT] = {false};
-    for (int i = 0; map.value.node && i < ACTION_COUNT; i++) {
+    enum { MOST = (int)ACTION_COUNT > (int)SHEET_KEYS ? (int)ACTION_COUNT : (int)SHEET_KEYS };
+    const char *name[MOST + 1] = {NULL};
+    bool is_own[MOST] = {false};
+    const int count = settings_key_count(set);
+    for (int i = 0; i < count; i++)
+        name[i] = name_of(set, i);
+    YamlMap map = yaml_map(value, name);
+    for (int i = 0; map.value.node && i < count; i++) {
         const char *text;
-        YamlValue key = yaml_get(&map, action_name[i], false);
+        KeyBinding read;
+        YamlValue key = yaml_get(&map, name[i], false);
         if (!key.node || !yaml_text(key, &text))
             continue;
-        is_own[i] = key_binding_parse(text, &settings->key[i]);
-        if (!is_own[i])
-            yaml_fault(key, "there is no key '%.40s'; valid are letters, digits and signs, Up, Page down, Keypad +, F1 and the like, with Alt+ before them",
-                       text);
+        const bool is_key = key_binding_parse(text, &read);
+        const char *refused = is_key ? settings_key_refused(set, read) : NULL;
+        is_own[i] = is_key && !refused;
+        if (is_own[i])
+            *settings_key(settings, set, i) = read;
+        else if (refused)
+            yaml_fault(key, "'%.40s' cannot be the key of %s: %s", text, name[i], refused);
+        else
+            yaml_fault(key, "there is no key '%.40s'; valid are letters, digits and signs, Up, Page down, Keypad +, F1 and the like, with Alt+%s before them",
+                       text, set == 0 ? "" : " or Ctrl+");
     }
     for (bool changes = true; changes;) {
         changes = false;
-        for (int i = 0; i < ACTION_COUNT; i++) {
-            int other = is_own[i] ? settings_clash(settings, (ActionId)i) : -1;
+        for (int i = 0; i < count; i++) {
+            int other = is_own[i] ? settings_clash(settings, set, i) : -1;
             if (other < 0)
                 continue;
             char text[KEY_BINDING_TEXT];
-            yaml_fault(yaml_get(&map, action_name[i], false), "%s is also the key of %s", key_binding_text(settings->key[i], text, sizeof text),
-                       action_name[other]);
-            settings->key[i] = key_table_default((ActionId)i);
+            yaml_fault(yaml_get(&map, name[i], false), "%s is also the key of %s", key_binding_text(*settings_key(settings, set, i), text, sizeof text),
+                       name[other]);
+            *settings_key(settings, set, i) = settings_key_default(set, i);
             is_own[i] = false;
             changes = true;
         }
@@ -165,7 +199,8 @@ static void read_keys(YamlValue value, Settings *settings)
 
 bool settings_parse(const char *text, size_t length, const char *file, Settings *settings, Faults *faults)
 {
-    static const char *const keys[] = {"seldinger_settings", "speed", "inverted", "interface_scale", "keys", NULL};
+    static const char *const keys[] = {"seldinger_settings", "speed",     "inverted", "interface_scale", "keys",
+                                       "case_keys",          "edit_keys", "pen_keys", "start_keys",      NULL};
     int version, before = faults->count;
     *settings = settings_default();
     YamlReader *reader = yaml_reader_open(text, length, file, faults);
@@ -175,7 +210,8 @@ bool settings_parse(const char *text, size_t length, const char *file, Settings 
     if (map.value.node && yaml_integer(yaml_get(&map, "seldinger_settings", true), 1, 1, &version)) {
         read_speeds(&map, &settings->speed);
         yaml_map_number(&map, "interface_scale", false, (NumberRange){settings_scale_least, settings_scale_most, false}, &settings->interface_scale);
-        read_keys(yaml_get(&map, "keys", false), settings);
+        for (int set = 0; set < KEY_SETS; set++)
+            read_keys(yaml_get(&map, section_of(set), false), set, settings);
     }
     yaml_reader_close(reader);
     return faults->count == before;
@@ -194,6 +230,25 @@ static void print_quoted(FILE *out, const char *text)
 
 static const char *boolean(bool is_on) { return is_on ? "true" : "false"; }
 
+// Those that differ from the defaults.
+static void print_keys(FILE *out, const Settings *settings, int set)
+{
+    const KeyBinding *row = set == 0 ? settings->key : settings->sheet_key[set - 1];
+    bool has_keys = false;
+    for (int i = 0; i < settings_key_count(set); i++) {
+        char now[KEY_BINDING_TEXT], usual[KEY_BINDING_TEXT];
+        key_binding_text(row[i], now, sizeof now);
+        if (!strcmp(now, key_binding_text(settings_key_default(set, i), usual, sizeof usual)))
+            continue;
+        if (!has_keys)
+            fprintf(out, "%s:\n", section_of(set));
+        fprintf(out, "  %s: ", name_of(set, i));
+        print_quoted(out, now);
+        fputc('\n', out);
+        has_keys = true;
+    }
+}
+
 char *settings_text(const Settings *settings)
 {
     char *text = NULL;
@@ -208,17 +263,8 @@ char *settings_text(const Settings *settings)
             "inverted: {insertion: %s, rotation: %s, c_arm_sideways: %s, c_arm_tilt: %s}\ninterface_scale: %.6g\n",
             speed->insertion, speed->rotation, speed->c_arm, boolean(speed->insertion_inverted), boolean(speed->rotation_inverted),
             boolean(speed->sideways_inverted), boolean(speed->tilt_inverted), settings->interface_scale);
-    bool has_keys = false;
-    for (int i = 0; i < ACTION_COUNT; i++) {
-        char now[KEY_BINDING_TEXT], usual[KEY_BINDING_TEXT];
-        key_binding_text(settings->key[i], now, sizeof now);
-        if (!strcmp(now, key_binding_text(key_table_default((ActionId)i), usual, sizeof usual)))
-            continue;
-        fprintf(out, "%s  %s: ", has_keys ? "" : "keys:\n", action_name[i]);
-        print_quoted(out, now);
-        fputc('\n', out);
-        has_keys = true;
-    }
+    for (int set = 0; set < KEY_SETS; set++)
+        print_keys(out, settings, set);
     bool good = !ferror(out);
     if (fclose(out) == 0 && good)
         return text;

@@ -4,13 +4,15 @@
 //   speed: {insertion: 1, rotation: 1, c_arm: 1}      # 0.1 to 5: times the usual speed, of keys and of devices with a built-in map
 //   inverted: {insertion: false, rotation: false, c_arm_sideways: false, c_arm_tilt: false}
 //   interface_scale: 1                                # 0.5 to 3
-//   keys: {push: Up, table_up: Alt+I, help: F1 or ?}  # those that differ from the defaults; two actions cannot share a key
+//   keys: {push: Up, table_up: Alt+I, help: F1 or ?}  # of the trainer, those that differ from the defaults; two actions cannot share a key
+//   case_keys: {wall: V, undo: Ctrl+U}                # of the other windows: also edit_keys, pen_keys (edit, while drawing), start_keys
 //
 // A missing file or key means the default. No window, no GL.
 #ifndef SELDINGER_RENDER_SETTINGS_H
 #define SELDINGER_RENDER_SETTINGS_H
 
 #include "base/base.h"
+#include "render/key_sheet.h"
 #include "render/key_table.h"
 
 typedef struct SpeedSettings {
@@ -19,7 +21,8 @@ typedef struct SpeedSettings {
 } SpeedSettings;
 
 typedef struct Settings {
-    KeyBinding key[ACTION_COUNT];
+    KeyBinding key[ACTION_COUNT];            // of the trainer
+    KeyBinding sheet_key[KEY_SHEETS][SHEET_KEYS];
     SpeedSettings speed;
     double interface_scale;                  // 0.5 to 3, default 1
 } Settings;
@@ -29,8 +32,16 @@ extern const double settings_speed_least, settings_speed_most, settings_scale_le
 Settings settings_default(void);
 // The name of an action in the file, "table_up".
 const char *settings_action_name(ActionId id);
-// Another action whose key is, or is part of, the key of `id`; -1: none.
-int settings_clash(const Settings *settings, ActionId id);
+
+// The sets of keys: no two keys of a set are the same. Set 0 is the trainer's, of ActionId; the others are the sheets, 1 + KeySheet.
+enum { KEY_SETS = 1 + KEY_SHEETS };
+int settings_key_count(int set);
+KeyBinding *settings_key(Settings *settings, int set, int key);
+KeyBinding settings_key_default(int set, int key);
+// Another key of the set that is, or is part of, this one; -1: none.
+int settings_clash(const Settings *settings, int set, int key);
+// Why no action of the set can have this key; NULL: it can.
+const char *settings_key_refused(int set, KeyBinding binding);
 
 // Reads a text. With faults, *settings has the default for each key that is wrong; false is then returned.
 bool settings_parse(const char *text, size_t length, const char *file, Settings *settings, Faults *faults);

@@ -9,6 +9,7 @@ void settings_put_in_force(const Settings *settings)
 {
     const SpeedSettings *speed = &settings->speed;
     key_table_bind(settings->key);
+    key_sheet_bind(settings->sheet_key);
     window_scale_letters(settings->interface_scale);
     controls_use_speeds(&(OperatorSpeeds){signed_factor(speed->insertion, speed->insertion_inverted), signed_factor(speed->rotation, speed->rotation_inverted),
                                           signed_factor(speed->c_arm, speed->sideways_inverted), signed_factor(speed->c_arm, speed->tilt_inverted)});

@@ -117,7 +117,9 @@ const char *devices_page_about(const DevicesPage *page, int row)
         return tr("A serial encoder needs a map of its own: scenes/devices/serial_encoder.yaml is an example, for nav --device.");
     if (kind == ROW_JOYSTICK)
         return tr("A built-in map drives the tool: forward pushes, right turns clockwise. Other axes need a map: scenes/devices/gamepad.yaml is an example.");
-    return kind == ROW_HID ? tr("Move a control to see its values. P and T assign the axes that push and turn: press the key, then move the axis.") : "";
+    return kind == ROW_HID
+               ? tr("Move a control to see its values. {learn_push} and {learn_turn} assign the axes that push and turn: press the key, then move the axis.")
+               : "";
 }
 
 static void save_learned(DevicesPage *page, const LearnedAxis *found)

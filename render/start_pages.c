@@ -12,11 +12,13 @@
 
 enum { LEVELS = 5 };             // of exercises
 static const char *const page_name[PAGES] = {N_("Cases"), N_("My sessions"), N_("Open a file"), N_("Devices"), N_("Settings")};
-static const char *const page_hint[PAGES] = {N_("Up, Down: choose   Enter: steer   Tab: next page   N: name   X: examination   Esc: leave"),
-                                             N_("Up, Down: choose   Enter: replay   R: report   Tab: next page   Esc: leave"),
-                                             N_("Up, Down: choose   Enter: open   Backspace: folder above   Tab: next page   Esc: leave"),
-                                             N_("Up, Down: choose   P: learn the push   T: learn the turn   U: look again   Tab: next page   Esc: leave"),
-                                             N_("Up, Down: choose   Left, Right: change   Enter: change, or a new key   Tab: next page   Esc: leave")};
+static const char *const page_hint[PAGES] = {
+    N_("{up}, {down}: choose   {open}: steer   {next_page}: next page   {name}: name   {examination}: examination   {leave}: leave"),
+    N_("{up}, {down}: choose   {open}: replay   {report}: report   {next_page}: next page   {leave}: leave"),
+    N_("{up}, {down}: choose   {open}: open   {folder_above}: folder above   {next_page}: next page   {leave}: leave"),
+    N_("{up}, {down}: choose   {learn_push}: learn the push   {learn_turn}: learn the turn   {look_again}: look again   {next_page}: next page   {leave}: "
+       "leave"),
+    N_("{up}, {down}: choose   {less}, {more}: change   {open}: change, or a new key   {next_page}: next page   {leave}: leave")};
 
 // --- files ---
 
@@ -155,58 +157,66 @@ static void move(StartWindow *w, int by)
     w->has_moved = true;
 }
 
-static void press_on_devices(StartWindow *w, int key)
+static void press_on_devices(StartWindow *w, StartKey key)
 {
     if (!w->devices)
         return;
-    if (key == 'U')
+    if (key == START_KEY_LOOK_AGAIN)
         look_at_devices(w);
-    else if (key == 'P' || key == 'T')
-        devices_page_learn(w->devices, w->state->row, key == 'T');
+    else if (key == START_KEY_LEARN_PUSH || key == START_KEY_LEARN_TURN)
+        devices_page_learn(w->devices, w->state->row, key == START_KEY_LEARN_TURN);
 }
 
 // Keys with a meaning on one page.
-static void press_on_page(StartWindow *w, const WindowEvent *event)
+static void press_on_page(StartWindow *w, StartKey key)
 {
-    const bool is_arrow = event->key == WINDOW_KEY_LEFT || event->key == WINDOW_KEY_RIGHT;
-    if (w->state->page == PAGE_FILES && event->key == WINDOW_KEY_BACKSPACE)
+    if (w->state->page == PAGE_FILES && key == START_KEY_FOLDER_ABOVE)
         go_up(w);
-    else if (w->state->page == PAGE_SESSIONS && event->key == 'R' && w->state->row < row_count(w))
+    else if (w->state->page == PAGE_SESSIONS && key == START_KEY_REPORT && w->state->row < row_count(w))
         start_choose(w, START_REPORT, w->options->shelf->session[w->state->row].path);
     else if (w->state->page == PAGE_DEVICES)
-        press_on_devices(w, event->key);
-    else if (w->state->page == PAGE_SETTINGS && is_arrow)
-        settings_page_step(&w->settings, w->state->row, event->key == WINDOW_KEY_RIGHT ? 1 : -1);
+        press_on_devices(w, key);
+    else if (w->state->page == PAGE_SETTINGS && (key == START_KEY_LESS || key == START_KEY_MORE))
+        settings_page_step(&w->settings, w->state->row, key == START_KEY_MORE ? 1 : -1);
 }
 
 void start_press(StartWindow *w, const WindowEvent *event)
 {
     if (w->state->page == PAGE_SETTINGS && settings_page_take(&w->settings, event))
         return;
-    if (w->state->page == PAGE_DEVICES && event->key == WINDOW_KEY_ESCAPE && devices_page_is_learning(w->devices)) {
+    const int key = key_sheet_pressed(SHEET_START, event, NULL);
+    if (w->state->page == PAGE_DEVICES && key == START_KEY_LEAVE && devices_page_is_learning(w->devices)) {
         devices_page_stop_learning(w->devices);
         return;
     }
-    switch (event->key) {
-    case WINDOW_KEY_UP: move(w, -1); break;
-    case WINDOW_KEY_DOWN: move(w, 1); break;
-    case WINDOW_KEY_PAGE_UP: move(w, -10); break;
-    case WINDOW_KEY_PAGE_DOWN: move(w, 10); break;
-    case WINDOW_KEY_HOME: move(w, -row_count(w)); break;
-    case WINDOW_KEY_END: move(w, row_count(w)); break;
-    case WINDOW_KEY_TAB: start_turn_page(w, w->state->page + (event->modifiers & WINDOW_SHIFT ? -1 : 1)); break;
-    case WINDOW_KEY_ENTER:
+    switch (key) {
+    case START_KEY_UP: move(w, -1); break;
+    case START_KEY_DOWN: move(w, 1); break;
+    case START_KEY_PAGE_UP: move(w, -10); break;
+    case START_KEY_PAGE_DOWN: move(w, 10); break;
+    case START_KEY_FIRST: move(w, -row_count(w)); break;
+    case START_KEY_LAST: move(w, row_count(w)); break;
+    case START_KEY_NEXT_PAGE: start_turn_page(w, w->state->page + (event->modifiers & WINDOW_SHIFT ? -1 : 1)); break;
+    case START_KEY_OPEN:
         if (!event->is_repeat)
             open_row(w, w->state->row);
         break;
-    case WINDOW_KEY_ESCAPE: w->ends = true; break;
-    case 'N': w->takes_name = 2; break;
-    case 'X': w->state->is_examination = !w->state->is_examination; break;
-    default: press_on_page(w, event); break;
+    case START_KEY_LEAVE: w->ends = true; break;
+    case START_KEY_NAME: w->takes_name = 2; break;
+    case START_KEY_EXAMINATION: w->state->is_examination = !w->state->is_examination; break;
+    case -1: break;
+    default: press_on_page(w, (StartKey)key); break;
     }
 }
 
 // --- drawing ---
+
+// A button with its key, as wide as its window.
+static bool key_button(Gui *gui, const char *id, const char *label, StartKey key, bool is_on)
+{
+    char text[KEY_BINDING_TEXT];
+    return gui_button(gui, id, label, key_sheet_text(SHEET_START, (int)key, text, sizeof text), 0, is_on).pressed;
+}
 
 // Small pictures that have been drawn meanwhile.
 static void load_pictures(StartWindow *w)
@@ -288,7 +298,7 @@ static void draw_list(StartWindow *w, GuiRect at)
                                              N_("No device is connected. The keyboard steers."), ""};
     Gui *gui = w->gui;
     gui_window_begin(gui, "list", at, 0);
-    if (w->state->page == PAGE_FILES && gui_button(gui, "up", w->state->folder, "Backspace", 0, false).pressed)
+    if (w->state->page == PAGE_FILES && key_button(gui, "up", w->state->folder, START_KEY_FOLDER_ABOVE, false))
         go_up(w);
     if (row_count(w) == 0)
         gui_text_wrapped(gui, GUI_NORMAL, gui_colors.dim, empty[w->state->page]);
@@ -315,22 +325,22 @@ static void draw_row_buttons(StartWindow *w)
     const int row = w->state->row;
     if (w->state->page == PAGE_SESSIONS && row < row_count(w)) {
         const ShelfSession *session = &w->options->shelf->session[row];
-        if (gui_button(gui, "replay", "Replay", "Enter", 0, false).pressed)
+        if (key_button(gui, "replay", "Replay", START_KEY_OPEN, false))
             start_choose(w, START_REPLAY, session->recording);
-        if (gui_button(gui, "report", "Report", "R", 0, false).pressed)
+        if (key_button(gui, "report", "Report", START_KEY_REPORT, false))
             start_choose(w, START_REPORT, session->path);
     } else if (w->state->page == PAGE_DEVICES && w->devices) {
         const bool can = devices_page_can_learn(w->devices, row);
-        if (can && gui_button(gui, "learn push", "Learn the push", "P", 0, false).pressed)
+        if (can && key_button(gui, "learn push", "Learn the push", START_KEY_LEARN_PUSH, false))
             devices_page_learn(w->devices, row, false);
-        if (can && gui_button(gui, "learn turn", "Learn the turn", "T", 0, false).pressed)
+        if (can && key_button(gui, "learn turn", "Learn the turn", START_KEY_LEARN_TURN, false))
             devices_page_learn(w->devices, row, true);
-        if (gui_button(gui, "look", "Look again", "U", 0, false).pressed)
+        if (key_button(gui, "look", "Look again", START_KEY_LOOK_AGAIN, false))
             look_at_devices(w);
     } else if (w->state->page == PAGE_SETTINGS && settings_page_has_steps(row)) {
-        if (gui_button(gui, "less", "Less", "Left", 0, false).pressed)
+        if (key_button(gui, "less", "Less", START_KEY_LESS, false))
             settings_page_step(&w->settings, row, -1);
-        if (gui_button(gui, "more", "More", "Right", 0, false).pressed)
+        if (key_button(gui, "more", "More", START_KEY_MORE, false))
             settings_page_step(&w->settings, row, 1);
     }
 }
@@ -339,6 +349,7 @@ static void draw_side(StartWindow *w, GuiRect at)
 {
     Gui *gui = w->gui;
     const float gap = floorf(12 * gui_scale(gui));
+    char text[200];
     gui_window_begin(gui, "side", at, 0);
     gui_text(gui, GUI_HUGE, gui_colors.text, "Seldinger");
     gui_text_wrapped(gui, GUI_SMALL, gui_colors.dim,
@@ -348,33 +359,33 @@ static void draw_side(StartWindow *w, GuiRect at)
         if (gui_button(gui, page_name[i], page_name[i], NULL, 0, i == w->state->page).pressed)
             start_turn_page(w, i);
     gui_space(gui, gap);
-    gui_text_wrapped(gui, GUI_SMALL, gui_colors.dim, "Your name, for the report (N; Enter ends)");
+    gui_text_wrapped(gui, GUI_SMALL, gui_colors.dim, key_sheet_fill(SHEET_START, tr("Your name, for the report ({name}; Enter ends)"), text, sizeof text));
     gui_text_field(gui, "trainee", w->state->trainee, sizeof w->state->trainee, w->takes_name > 0);
     w->takes_name -= w->takes_name > 0;
     gui_space(gui, gap);
-    if (gui_button(gui, "examination", "Examination: X-ray alone", "X", 0, w->state->is_examination).pressed)
+    if (key_button(gui, "examination", "Examination: X-ray alone", START_KEY_EXAMINATION, w->state->is_examination))
         w->state->is_examination = !w->state->is_examination;
     gui_space(gui, gap);
     draw_row_buttons(w);
     if (w->options->shelf->broken > 0) {
-        char text[200];
         snprintf(text, sizeof text, tr_n("%d session file cannot be read.", "%d session files cannot be read.", (unsigned long)w->options->shelf->broken),
                  w->options->shelf->broken);
         gui_text_wrapped(gui, GUI_SMALL, gui_colors.warning, text);
     }
-    if (gui_button(gui, "leave", "Leave", "Esc", 0, false).pressed)
+    if (key_button(gui, "leave", "Leave", START_KEY_LEAVE, false))
         w->ends = true;
     gui_window_end(gui);
 }
 
 // What the chosen row is about.
-static const char *about_row(const StartWindow *w)
+static const char *about_row(const StartWindow *w, char *text, size_t capacity)
 {
     if (w->state->page == PAGE_DEVICES && w->devices)
-        return devices_page_about(w->devices, w->state->row);
+        return key_sheet_fill(SHEET_START, devices_page_about(w->devices, w->state->row), text, capacity);
     if (w->state->page == PAGE_SETTINGS)
         return settings_page_about(&w->settings, w->state->row);
-    return w->state->page == PAGE_CASES && w->state->row < row_count(w) ? w->options->shelf->cases[w->state->row].text : "";
+    // texts of exercises name keys of the trainer
+    return w->state->page == PAGE_CASES && w->state->row < row_count(w) ? key_table_fill(tr(w->options->shelf->cases[w->state->row].text), text, capacity) : "";
 }
 
 void start_draw(StartWindow *w, const WindowInput *input, unsigned framebuffer)
@@ -390,9 +401,9 @@ void start_draw(StartWindow *w, const WindowInput *input, unsigned framebuffer)
     draw_side(w, (GuiRect){0, 0, side, height});
     draw_list(w, (GuiRect){side, 0, width - side, height - foot});
     gui_window_begin(w->gui, "foot", (GuiRect){side, height - foot, width - side, foot}, 0);
-    gui_text_wrapped(w->gui, GUI_SMALL, gui_colors.dim, page_hint[w->state->page]);
     char about[1200];
-    gui_text_wrapped(w->gui, GUI_NORMAL, gui_colors.text, w->message[0] ? w->message : key_table_fill(tr(about_row(w)), about, sizeof about));
+    gui_text_wrapped(w->gui, GUI_SMALL, gui_colors.dim, key_sheet_fill(SHEET_START, tr(page_hint[w->state->page]), about, sizeof about));
+    gui_text_wrapped(w->gui, GUI_NORMAL, gui_colors.text, w->message[0] ? w->message : about_row(w, about, sizeof about));
     gui_window_end(w->gui);
     gui_end(w->gui, framebuffer);
 }

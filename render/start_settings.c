@@ -42,15 +42,56 @@ void settings_page_open(SettingsPage *page)
     free(faults);
 }
 
-int settings_page_rows(void) { return VALUE_ROWS + ACTION_COUNT; }
-
-static void describe_key(const SettingsPage *page, ActionId id, const char **heading, char left[300], char right[200])
+// The set of keys and the key that a row is about. False: a row of a value, or no row.
+static bool key_at(int row, int *set, int *key)
 {
-    char key[KEY_BINDING_TEXT];
-    if (id == 0 || key_table[id].group != key_table[id - 1].group)
-        *heading = tr(action_group_name[key_table[id].group]);
-    snprintf(left, 300, "%s", tr(key_table[id].name));
-    snprintf(right, 200, "%s", page->waits_for == (int)id ? tr("press a key") : key_binding_text(page->settings.key[id], key, sizeof key));
+    *key = row - VALUE_ROWS;
+    for (*set = 0; *key >= 0 && *set < KEY_SETS; ++*set) {
+        if (*key < settings_key_count(*set))
+            return true;
+        *key -= settings_key_count(*set);
+    }
+    return false;
+}
+
+int settings_page_rows(void)
+{
+    int rows = VALUE_ROWS;
+    for (int set = 0; set < KEY_SETS; set++)
+        rows += settings_key_count(set);
+    return rows;
+}
+
+int settings_page_row_of(int set, int key)
+{
+    int row = VALUE_ROWS + key;
+    for (int i = 0; i < set; i++)
+        row += settings_key_count(i);
+    return row;
+}
+
+static const char *name_of(int set, int key) { return set == 0 ? key_table[key].name : key_sheet_row((KeySheet)(set - 1), key)->what; }
+
+// Leaves the window.
+static bool is_fixed(int set, int key) { return settings_key_default(set, key).key == WINDOW_KEY_ESCAPE; }
+
+static KeyBinding *awaited(SettingsPage *page, int *set, int *key)
+{
+    return key_at(page->waits_for, set, key) ? settings_key(&page->settings, *set, *key) : NULL;
+}
+
+static void describe_key(const SettingsPage *page, int row, const char **heading, char left[300], char right[200])
+{
+    char text[KEY_BINDING_TEXT];
+    int set, key;
+    key_at(row, &set, &key);
+    if (set > 0 && key == 0)
+        *heading = tr(key_sheet_title((KeySheet)(set - 1)));
+    else if (set == 0 && (key == 0 || key_table[key].group != key_table[key - 1].group))
+        *heading = tr(action_group_name[key_table[key].group]);
+    const KeyBinding now = set == 0 ? page->settings.key[key] : page->settings.sheet_key[set - 1][key];
+    snprintf(left, 300, "%s", tr(name_of(set, key)));
+    snprintf(right, 200, "%s", page->waits_for == row ? tr("press a key") : key_binding_text(now, text, sizeof text));
 }
 
 void settings_page_describe(const SettingsPage *page, int row, const char **heading, char left[300], char right[200])
@@ -58,7 +99,7 @@ void settings_page_describe(const SettingsPage *page, int row, const char **head
     *heading = NULL;
     right[0] = 0;
     if (row >= VALUE_ROWS) {
-        describe_key(page, (ActionId)(row - VALUE_ROWS), heading, left, right);
+        describe_key(page, row, heading, left, right);
         return;
     }
     const char *place = (const char *)&page->settings + value_row[row].place;
@@ -71,7 +112,8 @@ void settings_page_describe(const SettingsPage *page, int row, const char **head
 
 const char *settings_page_about(const SettingsPage *page, int row)
 {
-    return page->message[0] ? page->message : row >= VALUE_ROWS && row < settings_page_rows() ? tr(key_table[row - VALUE_ROWS].help) : "";
+    int set, key;
+    return page->message[0] ? page->message : key_at(row, &set, &key) && set == 0 ? tr(key_table[key].help) : "";
 }
 
 bool settings_page_has_steps(int row) { return row < VALUE_ROWS && value_row[row].kind != ROW_RESTORE; }
@@ -79,14 +121,13 @@ bool settings_page_has_steps(int row) { return row < VALUE_ROWS && value_row[row
 void settings_page_enter(SettingsPage *page, int row)
 {
     page->message[0] = 0;
-    if (row >= VALUE_ROWS) {
-        page->waits_for = row - VALUE_ROWS;
+    int set, key;
+    if (key_at(row, &set, &key)) {
+        page->waits_for = is_fixed(set, key) ? -1 : row;
         page->refused = (KeyBinding){0};
-        say(page, tr("Press the new key, with Alt if you like, or Esc to leave it as it is."));
-        if (page->waits_for == ACTION_QUIT) {
-            page->waits_for = -1;
-            say(page, tr("Esc remains the key that leaves every window."));
-        }
+        say(page, is_fixed(set, key) ? tr("Esc remains the key that leaves every window.")
+                  : set == 0         ? tr("Press the new key, with Alt if you like, or Esc to leave it as it is.")
+                                     : tr("Press the new key, with Ctrl or Alt if you like, or Esc to leave it as it is."));
     } else if (value_row[row].kind == ROW_RESTORE) {
         page->settings = settings_default();
         page->has_changed = true;
@@ -112,21 +153,22 @@ void settings_page_step(SettingsPage *page, int row, int by)
 static void bind(SettingsPage *page, KeyBinding binding)
 {
     Settings next = page->settings;
-    char key[KEY_BINDING_TEXT];
-    ActionId id = (ActionId)page->waits_for;
-    next.key[id] = binding;
-    int other = settings_clash(&next, id);
-    if (other == ACTION_QUIT) {
+    char text[KEY_BINDING_TEXT];
+    int set, key;
+    const KeyBinding before = *awaited(page, &set, &key);
+    *settings_key(&next, set, key) = binding;
+    int other = settings_clash(&next, set, key);
+    if (other >= 0 && is_fixed(set, other)) {
         say(page, tr("Esc remains the key that leaves every window."));
         return;
     }
     if (other >= 0 && page->refused.key == binding.key && page->refused.modifiers == binding.modifiers) {
-        next.key[id] = page->settings.key[other];
-        next.key[other] = page->settings.key[id];
+        *settings_key(&next, set, key) = *settings_key(&page->settings, set, other);
+        *settings_key(&next, set, other) = before;
     } else if (other >= 0) {
         page->refused = binding;
         snprintf(page->message, sizeof page->message, tr("%s is the key of \"%s\". Press it again to exchange the two, another key, or Esc."),
-                 key_binding_text(binding, key, sizeof key), tr(key_table[other].name));
+                 key_binding_text(binding, text, sizeof text), tr(name_of(set, other)));
         return;
     }
     page->settings = next;
@@ -137,15 +179,18 @@ static void bind(SettingsPage *page, KeyBinding binding)
 
 bool settings_page_take(SettingsPage *page, const WindowEvent *event)
 {
-    if (page->waits_for < 0)
+    int set, key;
+    if (!awaited(page, &set, &key))
         return false;
-    if (event->is_repeat || event->key == WINDOW_KEY_ALT || event->key == WINDOW_KEY_NONE)
-        return true;             // Alt comes before the key that it is held for
+    // Alt comes before the key that it is held for; in the trainer Shift and Ctrl are keys of their own
+    const KeyBinding binding = {event->key, event->modifiers & (set == 0 ? WINDOW_ALT : WINDOW_ALT | WINDOW_CTRL), 0};
+    if (event->is_repeat || event->key == WINDOW_KEY_ALT || event->key == WINDOW_KEY_NONE || (set > 0 && settings_key_refused(set, binding)))
+        return true;
     if (event->key == WINDOW_KEY_ESCAPE) {
         page->waits_for = -1;
         page->message[0] = 0;
     } else {
-        bind(page, (KeyBinding){event->key, event->modifiers & WINDOW_ALT, 0});
+        bind(page, binding);
     }
     return true;
 }

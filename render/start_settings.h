@@ -6,7 +6,7 @@
 
 typedef struct SettingsPage {
     Settings settings;
-    int waits_for;               // action whose new key is awaited, -1: none
+    int waits_for;               // row whose new key is awaited, -1: none
     KeyBinding refused;          // the key that another action has; pressed again, the two exchange keys. key 0: none
     bool has_changed;            // to be saved
     char message[600];
@@ -15,6 +15,8 @@ typedef struct SettingsPage {
 // Loads the user's settings; faults are shown as the message.
 void settings_page_open(SettingsPage *page);
 int settings_page_rows(void);
+// The row of a key: set and key as in settings_key.
+int settings_page_row_of(int set, int key);
 // The texts of a row, translated. `heading`: above the row, or NULL.
 void settings_page_describe(const SettingsPage *page, int row, const char **heading, char left[300], char right[200]);
 // What the row does, or what just happened.

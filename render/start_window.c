@@ -14,7 +14,7 @@ static void run_frames(StartWindow *w)
         bool visible = window_next_frame(w->window, &input);
         for (int i = 0; i < input->event_count && !w->ends; i++) {
             const WindowEvent *event = &input->event[i];
-            if (event->kind == WINDOW_KEY_DOWN_EVENT && !gui_takes_text(w->gui) && w->takes_name == 0)
+            if ((event->kind == WINDOW_KEY_DOWN_EVENT || event->kind == WINDOW_TEXT_EVENT) && !gui_takes_text(w->gui) && w->takes_name == 0)
                 start_press(w, event);
             else if (event->kind == WINDOW_DROP_EVENT)
                 start_choose(w, START_STEER, window_dropped(w->window));

@@ -1,5 +1,5 @@
 // Any bytes as the user's settings: within their ranges, no two actions with one key, and a text that reads back to the same text.
-// Covers: render/settings.c render/key_binding.c base/yaml_reader.c
+// Covers: render/settings.c render/key_sheet.c render/key_binding.c base/yaml_reader.c
 #include "render/settings.h"
 
 #include <stdint.h>
@@ -22,9 +22,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!is_factor(speed->insertion) || !is_factor(speed->rotation) || !is_factor(speed->c_arm) || !(settings.interface_scale >= settings_scale_least) ||
         !(settings.interface_scale <= settings_scale_most))
         abort();
-    for (int i = 0; i < ACTION_COUNT; i++)
-        if (settings.key[i].key <= 0 || settings.key[i].key >= WINDOW_KEYS || settings_clash(&settings, (ActionId)i) >= 0)
-            abort();
+    for (int set = 0; set < KEY_SETS; set++)
+        for (int i = 0; i < settings_key_count(set); i++) {
+            const KeyBinding *key = settings_key(&settings, set, i);
+            if (key->key <= 0 || key->key >= WINDOW_KEYS || settings_key_refused(set, *key) || settings_clash(&settings, set, i) >= 0)
+                abort();
+        }
     char *text = settings_text(&settings), *same = NULL;
     faults_clear(&faults);
     if (text && (!settings_parse(text, strlen(text), "again.yaml", &again, &faults) || !(same = settings_text(&again)) || strcmp(text, same) != 0))

@@ -351,7 +351,7 @@ static void sections_are_edited_in_the_window(void **state)
     case_state_click(s, vec3(6, 7, 8));
     wait_and_look(s);
     assert_false(case_state_edit_begin(s));      // local models have no sections
-    assert_true(s->message_is_fault && strstr(s->message, "M chooses the model"));
+    assert_true(s->message_is_fault && strstr(s->message, "{model} chooses the model"));
     case_state_next(s, CASE_MODELS, 1);
     wait_and_look(s);
     if (s->progress.stage != BUILD_DONE)

@@ -72,7 +72,7 @@ static void the_defaults_have_no_clash(void **state)
     (void)state;
     Settings settings = settings_default();
     for (int i = 0; i < ACTION_COUNT; i++)
-        assert_int_equal(settings_clash(&settings, (ActionId)i), -1);
+        assert_int_equal(settings_clash(&settings, 0, i), -1);
     char *text = settings_text(&settings);
     assert_null(strstr(text, "keys:"));
     Settings again = parsed(text, 0);
@@ -137,6 +137,48 @@ static void faults_name_the_line_and_the_rest_applies(void **state)
     parsed("seldinger_settings: 2\n", 1);
 }
 
+// The keys of the other windows: read, written, and their faults with the line and what is valid.
+static void keys_of_the_other_windows_are_read_and_kept(void **state)
+{
+    (void)state;
+    Settings settings = parsed("seldinger_settings: 1\n"
+                               "case_keys: {wall: V, undo: Ctrl+U, redo: ctrl+alt+r}\n"
+                               "start_keys:\n"
+                               "  up: Down\n"
+                               "  down: Up\n",
+                               0);
+    const KeyBinding *key = settings.sheet_key[SHEET_CASE];
+    assert_int_equal(key[CASE_KEY_WALL].key, 'V');
+    assert_true(key[CASE_KEY_UNDO].key == 'U' && key[CASE_KEY_UNDO].modifiers == WINDOW_CTRL);
+    assert_true(key[CASE_KEY_REDO].key == 'R' && key[CASE_KEY_REDO].modifiers == (WINDOW_CTRL | WINDOW_ALT));
+    assert_int_equal(settings.sheet_key[SHEET_START][START_KEY_UP].key, WINDOW_KEY_DOWN);
+    char *text = settings_text(&settings);
+    Settings again = parsed(text, 0);
+    assert_memory_equal(again.sheet_key, settings.sheet_key, sizeof again.sheet_key);
+    free(text);
+    settings = parsed("seldinger_settings: 1\n"
+                      "keys: {push: Ctrl+Q}\n"
+                      "case_keys:\n"
+                      "  wall: Shift\n"
+                      "  bone: N\n"
+                      "  walls: V\n"
+                      "edit_keys: {undo: Ctrl+Hyper}\n"
+                      "pen_keys: {add: A}\n",
+                      5);
+    static const char *const expected[] = {"s.yaml:2:14: 'Ctrl+Q' cannot be the key of push: Ctrl makes", "s.yaml:4:9: 'Shift' cannot be the key of wall",
+                                           "s.yaml:5:9: N is also the key of mark_next", "s.yaml:6:3: unknown key 'walls'; did you mean 'wall'?",
+                                           "s.yaml:7:19: there is no key 'Ctrl+Hyper'; valid are letters"};
+    for (int i = 0; i < 5; i++) {
+        bool is_there = false;
+        for (int k = 0; k < faults.count; k++)
+            is_there |= !strncmp(faults.text[k], expected[i], strlen(expected[i]));
+        if (!is_there)
+            fail_msg("no fault \"%s\"", expected[i]);
+    }
+    assert_int_equal(settings.sheet_key[SHEET_CASE][CASE_KEY_BONE].key, 'O');
+    assert_int_equal(settings.sheet_key[SHEET_PEN][PEN_KEY_ADD].key, 'A');       // a key of the edit window may be another one while drawing
+}
+
 // However keys are typed, no two actions share one afterwards.
 static void no_file_makes_two_actions_share_a_key(void **state)
 {
@@ -154,7 +196,7 @@ static void no_file_makes_two_actions_share_a_key(void **state)
         faults_clear(&faults);
         settings_parse(text, strlen(text), "s.yaml", &settings, &faults);
         for (int i = 0; i < ACTION_COUNT; i++)
-            assert_int_equal(settings_clash(&settings, (ActionId)i), -1);
+            assert_int_equal(settings_clash(&settings, 0, i), -1);
     }
 }
 
@@ -207,6 +249,7 @@ int main(void)
         cmocka_unit_test(the_defaults_have_no_clash),
         cmocka_unit_test(what_is_written_is_read),
         cmocka_unit_test(faults_name_the_line_and_the_rest_applies),
+        cmocka_unit_test(keys_of_the_other_windows_are_read_and_kept),
         cmocka_unit_test(no_file_makes_two_actions_share_a_key),
         cmocka_unit_test(bound_keys_act),
         cmocka_unit_test(a_file_with_faults_is_kept),

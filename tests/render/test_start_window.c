@@ -164,7 +164,7 @@ static void a_session_is_replayed_and_reported(void **state)
     close_stage(s);
 }
 
-static int row_of(ActionId id) { return settings_page_rows() - ACTION_COUNT + (int)id; }
+static int row_of(ActionId id) { return settings_page_row_of(0, (int)id); }
 
 static void a_key_is_given_refused_and_exchanged(void **state)
 {
@@ -195,6 +195,17 @@ static void a_key_is_given_refused_and_exchanged(void **state)
     static Faults faults;
     assert_true(settings_load(&kept, &faults));
     assert_int_equal(kept.key[ACTION_ROADMAP].key, 'Q');
+    // a key of another window, with Ctrl
+    s->state.row = settings_page_row_of(1 + SHEET_CASE, CASE_KEY_UNDO);
+    key(s, WINDOW_KEY_ENTER, 0);
+    key(s, WINDOW_KEY_CTRL, WINDOW_CTRL);
+    key(s, 'U', WINDOW_CTRL);
+    assert_true(page->settings.sheet_key[SHEET_CASE][CASE_KEY_UNDO].key == 'U' && page->settings.sheet_key[SHEET_CASE][CASE_KEY_UNDO].modifiers == WINDOW_CTRL);
+    s->state.row = settings_page_row_of(1 + SHEET_START, START_KEY_LEAVE);
+    key(s, WINDOW_KEY_ENTER, 0);
+    assert_non_null(strstr(page->message, "Esc remains"));
+    draw(s);
+    save_picture(s, "sheets");
     // values
     key(s, WINDOW_KEY_HOME, 0);
     key(s, WINDOW_KEY_LEFT, 0);
