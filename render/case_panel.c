@@ -7,10 +7,10 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const mouse_help[][2] = {{"click", "does what is chosen on the right; else looks there"},
-                                            {"left drag", "moves the cross-hair; turns the projection"},
+static const char *const mouse_help[][2] = {{"click", "do what is chosen on the right; else look there"},
+                                            {"left drag", "move the cross-hair; turn the projection"},
                                             {"right drag", "brightness: level and width"},
-                                            {"wheel (with Ctrl: zooms)", "next slice; zooms the projection"}};
+                                            {"wheel (with Ctrl: zoom)", "next slice; zoom the projection"}};
 
 // A button with its key.
 static bool key_button(Gui *gui, const char *id, const char *label, CaseKey key, float width, bool is_on)

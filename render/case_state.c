@@ -140,6 +140,7 @@ static void take_volume(CaseState *s)
     for (int i = 0; i < 3; i++)
         s->middle[i] = volume_middle(v), s->zoom[i] = 1;
     s->has_volume = true;
+    s->message[0] = 0;           // that it is still being loaded
 }
 
 bool case_state_frame(CaseState *s)
@@ -223,10 +224,33 @@ static Vec3 end_near(const CaseState *s, Vec3 x)
     return work ? case_work_tree(work)->center[case_tree_end_near(case_work_tree(work), x)] : x;
 }
 
+// A CT says what tissue is: contrast agent is far brighter.
+static void doubt_start(CaseState *s, Vec3 place)
+{
+    const double least = 120;        // [HU] of vessels with contrast agent, in the mean of neighbouring voxels
+    const Volume *v = s->volume;
+    const Vec3 voxel = volume_voxel_of(v, place);
+    const int middle[3] = {(int)lround(voxel.x), (int)lround(voxel.y), (int)lround(voxel.z)};
+    double sum = 0;
+    int count = 0;
+    for (int n = 0; n < 27; n++) {
+        const int i = middle[0] + n % 3 - 1, j = middle[1] + n / 3 % 3 - 1, k = middle[2] + n / 9 - 1;
+        if (i < 0 || j < 0 || k < 0 || i >= v->size[0] || j >= v->size[1] || k >= v->size[2])
+            continue;
+        sum += (double)v->value[((size_t)k * (size_t)v->size[1] + (size_t)j) * (size_t)v->size[0] + (size_t)i];
+        count++;
+    }
+    if (volume_has_ct_numbers(v) && count > 0 && sum / count < least)
+        say(s, true, "%.0f HU lie there, as in tissue; vessels with contrast agent have 150 to 600. To begin elsewhere, press {start} and click a vessel",
+            sum / count);
+}
+
 void case_state_act(CaseState *s, CaseActKind kind, Vec3 place)
 {
     CaseAct act = {.kind = kind, .place = rounded(kind == CASE_ENTRY ? end_near(s, place) : place), .radius = kind == CASE_FORBID ? s->forbid_radius : 0};
     add(s, &act);
+    if (s->has_volume && kind == CASE_START)
+        doubt_start(s, place);
 }
 
 void case_state_click(CaseState *s, Vec3 place)
@@ -239,6 +263,18 @@ void case_state_click(CaseState *s, Vec3 place)
     s->mode = CASE_LOOK;
     s->turns = false;
     case_state_act(s, (CaseActKind)mode, place);
+}
+
+void case_state_click_nowhere(CaseState *s, int view)
+{
+    if (s->progress.stage == BUILD_LOADING)
+        say(s, true, "the volume is still being loaded: click a vessel once it shows");
+    else if (!s->has_volume)
+        say(s, true, "there is no volume to click in");
+    else if (view == CASE_PROJECTION)
+        say(s, true, "nothing bright lies there: click on a vessel, or in a slice");
+    else
+        say(s, true, "that lies outside the volume");
 }
 
 void case_state_mode(CaseState *s, int mode) { s->mode = mode; }
@@ -440,8 +476,8 @@ const char *case_state_hint(const CaseState *s)
                                                       [CASE_LOOK] = "Click to look there; {start} to {target} choose what a click does; {steer} steers"};
     switch (s->progress.stage) {
     case BUILD_LOADING: return "The volume is being loaded; {leave} leaves";
-    case BUILD_TRACKING: return "The tree grows; {leave} stops it";
-    case BUILD_FITTING: return "The wall is fitted to the image; {leave} stops it";
+    case BUILD_TRACKING: return "The tree grows. A click looks there; {start}, then a click begins elsewhere; {leave} stops";
+    case BUILD_FITTING: return "The wall is fitted to the image. A click looks there; {start} to {target}, then a click corrects the tree; {leave} stops";
     default: return s->has_volume ? clicks[s->mode] : "The volume cannot be read; {leave} leaves";
     }
 }

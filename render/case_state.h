@@ -60,6 +60,8 @@ bool case_state_frame(CaseState *state);
 void case_state_act(CaseState *state, CaseActKind kind, Vec3 place);
 // A click at a point of the volume: the act of the mode, or looks there.
 void case_state_click(CaseState *state, Vec3 place);
+// A click in a view that meets no place of the volume: says why it does nothing.
+void case_state_click_nowhere(CaseState *state, int view);
 void case_state_mode(CaseState *state, int mode);
 void case_state_undo(CaseState *state);
 void case_state_redo(CaseState *state);

@@ -179,6 +179,8 @@ static void press(CaseWindow *w, int key)
     case CASE_KEY_CLICK:
         if (s->has_volume)
             case_state_click(s, s->cursor);
+        else
+            case_state_click_nowhere(s, s->view);
         break;
     case CASE_KEY_BACKGROUND: case_state_turn_background(s); break;
     case CASE_KEY_EDIT: open_desk(w); break;
@@ -211,8 +213,10 @@ static void click(CaseWindow *w, int view, double x, double y)
 {
     Vec3 place;
     w->state.view = view;
-    if (place_under(w, view, x, y, &place))
+    if (w->state.has_volume && place_under(w, view, x, y, &place))
         case_state_click(&w->state, place);
+    else
+        case_state_click_nowhere(&w->state, view);
 }
 
 static void drag(CaseWindow *w, unsigned buttons, double x, double y)
@@ -246,7 +250,7 @@ static void take_mouse(CaseWindow *w, const WindowInput *input)
         w->travel += fabs(x - w->x) + fabs(y - w->y);
         if (w->state.has_volume && w->held < CASE_VIEWS && w->travel > TRAVEL && (x != w->x || y != w->y))
             drag(w, input->mouse_buttons, x, y);
-    } else if (w->buttons && w->held < CASE_VIEWS && w->travel <= TRAVEL && (w->buttons & WINDOW_MOUSE_LEFT) && w->state.has_volume) {
+    } else if (w->buttons && w->held < CASE_VIEWS && w->travel <= TRAVEL && (w->buttons & WINDOW_MOUSE_LEFT)) {
         click(w, w->held, x, y);
     }
     w->buttons = input->mouse_buttons;

@@ -9,11 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const mouse_help[][2] = {{"click on the wall", "goes there"},
-                                            {"left, right drag, wheel", "turns, moves, zooms the surface"},
-                                            {"wheel on the section", "next station (with Ctrl: zooms)"},
-                                            {"drag a handle", "moves the contour"},
-                                            {"Shift and drag", "draws a new contour around the vessel"}};
+static const char *const mouse_help[][2] = {{"click on the wall", "go there"},
+                                            {"left, right drag, wheel", "turn, move, zoom the surface"},
+                                            {"wheel on the section", "next station (with Ctrl: zoom)"},
+                                            {"drag a handle", "move the contour"},
+                                            {"Shift and drag", "draw a new contour around the vessel"}};
 
 // A button with its key.
 static bool key_button(Gui *gui, const char *id, const char *label, EditKey key, float width, bool is_on)

@@ -458,6 +458,46 @@ static void views_move_as_the_patient_lies(void **state)
     end(s);
 }
 
+// A click that has no effect says why, and so does a start in the tissue of a CT.
+static void a_click_without_effect_says_why(void **state)
+{
+    (void)state;
+    CaseState *s = calloc(1, sizeof *s);
+    CaseOptions made = {.input = strdup(input())};
+    assert_true(s && case_state_begin(s, &made));
+    case_state_click_nowhere(s, SLICE_AXIAL);
+    assert_true(s->message_is_fault && strstr(s->message, "still being loaded"));
+    wait_and_look(s);
+    assert_int_equal(s->message[0], 0);          // it is loaded now
+    case_state_click_nowhere(s, SLICE_AXIAL);
+    assert_non_null(strstr(s->message, "outside the volume"));
+    case_state_click_nowhere(s, CASE_PROJECTION);
+    assert_non_null(strstr(s->message, "nothing bright"));
+    assert_int_equal(s->acts.count, 0);
+    end(s);
+
+    const int size[3] = {40, 40, 40};
+    Vec3 axis[3] = {{0.5, 0, 0}, {0, 0.5, 0}, {0, 0, 0.5}};
+    Volume *v = volume_create(size, vec3(0, 0, 0), axis);
+    assert_non_null(v);
+    for (size_t n = 0; n < 64000; n++) {
+        Vec3 x = volume_point_of(v, vec3((double)(n % 40), (double)(n / 40 % 40), (double)(n / 1600)));
+        v->value[n] = x.z > 18 ? -1000 : outside(x, vec3(-5, 10, 8), vec3(30, 10, 8), 2) < 0 ? 350 : 40;
+    }
+    v->minimum = -1000, v->maximum = 350;
+    assert_true(volume_save_nrrd(v, in_folder("ct.nrrd"), "int16", &faults));
+    volume_free(v);
+    s = calloc(1, sizeof *s);
+    made.input = strdup(in_folder("ct.nrrd"));
+    assert_true(s && case_state_begin(s, &made));
+    wait_and_look(s);
+    case_state_click(s, vec3(10, 4, 8));
+    assert_true(s->message_is_fault && strstr(s->message, "40 HU lie there, as in tissue"));
+    case_state_act(s, CASE_START, vec3(10, 10, 8));
+    assert_false(s->message_is_fault);
+    end(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -465,6 +505,7 @@ int main(void)
         cmocka_unit_test(views_move_as_the_patient_lies),    cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
         cmocka_unit_test(what_runs_is_stopped_at_once),      cmocka_unit_test(a_case_is_the_same_without_the_window),
         cmocka_unit_test(sections_are_edited_in_the_window), cmocka_unit_test(acts_are_translated),
+        cmocka_unit_test(a_click_without_effect_says_why),
     };
     return cmocka_run_group_tests(tests, make_volume, remove_folder);
 }
