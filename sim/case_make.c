@@ -326,12 +326,29 @@ static bool prepare_texts(CaseTexts *texts, const CaseWork *work, const CaseOpti
     return texts->scene && is_valid(options->library, texts->scene, faults);
 }
 
+// The trace, with the kind of the model as it was chosen beside it: the trace alone makes the same case.
+static bool write_trace(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
+{
+    const bool is_said = options->has_kind && work->trace && work->trace->made.model != options->kind;
+    char *text = is_said ? yaml_edit(options->trace, "case.model", model_names[options->kind], true) : NULL;
+    char flow[80];
+    snprintf(flow, sizeof flow, "{model: %s}", model_names[is_said ? options->kind : 0]);
+    if (is_said && !text)            // there is no `case:` yet
+        text = yaml_edit_flow(options->trace, "case", flow, true);
+    if (is_said && !text)
+        faults_add(faults, options->trace_path, 0, 0, "the model '%s' cannot be written into it; expected one YAML document with a map",
+                   model_names[options->kind]);
+    bool good = (!is_said || text) && write_text(folder, TRACE, text ? text : options->trace, faults);
+    free(text);
+    return good;
+}
+
 bool case_work_write(const CaseWork *work, const char *folder, const CaseOptions *options, Faults *faults)
 {
     CaseTexts texts;
     bool is_new, good = prepare_texts(&texts, work, options, faults) && create_folder(folder, &is_new, faults);
     const CaseDevice *const device[] = {&texts.device, &texts.catheter};
-    good = good && (!options->trace || write_text(folder, TRACE, options->trace, faults)) && write_model(work, folder, faults);
+    good = good && (!options->trace || write_trace(work, folder, options, faults)) && write_model(work, folder, faults);
     for (int i = 0; good && i < 2; i++)
         good = !device[i]->name || write_text(folder, device[i]->name, device[i]->text, faults);
     good = good && write_text(folder, SCENE, texts.scene, faults);

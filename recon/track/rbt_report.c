@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "shape", "noise", "background", "length"};
+const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "shape", "noise", "background", "length", "sac"};
 
 void rbt_report_free(RbtReport *report)
 {

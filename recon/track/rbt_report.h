@@ -69,6 +69,7 @@ typedef enum RbtDoubt {      // reasons to doubt a result
     RBT_NOISE,               // contrast, in standard errors or in standard deviations of the noise
     RBT_BACKGROUND,          // [grey values] change of the background beside the first branch; limit: its contrast
     RBT_LENGTH,              // length of the first branch, in radii
+    RBT_SAC,                 // [mm] radius of the sac in which the start lies; limit: that of the vessel beside it, from where the tree was tracked
     RBT_DOUBTS
 } RbtDoubt;
 extern const char *const rbt_doubt_name[RBT_DOUBTS];

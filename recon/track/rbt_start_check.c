@@ -7,19 +7,24 @@
 #include "recon/track/rbt_start.h"
 #include "recon/volume/volume_noise.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6;
 enum { NOISE_LAG = 3 };      // [voxel] distance for the noise estimate, because the noise of neighbours may be correlated
 
-static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
+static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *format, ...) __attribute__((format(printf, 5, 6)));
+static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *format, ...)
 {
     if (check->warning_count == RBT_MAX_WARNINGS)
         return;
     RbtWarning *w = &check->warning[check->warning_count++];
+    va_list arguments;
     *w = (RbtWarning){.kind = kind, .measured = measured, .limit = limit};
-    snprintf(w->text, sizeof w->text, "%s", text);
+    va_start(arguments, format);
+    vsnprintf(w->text, sizeof w->text, format, arguments);
+    va_end(arguments);
 }
 
 static double least_extent(const Volume *volume)
@@ -58,7 +63,6 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
     Verdict v = {.check = {.click = click, .cylinder = *c, .drift = drift_of(click, c), .inlier_rate = inlier_rate, .noise = rbt_level_noise(levels, 0)}};
     RbtSight sight = rbt_sight_of(levels->volume, v.check.noise, c);
     double extent = least_extent(t->volume);
-    char text[240];
     v.check.contrast = sight.contrast;
     v.check.certainty = sight.certainty;
     v.check.smoothing_mm = t->check.smoothing_mm;
@@ -83,25 +87,22 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
                  "of %.3g; expected a contrast %g times that, or a less noisy volume",
                  c->radius, sight.contrast, level_noise(t, levels), least_contrast);
     if (v.check.drift > c->radius + 0.5 * t->voxel) {
-        snprintf(text, sizeof text, "the click lies %.2f mm from the axis of the vessel found, outside its radius of %.2f mm", v.check.drift, c->radius);
-        doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, text);
+        doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, "the click lies %.2f mm from the axis of the vessel found, outside its radius of %.2f mm",
+              v.check.drift, c->radius);
     }
     if (inlier_rate < least_inliers) {
-        snprintf(text, sizeof text, "%.0f %% of the edge points at the start lie on its cylinder; expected %.0f %% or more for a vessel", 100 * inlier_rate,
-                 100 * least_inliers);
-        doubt(&v.check, RBT_INLIERS, inlier_rate, least_inliers, text);
+        doubt(&v.check, RBT_INLIERS, inlier_rate, least_inliers,
+              "%.0f %% of the edge points at the start lie on its cylinder; expected %.0f %% or more for a vessel", 100 * inlier_rate, 100 * least_inliers);
     }
     if (4 * c->radius > extent && 2 * c->radius <= extent) {
-        snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's smallest extent of %.1f mm", c->radius,
-                 extent);
-        doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
+        doubt(&v.check, RBT_RADIUS, c->radius, extent / 4,
+              "the radius found at the start, %.2f mm, is more than a quarter of the volume's smallest extent of %.1f mm", c->radius, extent);
     }
     if (sight.evenness < least_evenness) {
-        snprintf(text, sizeof text,
-                 "the volume beside the tube found at the start is bright on both sides (only %.0f %% of the tube's contrast there): a band, a sheet or "
-                 "touching vessels?",
-                 100 * fmax(0, sight.evenness));
-        doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness, text);
+        doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness,
+              "the volume beside the tube found at the start is bright on both sides (only %.0f %% of the tube's contrast there): a band, a sheet or "
+              "touching vessels?",
+              100 * fmax(0, sight.evenness));
     }
     return v;
 }
@@ -179,22 +180,19 @@ bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
 // Adds a warning about the noise, which alone is not a reason to refuse a start.
 static void report_noise(Tracker *t)
 {
-    char text[240];
     RbtStartCheck *check = &t->check;
     if (!t->is_noisy || !(check->noise > 0))
         return;
-    snprintf(text, sizeof text,
-             "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked; "
-             "thin branches may be missing",
-             check->contrast, check->noise, check->certainty, check->smoothing_mm);
-    doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
+    doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast,
+          "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked; "
+          "thin branches may be missing",
+          check->contrast, check->noise, check->certainty, check->smoothing_mm);
 }
 
 // Returns true if a tube around the click stands out much more than the one found, or if a much thinner one stands out inside it. The one found is then, for
 // example, a band in which the vessel lies; inside a wide vessel hardly anything stands out.
 static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtStartCheck *check)
 {
-    char text[240];
     RbtSight own = rbt_sight_of(levels->volume, check->noise, &check->cylinder);
     // the search is slow: skip it if the click lies in the middle of a good cylinder
     bool is_good = check->drift < 0.6 * check->cylinder.radius && check->inlier_rate > 0.6 && own.evenness > 0.6;
@@ -208,10 +206,9 @@ static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtSt
         double share = is_thin && check->drift > 0.6 * check->cylinder.radius ? 0.2 : is_thin ? 0.5 : 1.5;
         if (sight.certainty < certain_contrast || sight.evenness * sight.contrast < share * own.evenness * own.contrast)
             continue;
-        snprintf(text, sizeof text,
-                 "a tube of radius %.2f mm stands out at the click, which is not the one of %.2f mm that was found (%.3g and %.3g grey values)",
-                 t->scan[i].radius, check->cylinder.radius, sight.evenness * sight.contrast, own.evenness * own.contrast);
-        doubt(check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius, text);
+        doubt(check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius,
+              "a tube of radius %.2f mm stands out at the click, which is not the one of %.2f mm that was found (%.3g and %.3g grey values)", t->scan[i].radius,
+              check->cylinder.radius, sight.evenness * sight.contrast, own.evenness * own.contrast);
         return true;
     }
     return false;
@@ -276,7 +273,6 @@ static void judge_background(Tracker *t, int count)
 {
     enum { MOST = 512 };
     double beside[MOST], contrast[MOST];
-    char text[240];
     int n = 0, stride = count / MOST + 1;
     for (int i = 0; i < count && n < MOST; i += stride) {
         contrast[n] = t->tree.node[i].contrast;
@@ -287,17 +283,15 @@ static void judge_background(Tracker *t, int count)
     double low = beside[n / 10], high = beside[n - 1 - n / 10];
     if (high - low <= contrast[n / 2])
         return;
-    snprintf(text, sizeof text,
-             "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early "
-             "there, and branches may be missing",
-             low, high, contrast[n / 2]);
-    doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
+    doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2],
+          "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early "
+          "there, and branches may be missing",
+          low, high, contrast[n / 2]);
 }
 
 // Warns if the first branch ends in front of something much brighter than itself, such as the face of a band in which it may continue.
 static void judge_ends(Tracker *t, int count)
 {
-    char text[240];
     for (int end = 0; end < 2 && count > 3; end++) {
         const TrackNode *n = &t->tree.node[end ? count - 1 : 0], *before = &t->tree.node[end ? count - 4 : 3];
         Vec3 ahead = vec3_unit_or(vec3_sub(n->cylinder.center, before->cylinder.center), n->cylinder.axis), c = n->cylinder.center;
@@ -309,27 +303,24 @@ static void judge_ends(Tracker *t, int count)
         }
         if (brighter <= 1.5 * before->contrast + 4 * level_noise(t, t->levels))
             continue;
-        snprintf(text, sizeof text,
-                 "the first branch ends at (%.1f, %.1f, %.1f) mm next to something %.3g grey values brighter than itself, at a contrast of %.3g (a bright "
-                 "band?): it may continue there",
-                 c.x, c.y, c.z, brighter, before->contrast);
-        doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast, text);
+        doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast,
+              "the first branch ends at (%.1f, %.1f, %.1f) mm next to something %.3g grey values brighter than itself, at a contrast of %.3g (a bright "
+              "band?): it may continue there",
+              c.x, c.y, c.z, brighter, before->contrast);
     }
 }
 
 // Warns if the first branch of a CT is as bright as bone.
 static void judge_bone(Tracker *t, int count)
 {
-    char text[240];
     int bright = 0;
     for (int i = 0; i < count; i++)
         bright += tracker_brightness(t, t->tree.node[i].cylinder.center) > (double)CT_NUMBER_BONE;
     if (!volume_has_ct_numbers(t->volume) || 2 * bright <= count)
         return;
-    snprintf(text, sizeof text,
-             "%.0f %% of the first branch has more than %.0f HU: bone? Vessels with contrast agent mostly have 150 to 600 HU; start in one of them",
-             100.0 * bright / count, (double)CT_NUMBER_BONE);
-    doubt(&t->check, RBT_BACKGROUND, (double)bright / count, 0.5, text);
+    doubt(&t->check, RBT_BACKGROUND, (double)bright / count, 0.5,
+          "%.0f %% of the first branch has more than %.0f HU: bone? Vessels with contrast agent mostly have 150 to 600 HU; start in one of them",
+          100.0 * bright / count, (double)CT_NUMBER_BONE);
 }
 
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
@@ -337,7 +328,6 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
     enum { ROOT = 3 };
     double sum = 0, root = 0, length = 0;
     int faint = 0;
-    char text[240];
     const Track *tree = &t->tree;
     for (int i = 0; i < count; i++) {
         const TrackNode *n = &tree->node[i];
@@ -349,26 +339,31 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
     if (count == 0)
         return;
     if (sum < least_inliers * count) {
-        snprintf(text, sizeof text, "over the first branch %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel",
-                 100 * sum / count, 100 * least_inliers);
-        doubt(&t->check, RBT_INLIERS, sum / count, least_inliers, text);
+        doubt(&t->check, RBT_INLIERS, sum / count, least_inliers,
+              "over the first branch %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel", 100 * sum / count,
+              100 * least_inliers);
     } else if (root < least_inliers * (count < ROOT ? count : ROOT)) {
-        snprintf(text, sizeof text, "at the root %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel",
-                 100 * root / (count < ROOT ? count : ROOT), 100 * least_inliers);
-        doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
+        doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers,
+              "at the root %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel", 100 * root / (count < ROOT ? count : ROOT),
+              100 * least_inliers);
     }
     judge_background(t, count);
     judge_bone(t, count);
     judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {
-        snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; expected %g or more for a vessel", length, length / radius,
-                 least_length);
-        doubt(&t->check, RBT_LENGTH, length / radius, least_length, text);
+        doubt(&t->check, RBT_LENGTH, length / radius, least_length, "the first branch is %.1f mm long, %.1f of its radii; expected %g or more for a vessel",
+              length, length / radius, least_length);
     }
     if (faint > 0.2 * count) {
-        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count,
-                 RBT_NODE_CERTAINTY);
-        doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, text);
+        doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, "%.0f %% of the first branch does not stand out of the noise by %g standard errors",
+              100.0 * faint / count, RBT_NODE_CERTAINTY);
     }
+}
+
+void rbt_report_sac_start(Tracker *t, Vec3 start, double sac_radius, Vec3 vessel)
+{
+    doubt(&t->check, RBT_SAC, sac_radius, t->check.cylinder.radius,
+          "the start (%.2f, %.2f, %.2f) mm lies in a sac of %.1f mm on a vessel of %.1f mm; the tree begins at the vessel beside it, at (%.2f, %.2f, %.2f) mm",
+          start.x, start.y, start.z, 2 * sac_radius, 2 * t->check.cylinder.radius, vessel.x, vessel.y, vessel.z);
 }

@@ -19,6 +19,8 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
 bool rbt_suit_given(Tracker *t, RbtLevels *levels, const Cylinder *given);
 // Checks the first node tracked from a start with radius and direction. Returns false if it is refused.
 bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const TrackNode *first);
+// Adds that the start lies in a sac, and from where the tree was tracked instead.
+void rbt_report_sac_start(Tracker *t, Vec3 start, double sac_radius, Vec3 vessel);
 // Adds the doubts about the first branch (nodes 0 … count-1 of the tree) to t->check.
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count);
 

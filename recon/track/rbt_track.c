@@ -12,6 +12,7 @@
 #include "recon/track/rbt_loops.h"
 #include "recon/track/rbt_ostia.h"
 #include "recon/track/rbt_residue.h"
+#include "recon/track/rbt_sac_start.h"
 #include "recon/track/rbt_scan.h"
 #include "recon/track/rbt_start_check.h"
 #include "recon/track/rbt_trunk.h"
@@ -298,6 +299,41 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     return false;
 }
 
+// The first branch. If its start lies in a sac, it is tracked again from the vessel beside it; if nothing is found there, it stays.
+static bool run_first_seed(Tracker *t, const Job *job)
+{
+    RbtSeed *seed = &job->seed[0];
+    const RbtSeed given = *seed;
+    SacStart sac;
+    if (!run_seed(t, job, 0))
+        return false;
+    if (given.has_toward || given.radius > 0 || !rbt_starts_in_sac(t, given.start, &sac))
+        return true;
+    const Track through = t->tree;
+    const RbtStartCheck check = t->check;
+    const char *why = t->why;
+    const int before = job->faults->count;
+    t->tree = (Track){0};
+    for (int i = 0; i < sac.count && !t->out_of_memory; i++) {
+        track_free(&t->tree);
+        t->scan_count = -1;
+        t->refusal[0] = 0;
+        seed->start = sac.vessel[i];
+        if (run_seed(t, job, 0) && rbt_is_vessel_of_sac(t, &sac)) {
+            Track dropped = through;
+            track_free(&dropped);
+            rbt_report_sac_start(t, given.start, sac.radius, sac.vessel[i]);
+            job->faults->count = before;
+            return true;
+        }
+    }
+    track_free(&t->tree);
+    t->tree = through, t->check = check, t->why = why, *seed = given;
+    t->refusal[0] = 0;
+    job->faults->count = t->out_of_memory ? job->faults->count : before;
+    return !t->out_of_memory;
+}
+
 // Lists the branches in the order of their nodes: a branch attached to a later one comes after it. Returns how many have nodes.
 static int order_branches(const Track *tree, int total, int *order)
 {
@@ -500,7 +536,7 @@ static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
 // Tracks the whole tree: all branches found from the first start, then the cuts, then the branches that the other starts add.
 static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
 {
-    bool is_joined, good = run_seed(t, job, 0) && add_rivals(t, job, ends) && (rbt_repair_links(t, NULL, 0, &is_joined) || out_of_memory_at(job, 0));
+    bool is_joined, good = run_first_seed(t, job) && add_rivals(t, job, ends) && (rbt_repair_links(t, NULL, 0, &is_joined) || out_of_memory_at(job, 0));
     RbtPaint *paint = good ? rbt_paint_create(t->volume) : NULL;
     t->paint = paint;
     good = good && (paint || out_of_memory_at(job, 0)) && grow(t, job, paint, 0, ends);

@@ -48,6 +48,11 @@ static void a_volume_becomes_a_case(void **state)
     same_file("one/model.h5", "two/model.h5");
     same_file("one/scene.yaml", "two/scene.yaml");
     same_file("one/trace.yaml", "two/trace.yaml");
+    // a model chosen beside the trace is in the trace that is kept, which alone makes the same case
+    assert_int_equal(run_in("", "case 'a tube.nrrd' --trace one/trace.yaml --model sweep --threads 1 --quiet -o swept-one"), 0);
+    assert_int_equal(run_in("", "case 'a tube.nrrd' --trace swept-one/trace.yaml --threads 1 --quiet -o swept-two"), 0);
+    same_file("swept-one/trace.yaml", "swept-two/trace.yaml");
+    same_file("swept-one/model.h5", "swept-two/model.h5");
     // a copy elsewhere runs, and the target is reached
     assert_int_equal(run_in("mkdir sub && cp -r one sub/three &&", "info sub/three/scene.yaml"), 0);
     put("push.csv", "t_s,push_mm_s,twist_deg_s\n0,10,0\n0.5,0,0\n");
