@@ -279,7 +279,7 @@ CaseBuilder *case_builder_create(const CaseOptions *options)
         return NULL;
     b->options = *options;
     b->watching = (Progress){.call = take_part, .context = b, .is_stopped = is_stopped};
-    b->watch = (RbtWatch){.context = b, .show = take_seen, .is_stopped = is_stopped};
+    b->watch = (RbtWatch){.context = b, .show = take_seen, .is_stopped = is_stopped, .words = options->words};
     pthread_condattr_t monotonic;
     pthread_condattr_init(&monotonic);
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);

@@ -78,7 +78,7 @@ enum { RBT_MAX_WARNINGS = 12 };
 typedef struct RbtWarning {
     RbtDoubt kind;
     double measured, limit;
-    char text[240];          // the measured value, the usual limit, and advice
+    char text[300];          // the measured value, the usual limit, and advice
 } RbtWarning;
 
 typedef struct RbtStartCheck {

@@ -14,16 +14,18 @@
 static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6;
 enum { NOISE_LAG = 3 };      // [voxel] distance for the noise estimate, because the noise of neighbours may be correlated
 
-static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *format, ...) __attribute__((format(printf, 5, 6)));
-static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *format, ...)
+static void doubt(const Tracker *t, RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *format, ...)
+    __attribute__((format(printf, 6, 7)));
+static void doubt(const Tracker *t, RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *format, ...)
 {
     if (check->warning_count == RBT_MAX_WARNINGS)
         return;
+    const RbtWatch *watch = t->parameters->watch;
     RbtWarning *w = &check->warning[check->warning_count++];
     va_list arguments;
     *w = (RbtWarning){.kind = kind, .measured = measured, .limit = limit};
     va_start(arguments, format);
-    vsnprintf(w->text, sizeof w->text, format, arguments);
+    vsnprintf(w->text, sizeof w->text, watch && watch->words ? watch->words(format) : format, arguments);
     va_end(arguments);
 }
 
@@ -87,19 +89,19 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
                  "of %.3g; expected a contrast %g times that, or a less noisy volume",
                  c->radius, sight.contrast, level_noise(t, levels), least_contrast);
     if (v.check.drift > c->radius + 0.5 * t->voxel) {
-        doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, "the click lies %.2f mm from the axis of the vessel found, outside its radius of %.2f mm",
+        doubt(t, &v.check, RBT_DRIFT, v.check.drift, c->radius, "the click lies %.2f mm from the axis of the vessel found, outside its radius of %.2f mm",
               v.check.drift, c->radius);
     }
     if (inlier_rate < least_inliers) {
-        doubt(&v.check, RBT_INLIERS, inlier_rate, least_inliers,
+        doubt(t, &v.check, RBT_INLIERS, inlier_rate, least_inliers,
               "%.0f %% of the edge points at the start lie on its cylinder; expected %.0f %% or more for a vessel", 100 * inlier_rate, 100 * least_inliers);
     }
     if (4 * c->radius > extent && 2 * c->radius <= extent) {
-        doubt(&v.check, RBT_RADIUS, c->radius, extent / 4,
+        doubt(t, &v.check, RBT_RADIUS, c->radius, extent / 4,
               "the radius found at the start, %.2f mm, is more than a quarter of the volume's smallest extent of %.1f mm", c->radius, extent);
     }
     if (sight.evenness < least_evenness) {
-        doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness,
+        doubt(t, &v.check, RBT_SHAPE, sight.evenness, least_evenness,
               "the volume beside the tube found at the start is bright on both sides (only %.0f %% of the tube's contrast there): a band, a sheet or "
               "touching vessels?",
               100 * fmax(0, sight.evenness));
@@ -183,7 +185,7 @@ static void report_noise(Tracker *t)
     RbtStartCheck *check = &t->check;
     if (!t->is_noisy || !(check->noise > 0))
         return;
-    doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast,
+    doubt(t, check, RBT_NOISE, check->contrast / check->noise, least_contrast,
           "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked; "
           "thin branches may be missing",
           check->contrast, check->noise, check->certainty, check->smoothing_mm);
@@ -206,7 +208,7 @@ static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtSt
         double share = is_thin && check->drift > 0.6 * check->cylinder.radius ? 0.2 : is_thin ? 0.5 : 1.5;
         if (sight.certainty < certain_contrast || sight.evenness * sight.contrast < share * own.evenness * own.contrast)
             continue;
-        doubt(check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius,
+        doubt(t, check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius,
               "a tube of radius %.2f mm stands out at the click, which is not the one of %.2f mm that was found (%.3g and %.3g grey values)", t->scan[i].radius,
               check->cylinder.radius, sight.evenness * sight.contrast, own.evenness * own.contrast);
         return true;
@@ -283,7 +285,7 @@ static void judge_background(Tracker *t, int count)
     double low = beside[n / 10], high = beside[n - 1 - n / 10];
     if (high - low <= contrast[n / 2])
         return;
-    doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2],
+    doubt(t, &t->check, RBT_BACKGROUND, high - low, contrast[n / 2],
           "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early "
           "there, and branches may be missing",
           low, high, contrast[n / 2]);
@@ -303,7 +305,7 @@ static void judge_ends(Tracker *t, int count)
         }
         if (brighter <= 1.5 * before->contrast + 4 * level_noise(t, t->levels))
             continue;
-        doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast,
+        doubt(t, &t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast,
               "the first branch ends at (%.1f, %.1f, %.1f) mm next to something %.3g grey values brighter than itself, at a contrast of %.3g (a bright "
               "band?): it may continue there",
               c.x, c.y, c.z, brighter, before->contrast);
@@ -318,7 +320,7 @@ static void judge_bone(Tracker *t, int count)
         bright += tracker_brightness(t, t->tree.node[i].cylinder.center) > (double)CT_NUMBER_BONE;
     if (!volume_has_ct_numbers(t->volume) || 2 * bright <= count)
         return;
-    doubt(&t->check, RBT_BACKGROUND, (double)bright / count, 0.5,
+    doubt(t, &t->check, RBT_BACKGROUND, (double)bright / count, 0.5,
           "%.0f %% of the first branch has more than %.0f HU: bone? Vessels with contrast agent mostly have 150 to 600 HU; start in one of them",
           100.0 * bright / count, (double)CT_NUMBER_BONE);
 }
@@ -339,11 +341,11 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
     if (count == 0)
         return;
     if (sum < least_inliers * count) {
-        doubt(&t->check, RBT_INLIERS, sum / count, least_inliers,
+        doubt(t, &t->check, RBT_INLIERS, sum / count, least_inliers,
               "over the first branch %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel", 100 * sum / count,
               100 * least_inliers);
     } else if (root < least_inliers * (count < ROOT ? count : ROOT)) {
-        doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers,
+        doubt(t, &t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers,
               "at the root %.0f %% of the edge points lie on its cylinders; expected %.0f %% or more for a vessel", 100 * root / (count < ROOT ? count : ROOT),
               100 * least_inliers);
     }
@@ -352,18 +354,18 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
     judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {
-        doubt(&t->check, RBT_LENGTH, length / radius, least_length, "the first branch is %.1f mm long, %.1f of its radii; expected %g or more for a vessel",
+        doubt(t, &t->check, RBT_LENGTH, length / radius, least_length, "the first branch is %.1f mm long, %.1f of its radii; expected %g or more for a vessel",
               length, length / radius, least_length);
     }
     if (faint > 0.2 * count) {
-        doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, "%.0f %% of the first branch does not stand out of the noise by %g standard errors",
+        doubt(t, &t->check, RBT_NOISE, (double)faint / count, 0.2, "%.0f %% of the first branch does not stand out of the noise by %g standard errors",
               100.0 * faint / count, RBT_NODE_CERTAINTY);
     }
 }
 
 void rbt_report_sac_start(Tracker *t, Vec3 start, double sac_radius, Vec3 vessel)
 {
-    doubt(&t->check, RBT_SAC, sac_radius, t->check.cylinder.radius,
+    doubt(t, &t->check, RBT_SAC, sac_radius, t->check.cylinder.radius,
           "the start (%.2f, %.2f, %.2f) mm lies in a sac of %.1f mm on a vessel of %.1f mm; the tree begins at the vessel beside it, at (%.2f, %.2f, %.2f) mm",
           start.x, start.y, start.z, 2 * sac_radius, 2 * t->check.cylinder.radius, vessel.x, vessel.y, vessel.z);
 }

@@ -18,6 +18,8 @@ typedef struct RbtWatch {
     // Called from the thread that called rbt_track, after every few nodes; copies what it keeps. The result does not depend on it. May be NULL.
     void (*show)(void *context, const RbtSeen *node, int count);
     bool (*is_stopped)(void *context);   // as in Progress
+    // Translates the doubts about the first start (as sim/words.h); NULL: English.
+    const char *(*words)(const char *text) __attribute__((format_arg(1)));
 } RbtWatch;
 
 static inline bool rbt_watch_is_stopped(const RbtWatch *watch) { return watch && watch->is_stopped && watch->is_stopped(watch->context); }
