@@ -22,14 +22,17 @@ static double bessel_ratio(double z)
     return zeroth / (first * z / 2);
 }
 
+// The brightness falls fastest where this is 0; it is positive nearer to the disc's middle, and it grows with the radius.
+static double steepness(double radius, double blur, double x) { return radius * bessel_ratio(radius * x / (blur * blur)) - blur * blur / x - x; }
+
 double blurred_edge_of(double radius, double blur)
 {
     if (!(blur > 1e-3 * radius))
         return radius;
-    double low = 0, high = radius + 2 * blur, b2 = blur * blur;
+    double low = 0, high = radius + 2 * blur;
     for (int i = 0; i < 60; i++) {
         double x = 0.5 * (low + high);
-        if (radius * bessel_ratio(radius * x / b2) - b2 / x > x)
+        if (steepness(radius, blur, x) > 0)
             low = x;
         else
             high = x;
@@ -44,7 +47,7 @@ double blurred_edge_undo(double edge, double blur)
     double low = edge, high = edge + 0.2 * blur;
     for (int i = 0; i < 40; i++) {
         double radius = 0.5 * (low + high);
-        if (blurred_edge_of(radius, blur) < edge)
+        if (steepness(radius, blur, edge) < 0)
             low = radius;
         else
             high = radius;
