@@ -180,7 +180,9 @@ static void follow(CaseState *s, CaseActKind kind)
     follow_choices(s);
     if (changes_tree)        // the editor's model is about to go
         case_state_edit_end(s);
-    if (changes_tree || has_failed || !trace)
+    if (kind == CASE_MODEL && trace && s->progress.stage != BUILD_IDLE)
+        case_builder_refit(s->builder, trace);
+    else if (changes_tree || has_failed || !trace)
         case_builder_request(s->builder, trace);
     else if (kind == CASE_EDIT)
         case_builder_edit(s->builder, trace);

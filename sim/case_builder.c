@@ -11,6 +11,13 @@
 #include <time.h>
 #include <unistd.h>
 
+// What of the finished work stays when another trace is wanted.
+typedef enum {
+    KEPT_NOTHING,
+    KEPT_TREE,               // as tracked
+    KEPT_MODEL               // and as fitted
+} Kept;
+
 struct CaseBuilder {
     CaseOptions options;         // its trace is `trace`, its progress `watching`
     Progress watching;
@@ -20,8 +27,8 @@ struct CaseBuilder {
     pthread_mutex_t lock;        // of all below
     pthread_cond_t change;       // something is wanted, or the thread is idle
     bool quits, is_left, has_ended, is_wanted;
-    bool keeps_model;            // of what is wanted: only edits change
-    bool has_model;              // `work` holds the fitted model
+    Kept keeps;                  // of what is wanted: what its trace leaves as it is
+    Kept held;                   // what `work` holds
     char *wanted;                // the trace that is wanted next; NULL with is_wanted: none
     char *trace;                 // of what runs; the thread's own
     char *title;                 // the trace of the case that is there, with the latest choices of its scene
@@ -149,30 +156,41 @@ static void build_wall(CaseBuilder *b, const CaseOptions *options, double begun)
     enter(b, BUILD_DONE);
 }
 
-static void build(CaseBuilder *b, bool keeps_model)
+static void hold(CaseBuilder *b, Kept held)
+{
+    pthread_mutex_lock(&b->lock);
+    b->held = held;
+    pthread_mutex_unlock(&b->lock);
+}
+
+static bool track(CaseBuilder *b, const CaseOptions *options)
+{
+    forget_work(b);
+    return enter(b, BUILD_TRACKING) && case_work_track(&b->work, options, b->volume, &b->watch, &b->faults);
+}
+
+static void build(CaseBuilder *b, Kept kept)
 {
     CaseOptions options = b->options;
     double begun = clock_s(CLOCK_MONOTONIC);
     BuildProgress *p = &b->progress;
     options.trace = b->trace;
     options.progress = &b->watching;
-    if (keeps_model) {
+    if (kept > KEPT_NOTHING)
         forget_wall(b);
-        if (case_work_choose(&b->work, &options, &b->faults))
-            build_wall(b, &options, begun);
-        else
-            fail(b);
-        return;
-    }
-    forget_work(b);
-    if (!enter(b, BUILD_TRACKING))
-        return;
-    if (!case_work_track(&b->work, &options, b->volume, &b->watch, &b->faults)) {
+    if (kept > KEPT_NOTHING ? !case_work_choose(&b->work, &options, &b->faults) : !track(b, &options)) {
         fail(b);
         return;
     }
-    show_tree(b);
-    note_time(b, &p->track_s, &begun);
+    if (kept == KEPT_MODEL) {
+        build_wall(b, &options, begun);
+        return;
+    }
+    if (kept == KEPT_NOTHING) {
+        show_tree(b);
+        note_time(b, &p->track_s, &begun);
+        hold(b, KEPT_TREE);
+    }
     if (!enter(b, BUILD_FITTING))
         return;
     if (!case_work_fit(&b->work, &options, &b->faults)) {
@@ -180,9 +198,7 @@ static void build(CaseBuilder *b, bool keeps_model)
         return;
     }
     note_time(b, &p->fit_s, &begun);
-    pthread_mutex_lock(&b->lock);
-    b->has_model = true;
-    pthread_mutex_unlock(&b->lock);
+    hold(b, KEPT_MODEL);
     build_wall(b, &options, begun);
 }
 
@@ -253,12 +269,12 @@ static void *run(void *context)
         b->trace = b->wanted;
         b->wanted = NULL;
         b->is_wanted = false;
-        bool keeps_model = b->keeps_model && b->has_model;
-        b->has_model = keeps_model;
+        Kept kept = b->keeps < b->held ? b->keeps : b->held;
+        b->held = kept;
         atomic_store(&b->stops, false);
         pthread_mutex_unlock(&b->lock);
         if (b->trace && b->volume)
-            build(b, keeps_model);
+            build(b, kept);
         else
             forget_work(b);
         pthread_mutex_lock(&b->lock);
@@ -357,12 +373,13 @@ const Volume *case_builder_reduced(const CaseBuilder *b, float *low, float *high
     return volume ? b->reduced : NULL;
 }
 
-static void want(CaseBuilder *b, const char *trace, bool keeps_model)
+static void want(CaseBuilder *b, const char *trace, Kept keeps)
 {
     pthread_mutex_lock(&b->lock);
     if (b->progress.stage != BUILD_LOADING && b->volume) {
-        b->keeps_model = keeps_model && b->has_model && (!b->is_wanted || b->keeps_model);
-        if (!b->keeps_model)
+        keeps = keeps < b->held ? keeps : b->held;
+        b->keeps = b->is_wanted && b->keeps < keeps ? b->keeps : keeps;
+        if (b->keeps == KEPT_NOTHING)
             b->seen_count = 0;
         free(b->wanted);
         free(b->title);
@@ -370,7 +387,7 @@ static void want(CaseBuilder *b, const char *trace, bool keeps_model)
         b->title = trace ? HEAP_TEXT(trace) : NULL;
         b->is_wanted = true;
         b->progress.seen++;
-        b->progress.stage = !trace ? BUILD_IDLE : b->keeps_model ? BUILD_FITTING : BUILD_TRACKING;
+        b->progress.stage = !trace ? BUILD_IDLE : b->keeps > KEPT_NOTHING ? BUILD_FITTING : BUILD_TRACKING;
         b->progress.part = 0;
         atomic_store(&b->stops, true);
         pthread_cond_broadcast(&b->change);
@@ -378,8 +395,9 @@ static void want(CaseBuilder *b, const char *trace, bool keeps_model)
     pthread_mutex_unlock(&b->lock);
 }
 
-void case_builder_request(CaseBuilder *b, const char *trace) { want(b, trace, false); }
-void case_builder_edit(CaseBuilder *b, const char *trace) { want(b, trace, true); }
+void case_builder_request(CaseBuilder *b, const char *trace) { want(b, trace, KEPT_NOTHING); }
+void case_builder_refit(CaseBuilder *b, const char *trace) { want(b, trace, KEPT_TREE); }
+void case_builder_edit(CaseBuilder *b, const char *trace) { want(b, trace, KEPT_MODEL); }
 
 void case_builder_retitle(CaseBuilder *b, const char *trace)
 {

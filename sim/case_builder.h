@@ -36,6 +36,8 @@ const Volume *case_builder_volume(const CaseBuilder *builder);      // NULL unti
 const Volume *case_builder_reduced(const CaseBuilder *builder, float *low, float *high);
 // Makes the case of this trace (copied); NULL: of none.
 void case_builder_request(CaseBuilder *builder, const char *trace);
+// Only the kind of the model and its edits change: the tree stays, if it is there; else as a request.
+void case_builder_refit(CaseBuilder *builder, const char *trace);
 // Only the edits of the model change, if it is there; else as a request.
 void case_builder_edit(CaseBuilder *builder, const char *trace);
 // Only the scene changes: the next save takes this trace. The tree and the wall stay.

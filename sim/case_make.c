@@ -171,12 +171,21 @@ bool case_work_track(CaseWork *work, const CaseOptions *options, const Volume *v
 bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults)
 {
     ModelFile *file = &work->file;
+    sweep_editor_free(work->editor);
+    work->editor = NULL, work->edited = NULL;
+    sweep_model_free(work->made.sweep);
+    vessel_tree_free(work->made.model);
+    work->made = (TreeFit){0};
+    bool is_corrected = work->how.is_corrected;
     work->how = tree_fit_default_options();
+    work->how.is_corrected = is_corrected;
     work->how.model = (FitModel)(options->has_kind || !work->trace ? options->kind : work->trace->made.model);
     work->how.local.threads = options->threads;
     tree_fit_complete_options(&work->how, file->tree, &file->info);
     work->has_it = fit_model_is_swept(work->how.model) ? file->swept.of[fit_model_section(work->how.model)] != NULL : vessel_tree_is_model(file->tree);
-    return work->has_it || tree_fit(file->tree, options->input, &work->how, options->progress, &work->made, faults);
+    bool good = work->has_it || tree_fit(file->tree, options->input, &work->how, options->progress, &work->made, faults);
+    work->how.is_corrected |= !work->has_it;
+    return good;
 }
 
 const VesselTree *case_work_tree(const CaseWork *work) { return work->made.model ? work->made.model : work->file.tree; }

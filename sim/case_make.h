@@ -53,6 +53,7 @@ bool case_make(const char *folder, const CaseOptions *options, CaseFigures *figu
 // Reads the trace and tracks the volume (borrowed; NULL: the input is a tree, which is loaded). Without an entry the widest end of a vessel
 // becomes the root, unless the trace gives the first branch's direction; without such an end the root stays.
 bool case_work_track(CaseWork *work, const CaseOptions *options, const Volume *volume, const RbtWatch *watch, Faults *faults);
+// Fits the kind of model that the options or the trace say; again after case_work_choose().
 bool case_work_fit(CaseWork *work, const CaseOptions *options, Faults *faults);
 // Reads the choices and the edits of `options->trace` again; tree and model stay.
 bool case_work_choose(CaseWork *work, const CaseOptions *options, Faults *faults);

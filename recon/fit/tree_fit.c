@@ -107,7 +107,7 @@ void tree_fit_complete_options(TreeFitOptions *options, const VesselTree *tree, 
 bool tree_fit(VesselTree *tree, const char *path, const TreeFitOptions *options, const Progress *progress, TreeFit *fit, Faults *faults)
 {
     *fit = (TreeFit){0};
-    if (!blurred_edge_correct(tree, options->edge_blur)) {
+    if (!options->is_corrected && !blurred_edge_correct(tree, options->edge_blur)) {
         faults_add(faults, path, 0, 0, "not enough memory");
         return false;
     }

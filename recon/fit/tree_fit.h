@@ -24,6 +24,7 @@ typedef struct TreeFitOptions {
     LimFitOptions local;     // options of local models; the shared field takes its target_mm, voxel_mm and threads from them
     bool has_voxel;          // local.voxel_mm is given; else it is taken from the tree's file, 0 if the file does not give it
     double edge_blur;        // [mm] blur (standard deviation) that has moved the points inside the wall; < 0: taken from the tree's file
+    bool is_corrected;       // the tree's points were moved back by edge_blur before: another model was fitted to them
 } TreeFitOptions;
 TreeFitOptions tree_fit_default_options(void);
 

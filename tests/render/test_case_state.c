@@ -352,8 +352,13 @@ static void sections_are_edited_in_the_window(void **state)
     wait_and_look(s);
     assert_false(case_state_edit_begin(s));      // local models have no sections
     assert_true(s->message_is_fault && strstr(s->message, "{model} chooses the model"));
+    const VesselTree *tracked = case_builder_work(s->builder)->file.tree;
+    double track_s = s->progress.track_s;
     case_state_next(s, CASE_MODELS, 1);
     wait_and_look(s);
+    // the tree stays as it was tracked
+    assert_ptr_equal(case_builder_work(s->builder)->file.tree, tracked);
+    assert_true(s->progress.track_s == track_s);
     if (s->progress.stage != BUILD_DONE)
         fail_msg("%s", s->message);
     assert_string_equal(s->list[CASE_MODELS].name[s->list[CASE_MODELS].chosen], "sweep");
