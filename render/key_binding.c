@@ -116,12 +116,15 @@ bool key_binding_parse(const char *text, KeyBinding *binding)
 // The sign that is typed; with Ctrl none is.
 static unsigned typed(KeyBinding b) { return b.modifiers & WINDOW_CTRL ? 0 : (unsigned)b.character; }
 
+// Where + has the key of =, Shift is not needed.
+static bool types(KeyBinding b, unsigned sign) { return typed(b) && (sign == typed(b) || (sign == '=' && typed(b) == '+')); }
+
 // With Ctrl: the sign's place on a US keyboard.
 static int placed(KeyBinding b) { return !(b.modifiers & WINDOW_CTRL) ? 0 : b.character == '+' ? '=' : b.character; }
 
 static bool means_too(KeyBinding a, KeyBinding b)
 {
-    return (typed(a) && (typed(a) == typed(b) || ((int)typed(a) == b.key && !b.modifiers))) || (placed(a) && placed(a) == b.key && a.modifiers == b.modifiers);
+    return types(a, typed(b)) || (types(a, (unsigned)b.key) && !b.modifiers) || (placed(a) && placed(a) == b.key && a.modifiers == b.modifiers);
 }
 
 bool key_binding_clash(KeyBinding a, KeyBinding b) { return (a.key == b.key && a.modifiers == b.modifiers) || means_too(a, b) || means_too(b, a); }
@@ -129,7 +132,7 @@ bool key_binding_clash(KeyBinding a, KeyBinding b) { return (a.key == b.key && a
 bool key_binding_is_pressed(KeyBinding binding, const WindowEvent *event)
 {
     if (event->kind == WINDOW_TEXT_EVENT)
-        return typed(binding) && event->character == typed(binding);
+        return types(binding, event->character);
     return event->kind == WINDOW_KEY_DOWN_EVENT && !(event->modifiers & WINDOW_SUPER) && (event->modifiers & (WINDOW_ALT | WINDOW_CTRL)) == binding.modifiers &&
            (event->key == binding.key || event->key == placed(binding));
 }

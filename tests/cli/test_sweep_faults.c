@@ -146,7 +146,8 @@ static void unwritable_folders_are_refused(void **state)
 static void recordings_that_do_not_fit_stop_the_sweep(void **state)
 {
     (void)state;
-    int code = run_in("ulimit -f 16;", "sweep small.yaml -o full --threads 1 --quiet");
+    // HDF5 1.10 does not free the names in a file that it cannot write
+    int code = run_in("ulimit -f 16; ASAN_OPTIONS=$ASAN_OPTIONS:detect_leaks=0", "sweep small.yaml -o full --threads 1 --quiet");
     if (code != 2 || !strstr(output, "full/recordings/0.h5: ") || !strstr(output, "the same command goes on"))
         fail_msg("%d: %s", code, output);
     assert_int_not_equal(access(in_folder("full/recordings/0.h5"), F_OK), 0);
