@@ -126,9 +126,9 @@ static int call(void *structure, Faults *faults)
 {
     Sweep sweep = {.options = structure, .faults = faults};
     int code = EXIT_BAD_INPUT;
+    recording_prepare_process();
     if (sweep.options->report)
         return sweep_report(sweep.options, faults);
-    recording_prepare_process();
     sweep.stop = process_stop_in_order();
     if (sweep.options->output)
         snprintf(sweep.recordings, sizeof sweep.recordings, "%.4000s/recordings", sweep.options->output);

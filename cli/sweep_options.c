@@ -9,7 +9,8 @@ static const Option options[] = {
     {"output", "RESULTS", OPTION_FOLDER, AT(output), "folder of the results, which is created", .letter = 'o', .otherwise = ""},
     {"dry-run", NULL, OPTION_FLAG, AT(dry_run), "checks the specification, makes up to three of the runs, and says how many there are and how long they take"},
     {"report", "RESULTS", OPTION_FOLDER, AT(report),
-     "writes RESULTS/report.html of a finished sweep: distributions, pairs, sensitivity, the worst runs; SPEC.yaml is then only named in its commands",
+     "writes RESULTS/report.html of a finished sweep: distributions, pairs, sensitivity, the worst runs. With SPEC.yaml, those of them that the sweep did not "
+     "record are simulated again for their pictures",
      .otherwise = ""},
     {"run", "K", OPTION_WHOLE, AT(run), "repeats run K alone and writes its scene, script, recording and summary into the folder of --output",
      .most = 4294967295.0, .otherwise = "all runs"},

@@ -12,11 +12,11 @@
 static const struct {
     const char *name, *words;
     bool less_is_worse;
-} measure[] = {{"score.points", "fewest points", true},
-               {"golden.worst_mm", "farthest from the golden path", false},
-               {"targets[0].distance_mm", "tip stays farthest from the first target", false},
-               {"penetration_mm.max", "deepest penetration of the wall", false},
-               {"wall_force_n.max", "largest force on the wall", false}};
+} measure[] = {{"score.points", "those with the fewest points", true},
+               {"golden.worst_mm", "those farthest from the golden path", false},
+               {"targets[0].distance_mm", "those whose tip stays farthest from the first target", false},
+               {"penetration_mm.max", "those that penetrate the wall most", false},
+               {"wall_force_n.max", "those with the largest force on the wall", false}};
 enum { MEASURES = sizeof measure / sizeof measure[0] };
 
 typedef struct Ranked {
@@ -87,7 +87,7 @@ static void draw_picture(FILE *out, const SweepPage *page, int row)
         draw_last(out, run, scene, &wall, row);
     } else {
         fprintf(out, "<p>No picture: ");
-        page_text(out, faults->count > 0 ? faults->text[0] : "its recording was not kept");
+        page_text(out, faults->count > 0 ? faults->text[0] : "it was not recorded");
         fprintf(out, ".</p>");
     }
     check_wall_free(&wall);
@@ -125,22 +125,44 @@ static void print_run(FILE *out, const SweepPage *page, const Ranked *ranked, in
     fprintf(out, " --run %d -o run-%d</pre></article>\n", row, row);
 }
 
-void sweep_worst_section(FILE *out, const SweepPage *page)
+// The index of the figure that judges the runs, and its place in `measure`; -1: the table has none.
+static int find_measure(const SweepResults *results, int *m)
 {
-    const SweepResults *results = page->results;
-    int by = -1, m = 0;
-    for (; m < MEASURES; m++) {
-        by = sweep_results_find(results, measure[m].name);
+    for (*m = 0; *m < MEASURES; ++*m) {
+        int by = sweep_results_find(results, measure[*m].name);
         if (by >= 0 && sweep_results_is_figure(results, by) && results->column[by].varies)
-            break;
-        by = -1;
+            return by;
     }
+    return -1;
+}
+
+// All runs, the worst first; the caller frees them.
+static Ranked *rank(const SweepResults *results, int by, int m)
+{
     Ranked *ranked = HEAP_ZEROED((size_t)results->row_count + 1, sizeof *ranked);
     for (int i = 0; i < results->row_count; i++) {
         double value = by >= 0 ? results->column[by].value[i] : 0;
         ranked[i] = (Ranked){i, status_of(results, i), isnan(value) ? HUGE_VAL : by >= 0 && measure[m].less_is_worse ? -value : value};
     }
     qsort(ranked, (size_t)results->row_count, sizeof *ranked, compare_runs);
+    return ranked;
+}
+
+int sweep_worst_runs(const SweepResults *results, int rows[SWEEP_WORST_MOST])
+{
+    int m, by = find_measure(results, &m), count = results->row_count < SWEEP_WORST_MOST ? results->row_count : SWEEP_WORST_MOST;
+    Ranked *ranked = rank(results, by, m);
+    for (int i = 0; i < count; i++)
+        rows[i] = ranked[i].row;
+    free(ranked);
+    return count;
+}
+
+void sweep_worst_section(FILE *out, const SweepPage *page)
+{
+    const SweepResults *results = page->results;
+    int m, by = find_measure(results, &m);
+    Ranked *ranked = rank(results, by, m);
     fprintf(out, "<section id=\"worst\"><h2>The worst runs</h2>\n<p>First runs that failed, left the vessel or diverged; then %s.</p>\n<div class=\"worst\">",
             by >= 0 ? measure[m].words : "by number, because the table has no figure to judge them by");
     for (int i = 0; i < results->row_count && i < SWEEP_WORST_MOST; i++)

@@ -16,6 +16,9 @@ typedef struct SweepPage {
 
 enum { SWEEP_WORST_MOST = 10 };
 
+// The numbers of the worst runs, the worst first; returns how many.
+int sweep_worst_runs(const SweepResults *results, int rows[SWEEP_WORST_MOST]);
+
 // A section with the worst ten: first those that failed, diverged or left the vessel, then the worst by one figure; each with its values, the command that
 // repeats it and, where its recording was kept, its last picture.
 void sweep_worst_section(FILE *out, const SweepPage *page);

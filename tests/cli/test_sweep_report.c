@@ -38,22 +38,36 @@ static void a_finished_sweep_is_reported(void **state)
     assert_string_equal(output, "");
 }
 
-// The command beside a worst run, as it stands on the page, repeats it; the pictures of all recorded runs are there.
+static int pictures_of(const char *name)
+{
+    char *page = text_of(in_folder(name));
+    int pictures = 0;
+    for (const char *at = strstr(page, "<article"); at; at = strstr(at + 1, "<article"))
+        pictures += strstr(at, "<svg") != NULL && strstr(at, "<svg") < strstr(at, "</article>");
+    free(page);
+    return pictures;
+}
+
+// The command beside a worst run, as it stands on the page, repeats it. Runs that were not recorded are, for their pictures, unless they end in another state.
 static void the_commands_of_a_page_repeat(void **state)
 {
     (void)state;
     char *scene = text_of(SOURCE_DIR "/scenes/sweep/tube-scene.yaml"), command[200] = "";
     put("tube-scene.yaml", scene);
     put("tube.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary: {vessel.friction: {uniform: [0, 0.1]}}\nduration_s: 0.1\n"
-                     "sampling: {kind: sobol, runs: 12}\nkeep: {recordings: all}\n");
+                     "sampling: {kind: sobol, runs: 12}\n");
     free(scene);
     assert_int_equal(run("sweep tube.yaml -o tube --quiet"), 0);
+    assert_int_equal(run("sweep --report tube"), 0);
+    assert_int_equal(pictures_of("tube/report.html"), 0);
+    put("other.yaml", "sweep: 1\nscene: tube-scene.yaml\nvary: {vessel.friction: {uniform: [0, 0.2]}}\nduration_s: 0.1\n"
+                      "sampling: {kind: sobol, runs: 12}\n");
+    assert_int_equal(run("sweep other.yaml --report tube"), 0);
+    assert_non_null(strstr(output, "now ends in another state than in the table"));
+    assert_int_equal(pictures_of("tube/report.html"), 0);
     assert_int_equal(run("sweep tube.yaml --report tube"), 0);
+    assert_int_equal(pictures_of("tube/report.html"), 10);
     char *page = text_of(in_folder("tube/report.html"));
-    int pictures = 0;
-    for (const char *at = strstr(page, "<article"); at; at = strstr(at + 1, "<article"))
-        pictures += strstr(at, "<svg") != NULL && strstr(at, "<svg") < strstr(at, "</article>");
-    assert_int_equal(pictures, 10);
     assert_int_equal(sscanf(strstr(page, "seldinger sweep tube.yaml --run "), "seldinger %199[^<\n]", command), 1);
     assert_int_equal(run(command), 0);
     int number = atoi(strstr(command, "--run ") + 6);
