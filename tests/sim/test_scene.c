@@ -232,7 +232,7 @@ typedef struct Broken {
 
 static const Broken broken[] = {
     // YAML itself
-    {"", "1:1", "seldinger: 1"},
+    {"", "1:1", "expected YAML keys and values"},
     {"seldinger: [1\n", "2:1", "not YAML"},
     {"seldinger: 1\n\tx: 1\n", "2:1", "not YAML"},
     {"\xff\xfe\xfd", "1:1", "not YAML"},
