@@ -79,7 +79,6 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
     SEL_ASSERT(c->first_free >= 0, "a checkpoint holds a state");
     if (c->memory_count != s->memory_count || c->point_capacity != s->points.capacity || c->self_bytes != self_contact_bytes(s))
         return;
-    s->rest.is_known = false;
     s->first_free = c->first_free;
     s->state.time = c->time;
     s->state.inserted = c->inserted;

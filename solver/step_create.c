@@ -287,12 +287,6 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     place_wire(s, &o.wire);
     s->first_free = stepper_count_held(s, 0);
     SEL_ASSERT(s->first_free >= 0 && s->first_free <= s->state.node_count, "the sheath holds nodes of the chain");
-    s->rest.start = stepper_save(s, NULL);
-    if (!s->rest.start) {
-        snprintf(why, (size_t)capacity, "no memory for the state of a wire of %d elements", o.wire.elements);
-        stepper_destroy(s);
-        return NULL;
-    }
     return s;
 }
 
@@ -329,7 +323,6 @@ void stepper_destroy(Stepper *s)
     free(s->system.set.point);
     free(s->system.set.pair);
     self_contact_destroy(s->self);
-    checkpoint_free(s->rest.start);
     free(s->scratch);
     free(s);
 }

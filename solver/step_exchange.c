@@ -34,7 +34,6 @@ static void fit(Stepper *s, int k, int which)
     t->inserted = was.inserted;
     t->twist = was.twist;
     s->tools.fitted[k] = which;
-    s->rest.is_known = false;
     s->hands.hand[k].limit = t->hand_limit;
     s->hands.hand[k].valve = t->valve_friction;
     for (int m = 1; m < s->tools.count; m++) {

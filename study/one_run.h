@@ -7,7 +7,7 @@
 #include <signal.h>
 
 // Simulates run `run`. Returns its result, one line of JSON without a line break:
-//   {"run":7,"status":"done","message":"","state_hash":"84f46deec394c807","cpu_s":0.53,"figures":{"steps":6500,…}}
+//   {"run":7,"status":"done","message":"","state_hash":"7101e2090e328aed","cpu_s":0.53,"figures":{"steps":6500,…}}
 // All but cpu_s, the processor time that it took, is the same on every machine. The caller frees it. A scene that cannot be opened is a result too ("failed"). NULL if
 // *stop became 1, or with faults if the recording could not be written. `recordings`: the folder for RUN.h5, used as the specification says; NULL: none.
 char *one_run(OpenStudy *open, int64_t run, const char *recordings, const volatile sig_atomic_t *stop, Faults *faults);
