@@ -12,19 +12,6 @@ static const char *const mouse_help[][2] = {{"click", "do what is chosen on the 
                                             {"right drag", "brightness: level and width"},
                                             {"wheel (with Ctrl: zoom)", "next slice; zoom the projection"}};
 
-// A button with its key.
-static bool key_button(Gui *gui, const char *id, const char *label, CaseKey key, float width, bool is_on)
-{
-    char text[KEY_BINDING_TEXT];
-    return gui_button(gui, id, label, key_sheet_text(SHEET_CASE, (int)key, text, sizeof text), width, is_on).pressed;
-}
-
-static void heading(Gui *gui, const char *text)
-{
-    gui_space(gui, floorf(3 * gui_scale(gui)));
-    gui_text(gui, GUI_SMALL, gui_colors.dim, text);
-}
-
 static void show_progress(Gui *gui, const CaseState *s)
 {
     const BuildProgress *p = &s->progress;
@@ -63,9 +50,9 @@ static void show_modes(Gui *gui, CaseState *s)
 {
     static const char *const mode[CASE_TARGET + 1] = {"New start", "Add branch", "Forbid", "Cut", "End here", "Mark sac", "Entry", "Target"};
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
-    heading(gui, "A CLICK");
+    gui_heading(gui, "A CLICK");
     for (int i = 0; i <= CASE_TARGET; i++) {
-        if (key_button(gui, mode[i], mode[i], (CaseKey)(CASE_KEY_START + i), half, s->mode == i))
+        if (key_list_button(gui, SHEET_CASE, mode[i], mode[i], CASE_KEY_START + i, half, s->mode == i))
             case_state_mode(s, s->mode == i ? CASE_LOOK : i);
         if (i % 2 == 0)
             gui_beside(gui, gap);
@@ -85,7 +72,7 @@ static bool show_choices(Gui *gui, CaseState *s)
     const bool is_swept = work && work->how.model == FIT_MODEL_SWEEP;
     const CaseAct *behind = case_acts_last(&s->acts, CASE_BEHIND);
     char label[120];
-    heading(gui, "TOOLS, PATIENT AND WALL");
+    gui_heading(gui, "TOOLS, PATIENT AND WALL");
     static const char *const none[CASE_LISTS] = {N_("wire that suits the vessels"), N_("no catheter"), N_("which vessel it is: not said"),
                                                  N_("wall of local models")};
     for (int i = 0; i < CASE_LISTS; i++) {
@@ -93,14 +80,14 @@ static bool show_choices(Gui *gui, CaseState *s)
         const char *name = chosen > 0 ? s->list[i].name[chosen] : tr(none[i]);
         snprintf(label, sizeof label, i == CASE_MODELS && chosen > 0 ? tr("wall: %.*s") : "%.*s", (int)strcspn(name, "."), name);
         const bool has_neighbour = i == CASE_MODELS && is_swept;
-        if (key_button(gui, none[i], label, (CaseKey)(CASE_KEY_WIRE + i), has_neighbour ? half : 0, chosen > 0))
+        if (key_list_button(gui, SHEET_CASE, none[i], label, CASE_KEY_WIRE + i, has_neighbour ? half : 0, chosen > 0))
             case_state_next(s, (CaseListId)i, 1);
         if (has_neighbour)
             gui_beside(gui, gap);
     }
-    bool edits = is_swept && key_button(gui, "edit", "Edit sections", CASE_KEY_EDIT, half, false);
-    if (key_button(gui, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", CASE_KEY_BACKGROUND, 0,
-                   behind && behind->is_on))
+    bool edits = is_swept && key_list_button(gui, SHEET_CASE, "edit", "Edit sections", CASE_KEY_EDIT, half, false);
+    if (key_list_button(gui, SHEET_CASE, "behind", behind && behind->is_on ? "the volume lies behind" : "a plain patient lies behind", CASE_KEY_BACKGROUND, 0,
+                        behind && behind->is_on))
         case_state_turn_background(s);
     return edits;
 }
@@ -133,15 +120,15 @@ static void show_acts(Gui *gui, CaseState *s)
     enum { SHOWN = 4 };
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
     char text[160];
-    heading(gui, "ACTS");
+    gui_heading(gui, "ACTS");
     for (int i = s->acts.count > SHOWN ? s->acts.count - SHOWN : 0; i < s->acts.count; i++) {
         case_act_describe(&s->acts.act[i], tr, text, sizeof text);
         gui_text(gui, GUI_SMALL, gui_colors.text, text);
     }
-    if (key_button(gui, "undo", "Undo", CASE_KEY_UNDO, half, false))
+    if (key_list_button(gui, SHEET_CASE, "undo", "Undo", CASE_KEY_UNDO, half, false))
         case_state_undo(s);
     gui_beside(gui, gap);
-    if (key_button(gui, "redo", "Redo", CASE_KEY_REDO, half, false))
+    if (key_list_button(gui, SHEET_CASE, "redo", "Redo", CASE_KEY_REDO, half, false))
         case_state_redo(s);
 }
 
@@ -159,10 +146,10 @@ CasePanelActions case_panel_draw(Gui *gui, CaseState *s, GuiRect at, bool shows_
     show_acts(gui, s);
     gui_space(gui, floorf(4 * k));
     float half = floorf((gui_width(gui) - gap) / 2);
-    actions.steer = key_button(gui, "steer", can_steer ? "Steer" : "Steer: not yet", CASE_KEY_STEER, 0, can_steer);
-    actions.help = key_button(gui, "help", "All keys", CASE_KEY_HELP, half, shows_help);
+    actions.steer = key_list_button(gui, SHEET_CASE, "steer", can_steer ? "Steer" : "Steer: not yet", CASE_KEY_STEER, 0, can_steer);
+    actions.help = key_list_button(gui, SHEET_CASE, "help", "All keys", CASE_KEY_HELP, half, shows_help);
     gui_beside(gui, gap);
-    actions.leave = key_button(gui, "leave", "Leave", CASE_KEY_LEAVE, half, false);
+    actions.leave = key_list_button(gui, SHEET_CASE, "leave", "Leave", CASE_KEY_LEAVE, half, false);
     gui_text_wrapped(gui, GUI_NORMAL, s->message_is_fault ? gui_colors.warning : gui_colors.good, key_sheet_fill(SHEET_CASE, s->message, text, sizeof text));
     gui_window_end(gui);
     show_marks(gui, s, (GuiRect){at.x, at.y + at.height - low, at.width, low});

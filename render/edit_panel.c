@@ -15,13 +15,6 @@ static const char *const mouse_help[][2] = {{"click on the wall", "go there"},
                                             {"drag a handle", "move the contour"},
                                             {"Shift and drag", "draw a new contour around the vessel"}};
 
-// A button with its key.
-static bool key_button(Gui *gui, const char *id, const char *label, EditKey key, float width, bool is_on)
-{
-    char text[KEY_BINDING_TEXT];
-    return gui_button(gui, id, label, key_sheet_text(SHEET_EDIT, (int)key, text, sizeof text), width, is_on).pressed;
-}
-
 static void row(Gui *gui, const char *label, const char *format, ...) __attribute__((format(printf, 3, 4)));
 static void row(Gui *gui, const char *label, const char *format, ...)
 {
@@ -31,12 +24,6 @@ static void row(Gui *gui, const char *label, const char *format, ...)
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     gui_row(gui, GUI_NORMAL, label, gui_colors.text, text);
-}
-
-static void heading(Gui *gui, const char *text)
-{
-    gui_space(gui, floorf(3 * gui_scale(gui)));
-    gui_text(gui, GUI_SMALL, gui_colors.dim, text);
 }
 
 static void show_place(Gui *gui, const EditState *s)
@@ -58,11 +45,11 @@ static void show_smoothing(Gui *gui, EditState *s)
 {
     static const char *const extents[] = {"section", "", "branch", "tree"};
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2), third = floorf((gui_width(gui) - 2 * gap) / 3);
-    heading(gui, "SMOOTH TOWARDS");
-    if (key_button(gui, "circle", "Circle", EDIT_KEY_SHAPE, half, s->shape == SMOOTH_CIRCLE))
+    gui_heading(gui, "SMOOTH TOWARDS");
+    if (key_list_button(gui, SHEET_EDIT, "circle", "Circle", EDIT_KEY_SHAPE, half, s->shape == SMOOTH_CIRCLE))
         s->shape = SMOOTH_CIRCLE;
     gui_beside(gui, gap);
-    if (key_button(gui, "ellipse", "Ellipse", EDIT_KEY_SHAPE, half, s->shape == SMOOTH_ELLIPSE))
+    if (key_list_button(gui, SHEET_EDIT, "ellipse", "Ellipse", EDIT_KEY_SHAPE, half, s->shape == SMOOTH_ELLIPSE))
         s->shape = SMOOTH_ELLIPSE;
     for (int i = 0; i < 4; i++) {
         if (i == SMOOTH_RANGE)
@@ -74,14 +61,14 @@ static void show_smoothing(Gui *gui, EditState *s)
     }
     if (gui_slider(gui, "strength", &s->strength, 0, 1, "strength %.2f", 0))
         edit_state_smooth(s, false);
-    if (key_button(gui, "smooth", "Smooth", EDIT_KEY_SMOOTH, 0, false))
+    if (key_list_button(gui, SHEET_EDIT, "smooth", "Smooth", EDIT_KEY_SMOOTH, 0, false))
         edit_state_smooth(s, true);
 }
 
 static void show_fork(Gui *gui, EditState *s)
 {
     char text[80];
-    heading(gui, key_sheet_fill(SHEET_EDIT, tr("BLEND AT THE FORK ({blend_narrower}, {blend_wider})"), text, sizeof text));
+    gui_heading(gui, key_sheet_fill(SHEET_EDIT, tr("BLEND AT THE FORK ({blend_narrower}, {blend_wider})"), text, sizeof text));
     if (sweep_editor_model(s->editor)->branch[s->branch].parent < 0)
         gui_text(gui, GUI_NORMAL, gui_colors.dim, "this branch is the root");
     else if (gui_slider(gui, "blend", &s->blend, 0, 2, "%.2f radii", 0))
@@ -91,25 +78,25 @@ static void show_fork(Gui *gui, EditState *s)
 static void show_branches(Gui *gui, EditState *s)
 {
     float gap = floorf(6 * gui_scale(gui)), half = floorf((gui_width(gui) - gap) / 2);
-    heading(gui, "BRANCHES");
+    gui_heading(gui, "BRANCHES");
     char end[KEY_BINDING_TEXT];
     key_sheet_text(SHEET_PEN, PEN_KEY_END, end, sizeof end);
     if (s->draws_branch ? gui_button(gui, "draw", "End the branch", end, half, true).pressed
-                        : key_button(gui, "draw", "Draw one", EDIT_KEY_DRAW, half, false)) {
+                        : key_list_button(gui, SHEET_EDIT, "draw", "Draw one", EDIT_KEY_DRAW, half, false)) {
         if (s->draws_branch)
             edit_state_draw_end(s, true);
         else
             edit_state_draw_begin(s);
     }
     gui_beside(gui, gap);
-    if (key_button(gui, "cut", "Cut here", EDIT_KEY_CUT, half, false))
+    if (key_list_button(gui, SHEET_EDIT, "cut", "Cut here", EDIT_KEY_CUT, half, false))
         edit_state_cut(s);
     if (s->draws_branch)
         gui_slider(gui, "radius", &s->drawn_radius, 0.1f, 5, "radius %.2f mm", 0);
-    if (key_button(gui, "delete", "Delete section", EDIT_KEY_DELETE, half, false))
+    if (key_list_button(gui, SHEET_EDIT, "delete", "Delete section", EDIT_KEY_DELETE, half, false))
         edit_state_delete(s);
     gui_beside(gui, gap);
-    if (key_button(gui, "flip", "Flip the flow", EDIT_KEY_FLIP, half, false))
+    if (key_list_button(gui, SHEET_EDIT, "flip", "Flip the flow", EDIT_KEY_FLIP, half, false))
         edit_state_flip(s);
 }
 
@@ -141,14 +128,14 @@ EditPanelActions edit_panel_draw(Gui *gui, EditState *s, GuiRect at, bool shows_
     show_fork(gui, s);
     show_branches(gui, s);
     snprintf(title, sizeof title, is_of_case ? tr("EDITS: %d") : edits == s->saved_count ? tr("EDITS: %d, saved") : tr("EDITS: %d, not saved"), edits);
-    heading(gui, title);
+    gui_heading(gui, title);
     float third = floorf((gui_width(gui) - 2 * gap) / 3);
-    actions.undo = key_button(gui, "undo", "Undo", EDIT_KEY_UNDO, third, false);
+    actions.undo = key_list_button(gui, SHEET_EDIT, "undo", "Undo", EDIT_KEY_UNDO, third, false);
     gui_beside(gui, gap);
-    actions.redo = key_button(gui, "redo", "Redo", EDIT_KEY_REDO, third, false);
+    actions.redo = key_list_button(gui, SHEET_EDIT, "redo", "Redo", EDIT_KEY_REDO, third, false);
     gui_beside(gui, gap);
-    actions.save = key_button(gui, "save", is_of_case ? "Done" : "Save", EDIT_KEY_SAVE, third, false);
-    actions.help = key_button(gui, "help", "All keys", EDIT_KEY_HELP, 0, shows_help);
+    actions.save = key_list_button(gui, SHEET_EDIT, "save", is_of_case ? "Done" : "Save", EDIT_KEY_SAVE, third, false);
+    actions.help = key_list_button(gui, SHEET_EDIT, "help", "All keys", EDIT_KEY_HELP, 0, shows_help);
     gui_space(gui, floorf(2 * k));
     char message[800], pen[800];
     key_sheet_fill(SHEET_PEN, s->message, pen, sizeof pen);

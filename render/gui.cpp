@@ -525,6 +525,12 @@ extern "C" void gui_text(Gui *gui, GuiFont font, Color color, const char *text)
     ImGui::PopFont();
 }
 
+extern "C" void gui_heading(Gui *gui, const char *text)
+{
+    gui_space(gui, floorf(3 * gui_scale(gui)));
+    gui_text(gui, GUI_SMALL, gui_colors.dim, text);
+}
+
 extern "C" void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char *text)
 {
     ImGui::PushTextWrapPos(0);

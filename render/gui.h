@@ -70,6 +70,7 @@ float gui_width(Gui *gui);                                // remaining width of 
 float gui_line_height(const Gui *gui, GuiFont font);
 
 void gui_text(Gui *gui, GuiFont font, Color color, const char *text);
+void gui_heading(Gui *gui, const char *text);             // of a group of items, in small letters
 void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char *text);
 void gui_row(Gui *gui, GuiFont font, const char *label, Color color, const char *value);   // label left, value right, in one line
 

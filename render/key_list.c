@@ -31,3 +31,9 @@ void key_list_draw(Gui *gui, const WindowInput *input, int mouse_count, const ch
         }
     gui_window_end(gui);
 }
+
+bool key_list_button(Gui *gui, KeySheet sheet, const char *id, const char *label, int key, float width, bool is_on)
+{
+    char text[KEY_BINDING_TEXT];
+    return gui_button(gui, id, label, key_sheet_text(sheet, key, text, sizeof text), width, is_on).pressed;
+}

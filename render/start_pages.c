@@ -1,6 +1,7 @@
 #include "render/start_pages.h"
 
 #include "render/case_picture.h"
+#include "render/key_list.h"
 #include "render/translation.h"
 
 #include <dirent.h>
@@ -211,13 +212,6 @@ void start_press(StartWindow *w, const WindowEvent *event)
 
 // --- drawing ---
 
-// A button with its key, as wide as its window.
-static bool key_button(Gui *gui, const char *id, const char *label, StartKey key, bool is_on)
-{
-    char text[KEY_BINDING_TEXT];
-    return gui_button(gui, id, label, key_sheet_text(SHEET_START, (int)key, text, sizeof text), 0, is_on).pressed;
-}
-
 // Small pictures that have been drawn meanwhile.
 static void load_pictures(StartWindow *w)
 {
@@ -298,7 +292,7 @@ static void draw_list(StartWindow *w, GuiRect at)
                                              N_("No device is connected. The keyboard steers."), ""};
     Gui *gui = w->gui;
     gui_window_begin(gui, "list", at, 0);
-    if (w->state->page == PAGE_FILES && key_button(gui, "up", w->state->folder, START_KEY_FOLDER_ABOVE, false))
+    if (w->state->page == PAGE_FILES && key_list_button(gui, SHEET_START, "up", w->state->folder, START_KEY_FOLDER_ABOVE, 0, false))
         go_up(w);
     if (row_count(w) == 0)
         gui_text_wrapped(gui, GUI_NORMAL, gui_colors.dim, empty[w->state->page]);
@@ -325,22 +319,22 @@ static void draw_row_buttons(StartWindow *w)
     const int row = w->state->row;
     if (w->state->page == PAGE_SESSIONS && row < row_count(w)) {
         const ShelfSession *session = &w->options->shelf->session[row];
-        if (key_button(gui, "replay", "Replay", START_KEY_OPEN, false))
+        if (key_list_button(gui, SHEET_START, "replay", "Replay", START_KEY_OPEN, 0, false))
             start_choose(w, START_REPLAY, session->recording);
-        if (key_button(gui, "report", "Report", START_KEY_REPORT, false))
+        if (key_list_button(gui, SHEET_START, "report", "Report", START_KEY_REPORT, 0, false))
             start_choose(w, START_REPORT, session->path);
     } else if (w->state->page == PAGE_DEVICES && w->devices) {
         const bool can = devices_page_can_learn(w->devices, row);
-        if (can && key_button(gui, "learn push", "Learn the push", START_KEY_LEARN_PUSH, false))
+        if (can && key_list_button(gui, SHEET_START, "learn push", "Learn the push", START_KEY_LEARN_PUSH, 0, false))
             devices_page_learn(w->devices, row, false);
-        if (can && key_button(gui, "learn turn", "Learn the turn", START_KEY_LEARN_TURN, false))
+        if (can && key_list_button(gui, SHEET_START, "learn turn", "Learn the turn", START_KEY_LEARN_TURN, 0, false))
             devices_page_learn(w->devices, row, true);
-        if (key_button(gui, "look", "Look again", START_KEY_LOOK_AGAIN, false))
+        if (key_list_button(gui, SHEET_START, "look", "Look again", START_KEY_LOOK_AGAIN, 0, false))
             look_at_devices(w);
     } else if (w->state->page == PAGE_SETTINGS && settings_page_has_steps(row)) {
-        if (key_button(gui, "less", "Less", START_KEY_LESS, false))
+        if (key_list_button(gui, SHEET_START, "less", "Less", START_KEY_LESS, 0, false))
             settings_page_step(&w->settings, row, -1);
-        if (key_button(gui, "more", "More", START_KEY_MORE, false))
+        if (key_list_button(gui, SHEET_START, "more", "More", START_KEY_MORE, 0, false))
             settings_page_step(&w->settings, row, 1);
     }
 }
@@ -363,7 +357,7 @@ static void draw_side(StartWindow *w, GuiRect at)
     gui_text_field(gui, "trainee", w->state->trainee, sizeof w->state->trainee, w->takes_name > 0);
     w->takes_name -= w->takes_name > 0;
     gui_space(gui, gap);
-    if (key_button(gui, "examination", "Examination: X-ray alone", START_KEY_EXAMINATION, w->state->is_examination))
+    if (key_list_button(gui, SHEET_START, "examination", "Examination: X-ray alone", START_KEY_EXAMINATION, 0, w->state->is_examination))
         w->state->is_examination = !w->state->is_examination;
     gui_space(gui, gap);
     draw_row_buttons(w);
@@ -372,7 +366,7 @@ static void draw_side(StartWindow *w, GuiRect at)
                  w->options->shelf->broken);
         gui_text_wrapped(gui, GUI_SMALL, gui_colors.warning, text);
     }
-    if (key_button(gui, "leave", "Leave", START_KEY_LEAVE, false))
+    if (key_list_button(gui, SHEET_START, "leave", "Leave", START_KEY_LEAVE, 0, false))
         w->ends = true;
     gui_window_end(gui);
 }

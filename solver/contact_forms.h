@@ -78,9 +78,6 @@ Mat3 contact_pairs_block(const ContactPairs *pairs, int k, int l);
 // Updates s->delta, the step of the chain without the closed pairs, to the step with them. Returns false if the system is singular.
 bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole, ContactSolve solve);
 
-// Block form on the chain condensed to the contacts' nodes. Returns false if these are too many or the chain is not positive definite.
-bool contact_condensed(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
-                       ContactReport *report);
 // Solves the wall contacts and pairs [0, count) on a chain that is not factored yet. Returns false if the chain is not positive definite.
 bool contact_walls(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
 // Updates the solution after b has changed by `change` (M, n), with the same matrix and states: fast, and accurate if the change is small. Returns false if

@@ -6,8 +6,9 @@
 // Condensation costs about as much as two factorisations of the eliminated part: it pays unless nearly all nodes are kept.
 static const double FULL_SHARE = 1.25;
 
-// Applies the block form to the chain condensed to the contacts' nodes. Returns false if this is not possible.
-bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
+// Applies the block form to the chain condensed to the contacts' nodes. Returns false if these are too many or the chain is not positive definite.
+static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
+                            ContactReport *report)
 {
     SEL_ASSERT(s->banded >= 0 && s->banded <= count, "pairs follow all other rows");
     bool *keep = block_condenser_keep(s->condenser);
@@ -54,7 +55,7 @@ bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, i
     s->small = NULL;
     if (count == 0)
         return block_chain_factor_solve(chain, s->factor, b, u);
-    if (contact_condensed(s, chain, b, count, options, u, report))
+    if (solve_condensed(s, chain, b, count, options, u, report))
         return true;
     if (!block_chain_factor(chain, s->braced_factor))
         return false;

@@ -61,8 +61,8 @@ void figures_add(cJSON *to, const cJSON *from, const char *prefix)
     }
 }
 
-bool figure_is_named(const char *name, const char *wanted)
+bool path_is_part_of(const char *path, const char *whole)
 {
-    size_t length = strlen(wanted);
-    return !strncmp(name, wanted, length) && (!name[length] || name[length] == '.' || name[length] == '[');
+    size_t length = strlen(whole);
+    return !strncmp(path, whole, length) && (!path[length] || path[length] == '.' || path[length] == '[');
 }

@@ -111,7 +111,7 @@ static void add_golden(Run *run)
 static bool is_kept(const Study *study, const char *name)
 {
     for (int i = 0; i < study->figure_count; i++)
-        if (figure_is_named(name, study->figure[i]))
+        if (path_is_part_of(name, study->figure[i]))
             return true;
     return study->figure_count == 0;
 }

@@ -1,5 +1,7 @@
 #include "study/spec.h"
 
+#include "study/figures.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -255,23 +257,16 @@ static void read_sampling(Reading *reading, YamlValue value)
 
 // --- what cannot be meant together ---
 
-// Whether `path` is `part` of, or the same as, `whole`: vessel.tube.radius_mm of vessel.tube.
-static bool is_part_of(const char *path, const char *whole)
-{
-    size_t length = strlen(whole);
-    return !strncmp(path, whole, length) && (path[length] == 0 || path[length] == '.' || path[length] == '[');
-}
-
 static void check_together(const Reading *reading)
 {
     const Study *study = reading->study;
     for (int i = 0; i < study->factor_count; i++) {
         const Factor *f = &study->factor[i];
-        if (study->hands.wanted && is_part_of(f->path, "script"))
+        if (study->hands.wanted && path_is_part_of(f->path, "script"))
             faults_add(reading->faults, reading->path, f->line, f->column, "'%s' is varied, but random 'hands' replace the script; expected one of them",
                        f->path);
         for (int k = 0; k < i; k++)
-            if (is_part_of(study->factor[k].path, f->path))
+            if (path_is_part_of(study->factor[k].path, f->path))
                 faults_add(reading->faults, reading->path, f->line, f->column,
                            "'%s' replaces '%s', which is set before it and would have no effect; expected it first, or only one of them", f->path,
                            study->factor[k].path);

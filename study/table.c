@@ -127,9 +127,9 @@ static void warn_of_figures(const Table *table)
     const Study *study = table->study;
     for (int i = 0; i < study->figure_count; i++) {
         const cJSON *column = table->columns->child;
-        while (column && !figure_is_named(column->string, study->figure[i]))
+        while (column && !path_is_part_of(column->string, study->figure[i]))
             column = column->next;
-        if (!column && table->has_ends && !figure_is_named(study->figure[i], "flags"))
+        if (!column && table->has_ends && !path_is_part_of(study->figure[i], "flags"))
             fprintf(stderr, "%s: warning: no run has a figure '%.100s' of keep.figures; table.csv names those that there are if 'figures' is left out\n",
                     study->path, study->figure[i]);
     }
