@@ -478,8 +478,9 @@ const char *case_state_hint(const CaseState *s)
                                                       [CASE_LOOK] = "Click to look there; {start} to {target} choose what a click does; {steer} steers"};
     switch (s->progress.stage) {
     case BUILD_LOADING: return "The volume is being loaded; {leave} leaves";
-    case BUILD_TRACKING: return "The tree grows. A click looks there; {start}, then a click begins elsewhere; {leave} stops";
-    case BUILD_FITTING: return "The wall is fitted to the image. A click looks there; {start} to {target}, then a click corrects the tree; {leave} stops";
+    case BUILD_TRACKING: return "The tree grows. A click looks there; to begin elsewhere, press {start} and click; {leave} stops";
+    case BUILD_FITTING:
+        return "The wall is fitted to the image. A click looks there; to correct the tree, press one of {start} to {target} and click; {leave} stops";
     default: return s->has_volume ? clicks[s->mode] : "The volume cannot be read; {leave} leaves";
     }
 }

@@ -116,7 +116,7 @@ bool key_binding_parse(const char *text, KeyBinding *binding)
 // The sign that is typed; with Ctrl none is.
 static unsigned typed(KeyBinding b) { return b.modifiers & WINDOW_CTRL ? 0 : (unsigned)b.character; }
 
-// Where + has the key of =, Shift is not needed.
+// On a US keyboard + is Shift and =; the key counts without Shift, too.
 static bool types(KeyBinding b, unsigned sign) { return typed(b) && (sign == typed(b) || (sign == '=' && typed(b) == '+')); }
 
 // With Ctrl: the sign's place on a US keyboard.

@@ -125,9 +125,9 @@ int settings_clash(const Settings *settings, int set, int key)
 const char *settings_key_refused(int set, KeyBinding binding)
 {
     if (set == 0)
-        return binding.modifiers & WINDOW_CTRL ? "Ctrl makes the tool slower in the trainer and is no part of a key there; Alt may be" : NULL;
+        return binding.modifiers & WINDOW_CTRL ? "Ctrl makes the tool slower in the trainer, so a key there cannot contain it; Alt is allowed" : NULL;
     const bool is_held = binding.key == WINDOW_KEY_SHIFT || binding.key == WINDOW_KEY_CTRL || binding.key == WINDOW_KEY_ALT;
-    return is_held ? "Shift, Ctrl and Alt are held together with other keys in this window; they are no keys of their own" : NULL;
+    return is_held ? "Shift, Ctrl and Alt are held together with other keys in this window and cannot be used alone" : NULL;
 }
 
 // --- reading ---
