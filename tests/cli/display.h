@@ -12,6 +12,10 @@
 
 static pid_t display_server;
 
+// A shell command: the script of keys `%s` runs beside PROGRAM and ends with it, even if it still waits for a window: a script left behind would keep the output
+// of the test open, and ctest would wait for its end. The exit code is PROGRAM's.
+#define BY_HAND(program) "(%s) >hand.txt 2>&1 & H=$!; " program "; C=$?; kill $H 2>/dev/null; exit $C"
+
 static inline bool is_installed(const char *program)
 {
     char command[200];

@@ -76,8 +76,7 @@ static void a_saved_session_is_what_its_edits_replay_to(void **state)
 {
     (void)state;
     need_display();
-    int code = run("(%s) & %s edit model.h5 -o window.h5 --duration-s 150 --size 900x600 --picture window.png >out.txt 2>&1; C=$?; wait; exit $C", hand,
-                   SELDINGER_PROGRAM);
+    int code = run(BY_HAND("%s edit model.h5 -o window.h5 --duration-s 150 --size 900x600 --picture window.png >out.txt 2>&1"), hand, SELDINGER_PROGRAM);
     char *said = text_of(in_folder("out.txt"));
     if (code != 0)
         print_message("%s", said);
@@ -117,7 +116,7 @@ static void contours_and_branches_are_drawn_by_keys(void **state)
 {
     (void)state;
     need_display();
-    int code = run("(%s) & %s edit model.h5 -o keys.h5 --duration-s 150 --size 900x600 >out.txt 2>&1; C=$?; wait; exit $C", keys, SELDINGER_PROGRAM);
+    int code = run(BY_HAND("%s edit model.h5 -o keys.h5 --duration-s 150 --size 900x600 >out.txt 2>&1"), keys, SELDINGER_PROGRAM);
     assert_int_equal(code, 0);
     assert_int_equal(run("%s edit keys.h5 --save-edits drawn.yaml && %s edit model.h5 --do drawn.yaml -o drawn.h5 --quiet && cmp keys.h5 drawn.h5",
                          SELDINGER_PROGRAM, SELDINGER_PROGRAM),
