@@ -78,7 +78,7 @@ static const SheetKey case_key[] = {
     [CASE_KEY_UNDO] = {"undo", CTRL('Z'), "Undo", "undo, do again"},
     [CASE_KEY_REDO] = {"redo", CTRL('Y'), "Do again", NULL},
     [CASE_KEY_STEER] = {"steer", K('S'), "Save and steer", "save the case and steer in it"},
-    [CASE_KEY_HELP] = {"help", K('H'), "List of keys", "this list"},
+    [CASE_KEY_HELP] = {"help", KEY(F1), "List of keys", "this list"},
     [CASE_KEY_LEAVE] = {"leave", KEY(ESCAPE), "Leave", "stop what is being made; leave"},
 };
 
@@ -118,7 +118,7 @@ static const SheetKey edit_key[] = {
     [EDIT_KEY_UNDO] = {"undo", CTRL('Z'), "Undo", "undo, do again"},
     [EDIT_KEY_REDO] = {"redo", CTRL('Y'), "Do again", NULL},
     [EDIT_KEY_SAVE] = {"save", CTRL('S'), "Save", "save the model"},
-    [EDIT_KEY_HELP] = {"help", K('H'), "List of keys", "this list"},
+    [EDIT_KEY_HELP] = {"help", KEY(F1), "List of keys", "this list"},
     [EDIT_KEY_LEAVE] = {"leave", KEY(ESCAPE), "Leave", "leave the window"},
 };
 

@@ -87,7 +87,7 @@ static void a_user_leaves(void **state)
 {
     (void)state;
     need_display();
-    check_case("$S case tube.nrrd > said 2>&1 & P=$!; window case; keys h h Escape; wait $P; [ $? = 0 ] && ! [ -s said ]");
+    check_case("$S case tube.nrrd > said 2>&1 & P=$!; window case; keys F1 F1 Escape; wait $P; [ $? = 0 ] && ! [ -s said ]");
 }
 
 int main(void)
