@@ -248,6 +248,33 @@ static void exchange(Simulator *simulator, const ToolCommands *commands)
     }
 }
 
+// All stages of a step. A stage is repeated where its solution is not good enough.
+static void solve(Stepper *stepper, const StepCommand *command, unsigned released, StageClock *clock)
+{
+    step_feed_tools(stepper, command, released);
+    lap(clock, STAGE_FEED);
+    for (unsigned needs = STEP_NEEDS_ALL; needs != 0;) {
+        if (needs & STEP_NEEDS_WALLS) {
+            step_detect(stepper);
+            lap(clock, STAGE_DETECT);
+        }
+        if (needs & STEP_NEEDS_SYSTEM) {
+            step_assemble(stepper);
+            lap(clock, STAGE_ASSEMBLE);
+            step_factor(stepper);
+            lap(clock, STAGE_FACTOR);
+        }
+        ContactProblem contacts = step_contacts(stepper);
+        ContactReport solved = contact_solve(&contacts);
+        lap(clock, STAGE_CONTACT);
+        needs = step_judge(stepper, &solved);
+        lap(clock, STAGE_JUDGE);
+    }
+    step_correct(stepper);
+    SEL_VALIDATE(!stepper_broken(stepper), stepper_broken(stepper));
+    lap(clock, STAGE_CORRECT);
+}
+
 void simulator_step(Simulator *simulator, const ToolCommands *commands)
 {
     exchange(simulator, commands);
@@ -259,32 +286,14 @@ void simulator_step(Simulator *simulator, const ToolCommands *commands)
         command[k] = (StepCommand){.advance = commands->tool[k].push_mm_s * seconds, .twist = commands->tool[k].twist_deg_s * seconds * PI / 180};
     for (int k = 0; k < STEP_TOOLS_MAX; k++)
         SEL_ASSERT(isfinite(command[k].advance) && isfinite(command[k].twist), "commands are finite: devices and scripts were checked");
-    step_feed_tools(stepper, command, commands->released);
-    lap(&clock, STAGE_FEED);
-    for (unsigned needs = STEP_NEEDS_ALL; needs != 0;) {
-        if (needs & STEP_NEEDS_WALLS) {
-            step_detect(stepper);
-            lap(&clock, STAGE_DETECT);
-        }
-        if (needs & STEP_NEEDS_SYSTEM) {
-            step_assemble(stepper);
-            lap(&clock, STAGE_ASSEMBLE);
-            step_factor(stepper);
-            lap(&clock, STAGE_FACTOR);
-        }
-        ContactProblem contacts = step_contacts(stepper);
-        ContactReport solved = contact_solve(&contacts);
-        lap(&clock, STAGE_CONTACT);
-        needs = step_judge(stepper, &solved);
-        lap(&clock, STAGE_JUDGE);
-    }
-    step_correct(stepper);
-    SEL_VALIDATE(!stepper_broken(stepper), stepper_broken(stepper));
-    lap(&clock, STAGE_CORRECT);
+    if (step_rests(stepper, command, commands->released))
+        lap(&clock, STAGE_FEED);
+    else
+        solve(stepper, command, commands->released, &clock);
 
     keep_times(simulator, &clock);
     accumulate(simulator);
-    if (simulator->energy.watched)
+    if (simulator->energy.watched && !simulator_last(simulator)->is_at_rest)
         balance_energy(simulator);
 }
 

@@ -14,6 +14,7 @@ struct Checkpoint {
     size_t memory_count;
     double time, inserted, twist;
     StepReport report;
+    Rest rest;
     double hand_force[STEP_TOOLS_MAX][2];
     VesselMemory *place;
     double *memory;
@@ -27,8 +28,17 @@ void checkpoint_free(Checkpoint *c)
         return;
     free(c->place);
     free(c->memory);
+    free(c->rest.moved);
     free(c->self);
     free(c);
+}
+
+static void copy_rest(Rest *to, const Rest *from, const Stepper *s)
+{
+    double *moved = to->moved;
+    memcpy(moved, from->moved, row_of(s, s->wire.node_count) * sizeof *moved);
+    *to = *from;
+    to->moved = moved;
 }
 
 Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
@@ -48,7 +58,8 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c->memory = calloc(c->memory_count, sizeof *c->memory);
         c->self_bytes = self_contact_bytes(s);
         c->self = malloc(c->self_bytes + 1);
-        if (!c->place || !c->memory || !c->self) {
+        c->rest.moved = calloc(row_of(s, s->wire.node_count), sizeof *c->rest.moved);
+        if (!c->place || !c->memory || !c->self || !c->rest.moved) {
             checkpoint_free(c);
             return NULL;
         }
@@ -58,6 +69,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
     c->report = s->report;
+    copy_rest(&c->rest, &s->rest, s);
     for (int k = 0; k < s->tools.count; k++)
         memcpy(c->hand_force[k], s->hands.hand[k].force, sizeof c->hand_force[k]);
     for (int k = 0; s->tools.count > 1 && k < s->tools.count; k++) {
@@ -84,6 +96,7 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
+    copy_rest(&s->rest, &c->rest, s);
     for (int k = 0; k < s->tools.count; k++)
         memcpy(s->hands.hand[k].force, c->hand_force[k], sizeof c->hand_force[k]);
     tools_refit(s, c->fitted);

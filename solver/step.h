@@ -52,6 +52,7 @@ typedef struct StepReport {
     int self_contacts;           // number of loaded contacts of the tool with itself
     double self_overlap;         // [mm] largest overlap of the tool with itself, >= 0, of the state at the start of the step
     double slipped;              // [mm] motion of the hand minus that of the tool
+    bool is_at_rest;             // the step left the state exactly as it was, except for the time (step_rests)
     int newton;                  // further linearisations in this step; 0 in a step without difficulties
 } StepReport;
 
@@ -108,6 +109,10 @@ StepExchange stepper_exchange(Stepper *stepper, int tool, int which);
 const char *step_exchange_refusal(StepExchange outcome);   // reason and remedy, to follow "because" or a colon; "" for EXCHANGE_DONE
 // The tool in place: 0 for the first one, k for its k-th spare.
 int stepper_fitted(const Stepper *stepper, int tool);
+
+// Instead of a step with these commands ([1 + inner_count]): whether the tools are at rest (step_rest.c) and the hands leave them so. If so, the step is done, in
+// less than a microsecond: the time has gone on by dt, all else is as it was.
+bool step_rests(Stepper *stepper, const StepCommand *command, unsigned released);
 
 void step_detect(Stepper *stepper);
 void step_assemble(Stepper *stepper);

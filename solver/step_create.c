@@ -17,7 +17,7 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    size_t per_node = 6 * (size_t)s->system.chain.size + 9 + 8 * (size_t)s->state.inner_count;
+    size_t per_node = 7 * (size_t)s->system.chain.size + 9 + 8 * (size_t)s->state.inner_count;
     size_t total = (BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + per_node * m;
     s->scratch = calloc(total, sizeof *s->scratch);
     if (!s->scratch)
@@ -41,6 +41,7 @@ static bool allocate_scratch(Stepper *s)
     s->system.b = take(&at, rows);
     s->system.u = take(&at, rows);
     s->iterate.moved = take(&at, rows);
+    s->rest.moved = take(&at, rows);
     s->iterate.seen = take(&at, rows);
     s->system.product = take(&at, rows);
     s->iterate.kept = take(&at, 7 * m + rows + 2 * inner);

@@ -88,7 +88,7 @@ static double of_mass_damping(const Stepper *s)
 StepEnergy stepper_energy(Stepper *s)
 {
     StepEnergy e = {.elastic = stepper_elastic_energy(s), .kinetic = stepper_kinetic_energy(s)};
-    if (s->progress.has_failed)
+    if (s->progress.has_failed || s->report.is_at_rest)
         return e;
     e.hand = hands_work(s);
     e.load = stepper_load_work(s);

@@ -34,6 +34,7 @@ static void fit(Stepper *s, int k, int which)
     t->inserted = was.inserted;
     t->twist = was.twist;
     s->tools.fitted[k] = which;
+    s->rest.time = 0;
     s->hands.hand[k].limit = t->hand_limit;
     s->hands.hand[k].valve = t->valve_friction;
     for (int m = 1; m < s->tools.count; m++) {

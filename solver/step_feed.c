@@ -162,6 +162,7 @@ static void feed(Stepper *s, unsigned released)
 
 void step_feed_tools(Stepper *s, const StepCommand *command, unsigned released)
 {
+    rest_feed(s, command, released);
     memcpy(s->hands.command, command, (size_t)s->tools.count * sizeof *command);
     feed(s, released);
 }

@@ -193,6 +193,14 @@ typedef struct StepProgress {
     bool makes_energy;       // it creates energy although it rotates little
 } StepProgress;
 
+// Rest (step_rest.c).
+typedef struct Rest {
+    double time;             // [ms] for which the tool has stayed at one place in quiet steps
+    double *moved;           // [rows] motion of the unknowns since then
+    unsigned released;       // tools that no hand held in the last step
+    bool is_quiet;           // of this step: the hands are still, and no load grows
+} Rest;
+
 struct Stepper {
     // constant after creation
     Wire wire;
@@ -226,6 +234,7 @@ struct Stepper {
     Iterate iterate;
     StepProgress progress;
     StepReport report;
+    Rest rest;
 };
 
 // Offset of a node's unknowns in a vector, and of its block in the matrix.
@@ -329,6 +338,9 @@ double stepper_tip_straightening(const Stepper *s);
 Vec3 stepper_tip_curvature(const Stepper *s);    // [1/mm] at rest, in space axes
 // Reaction [N] on node 0 along (dof 0 to 2) and about [N mm] (3 to 5) the axes of its unknowns.
 double stepper_reaction(const Stepper *s, int dof);
+// Before a step takes its commands, and after it has corrected the state (step_rest.c).
+void rest_feed(Stepper *s, const StepCommand *command, unsigned released);
+void rest_judge(Stepper *s);
 // Takes the commands of the step.
 void hands_feed(Stepper *s, unsigned released);
 // Prescribes the motion of the hands at node 0; after the solve, transforms their unknowns back.

@@ -293,6 +293,7 @@ void step_correct(Stepper *s)
     }
     if (s->progress.has_failed)
         keep_last_state(s);
+    rest_judge(s);
 }
 
 const StepReport *step_report(const Stepper *s) { return &s->report; }
