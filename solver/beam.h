@@ -81,6 +81,9 @@ void beam_chain_assemble(const BeamChain *beam, int first, int last, double scal
 // a rotation of any size causes no damping.
 void beam_chain_damp(const BeamChain *beam, const BeamPose *start, int first, int last, double rate, double *b);
 
+// Elastic energy [mJ] of elements first to last-1 at the chain's pose, added up in their order.
+double beam_chain_energy(const BeamChain *beam, int first, int last);
+
 // c and d of a beam of this length: moment per rotation of the near end and of the far end.
 void beam_bending(double length, double bending, double shear, double *near, double *far);
 // Derivatives of c and d with respect to length.

@@ -55,6 +55,14 @@ INLINE void lane_element(const BeamChain *c, int base, int l, bool is_curved, do
     put(far + F_MOMENT * 2 * LANES, 2 * LANES, vec3_add(o.moment2, vec3_cross(turn, vec3_add_scaled(o.moment2, -taut, o.bow2))));
 }
 
+INLINE double lane_energy(const BeamChain *c, int base, int l, bool is_curved)
+{
+    BeamInput in = input_at(&c->rest, &c->pose, base + l);
+    BeamOutput o;
+    element(&in, is_curved, &o);
+    return o.energy;
+}
+
 // A node sums the first end of its element, the second end of the preceding element, and its inertia.
 INLINE void lane_node(const BeamChain *c, int base, int l, double rate, Tile *t)
 {
@@ -206,6 +214,17 @@ INLINE void leave_to_next(Tile *t, int lanes)
         t->far[k][LANES - 1] = t->far[k][LANES - 1 + lanes];
 }
 
+// Whether the elements from `base` on are curved at rest; *lanes: how many of them are alike in this. Sections are long, so that few groups end early.
+INLINE bool group_at(const BeamRest *r, int base, int last, int *lanes)
+{
+    bool is_curved = r->half_w[base] < 1;
+    int count = 1;
+    while (count < LANES && base + count < last && (r->half_w[base + count] < 1) == is_curved)
+        count++;
+    *lanes = count;
+    return is_curved;
+}
+
 #define KERNEL_TEXT "solver/beam_chain.inc"
 #include "base/each_simd.inc"
 
@@ -237,4 +256,12 @@ void beam_chain_damp(const BeamChain *beam, const BeamPose *start, int first, in
             }
         }
     }
+}
+
+static double (*const energy_on[SIMD_COUNT])(const BeamChain *, int, int) = SIMD_FORMS(energy);
+
+double beam_chain_energy(const BeamChain *beam, int first, int last)
+{
+    SEL_ASSERT(first >= 0 && last <= beam->rest.count, "the elements lie within the chain");
+    return energy_on[simd_level()](beam, first, last);
 }

@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-static void load_pose(const Vec3 *restrict position, const Quat *restrict orientation, int first, int count, const BeamPose *pose)
+void stepper_load_pose(const Vec3 *restrict position, const Quat *restrict orientation, int first, int count, const BeamPose *pose)
 {
     double *restrict x = pose->x, *restrict y = pose->y, *restrict z = pose->z;
     double *restrict qw = pose->qw, *restrict qx = pose->qx, *restrict qy = pose->qy, *restrict qz = pose->qz;
@@ -47,12 +47,12 @@ static void free_nodes(Stepper *s, double scale, double inertia)
     SEL_ASSERT(s->first_free >= 0 && s->first_free < s->state.node_count, "at least one node is outside the sheath");
     int first = s->first_free, count = s->state.node_count;
     size_t from = row_of(s, first), to = row_of(s, count);
-    load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
+    stepper_load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
     load_inertia(s, inertia);
     s->beam.slides = s->iterate.is_moved ? 0 : s->iterate.slides;
     memset(s->beam.drag, 0, (size_t)s->wire.element_count * sizeof(double));
     if (s->iterate.is_moved) {
-        load_pose(s->start.position, s->start.orientation, first, count, &s->start.pose);
+        stepper_load_pose(s->start.position, s->start.orientation, first, count, &s->start.pose);
         beam_chain_damp(&s->beam, &s->start.pose, first, count - 1, scale - 1, s->system.product);
     }
     beam_chain_assemble(&s->beam, first, count - 1, scale, inertia, &s->system.chain, s->system.b);
@@ -253,8 +253,8 @@ double stepper_stiffness_damping(Stepper *s)
     if (s->tools.count > 1)
         return tools_stiffness_damping(s);
     if (first < last) {
-        load_pose(s->state.position, s->state.orientation, first, last + 1, &s->beam.pose);
-        load_pose(s->start.position, s->start.orientation, first, last + 1, &s->start.pose);
+        stepper_load_pose(s->state.position, s->state.orientation, first, last + 1, &s->beam.pose);
+        stepper_load_pose(s->start.position, s->start.orientation, first, last + 1, &s->start.pose);
         beam_chain_damp(&s->beam, &s->start.pose, first, last, rate, s->system.product);
         for (size_t k = row_of(s, first); k < row_of(s, last + 1); k++)
             work -= s->system.product[k] * u[k];

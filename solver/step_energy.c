@@ -3,34 +3,36 @@
 #include "base/base.h"
 #include "solver/tools_internal.h"
 
-static double element_energy(const Stepper *s, int i, int held)
+// Of the elements up to the mouth.
+static double held_energy(const Stepper *s, int i)
 {
-    SEL_ASSERT(held >= 0 && held <= s->state.node_count, "the sheath holds nodes of the chain");
     const BeamRest *r = &s->beam.rest;
     const WireState *w = &s->state;
-    if (i + 1 < held) {
+    if (i + 1 < s->first_free) {
         double k0 = r->curvature[i], strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - r->length[i];
         Quat p = quat_mul(quat_conjugate(w->orientation[i]), w->orientation[i + 1]);
         double twist = 2 * same_atan2(p.x, p.w);
         return 0.5 * (r->axial[i] * strain * strain + r->twist[i] * twist * twist + r->bending[i] * k0 * k0 * r->length[i]);
     }
-    if (i + 1 == held) {
-        SheathElement e;
-        sheath_element(r, i, s->entry.mouth, s->entry.axis[0], stepper_sheath_coordinate(s, i), w->orientation[i], w->position[i + 1], w->orientation[i + 1], 0,
-                       &e);
-        return e.energy;
-    }
-    BeamInput in = stepper_beam(s, i);
-    BeamOutput out;
-    beam_element(&in, &out);
-    return out.energy;
+    SheathElement e;
+    sheath_element(r, i, s->entry.mouth, s->entry.axis[0], stepper_sheath_coordinate(s, i), w->orientation[i], w->position[i + 1], w->orientation[i + 1], 0,
+                   &e);
+    return e.energy;
+}
+
+static double tool_energy(const Stepper *s)
+{
+    int elements = s->wire.element_count, held = s->first_free < elements ? s->first_free : elements;
+    double energy = 0;
+    for (int i = 0; i < held; i++)
+        energy += held_energy(s, i);
+    stepper_load_pose(s->state.position, s->state.orientation, held, elements + 1, &s->beam.pose);
+    return energy + beam_chain_energy(&s->beam, held, elements);
 }
 
 double stepper_elastic_energy(const Stepper *s)
 {
-    double energy = s->tools.count > 1 ? tools_elastic_energy(s) : 0;
-    for (int i = 0; s->tools.count == 1 && i < s->wire.element_count; i++)
-        energy += element_energy(s, i, s->first_free);
+    double energy = s->tools.count > 1 ? tools_elastic_energy(s) : tool_energy(s);
     if (s->first_free == s->state.node_count)
         energy -= stepper_tip_straightening(s) * fmax(stepper_sheath_coordinate(s, s->first_free - 1), 0);
     return energy;

@@ -319,6 +319,8 @@ Vec3 touch_done(const Stepper *s, const Touch *touch, Vec3 arm);
 void touch_keep(Stepper *s);
 // Input of element i, between two nodes of one tool, at the present state.
 BeamInput stepper_beam(const Stepper *s, int i);
+// Writes the pose of nodes first to count-1 into arrays by quantity.
+void stepper_load_pose(const Vec3 *restrict position, const Quat *restrict orientation, int first, int count, const BeamPose *pose);
 // Replaces the row and column of one unknown by a unit row with its value.
 void stepper_prescribe(Stepper *s, int node, int dof, double value);
 // Force and moment of a load in space axes at this time, on its node (end 0) or the next one (end 1). Returns false if there is none.

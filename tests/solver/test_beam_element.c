@@ -454,6 +454,13 @@ static void chain_equals_elements(void **state)
     for (int first = 0; first <= E; first++) {
         double diag[36 * (E + 1)] = {0}, lower[36 * (E + 1)] = {0}, b[6 * (E + 1)] = {0};
         plain_assembly(&c, first, 1.2, 0.7, diag, lower, b);
+        double energy = 0;
+        for (int i = first; i < E; i++) {
+            BeamInput in = chain_input(&c, i);
+            BeamOutput out;
+            beam_element(&in, &out);
+            energy += out.energy;
+        }
         for (int level = (int)simd_widest(); level >= 0; level--) {
             simd_force((SimdLevel)level);
             for (int k = 0; k < 36 * (E + 1); k++)
@@ -461,6 +468,7 @@ static void chain_equals_elements(void **state)
             for (int k = 0; k < 6 * (E + 1); k++)
                 c.b[k] = -7;
             beam_chain_assemble(&c.beam, first, E, 1.2, 0.7, &c.blocks, c.b);
+            assert_true(beam_chain_energy(&c.beam, first, E) == energy && (energy > 0 || first == E));
             for (int k = 0; k < 36 * first; k++)
                 assert_true(c.blocks.diag[k] == -7 && (k >= 36 * E || c.blocks.lower[k] == -7) && (k >= 6 * first || c.b[k] == -7));
             assert_near(c.blocks.diag + 36 * first, diag + 36 * first, 36 * (E + 1 - first));
