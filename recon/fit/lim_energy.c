@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ARRAYS = 20 };
+enum { ARRAYS = 20, SOLVE_ROWS = 8 };
 // squared gradient below which the direction is undefined, so the curvature gets almost no weight
 static const float LEAST_GRADIENT2 = 1e-8f;
 
