@@ -39,9 +39,9 @@ typedef struct Job {
     const VesselTree *tree;
     PowerBlocks blocks;
     double *reach;           // (N) [mm] no point of a node lies further from its centre
+    double *link;            // (N) [mm] length of the link that is lumen to the parent; 0: there is none
     Draft *draft;            // (N) rows from each node's points and tube
     int **cell;              // (N) the cells that contain those rows, data first
-    FieldRows *rows;
     int64_t *dropped;        // (N)
 } Job;
 
@@ -100,11 +100,21 @@ static double share_of_tube(const VesselTree *tree, int node, Vec3 x)
     return vec3_distance(x, vec3_mix(a, b, t)) / r;
 }
 
-static bool is_in_lumen(const VesselTree *tree, int node, Vec3 x)
+// Returns true if x is nearer to the node's tube than `limit`, measured as if the tube had the node's radius all along. Most tubes are so far away that the
+// distance from the node's centre tells.
+static bool is_near_tube(const Job *job, int node, Vec3 x, double limit)
 {
+    const double rounding = 1 + 1e-9, reach = rounding * (job->link[node] + limit);
+    const VesselTree *tree = job->tree;
+    return vec3_norm2(vec3_sub(x, tree->center[node])) < reach * reach && share_of_tube(tree, node, x) * tree->radius[node] < limit;
+}
+
+static bool is_in_lumen(const Job *job, int node, Vec3 x)
+{
+    const VesselTree *tree = job->tree;
     for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
         int at = k < tree->near_offset[node] ? node : tree->near[k];
-        if (tree->kind[at] == NODE_VESSEL && share_of_tube(tree, at, x) < LUMEN_POINT)
+        if (tree->kind[at] == NODE_VESSEL && is_near_tube(job, at, x, LUMEN_POINT * tree->radius[at]))
             return true;
     }
     return false;
@@ -124,7 +134,7 @@ static bool is_clear(const Job *job, int node, Vec3 x, double clear)
     for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
         int at = k < tree->near_offset[node] ? node : tree->near[k];
         double r = tree->radius[at], share = tree->kind[at] == NODE_VESSEL ? 1.1 : SAC_BALL;
-        if (share_of_tube(tree, at, x) * r < share * r + 0.5 * clear)
+        if (is_near_tube(job, at, x, share * r + 0.5 * clear))
             return false;
         double away = vec3_distance(x, tree->center[at]);
         if (away > r + tree->height[at] + 2 * clear + 1.5 * r || (tree->kind[at] == NODE_VESSEL && away > job->reach[at] + clear))
@@ -244,14 +254,16 @@ static void extend_inlet(const VesselTree *tree, Draft *d)
         add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), MOST_INSIDE);
 }
 
-static void measure_reach(const VesselTree *tree, double *reach)
+static void measure_reach(const VesselTree *tree, double *reach, double *link)
 {
     const double rounding = 1 + 1e-12;
-    for (int node = 0; node < tree->node_count; node++)
+    for (int node = 0; node < tree->node_count; node++) {
+        link[node] = field_link_is_lumen(tree, node) ? vec3_distance(tree->center[node], tree->center[tree->parent[node]]) : 0;
         for (int64_t i = tree->point_offset[node]; i < tree->point_offset[node + 1]; i++) {
             double away = rounding * vec3_distance(tree->point[i], tree->center[node]);
             reach[node] = away > reach[node] ? away : reach[node];
         }
+    }
 }
 
 static void draft_node(void *context, long index)
@@ -262,7 +274,7 @@ static void draft_node(void *context, long index)
     Draft *d = &job->draft[node];
     for (int64_t i = tree->point_offset[node]; i < tree->point_offset[node + 1]; i++) {
         Vec3 p = tree->point[i];
-        if (is_in_lumen(tree, node, p))
+        if (is_in_lumen(job, node, p))
             job->dropped[node]++;
         else
             add_point(d, p);
@@ -306,31 +318,62 @@ static int by_z(const void *a, const void *b) { return compare_rows(a, b, 2); }
 
 static int padded(int count) { return (count + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES; }
 
-// Halves the rows until a tile holds no more than its limit. Counts the tiles, or with `tile` fills them; their numbers go to `memory`.
-static void split_rows(Row *row, int count, int node, RowTile **tile, float **memory, int *tiles, size_t *floats)
+typedef struct TileJob {
+    FieldRows *rows;
+    Row *row;                // (M) by cell
+    const int *first;        // (N+1) cell i has rows first[i] … first[i+1]-1
+    size_t *floats;          // (N+1) a cell's numbers; then where they begin
+} TileJob;
+
+static void measure_rows(const Row *row, int count, int *data, float low[3], float high[3])
 {
-    int data = 0;
-    float low[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF}, high[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
+    *data = 0;
+    for (int k = 0; k < 3; k++)
+        low[k] = HUGE_VALF, high[k] = -HUGE_VALF;
     for (int i = 0; i < count; i++) {
-        data += row[i].is_data;
+        *data += row[i].is_data;
         for (int k = 0; k < 3; k++)
             low[k] = fminf(low[k], row[i].x[k]), high[k] = fmaxf(high[k], row[i].x[k]);
     }
+}
+
+static bool is_tile(int data, int count) { return data <= FIELD_TILE && count - data <= GUARD_TILE; }
+
+// Halves the rows until a tile holds no more than its limit. Sorts them for that, and counts tiles and their numbers.
+static void split_rows(Row *row, int count, int *tiles, size_t *floats)
+{
+    int data;
+    float low[3], high[3];
+    measure_rows(row, count, &data, low, high);
     if (count == 0)
         return;
-    if (data > FIELD_TILE || count - data > GUARD_TILE) {
+    if (!is_tile(data, count)) {
         int axis = high[1] - low[1] > high[0] - low[0] ? 1 : 0;
         axis = high[2] - low[2] > high[axis] - low[axis] ? 2 : axis;
         qsort(row, (size_t)count, sizeof *row, axis == 0 ? by_x : axis == 1 ? by_y : by_z);
-        split_rows(row, count / 2, node, tile, memory, tiles, floats);
-        split_rows(row + count / 2, count - count / 2, node, tile, memory, tiles, floats);
+        split_rows(row, count / 2, tiles, floats);
+        split_rows(row + count / 2, count - count / 2, tiles, floats);
         return;
     }
     int d = padded(data), g = padded(count - data);
     *tiles += 1;
     *floats += (size_t)(3 * (d + g) + d + 2 * g);
-    if (!tile)
+}
+
+// Fills the tiles of rows that were split; their numbers go to `memory`.
+static void fill_tiles(const Row *row, int count, int node, RowTile **tile, float **memory)
+{
+    int data;
+    float low[3], high[3];
+    measure_rows(row, count, &data, low, high);
+    if (count == 0)
         return;
+    if (!is_tile(data, count)) {
+        fill_tiles(row, count / 2, node, tile, memory);
+        fill_tiles(row + count / 2, count - count / 2, node, tile, memory);
+        return;
+    }
+    int d = padded(data), g = padded(count - data);
     float *next = *memory;
     RowTile *to = (*tile)++;
     *to = (RowTile){.node = node, .data_padded = d, .guards_padded = g, .x = next, .y = next + d + g, .z = next + 2 * (d + g), .weight = next + 3 * (d + g)};
@@ -348,6 +391,22 @@ static void split_rows(Row *row, int count, int node, RowTile **tile, float **me
         float dx = row[i].x[0] - to->middle[0], dy = row[i].x[1] - to->middle[1], dz = row[i].x[2] - to->middle[2];
         to->radius = fmaxf(to->radius, sqrtf(dx * dx + dy * dy + dz * dz));
     }
+    for (int i = to->guards; i < g; i++)
+        to->low[i] = -HUGE_VALF, to->high[i] = HUGE_VALF;
+}
+
+static void split_cell(void *context, long index)
+{
+    TileJob *job = context;
+    split_rows(job->row + job->first[index], job->first[index + 1] - job->first[index], &job->rows->first[index], &job->floats[index]);
+}
+
+static void fill_cell(void *context, long index)
+{
+    TileJob *job = context;
+    RowTile *tile = job->rows->tile + job->rows->first[index];
+    float *memory = job->rows->memory + job->floats[index];
+    fill_tiles(job->row + job->first[index], job->first[index + 1] - job->first[index], (int)index, &tile, &memory);
 }
 
 // Collects all rows (M), those of a cell consecutive; first (N+1) gives the first row of each cell.
@@ -385,30 +444,30 @@ static Row *collect_rows(const Job *job, int *first)
     return row;
 }
 
-static bool make_tiles(const Job *job)
+static bool make_tiles(const Job *job, FieldRows *rows, int threads)
 {
-    FieldRows *rows = job->rows;
-    int n = rows->node_count, *first = calloc((size_t)n + 1, sizeof *first);
-    Row *row = first ? collect_rows(job, first) : NULL;
+    int n = rows->node_count, *first = calloc((size_t)n + 1, sizeof *first), tiles = 0;
+    TileJob t = {rows, first ? collect_rows(job, first) : NULL, first, calloc((size_t)n + 1, sizeof *t.floats)};
     size_t floats = 0;
-    int tiles = 0;
-    for (int i = 0; i < n && row; i++) {
-        rows->first[i] = tiles;
-        split_rows(row + first[i], first[i + 1] - first[i], i, NULL, NULL, &tiles, &floats);
+    bool good = t.row && t.floats;
+    if (good)
+        parallel_for(threads, n, split_cell, &t, NULL);
+    for (int i = 0; i <= n && good; i++) {
+        int own = rows->first[i];
+        size_t numbers = t.floats[i];
+        rows->first[i] = tiles, t.floats[i] = floats;
+        tiles += own, floats += numbers;
     }
-    rows->first[n] = tiles;
-    rows->tile = calloc((size_t)tiles + 1, sizeof *rows->tile);
-    rows->memory = aligned_alloc(64, (floats + FIELD_LANES) / FIELD_LANES * 64);
-    bool good = row && rows->tile && rows->memory;
+    rows->tile = good ? calloc((size_t)tiles + 1, sizeof *rows->tile) : NULL;
+    rows->memory = good ? aligned_alloc(64, (floats + FIELD_LANES) / FIELD_LANES * 64) : NULL;
+    good = rows->tile && rows->memory;
     if (good) {
         memset(rows->memory, 0, floats * sizeof(float));
-        RowTile *tile = rows->tile;
-        float *memory = rows->memory;
-        for (int i = 0; i < n; i++)
-            split_rows(row + first[i], first[i + 1] - first[i], i, &tile, &memory, &tiles, &floats);
+        parallel_for(threads, n, fill_cell, &t, NULL);
     }
     free(first);
-    free(row);
+    free(t.row);
+    free(t.floats);
     return good;
 }
 
@@ -418,15 +477,15 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
     *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
     Job job = {.tree = tree,
                .reach = calloc(n, sizeof *job.reach),
+               .link = calloc(n, sizeof *job.link),
                .draft = calloc(n, sizeof *job.draft),
                .cell = calloc(n, sizeof *job.cell),
-               .rows = rows,
                .dropped = calloc(n, sizeof *job.dropped)};
-    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.reach && job.draft && job.cell && job.dropped;
+    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.reach && job.link && job.draft && job.cell && job.dropped;
     if (good) {
-        measure_reach(tree, job.reach);
+        measure_reach(tree, job.reach, job.link);
         parallel_for(threads, tree->node_count, draft_node, &job, NULL);
-        good = make_tiles(&job);
+        good = make_tiles(&job, rows, threads);
     }
     for (int i = 0; i < tree->node_count && job.draft && job.cell && job.dropped; i++) {
         rows->dropped += job.dropped[i];
@@ -436,6 +495,7 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
         free(job.cell[i]);
     }
     free(job.reach);
+    free(job.link);
     free(job.draft);
     free(job.cell);
     free(job.dropped);

@@ -1,7 +1,7 @@
 // The rows of the whole-tree fit, node by node: the target values of the field at data points and guards. Internal to recon; see field_fit.h.
 //
 // A row belongs to the node in whose power cell it lies, because that node's field is evaluated there. Single precision, relative to the node's
-// centre, structure of arrays; data and guards are each padded to whole lanes by rows of weight 0.
+// centre, structure of arrays; data and guards are each padded to whole lanes by rows of weight 0, or without bounds.
 #ifndef SELDINGER_RECON_FIT_FIELD_ROWS_H
 #define SELDINGER_RECON_FIT_FIELD_ROWS_H
 
@@ -16,7 +16,7 @@ typedef struct RowTile {     // neighbouring rows of one node: at most FIELD_TIL
     int guards, guards_padded;   // G: number of guards, target f within [low, high]
     float *x, *y, *z;        // (padded D + padded G) [mm] from the node's centre
     float *weight;           // (padded D) weight of a point: 1, or 0 in the padding
-    float *low, *high;       // (padded G)
+    float *low, *high;       // (padded G) infinite in the padding
     float middle[3], radius; // [mm] a ball around all rows
 } RowTile;
 
