@@ -6,6 +6,7 @@
 
 // images
 #include "recon/volume/volume.h"
+#include "recon/volume/ct_soft_tissue.h"
 #include "recon/volume/volume_file.h"
 #include "recon/volume/volume_reduce.h"
 

@@ -57,6 +57,11 @@ static void show_modes(Gui *gui, CaseState *s)
         if (i % 2 == 0)
             gui_beside(gui, gap);
     }
+    if (s->soft) {
+        const bool forbids = case_state_forbids_bone(s);
+        if (key_list_button(gui, SHEET_CASE, "bone", forbids ? "bone is left out" : "bone may be tracked", CASE_KEY_FORBID_BONE, 0, forbids))
+            case_state_turn_bone(s);
+    }
     if (s->mode == CASE_FORBID) {
         float radius = (float)s->forbid_radius;
         if (gui_slider(gui, "radius", &radius, 0.5f, 20, "radius %.1f mm", 0))

@@ -127,6 +127,7 @@ static void take_volume(CaseState *s)
     Vec3 corner[8];
     s->volume = case_builder_volume(s->builder);
     s->reduced = case_builder_reduced(s->builder, &low, &high);
+    s->soft = case_builder_soft(s->builder);
     const Volume *v = s->volume;
     s->axes = patient_axes(v->frame);
     s->full_low = s->low = (double)low;
@@ -375,6 +376,22 @@ void case_state_turn_background(CaseState *s)
     add(s, &act);
 }
 
+bool case_state_forbids_bone(const CaseState *s)
+{
+    const CaseAct *last = case_acts_last(&s->acts, CASE_BONE);
+    return s->soft && (!last || last->is_on);
+}
+
+void case_state_turn_bone(CaseState *s)
+{
+    if (s->has_volume && !s->soft) {
+        say(s, true, "only a CT says what bone is: choose a region with {forbid} instead");
+        return;
+    }
+    add(s, &(CaseAct){.kind = CASE_BONE, .is_on = !case_state_forbids_bone(s)});
+    s->shows_bone = s->has_volume && !case_state_forbids_bone(s);
+}
+
 void case_state_choose_mark(CaseState *s, int mark)
 {
     const CaseMark *marks;
@@ -390,7 +407,7 @@ void case_state_choose_mark(CaseState *s, int mark)
 
 // --- views ---
 
-const Volume *case_state_projected(const CaseState *s) { return volume_has_ct_numbers(s->volume) && !s->shows_bone ? s->reduced : s->volume; }
+const Volume *case_state_projected(const CaseState *s) { return s->soft && !s->shows_bone ? s->soft : s->volume; }
 
 Camera case_state_camera(const CaseState *s, int view, int width, int height)
 {

@@ -22,6 +22,7 @@ typedef struct CaseState {
     BuildProgress progress;      // of the last frame
     bool has_volume;             // and all below is set
     const Volume *volume, *reduced;
+    const Volume *soft;          // of a CT, without bone; else NULL
     VolumeAxes axes;
     double low, high;            // brightness shown as black and white
     double full_low, full_high;  // at first
@@ -69,6 +70,9 @@ void case_state_redo(CaseState *state);
 void case_state_cancel(CaseState *state);
 void case_state_next(CaseState *state, CaseListId list, int by);
 void case_state_turn_background(CaseState *state);
+// Bone of a CT is tracked from now on, or left out again. Without a CT: says that there is none.
+void case_state_turn_bone(CaseState *state);
+bool case_state_forbids_bone(const CaseState *state);
 void case_state_choose_mark(CaseState *state, int mark);
 
 // Begins to edit the sections of a swept model. False with a message if there is none. The edits are acts …
@@ -77,7 +81,7 @@ void case_state_edit_end(CaseState *state);
 // … once this has taken them, after anything that may have changed `edit`.
 void case_state_edit_take(CaseState *state);
 
-// What the projection shows and a click in it meets: of a CT what is not bone, in `reduced`, unless the user wants it.
+// What the projection shows and a click in it meets: of a CT what is not bone, unless the user wants it.
 const Volume *case_state_projected(const CaseState *state);
 // A view of this size; the projection at CASE_PROJECTION.
 Camera case_state_camera(const CaseState *state, int view, int width, int height);

@@ -22,6 +22,7 @@ typedef struct Picture {
     int number;                  // CaseState.pictures when it was drawn
     bool is_coarse;
     uint8_t *grey, *rgba;
+    uint8_t *soft;               // grey without bone, of a slice of a CT
 } Picture;
 
 typedef struct CutLine {
@@ -76,6 +77,7 @@ void case_views_destroy(CaseViews *v)
         glDeleteFramebuffers(1, &v->picture[i].framebuffer);
         glDeleteTextures(1, &v->picture[i].texture);
         free(v->picture[i].grey);
+        free(v->picture[i].soft);
         free(v->picture[i].rgba);
     }
     for (int i = 0; i < 3; i++)
@@ -97,8 +99,10 @@ static bool fit_picture(Picture *p, int width, int height)
     if (p->width == width && p->height == height)
         return true;
     free(p->grey);
+    free(p->soft);
     free(p->rgba);
     p->grey = malloc((size_t)width * (size_t)height);
+    p->soft = malloc((size_t)width * (size_t)height);
     p->rgba = malloc((size_t)width * (size_t)height * 4);
     p->width = width, p->height = height;
     glBindTexture(GL_TEXTURE_2D, p->texture);
@@ -107,7 +111,21 @@ static bool fit_picture(Picture *p, int width, int height)
     glBindFramebuffer(GL_FRAMEBUFFER, p->framebuffer);
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, p->texture, 0);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    return p->grey && p->rgba;
+    return p->grey && p->soft && p->rgba;
+}
+
+// Colours what is brighter in the volume than without bone, so that a user sees what is left out.
+static void tint_bone(Picture *p, const CaseState *s, const Camera *camera)
+{
+    const Color tint = {150, 105, 60, 255};
+    volume_slice(s->soft, camera, s->cursor, s->low, s->high, p->soft);
+    for (int i = 0; i < p->width * p->height; i++) {
+        const int grey = p->grey[i], more = grey > p->soft[i] ? grey - p->soft[i] : 0;
+        uint8_t *out = p->rgba + 4 * (size_t)i;
+        out[0] = (uint8_t)(grey - more + more * tint.r / 255);
+        out[1] = (uint8_t)(grey - more + more * tint.g / 255);
+        out[2] = (uint8_t)(grey - more + more * tint.b / 255);
+    }
 }
 
 static bool update_picture(Picture *p, const CaseState *s, int view, GuiRect at, bool is_moving)
@@ -134,6 +152,8 @@ static bool update_picture(Picture *p, const CaseState *s, int view, GuiRect at,
         memset(p->rgba + 4 * (size_t)i, p->grey[i], 3);
         p->rgba[4 * (size_t)i + 3] = 255;
     }
+    if (!is_projection && case_state_forbids_bone(s))
+        tint_bone(p, s, &camera);
     glBindTexture(GL_TEXTURE_2D, p->texture);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, p->rgba);
@@ -419,6 +439,8 @@ static void draw_frame(const Over *o)
                             ? key_sheet_fill(SHEET_CASE, tr("projection without bone ({bone})"), without, sizeof without)
                             : name[o->view];
     gui_draw_text(o->gui, at.x + 8 * k, at.y + 6 * k, GUI_SMALL, gui_colors.dim, title);
+    if (o->view < CASE_PROJECTION && case_state_forbids_bone(o->s))
+        gui_draw_text(o->gui, at.x + 8 * k, at.y + 22 * k, GUI_SMALL, gui_colors.dim, "brown: bone, left out");
     // a scale of 10 mm, or a tenth or ten times that
     double bar = 10;
     while (bar / c->mm_per_pixel > 0.4 * (double)at.width)

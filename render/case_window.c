@@ -182,6 +182,7 @@ static void press(CaseWindow *w, int key)
         else
             case_state_click_nowhere(s, s->view);
         break;
+    case CASE_KEY_FORBID_BONE: case_state_turn_bone(s); break;
     case CASE_KEY_BACKGROUND: case_state_turn_background(s); break;
     case CASE_KEY_EDIT: open_desk(w); break;
     case CASE_KEY_UNDO: case_state_undo(s); break;

@@ -69,6 +69,7 @@ static const SheetKey case_key[] = {
     [CASE_KEY_MARK_BEFORE] = {"mark_before", K('P'), "Mark before", NULL},
     [CASE_KEY_WALL] = {"wall", K('W'), "Wall or projection", "the wall instead of the projection"},
     [CASE_KEY_BONE] = {"bone", K('O'), "Bone in the projection", "bone in the projection of a CT, or not"},
+    [CASE_KEY_FORBID_BONE] = {"forbid_bone", K('F'), "Forbid bone", "bone of a CT is left out, or tracked as anything else"},
     [CASE_KEY_WIRE] = {"wire", K('T'), "Next wire", "next wire; next catheter around it (Shift: back)"},
     [CASE_KEY_CATHETER] = {"catheter", K('C'), "Next catheter", NULL},
     [CASE_KEY_ANATOMY] = {"anatomy", K('A'), "Which vessel of the body", "which vessel of the body it is (Shift: back)"},

@@ -45,6 +45,7 @@ typedef enum CaseKey {
     CASE_KEY_MARK_BEFORE,
     CASE_KEY_WALL,
     CASE_KEY_BONE,
+    CASE_KEY_FORBID_BONE,
     CASE_KEY_WIRE,               // the lists, in the order of CaseListId
     CASE_KEY_CATHETER,
     CASE_KEY_ANATOMY,

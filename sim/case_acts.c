@@ -65,7 +65,7 @@ const CaseAct *case_acts_last(const CaseActs *acts, CaseActKind kind)
     return NULL;
 }
 
-bool case_act_changes_tree(CaseActKind kind) { return kind <= CASE_ENTRY || kind == CASE_MODEL; }
+bool case_act_changes_tree(CaseActKind kind) { return kind <= CASE_ENTRY || kind == CASE_MODEL || kind == CASE_BONE; }
 
 int case_acts_first_edit(const CaseActs *acts)
 {
@@ -105,8 +105,8 @@ static void describe_edit(const SweepEdit *edit, Words words, char *out, size_t 
 
 void case_act_describe(const CaseAct *act, Words words, char *out, size_t capacity)
 {
-    static const char *const name[CASE_ACTS] = {"start",  "branch", "forbid",   "cut",     "end here",   "sac",   "entry",
-                                                "target", "tool",   "catheter", "anatomy", "background", "model", "edit"};
+    static const char *const name[CASE_ACTS] = {"start", "branch",   "forbid",  "cut",        "end here", "sac",  "entry", "target",
+                                                "tool",  "catheter", "anatomy", "background", "model",    "bone", "edit"};
     Vec3 x = act->place;
     words = words ? words : words_english;
     if (act->kind == CASE_DEVICE)
@@ -119,6 +119,8 @@ void case_act_describe(const CaseAct *act, Words words, char *out, size_t capaci
         describe_edit(&act->edit, words, out, capacity);
     else if (act->kind == CASE_BEHIND)
         snprintf(out, capacity, words("background: %s"), act->is_on ? words("the volume") : words("a plain patient"));
+    else if (act->kind == CASE_BONE)
+        snprintf(out, capacity, act->is_on ? words("forbid bone: more than %.0f HU") : words("bone may be tracked: more than %.0f HU"), (double)CT_NUMBER_BONE);
     else if (act->kind == CASE_FORBID)
         snprintf(out, capacity, words("forbid %.1f mm around %.1f, %.1f, %.1f"), act->radius, x.x, x.y, x.z);
     else
@@ -235,6 +237,9 @@ char *case_acts_trace(const CaseActs *acts)
     write_list(out, acts, "aneurysms", CASE_SAC, "");
     if (branches > 1)        // a trace of several branches is tracked by hand otherwise
         fputs("automatic: 1\n", out);
+    const CaseAct *bone = case_acts_last(acts, CASE_BONE);
+    if (bone && !bone->is_on)
+        fputs("bone_hu: 0\n", out);
     write_choices(out, acts);
     if (!write_edits(out, acts)) {
         output_text_forget(&text);

@@ -21,6 +21,7 @@ typedef enum {
     CASE_ANATOMY,            // which vessel of the body it is
     CASE_BEHIND,             // the volume lies behind the vessels in fluoroscopy, or no longer
     CASE_MODEL,              // the kind of the wall's model
+    CASE_BONE,               // bone of a CT is left out (as it is without this act), or tracked as anything else
     CASE_EDIT,               // an edit of a swept model: those after the last act that changes the tree count
     CASE_ACTS
 } CaseActKind;
@@ -29,7 +30,7 @@ typedef struct CaseAct {
     CaseActKind kind;
     Vec3 place;              // [mm]
     double radius;           // [mm] of CASE_FORBID
-    bool is_on;              // of CASE_BEHIND
+    bool is_on;              // of CASE_BEHIND and CASE_BONE
     // of CASE_DEVICE and CASE_CATHETER: a file of the device library; "": a wire that suits the vessels, no catheter. Of CASE_ANATOMY: a segment
     // (sim/patient_landmarks.h); "": not said. Of CASE_MODEL: one of model_names; "": the first
     char name[80];

@@ -37,6 +37,7 @@ struct CaseBuilder {
     int seen_count, seen_capacity;
     // written by the thread before the stage that lets the owner read them
     Volume *volume, *reduced;
+    Volume *soft;                // of a CT
     float low, high;
     CaseWork work;
     ModelField wall;
@@ -207,6 +208,7 @@ static void free_all(CaseBuilder *b)
     forget_work(b);
     volume_free(b->volume);
     volume_free(b->reduced);
+    volume_free(b->soft);
     free(b->seen);
     free(b->trace);
     free(b->title);
@@ -234,11 +236,11 @@ static void load(CaseBuilder *b)
     enum { REDUCED = 160 };          // voxels along an axis: a projection of them takes 20 ms of one core
     double begun = clock_s(CLOCK_MONOTONIC);
     Volume *volume = volume_load_with(b->options.input, &b->watching, &b->faults);
-    if (volume && !(b->reduced = volume_reduced(volume, REDUCED))) {
-        volume_free(volume);
-        volume = NULL;
-    }
-    if (volume && volume_has_ct_numbers(volume) && !volume_hide_bone(b->reduced)) {
+    const bool is_ct = volume && volume_has_ct_numbers(volume);
+    if (is_ct)
+        b->soft = ct_soft_tissue(volume, (double)CT_NUMBER_BONE);
+    const Volume *shown = is_ct ? b->soft : volume;
+    if (volume && !(shown && (b->reduced = volume_reduced(shown, REDUCED)))) {
         volume_free(volume);
         volume = NULL;
     }
@@ -365,6 +367,8 @@ static BuildStage stage_of(const CaseBuilder *builder)
 }
 
 const Volume *case_builder_volume(const CaseBuilder *b) { return stage_of(b) == BUILD_LOADING ? NULL : b->volume; }
+
+const Volume *case_builder_soft(const CaseBuilder *b) { return case_builder_volume(b) ? b->soft : NULL; }
 
 const Volume *case_builder_reduced(const CaseBuilder *b, float *low, float *high)
 {

@@ -32,7 +32,9 @@ CaseBuilder *case_builder_create(const CaseOptions *options);
 void case_builder_free(CaseBuilder *builder);
 BuildProgress case_builder_progress(CaseBuilder *builder);
 const Volume *case_builder_volume(const CaseBuilder *builder);      // NULL until it is loaded
-// A small copy for projections, of a CT without bone (volume_hide_bone()), and the brightness range to show. NULL until the volume is loaded.
+// Of a CT what is not bone (ct_soft_tissue()); NULL: no CT, or not loaded yet.
+const Volume *case_builder_soft(const CaseBuilder *builder);
+// A small copy for projections, of a CT without bone, and the brightness range to show. NULL until the volume is loaded.
 const Volume *case_builder_reduced(const CaseBuilder *builder, float *low, float *high);
 // Makes the case of this trace (copied); NULL: of none.
 void case_builder_request(CaseBuilder *builder, const char *trace);

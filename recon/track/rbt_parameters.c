@@ -2,6 +2,7 @@
 #include "recon/track/rbt_parameters.h"
 
 #include "base/base.h"
+#include "recon/volume/volume.h"
 
 #include <stddef.h>
 #include <stdio.h>
@@ -54,6 +55,7 @@ RbtParameters rbt_default_parameters(void)
     p.contrast = 0.3;
     p.turn_deg = 110;
     p.look_ahead = 12;
+    p.bone_hu = (double)CT_NUMBER_BONE;
     p.aneurysm_rays = 642;
     p.ostia = 1;
     return p;
@@ -86,6 +88,7 @@ const RbtParameterName rbt_parameter_table[] = {
     {"look_ahead", FIELD(look_ahead), 0, 40, false, "radii ahead to search for the continuation of a branch that widens or ends; 0: none"},
     {"overlap", FIELD(overlap), 0, 1, false, "a branch ends this many radii from the centre of a node of another branch"},
     {"max_length_mm", FIELD(max_length_mm), 1, 100000, false, "largest length of a branch"},
+    {"bone_hu", FIELD(bone_hu), 0, 4000, false, "in a CT, CT number above which connected voxels are bone, which is not tracked; 0: nothing is bone"},
     {"aneurysm_rays", FIELD(aneurysm_rays), 42, 2562, true, "number of rays from each centre of an aneurysm: 42, 162, 642 or 2562"},
     {"aneurysm_reach_mm", FIELD(aneurysm_reach_mm), 0.1, 1000, false, "length of the rays from an aneurysm's centres"},
     {"automatic", FIELD(automatic), 0, 1, true, "1: track the whole tree from the first start; 0: only the branches in the trace file"},

@@ -47,6 +47,7 @@ typedef struct RbtParameters {
     double look_ahead;       // if a branch widens or ends, search the lumen this many radii ahead for its continuation; 0: never
     double overlap;          // a branch ends where its centre is closer than this many radii to the centre of another branch's node
     double max_length_mm;    // [mm] largest length of a branch
+    double bone_hu;          // [HU] of a CT: connected voxels above it are bone, which is left out (ct_soft_tissue()); 0: nothing is
     double aneurysm_rays;    // number of rays from each centre of an aneurysm: 162, 642 or 2562
     double aneurysm_reach_mm;    // [mm] length of these rays
     double seed;             // seed of the random numbers

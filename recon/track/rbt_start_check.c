@@ -312,19 +312,6 @@ static void judge_ends(Tracker *t, int count)
     }
 }
 
-// Warns if the first branch of a CT is as bright as bone.
-static void judge_bone(Tracker *t, int count)
-{
-    int bright = 0;
-    for (int i = 0; i < count; i++)
-        bright += tracker_brightness(t, t->tree.node[i].cylinder.center) > (double)CT_NUMBER_BONE;
-    if (!volume_has_ct_numbers(t->volume) || 2 * bright <= count)
-        return;
-    doubt(t, &t->check, RBT_BACKGROUND, (double)bright / count, 0.5,
-          "%.0f %% of the first branch has more than %.0f HU: bone? Vessels with contrast agent mostly have 150 to 600 HU; start in one of them",
-          100.0 * bright / count, (double)CT_NUMBER_BONE);
-}
-
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
 {
     enum { ROOT = 3 };
@@ -350,7 +337,6 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
               100 * least_inliers);
     }
     judge_background(t, count);
-    judge_bone(t, count);
     judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {

@@ -16,6 +16,8 @@
 #include "recon/track/rbt_scan.h"
 #include "recon/track/rbt_start_check.h"
 #include "recon/track/rbt_trunk.h"
+#include "recon/volume/bspline.h"
+#include "recon/volume/ct_soft_tissue.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -143,25 +145,16 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
 // --- the whole tree ---
 
 // Brightness range of a million samples: `low` is the first quartile, which is background (vessels fill less than three quarters of any angiogram), `high`
-// the 99.9th percentile. The extremes would be noise, air or metal: with them half of a noisy background was taken for vessel. Of CT numbers only those of soft
-// tissue and vessels count: a quarter of a CT is air, and more than a thousandth bone.
+// the 99.9th percentile. The extremes would be noise or metal: with them half of a noisy background was taken for vessel.
 static void brightness_range(const Volume *volume, double *low, double *high)
 {
     enum { BINS = 1 << 12 };
     static const double share[2] = {0.25, 0.999};
     long count[BINS] = {0}, total = 0, sum = 0;
     size_t voxels = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2], stride = voxels / 1000003 + 1;
-    const bool is_ct = volume_has_ct_numbers(volume);
-    double least = is_ct ? (double)CT_NUMBER_TISSUE : (double)volume->minimum, most = (double)volume->maximum;
-    most = is_ct ? fmin(most, (double)CT_NUMBER_BONE) : most;
-    double width = (most - least) / BINS;
-    for (size_t i = 0; i < voxels && width > 0; i += stride) {
-        double value = (double)volume->value[i];
-        if (value < least || value > most)
-            continue;
-        count[(int)fmin((value - least) / width, BINS - 1)]++;
-        total++;
-    }
+    double least = (double)volume->minimum, width = ((double)volume->maximum - least) / BINS;
+    for (size_t i = 0; i < voxels && width > 0; i += stride, total++)
+        count[(int)fmin(((double)volume->value[i] - least) / width, BINS - 1)]++;
     *low = *high = least;
     for (int bin = 0; bin < BINS; bin++) {
         sum += count[bin];
@@ -184,8 +177,6 @@ static bool check_point(Tracker *t, Vec3 x, const RbtSeed *seed, const char *wha
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
-    if (volume_has_ct_numbers(t->volume))
-        low = (double)CT_NUMBER_TISSUE, high = fmin(high, (double)CT_NUMBER_BONE);
     if (!(high > low) || (value < fmax(low + 0.1 * (high - low), t->dark) && !(seed ? rbt_stands_out(t, t->levels, seed) : t->is_noisy))) {
         faults_add(faults, path, line, column,
                    "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); expected a point inside a vessel, above %g",
@@ -213,6 +204,19 @@ static bool check_seed(Tracker *t, RbtSeed *seed, int number, const char *path, 
         faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; expected at most %g mm", seed->radius,
                    number + 1, extent / 2);
     return faults->count == before;
+}
+
+// A start on bone that is left out.
+static bool check_bone(const Tracker *t, const Volume *whole, const RbtSeed *seed, int number, const char *path, Faults *faults)
+{
+    const double value = tracker_is_inside(whole, seed->start) ? (double)bspline_sample(whole, volume_voxel_of(whole, seed->start)) : 0;
+    if (t->volume == whole || !(t->parameters->bone_hu > 0) || value < t->parameters->bone_hu || tracker_brightness(t, seed->start) >= t->parameters->bone_hu)
+        return true;
+    faults_add(faults, path, seed->line, seed->column,
+               "the start of branch %d (%g, %g, %g) mm has %.0f HU as bone has (vessels with contrast agent: 150 to 600), and bone above %.0f HU is left out; "
+               "expected a point in a vessel, or bone_hu above the vessel's CT number (0: nothing is bone)",
+               number + 1, seed->start.x, seed->start.y, seed->start.z, value, t->parameters->bone_hu);
+    return false;
 }
 
 static RbtSeed seed_in_mm(const Volume *volume, const RbtSeed *given)
@@ -288,14 +292,10 @@ static bool run_seed(Tracker *t, const Job *job, int i)
         return out_of_memory_at(job, i);
     if (t->refusal[0])
         return start_is_refused(t, &job->seed[i], i, job->path, job->faults);
-    double value = tracker_brightness(t, job->seed[i].start);
-    char bone[100] = "";
-    if (volume_has_ct_numbers(t->volume) && value > (double)CT_NUMBER_BONE)
-        snprintf(bone, sizeof bone, ", which has %.0f HU as bone has (vessels with contrast agent: 150 to 600)", value);
     faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column,
-               "nothing could be tracked from the start of branch %d%s (%s); expected a point well inside the vessel, "
+               "nothing could be tracked from the start of branch %d (%s); expected a point well inside the vessel, "
                "about its true radius and direction",
-               i + 1, bone, t->why);
+               i + 1, t->why);
     return false;
 }
 
@@ -615,16 +615,18 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
     return good;
 }
 
-VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *given, int seed_count, const RbtAneurysm *aneurysm,
+VesselTree *rbt_track(const Volume *whole, const RbtParameters *parameters, const RbtSeed *given, int seed_count, const RbtAneurysm *aneurysm,
                       int aneurysm_count, int threads, const Progress *progress, RbtReport *report, const char *path, Faults *faults)
 {
     Tracker *t = calloc(1, sizeof *t);
     RbtSeed *seed = malloc((size_t)(seed_count > 0 ? seed_count : 1) * sizeof *seed);
     Vec3 **center = calloc((size_t)(aneurysm_count > 0 ? aneurysm_count : 1), sizeof *center);
     RbtReport own = {0};
+    Volume *without = volume_has_ct_numbers(whole) ? ct_soft_tissue(whole, parameters->bone_hu) : NULL;
+    const Volume *volume = without ? without : whole;
     RbtLevels levels = rbt_levels_of(volume, threads);
     VesselTree *tree = NULL;
-    bool good = t && seed && center;
+    bool good = t && seed && center && (without || !volume_has_ct_numbers(whole));
     int before = faults->count;
     for (int i = 0; good && i < aneurysm_count; i++)
         good = (center[i] = malloc((size_t)aneurysm[i].center_count * sizeof **center)) != NULL;
@@ -660,7 +662,8 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
                 start_is_refused(t, &seed[0], 0, path, faults);
         }
         for (int i = 0; i < seed_count; i++)
-            check_seed(t, &seed[i], i, path, faults);
+            if (check_bone(t, whole, &seed[i], i, path, faults))
+                check_seed(t, &seed[i], i, path, faults);
         for (int i = 0; i < aneurysm_count; i++)
             for (int k = 0; k < aneurysm[i].center_count; k++) {
                 center[i][k] = tracker_in_mm(volume, aneurysm[i].center[k], aneurysm[i].is_voxel);
@@ -685,6 +688,7 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     }
     for (int i = 0; center && i < aneurysm_count; i++)
         free(center[i]);
+    volume_free(without);
     free(center);
     free(seed);
     free(t);

@@ -503,6 +503,71 @@ static void a_click_without_effect_says_why(void **state)
     end(s);
 }
 
+static bool trace_says(const CaseState *s, const char *text)
+{
+    char *trace = case_acts_trace(&s->acts);
+    assert_non_null(trace);
+    const bool says = strstr(trace, text) != NULL;
+    free(trace);
+    return says;
+}
+
+// A vessel along x that lies on a block of bone: the projection, a click and the tree leave the bone out, until the user wants it.
+static void bone_of_a_ct_is_forbidden_in_one_act(void **state)
+{
+    (void)state;
+    const int size[3] = {60, 50, 40};
+    const Vec3 axis[3] = {{0.5, 0, 0}, {0, 0.5, 0}, {0, 0, 0.5}}, in_bone = {15, 18, 10};
+    Volume *v = volume_create(size, vec3(0, 0, 0), axis);
+    Vec3 place;
+    assert_non_null(v);
+    for (size_t n = 0; n < 120000; n++) {
+        const Vec3 x = volume_point_of(v, vec3((double)(n % 60), (double)(n / 60 % 50), (double)(n / 3000)));
+        const double vessel = fmin(fmax(0.5 - outside(x, vec3(-5, 10, 10), vec3(40, 10, 10), 2) / 0.7, 0), 1);
+        v->value[n] = x.z > 18.4 ? -1000 : (float)round(vessel * 350 + (1 - vessel) * (x.y > 11.5 ? 1200 : 40));
+    }
+    v->minimum = -1000, v->maximum = 1200;
+    assert_true(volume_save_nrrd(v, in_folder("bone.nrrd"), "int16", &faults));
+    volume_free(v);
+    CaseState *s = calloc(1, sizeof *s);
+    CaseOptions made = {.input = strdup(in_folder("bone.nrrd"))};
+    assert_true(s && case_state_begin(s, &made));
+    wait_and_look(s);
+    assert_true(case_state_forbids_bone(s));
+    assert_true(volume_value_at(case_state_projected(s), in_bone) < 100);
+    // a click in the view from behind passes the bone and meets the vessel
+    const Camera c = slice_camera(&s->axes, SLICE_CORONAL, s->volume, volume_middle(s->volume), 1, 200, 150);
+    const Vec3 p = camera_project(&c, vec3(15, 10, 10));
+    assert_true(volume_pick(case_state_projected(s), &c, p.x, p.y, &place));
+    assert_true(fabs(place.y - 10) < 2);
+    case_state_act(s, CASE_START, vec3(15, 10, 10));
+    wait_and_look(s);
+    if (s->progress.stage != BUILD_DONE)
+        fail_msg("%s", s->message);
+    const VesselTree *tree = case_work_tree(case_builder_work(s->builder));
+    for (int i = 0; i < tree->node_count; i++)
+        assert_true(outside(tree->center[i], vec3(-5, 10, 10), vec3(40, 10, 10), 0) < 0.5);
+    assert_true(length_of(s) > 25);
+    assert_false(trace_says(s, "bone_hu"));
+    // one act lets it be tracked, and is undone like any other
+    case_state_turn_bone(s);
+    assert_false(case_state_forbids_bone(s));
+    assert_true(trace_says(s, "bone_hu: 0\n"));
+    assert_true(volume_value_at(case_state_projected(s), in_bone) > 1000);
+    case_state_undo(s);
+    assert_true(case_state_forbids_bone(s) && !trace_says(s, "bone_hu"));
+    case_state_turn_bone(s);
+    case_state_turn_bone(s);
+    assert_true(case_state_forbids_bone(s) && !trace_says(s, "bone_hu"));
+    end(s);
+    // no other volume says what bone is
+    s = begin();
+    assert_false(case_state_forbids_bone(s));
+    case_state_turn_bone(s);
+    assert_true(s->message_is_fault && s->acts.count == 0);
+    end(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -510,7 +575,7 @@ int main(void)
         cmocka_unit_test(views_move_as_the_patient_lies),    cmocka_unit_test(a_click_grows_the_tree_and_acts_change_it),
         cmocka_unit_test(what_runs_is_stopped_at_once),      cmocka_unit_test(a_case_is_the_same_without_the_window),
         cmocka_unit_test(sections_are_edited_in_the_window), cmocka_unit_test(acts_are_translated),
-        cmocka_unit_test(a_click_without_effect_says_why),
+        cmocka_unit_test(a_click_without_effect_says_why),   cmocka_unit_test(bone_of_a_ct_is_forbidden_in_one_act),
     };
     return cmocka_run_group_tests(tests, make_volume, remove_folder);
 }
