@@ -203,7 +203,7 @@ static bool place_under(const CaseWindow *w, int view, double x, double y, Vec3 
     Camera camera = case_state_camera(s, view, (int)at.width, (int)at.height);
     x -= (double)at.x, y -= (double)at.y;
     if (view == CASE_PROJECTION)
-        return volume_pick(case_state_projected(s), &camera, x, y, place);
+        return volume_pick(case_state_projected(s), &camera, s->low, s->high, x, y, place);
     *place = camera_point(&camera, x, y, s->cursor);
     Vec3 v = volume_voxel_of(s->volume, *place);
     const int *size = s->volume->size;

@@ -168,21 +168,35 @@ void volume_projection(const Volume *volume, const Camera *camera, double low, d
     parallel_for(threads, camera->height, project_row, &p, NULL);
 }
 
-bool volume_pick(const Volume *v, const Camera *c, double x, double y, Vec3 *place)
+typedef struct SightLine {       // of a pixel: start + t direction [mm], within the volume
+    Vec3 start, direction;
+    double from, to;
+} SightLine;
+
+static bool sight_line(const Volume *v, const Camera *c, double x, double y, SightLine *line)
 {
-    const double bright = 0.85;      // of the brightest place of the ray, over the volume's least value
-    Vec3 start = camera_point(c, x, y, c->center), d = vec3_negate(c->back), at = volume_voxel_of(v, start),
-         step = vec3_sub(volume_voxel_of(v, vec3_add(start, d)), at);
-    double from, to, most = (double)v->minimum;
-    if (!clip(v, at, step, &from, &to))
-        return false;
-    double each = 0.5 * volume_voxel_size(v);
-    for (double t = from; t <= to; t += each)
-        most = fmax(most, volume_value_at(v, vec3_add_scaled(start, t, d)));
-    double level = (double)v->minimum + bright * (most - (double)v->minimum), first = 0, last = 0;
+    line->start = camera_point(c, x, y, c->center);
+    line->direction = vec3_negate(c->back);
+    const Vec3 at = volume_voxel_of(v, line->start), step = vec3_sub(volume_voxel_of(v, vec3_add(line->start, line->direction)), at);
+    return clip(v, at, step, &line->from, &line->to);
+}
+
+static double brightest_on(const Volume *v, const SightLine *line)
+{
+    double most = (double)v->minimum;
+    for (double t = line->from; t <= line->to; t += 0.5 * volume_voxel_size(v))
+        most = fmax(most, volume_value_at(v, vec3_add_scaled(line->start, t, line->direction)));
+    return most;
+}
+
+// The middle of the first stretch of the line that is nearly as bright as `most`.
+static Vec3 first_bright(const Volume *v, const SightLine *line, double most)
+{
+    const double bright = 0.85, level = (double)v->minimum + bright * (most - (double)v->minimum);
+    double first = 0, last = 0;
     bool is_within = false;
-    for (double t = from; t <= to; t += each) {
-        bool is_bright = volume_value_at(v, vec3_add_scaled(start, t, d)) >= level;
+    for (double t = line->from; t <= line->to; t += 0.5 * volume_voxel_size(v)) {
+        bool is_bright = volume_value_at(v, vec3_add_scaled(line->start, t, line->direction)) >= level;
         if (is_bright && !is_within)
             first = t, is_within = true;
         if (is_bright)
@@ -190,8 +204,25 @@ bool volume_pick(const Volume *v, const Camera *c, double x, double y, Vec3 *pla
         else if (is_within)
             break;
     }
-    *place = vec3_add_scaled(start, 0.5 * (first + last), d);
-    return true;
+    return vec3_add_scaled(line->start, 0.5 * (first + last), line->direction);
+}
+
+bool volume_pick(const Volume *v, const Camera *c, double low, double high, double x, double y, Vec3 *place)
+{
+    enum { REACH = 6 };              // pixels
+    const double least = 0.3;        // of the range from black to white
+    double best = 0;
+    for (int j = -REACH; j <= REACH; j++)
+        for (int i = -REACH; i <= REACH; i++) {
+            SightLine line;
+            const double away = hypot(i, j);
+            if (away > REACH || !sight_line(v, c, x + i, y + j, &line))
+                continue;
+            const double most = brightest_on(v, &line), seen = (fmin(most, high) - low) / (high - low), score = seen * (1 - 0.5 * away / REACH);
+            if (seen >= least && score > best)
+                best = score, *place = first_bright(v, &line, most);
+        }
+    return best > 0;
 }
 
 void mesh_cut(const TriangleMesh *mesh, Vec3 point, Vec3 normal, void (*call)(void *context, Vec3 a, Vec3 b, int vertex), void *context)

@@ -24,8 +24,9 @@ Vec3 camera_point(const Camera *camera, double x, double y, Vec3 through);
 // Brightness as grey: 0 to 255 from `low` to `high`, (height, width) rows from the top. Outside the volume 0.
 void volume_slice(const Volume *volume, const Camera *camera, Vec3 through, double low, double high, uint8_t *grey);
 void volume_projection(const Volume *volume, const Camera *camera, double low, double high, int threads, uint8_t *grey);
-// The place of the vessel that is seen in a projection at a pixel: the middle of the bright stretch nearest to the eye. False if the ray misses the volume.
-bool volume_pick(const Volume *volume, const Camera *camera, double x, double y, Vec3 *place);
+// The place of the vessel that is seen in a projection, drawn from `low` to `high`, at a pixel or up to six pixels beside it: the middle of the bright stretch nearest
+// to the eye. Brighter and nearer pixels come first. False if nothing there is brighter than dark grey.
+bool volume_pick(const Volume *volume, const Camera *camera, double low, double high, double x, double y, Vec3 *place);
 double volume_value_at(const Volume *volume, Vec3 x);        // trilinear; the least value outside
 
 // The lines in which a plane cuts triangles. `call` for each: its ends and the triangle's first vertex.

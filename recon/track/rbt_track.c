@@ -293,8 +293,8 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     if (t->refusal[0])
         return start_is_refused(t, &job->seed[i], i, job->path, job->faults);
     faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column,
-               "nothing could be tracked from the start of branch %d (%s); expected a point well inside the vessel, "
-               "about its true radius and direction",
+               "nothing could be tracked from the start of branch %d (%s); expected a point well inside a vessel and, if "
+               "they are given, about its radius and direction",
                i + 1, t->why);
     return false;
 }

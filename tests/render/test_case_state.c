@@ -103,9 +103,14 @@ static void a_click_in_a_projection_meets_the_vessel(void **state)
     for (int view = 0; view < 3; view++) {
         Camera c = slice_camera(&a, (SliceView)view, v, volume_middle(v), 1, 200, 150);
         Vec3 p = camera_project(&c, center);
-        assert_true(volume_pick(v, &c, p.x, p.y, &place));
+        assert_true(volume_pick(v, &c, 10, 100, p.x, p.y, &place));
         assert_true(vec3_distance(place, center) < 1);
-        assert_false(volume_pick(v, &c, -500, p.y, &place));
+        assert_false(volume_pick(v, &c, 10, 100, -500, p.y, &place));
+        // four pixels beside the ball it is met, twenty beside it nothing is
+        const double edge = 3 / c.mm_per_pixel;
+        assert_true(volume_pick(v, &c, 10, 100, p.x + edge + 4, p.y, &place));
+        assert_true(vec3_distance(place, center) < 3.1);
+        assert_false(volume_pick(v, &c, 10, 100, p.x + edge + 20, p.y, &place));
     }
     // what is reduced keeps the ball's place
     Volume *small = volume_reduced(v, 20);
@@ -538,7 +543,7 @@ static void bone_of_a_ct_is_forbidden_in_one_act(void **state)
     // a click in the view from behind passes the bone and meets the vessel
     const Camera c = slice_camera(&s->axes, SLICE_CORONAL, s->volume, volume_middle(s->volume), 1, 200, 150);
     const Vec3 p = camera_project(&c, vec3(15, 10, 10));
-    assert_true(volume_pick(case_state_projected(s), &c, p.x, p.y, &place));
+    assert_true(volume_pick(case_state_projected(s), &c, s->low, s->high, p.x, p.y, &place));
     assert_true(fabs(place.y - 10) < 2);
     case_state_act(s, CASE_START, vec3(15, 10, 10));
     wait_and_look(s);
