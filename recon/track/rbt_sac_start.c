@@ -34,6 +34,7 @@ static Side side_of(const Tracker *t, int from, int step, double radius)
     Side side = {.kind = SIDE_END};
     double way = 0, edge = -1, near[WINDOW];
     int count = 0;
+    bool at_border = false;
     for (int i = from; i >= 0 && i < t->tree.count; i += step) {
         const Cylinder *c = &t->tree.node[i].cylinder;
         way += i == from ? 0 : vec3_distance(c->center, t->tree.node[i - step].cylinder.center);
@@ -46,10 +47,15 @@ static Side side_of(const Tracker *t, int from, int step, double radius)
         edge = edge < 0 ? way : edge;
         if (way > edge + (SAC_STARTS + 0.5) * radius || count == WINDOW)
             break;
+        if (distance_to_border(t->volume, c->center) < 2 * radius)
+            at_border = true;
         near[count++] = c->radius;
         if (side.count < SAC_STARTS && way >= edge + (side.count + 1) * radius)
             side.node[side.count++] = i;
     }
+    // what ends within a radius of the sac is the sac's own end, as narrow as its nodes may be there
+    if (side.count == 0 && !at_border)
+        return side;
     if (count == 0)
         return side;
     sort_doubles(near, (size_t)count);
@@ -93,18 +99,21 @@ static void exits_of_sac(const Tracker *t, Vec3 middle, double radius, SacStart 
 bool rbt_starts_in_sac(const Tracker *t, Vec3 start, SacStart *sac)
 {
     int at = 0;
-    double radius = 0;
     for (int i = 1; i < t->tree.count; i++)
         if (vec3_distance(start, t->tree.node[i].cylinder.center) < vec3_distance(start, t->tree.node[at].cylinder.center))
             at = i;
     if (t->tree.count == 0)
         return false;
-    // the widest place that the start belongs to
+    // the widest place that the start belongs to, unless it lies in a vessel beside it
     const double there = t->tree.node[at].cylinder.radius;
+    int widest = at;
     for (int step = -1; step <= 1; step += 2)
         for (int i = at; i >= 0 && i < t->tree.count && t->tree.node[i].cylinder.radius >= WIDE * there; i += step)
-            radius = fmax(radius, t->tree.node[i].cylinder.radius);
-    const Side side[2] = {side_of(t, at, -1, radius), side_of(t, at, 1, radius)};
+            widest = t->tree.node[i].cylinder.radius > t->tree.node[widest].cylinder.radius ? i : widest;
+    const double radius = t->tree.node[widest].cylinder.radius;
+    if (there <= NARROW * radius)
+        return false;
+    const Side side[2] = {side_of(t, widest, -1, radius), side_of(t, widest, 1, radius)};
     if (side[0].wide + side[1].wide > LONGEST * radius)
         return false;
     *sac = (SacStart){.radius = radius};

@@ -1,5 +1,6 @@
 // A start in a sac: the tree begins at the vessel beside it, the sac is found as a sac, and the report says so. A start in a vessel, also in a tapered one or at a
 // fork, stays.
+#include "recon/track/rbt_sac_start.h"
 #include "recon/track/rbt_track.h"
 
 #include <setjmp.h>
@@ -9,6 +10,7 @@
 
 #include <cmocka.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static Faults faults;
@@ -97,6 +99,48 @@ static void a_start_in_a_sac_begins_at_its_vessel(void **state)
     check_sac(IN_THE_WAY, vec3(20, MIDDLE, MIDDLE), 15);
 }
 
+// A first branch along x, of nodes 1 mm apart: whether a start at one of them lies in a sac.
+static bool is_in_sac(const double *radius, int count, int start)
+{
+    static const int size[3] = {100, 60, 60};
+    static const Vec3 axis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    Tracker *t = calloc(1, sizeof *t);
+    Volume *v = volume_create(size, vec3(0, 0, 0), axis);
+    SacStart sac;
+    assert_true(t && v);
+    t->volume = v;
+    for (int i = 0; i < count; i++) {
+        const TrackNode node = {.cylinder = {.center = vec3(30 + i, 30, 30), .axis = vec3(1, 0, 0), .radius = radius[i]}, .parent = i - 1};
+        assert_true(track_append(&t->tree, &node, NULL));
+    }
+    const bool is = rbt_starts_in_sac(t, t->tree.node[start].cylinder.center, &sac);
+    if (is)
+        assert_true(sac.count > 0 && sac.vessel[0].x > 30 + start);
+    track_free(&t->tree);
+    volume_free(v);
+    free(t);
+    return is;
+}
+
+// The first branch begins at the sac's edge with a node between the sac and its vessel, as in aneurism.nrrd mirrored in x.
+static void a_start_at_the_edge_of_a_sac_is_seen(void **state)
+{
+    (void)state;
+    static const double edge[] = {3.49, 4.45, 4.61, 4.64, 4.66, 4.63, 3.27, 2.42, 2.48, 2.37, 2.36, 2.37,
+                                  2.40, 2.41, 2.40, 2.41, 2.4,  2.4,  2.4,  2.4,  2.4,  2.4,  2.4};
+    enum { COUNT = sizeof edge / sizeof *edge, LONG = 45 };
+    double cone[LONG];
+    for (int i = 0; i < LONG; i++)
+        cone[i] = 4.6 - 0.05 * i;
+    for (int i = 0; i <= 5; i++)
+        assert_true(is_in_sac(edge, COUNT, i));
+    // not in the vessel beside it, nor in one that tapers
+    for (int i = 8; i < COUNT; i++)
+        assert_false(is_in_sac(edge, COUNT, i));
+    for (int i = 0; i < LONG; i++)
+        assert_false(is_in_sac(cone, LONG, i));
+}
+
 static void a_start_in_a_vessel_stays(void **state)
 {
     (void)state;
@@ -118,6 +162,7 @@ static void a_start_in_a_vessel_stays(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_start_in_a_sac_begins_at_its_vessel), cmocka_unit_test(a_start_in_a_vessel_stays)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_start_in_a_sac_begins_at_its_vessel), cmocka_unit_test(a_start_at_the_edge_of_a_sac_is_seen),
+                                       cmocka_unit_test(a_start_in_a_vessel_stays)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
