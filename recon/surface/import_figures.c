@@ -59,8 +59,13 @@ void import_figures_print(FILE *out, const char *surface, const ImportFigures *f
     fprintf(out, "centrelines    %d curves %s, %d branches, %.1f mm, radius %.3g to %.3g mm\n", f->curve_count, f->computed ? "computed" : "read",
             r->branch_count, r->length, r->radius_min, r->radius_max);
     fprintf(out, "ends           %d, %d of them open\n", r->end_count, r->open_end_count);
-    fprintf(out, "root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z,
+    fprintf(out, "root           (%.5g, %.5g, %.5g) mm, radius %.3g mm, %s\n", r->root.x, r->root.y, r->root.z, r->root_radius,
             r->root_is_open ? "open" : "closed: no tool can enter there; --root X,Y,Z opens an end");
+    if (r->closed_radius > 0)
+        fprintf(out,
+                "               tools enter there because it is the widest open end; the closed end at (%.5g, %.5g, %.5g) mm is wider, radius %.3g mm: "
+                "--root %.5g,%.5g,%.5g opens it and makes it the root\n",
+                r->closed.x, r->closed.y, r->closed.z, r->closed_radius, r->closed.x, r->closed.y, r->closed.z);
     print_junctions(out, r);
     fprintf(out, "nodes          %d, %ld points; %ld of them visible from no node; removed: %ld that belong to no node, %ld in a tool's path\n", f->nodes,
             f->points, r->unseen_points, r->left_points, r->inner_points);
@@ -140,6 +145,8 @@ void import_figures_add(cJSON *root, const ImportFigures *f)
                 {"moved_percent", r->samples ? 100.0 * r->moved_samples / r->samples : 0},
                 {"cut_percent", r->samples ? 100.0 * r->cut_samples / r->samples : 0},
                 {"root_cut_mm", r->root_cut},
+                {"root_radius_mm", r->root_radius},
+                {"wider_closed_end_radius_mm", r->closed_radius},
                 {"curves_scaled", r->curves_scaled},
                 {"seconds", f->seconds}};
     for (size_t i = 0; i < sizeof surface / sizeof surface[0]; i++)

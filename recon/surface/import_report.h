@@ -45,6 +45,9 @@ typedef struct ImportReport {
     int unused_components;   // components of the surface that no node sees; they were omitted
     bool root_is_open, root_is_cut;      // cut: there was no opening, so one was cut
     double root_cut;         // [mm] length removed from the root's curve by the cut
+    double root_radius;      // [mm] of the vessel at its end
+    double closed_radius;    // [mm] of the widest closed end, if it is clearly wider than an open root that nobody asked for; else 0
+    Vec3 closed;             // [mm] that end
     double radius_min, radius_max, length;   // [mm] length: of all branches
     long sampled_points;     // points sampled on the surface
     long unseen_points;      // points visible from no node: assigned to the nearest node by power distance within 2.5 of its radii

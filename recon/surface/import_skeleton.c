@@ -147,9 +147,10 @@ static bool end_is_joined(const Fine *fine, int curve, int sample)
 }
 
 // Chooses the end that becomes the root: the one nearest to options->root, else the widest, open ends first.
-static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions *options, const char *name, End *root, Faults *faults)
+static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions *options, ImportReport *report, const char *name, End *root, Faults *faults)
 {
-    double best = -INFINITY;
+    const double wider = 1.26;       // a parent is as much wider than each of two equal children (Murray)
+    double best = -INFINITY, closed = 0;
     for (int c = 0; c < fine->curve_count; c++)
         for (int last = 0; last < 2; last++) {
             End end = end_at(fine, wall, c, last);
@@ -161,6 +162,8 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
                 best = value;
                 *root = end;
             }
+            if (end.opening < 0 && end.radius > closed)
+                closed = end.radius, report->closed = place;
         }
     if (best == -INFINITY) {
         faults_add(faults, name, 0, 0, "the centrelines have no free end where a tool could enter: all of them form closed loops");
@@ -172,6 +175,8 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
                    options->root.y, options->root.z, p.x, p.y, p.z, -best);
         return false;
     }
+    report->root_radius = root->opening >= 0 ? wall->opening[root->opening].radius : root->radius;
+    report->closed_radius = !options->has_root && root->opening >= 0 && closed > wider * report->root_radius ? closed : 0;
     return true;
 }
 
@@ -380,7 +385,7 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
                   Faults *faults)
 {
     End root = {.opening = -1};
-    if (!choose_root(fine, wall, options, name, &root, faults))
+    if (!choose_root(fine, wall, options, report, name, &root, faults))
         return false;
     Skeleton *s = g->s;
     int c = curve_of(fine, root.sample), at = root.sample, parent = -1;

@@ -125,8 +125,73 @@ static void a_rounded_end_is_closed(void **state)
     }
 }
 
+// A cone along z, 4 mm wide and rounded at one end, `narrow` and open at the other.
+static SurfaceMesh *make_cone(double narrow)
+{
+    const double wide = 4, length = 60;
+    SurfaceMesh *mesh = calloc(1, sizeof *mesh);
+    mesh->vertex = malloc((RING * RINGS + 1) * sizeof *mesh->vertex);
+    mesh->triangle = malloc((2 * RING * RINGS + RING) * sizeof *mesh->triangle);
+    mesh->vertex[mesh->vertex_count++] = vec3(0, 0, -wide);
+    for (int i = 0; i < RINGS; i++) {
+        enum { ROUND = 12 };         // rings of the hemisphere
+        const double angle = 0.5 * 3.14159265358979 * (i + 1) / ROUND, part = (double)(i - ROUND + 1) / (RINGS - ROUND);
+        const double r = i < ROUND ? wide * sin(angle) : wide + (narrow - wide) * part, z = i < ROUND ? -wide * cos(angle) : length * part;
+        for (int k = 0; k < RING; k++) {
+            const double a = 2 * 3.14159265358979 * k / RING;
+            mesh->vertex[mesh->vertex_count++] = vec3(r * cos(a), r * sin(a), z);
+            const int at = 1 + i * RING + k, next = 1 + i * RING + (k + 1) % RING;
+            if (i == 0)
+                memcpy(mesh->triangle[mesh->triangle_count++], (int[3]){0, next, at}, sizeof(int[3]));
+            else {
+                memcpy(mesh->triangle[mesh->triangle_count++], (int[3]){at - RING, next - RING, at}, sizeof(int[3]));
+                memcpy(mesh->triangle[mesh->triangle_count++], (int[3]){next - RING, next, at}, sizeof(int[3]));
+            }
+        }
+    }
+    MeshCheck check;
+    assert_true(mesh_repair(mesh, &check));
+    return mesh;
+}
+
+static VesselTree *tree_of(SurfaceMesh *mesh, const ImportOptions *options, ImportReport *report)
+{
+    faults_clear(&faults);
+    *report = (ImportReport){0};
+    CurveSet *set = mesh_centreline(mesh, options, report, "cone", &faults);
+    VesselTree *tree = set ? import_surface(mesh, set, options, report, "cone", &faults) : NULL;
+    if (!tree)
+        fail_msg("%s", faults.text[0]);
+    curve_set_free(set);
+    return tree;
+}
+
+// The only open end is the root, and the report says where a wider closed one is; --root there opens it.
+static void a_wider_closed_end_is_reported(void **state)
+{
+    (void)state;
+    ImportReport report;
+    ImportOptions options = import_default_options();
+    SurfaceMesh *mesh = make_cone(2);
+    vessel_tree_free(tree_of(mesh, &options, &report));
+    assert_true(report.root_is_open && fabs(report.root.z - 60) < 2);
+    assert_true(fabs(report.root_radius - 2) < 0.2 && fabs(report.closed_radius - 4) < 0.4);
+    assert_true(hypot(report.closed.x, report.closed.y) < 1 && report.closed.z < 4);      // in the rounded end
+    options.has_root = true;
+    options.root = report.closed;
+    vessel_tree_free(tree_of(mesh, &options, &report));
+    assert_true(report.root_is_open && report.root_is_cut && report.root.z < 5 && report.closed_radius <= 0);
+    surface_free(mesh);
+    // as wide: nothing to say
+    options.has_root = false;
+    mesh = make_cone(3.6);
+    vessel_tree_free(tree_of(mesh, &options, &report));
+    assert_true(report.root_is_open && report.closed_radius <= 0);
+    surface_free(mesh);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(inlets), cmocka_unit_test(a_rounded_end_is_closed)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(inlets), cmocka_unit_test(a_rounded_end_is_closed), cmocka_unit_test(a_wider_closed_end_is_reported)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
