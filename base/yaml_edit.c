@@ -15,27 +15,41 @@ static size_t byte_of(const char *text, size_t characters)
     return at;
 }
 
-// An item of a list by its index, counted from 0.
-static yaml_node_t *item_of(yaml_document_t *document, const yaml_node_t *list, const char *number)
+// Keys and values of a map one after the other, items of a list.
+static int child_count(const yaml_node_t *node)
 {
-    char *end;
-    long index = *number >= '0' && *number <= '9' ? strtol(number, &end, 10) : -1;
-    bool whole = index >= 0 && (*end == '.' || !*end) && index < list->data.sequence.items.top - list->data.sequence.items.start;
-    return whole ? yaml_document_get_node(document, list->data.sequence.items.start[index]) : NULL;
+    return node->type == YAML_SEQUENCE_NODE  ? (int)(node->data.sequence.items.top - node->data.sequence.items.start)
+           : node->type == YAML_MAPPING_NODE ? 2 * (int)(node->data.mapping.pairs.top - node->data.mapping.pairs.start)
+                                             : 0;
 }
 
-static yaml_node_t *value_of(yaml_document_t *document, const yaml_node_t *map, const char *key, size_t length)
+static int child_of(const yaml_node_t *node, int i)
 {
-    if (map->type == YAML_SEQUENCE_NODE)
-        return item_of(document, map, key);
-    if (map->type != YAML_MAPPING_NODE)
-        return NULL;
-    for (yaml_node_pair_t *pair = map->data.mapping.pairs.start; pair < map->data.mapping.pairs.top; pair++) {
-        const yaml_node_t *name = yaml_document_get_node(document, pair->key);
-        if (name->type == YAML_SCALAR_NODE && name->data.scalar.length == length && !memcmp(name->data.scalar.value, key, length))
-            return yaml_document_get_node(document, pair->value);
+    if (node->type == YAML_SEQUENCE_NODE)
+        return node->data.sequence.items.start[i];
+    return i % 2 ? node->data.mapping.pairs.start[i / 2].value : node->data.mapping.pairs.start[i / 2].key;
+}
+
+// Where a list has the item with that index, or a map the value of that key, among its children (child_of). -1: nowhere.
+static int position_of(yaml_document_t *document, const yaml_node_t *node, const char *key, size_t length)
+{
+    if (node->type == YAML_SEQUENCE_NODE) {
+        char *end;
+        long index = *key >= '0' && *key <= '9' ? strtol(key, &end, 10) : -1;
+        return index >= 0 && end == key + length && index < child_count(node) ? (int)index : -1;
     }
-    return NULL;
+    for (int i = 0; i < child_count(node); i += 2) {
+        const yaml_node_t *name = yaml_document_get_node(document, child_of(node, i));
+        if (name->type == YAML_SCALAR_NODE && name->data.scalar.length == length && !memcmp(name->data.scalar.value, key, length))
+            return i + 1;
+    }
+    return -1;
+}
+
+static yaml_node_t *value_of(yaml_document_t *document, const yaml_node_t *node, const char *key, size_t length)
+{
+    int at = position_of(document, node, key, length);
+    return at >= 0 ? yaml_document_get_node(document, child_of(node, at)) : NULL;
 }
 
 static void write_quoted(FILE *stream, const char *value)
@@ -173,50 +187,92 @@ static bool load(const char *text, yaml_document_t *document)
     return good;
 }
 
-enum { DEEPEST = 100 };
+// --- the edited text is read again ---
 
-static bool same_value(yaml_document_t *a, const yaml_node_t *x, yaml_document_t *b, const yaml_node_t *y, int depth)
+// Compares values of two documents. A value that aliases repeat is compared once: partner[x] is the node of b that stands where x stands in a.
+typedef struct Comparison {
+    yaml_document_t *a, *b;
+    int *partner;
+} Comparison;
+
+static Comparison comparison_of(yaml_document_t *a, yaml_document_t *b)
 {
-    if (!x || !y || x->type != y->type || depth > DEEPEST)
-        return false;
-    if (x->type == YAML_SCALAR_NODE)
-        return x->data.scalar.length == y->data.scalar.length && !memcmp(x->data.scalar.value, y->data.scalar.value, x->data.scalar.length);
-    bool is_list = x->type == YAML_SEQUENCE_NODE;
-    long count = is_list ? x->data.sequence.items.top - x->data.sequence.items.start : x->data.mapping.pairs.top - x->data.mapping.pairs.start;
-    if (count != (is_list ? y->data.sequence.items.top - y->data.sequence.items.start : y->data.mapping.pairs.top - y->data.mapping.pairs.start))
-        return false;
-    for (long i = 0; i < count; i++) {
-        const yaml_node_pair_t *p = is_list ? NULL : &x->data.mapping.pairs.start[i], *q = is_list ? NULL : &y->data.mapping.pairs.start[i];
-        int m = is_list ? x->data.sequence.items.start[i] : p->value, n = is_list ? y->data.sequence.items.start[i] : q->value;
-        if (!same_value(a, yaml_document_get_node(a, m), b, yaml_document_get_node(b, n), depth + 1) ||
-            (!is_list && !same_value(a, yaml_document_get_node(a, p->key), b, yaml_document_get_node(b, q->key), depth + 1)))
-            return false;
-    }
-    return true;
+    size_t nodes = (size_t)(a->nodes.top - a->nodes.start);
+    return (Comparison){a, b, calloc(nodes + 1, sizeof(int))};
 }
 
-static bool is_flow_value(yaml_document_t *document, const yaml_node_t *node, const char *flow)
+static bool same(const Comparison *c, int x, int y)
 {
-    yaml_document_t wanted;
-    if (!load(flow, &wanted))
+    const yaml_node_t *a = yaml_document_get_node(c->a, x), *b = yaml_document_get_node(c->b, y);
+    if (!a || !b || a->type != b->type)
         return false;
-    bool good = same_value(document, node, &wanted, yaml_document_get_root_node(&wanted), 0);
+    if (a->type == YAML_SCALAR_NODE)
+        return a->data.scalar.length == b->data.scalar.length && !memcmp(a->data.scalar.value, b->data.scalar.value, a->data.scalar.length);
+    if (c->partner[x])
+        return c->partner[x] == y;
+    c->partner[x] = y;
+    bool good = child_count(a) == child_count(b);
+    for (int i = 0; good && i < child_count(a); i++)
+        good = same(c, child_of(a, i), child_of(b, i));
+    return good;
+}
+
+// Node `y` of the new document is the value that was to be set in place of node `x`, or the list of it with the value at its end.
+static bool is_wanted(Comparison *c, int x, int y, const char *value, EditKind kind)
+{
+    const yaml_node_t *old = yaml_document_get_node(c->a, x), *node = yaml_document_get_node(c->b, y);
+    if (kind == EDIT_SCALAR)
+        return node->type == YAML_SCALAR_NODE && !strcmp((const char *)node->data.scalar.value, value);
+    if (kind == EDIT_ITEM) {
+        int before = old ? child_count(old) : 0;
+        bool good = node->type == YAML_SEQUENCE_NODE && child_count(node) == before + 1;
+        for (int i = 0; good && i < before; i++)
+            good = same(c, child_of(old, i), child_of(node, i));
+        if (!good)
+            return false;
+        y = child_of(node, before);
+    }
+    yaml_document_t wanted;
+    if (!load(value, &wanted))
+        return false;
+    Comparison with_value = comparison_of(&wanted, c->b);
+    bool good = with_value.partner && same(&with_value, 1, y);
+    free(with_value.partner);
     yaml_document_delete(&wanted);
     return good;
 }
 
-// True if the edited text has the intended value. Aliases of the replaced value, tags, and keys that begin with `?` can give a different value or invalid YAML.
-static bool has_value(const char *text, const char *path, const char *value, EditKind kind)
+// Node `y` is node `x` with another value at `path`, and nothing else has changed.
+static bool is_edited(Comparison *c, int x, int y, const char *path, const char *value, EditKind kind)
 {
-    yaml_document_t document;
-    const char *key;
-    if (!load(text, &document))
+    const yaml_node_t *a = yaml_document_get_node(c->a, x), *b = yaml_document_get_node(c->b, y);
+    size_t length = strcspn(path, ".");
+    int at = a->type == b->type ? position_of(c->a, a, path, length) : -1, added = 0;
+    if (at < 0) {        // a key that was missing is the first now
+        added = 2;
+        at = b->type == YAML_MAPPING_NODE && !path[length] && position_of(c->b, b, path, length) == 1 ? 1 : -1;
+    }
+    bool good = at >= 0 && child_count(b) == child_count(a) + added;
+    for (int i = 0; good && i < child_count(b); i++) {
+        int old = i >= added ? child_of(a, i - added) : 0, new = child_of(b, i);
+        if (i != at)
+            good = i < added || same(c, old, new);
+        else
+            good = path[length] ? is_edited(c, old, new, path + length + 1, value, kind) : is_wanted(c, old, new, value, kind);
+    }
+    return good;
+}
+
+// Aliases, tags, comments in the value, and keys that begin with `?` can make another text than the intended one.
+static bool is_good(yaml_document_t *before, const char *text, const char *path, const char *value, EditKind kind)
+{
+    yaml_document_t after;
+    if (!load(text, &after))
         return false;
-    const yaml_node_t *map = parent_of(&document, path, &key), *node = map ? value_of(&document, map, key, strlen(key)) : NULL;
-    bool good = node && (kind == EDIT_ITEM   ? node->type == YAML_SEQUENCE_NODE
-                         : kind == EDIT_FLOW ? is_flow_value(&document, node, value)
-                                             : node->type == YAML_SCALAR_NODE && !strcmp((const char *)node->data.scalar.value, value));
-    yaml_document_delete(&document);
+    Comparison c = comparison_of(before, &after);
+    bool good = c.partner && yaml_document_get_root_node(&after) && is_edited(&c, 1, 1, path, value, kind);
+    free(c.partner);
+    yaml_document_delete(&after);
     return good;
 }
 
@@ -226,11 +282,12 @@ static char *edit(const char *text, const char *path, const char *value, bool ad
     if (!load(text, &document))
         return NULL;
     char *out = kind == EDIT_ITEM ? append_item(&document, text, path, value) : edit_document(&document, text, path, value, add, kind);
+    if (out && !is_good(&document, out, path, value, kind)) {
+        free(out);
+        out = NULL;
+    }
     yaml_document_delete(&document);
-    if (out && has_value(out, path, value, kind))
-        return out;
-    free(out);
-    return NULL;
+    return out;
 }
 
 char *yaml_edit(const char *text, const char *path, const char *value, bool add) { return edit(text, path, value, add, EDIT_SCALAR); }

@@ -240,9 +240,20 @@ typedef struct Change {
     char *changed;
 } Change;
 
+static bool is_yaml(const char *text, const char *name, Faults *faults)
+{
+    YamlReader *reader = yaml_reader_open(text, strlen(text), name, faults);
+    yaml_reader_close(reader);
+    return reader != NULL;
+}
+
 static bool change_text(SelContext *context, void *what)
 {
     Change *change = what;
+    char name[100];
+    snprintf(name, sizeof name, "value of %.80s", change->key);
+    if (!is_yaml(change->text, "scene", &context->faults) || !is_yaml(change->value, name, &context->faults))
+        return false;
     change->changed = yaml_edit_flow(change->text, change->key, change->value, true);
     if (!change->changed)
         faults_add(&context->faults, "scene", 0, 0,

@@ -52,6 +52,8 @@ static void values_in_flow_style_are_written(void **state)
     assert_null(yaml_edit_flow("a: 1\n", "a", "[1", true));
     assert_null(yaml_edit_flow("a: {b: 1}\n", "a.b", "1, c: 2", true));
     assert_null(yaml_edit_flow("a: [1, 2]\n", "a.2", "3", true));
+    assert_null(yaml_edit_flow("v: {a: 1, b: 2\n}\n", "v.a", "3 # b is gone", true));
+    assert_null(yaml_edit_flow("a: &x [1]\nb: *x\n", "b.0", "2", true));     // would change a
 }
 
 static void keys_are_added(void **state)
