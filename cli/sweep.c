@@ -41,9 +41,9 @@ static void print_end(const Sweep *sweep, const QueueState *state)
 {
     if (isatty(STDERR_FILENO))
         fputc('\n', stderr);
-    printf("%s: %lld of %lld runs: %lld done, %lld diverged, %lld left the vessel, %lld failed; %.1f s", sweep->study->path, (long long)state->finished,
+    printf("%s: %lld of %lld runs: %lld done, %lld diverged, %lld left the vessel, %lld failed%s; %.1f s", sweep->study->path, (long long)state->finished,
            (long long)state->runs, (long long)state->count[RUN_DONE], (long long)state->count[RUN_DIVERGED], (long long)state->count[RUN_LEFT],
-           (long long)state->count[RUN_FAILED], state->elapsed_s);
+           (long long)state->count[RUN_FAILED], state->count[RUN_FAILED] > 0 ? " (the column 'message' says why)" : "", state->elapsed_s);
     if (state->before > 0)
         printf(", %lld of them from before", (long long)state->before);
     printf("\n");

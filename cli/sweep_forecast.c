@@ -23,6 +23,15 @@ static double cpu_of(const char *line)
     return at ? strtod(at + strlen("\"cpu_s\":"), NULL) : 0;
 }
 
+static void print_run(int64_t run, const char *line)
+{
+    cJSON *result = cJSON_Parse(line);
+    const char *message = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(result, "message"));
+    printf("run %lld: %.3g s; %s%s%s\n", (long long)run, cpu_of(line), cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(result, "status")),
+           *message ? ": " : "", message);
+    cJSON_Delete(result);
+}
+
 int sweep_dry_run(OpenStudy *open, const SweepOptions *options, Faults *faults)
 {
     const Study *study = open->study;
@@ -39,9 +48,8 @@ int sweep_dry_run(OpenStudy *open, const SweepOptions *options, Faults *faults)
         char *line = one_run(open, run, NULL, NULL, faults);
         if (i > 0 || tried == 1)     // the first one opened the vessel
             sum += cpu_of(line);
-        printf("run %lld: %.3g s; %.*s\n", (long long)run, cpu_of(line),
-               line ? (int)strcspn(strstr(line, "\"status\""), "}") < 60 ? (int)strcspn(strstr(line, "\"status\""), "}") : 60 : 0,
-               line ? strstr(line, "\"status\"") : "");
+        if (line)
+            print_run(run, line);
         free(line);
     }
     double each = sum / (tried > 1 ? tried - 1 : 1);

@@ -168,12 +168,15 @@ static bool open_source(const Scene *scene, const OpenVesselOptions *options, Op
     return false;
 }
 
-bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+static bool contact_is_surface(ContactKind contact)
+{
+    return contact == CONTACT_MESH || contact == CONTACT_SMOOTH_MESH || contact == CONTACT_FLAT_MESH || contact == CONTACT_GRID;
+}
+
+bool open_vessel_suits(const Scene *scene, Faults *faults)
 {
     int before = faults->count;
-    *out = (OpenVessel){0};
-    bool as_mesh = scene->contact == CONTACT_MESH || scene->contact == CONTACT_SMOOTH_MESH || scene->contact == CONTACT_FLAT_MESH,
-         as_surface = as_mesh || scene->contact == CONTACT_GRID;
+    bool as_mesh = contact_is_surface(scene->contact) && scene->contact != CONTACT_GRID;
     bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
     const char *name = contact_name[scene->contact];
     if (scene->source == SOURCE_NONE)
@@ -187,15 +190,24 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
                    "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
                    "flat_mesh and grid",
                    name);
-    else if (as_surface && scene->source == SOURCE_PLANE)
+    else if (contact_is_surface(scene->contact) && scene->source == SOURCE_PLANE)
         faults_add(faults, scene->path, 0, 0, "contact '%s' needs a bounded wall; use 'tube' for a plane, which is the exact plane", name);
     else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())
         faults_add(faults, scene->path, 0, 0,
                    "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
                    "build again, or take another contact",
                    name);
+    return faults->count == before;
+}
+
+bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    *out = (OpenVessel){0};
+    if (scene->source == SOURCE_NONE)
+        return true;
+    bool as_surface = contact_is_surface(scene->contact);
     const char *needed = scene_needed_file(scene);
-    return faults->count == before && (!needed || is_prepared(needed, faults)) && open_source(scene, options, out, faults) &&
+    return open_vessel_suits(scene, faults) && (!needed || is_prepared(needed, faults)) && open_source(scene, options, out, faults) &&
            (!as_surface || scene->source == SOURCE_MESH || turn_into_surface(scene, options, out, faults));
 }
 

@@ -19,6 +19,8 @@ typedef struct OpenVesselOptions {
     NoteFunction note;       // receives the defects found and repaired in a mesh, and what is lost in making one; may be NULL
 } OpenVesselOptions;
 
+// Whether the scene's contact goes with its vessel, without opening it. Returns false with faults.
+bool open_vessel_suits(const Scene *scene, Faults *faults);
 // Returns false with faults; call open_vessel_close in either case.
 bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults);
 // The vessel's surface for pictures; NULL if it has none or memory runs out.

@@ -52,6 +52,13 @@ const char *distribution_at(const Distribution *d, double u, char text[VARY_TEXT
     return number(d->kind == VARY_NORMAL ? d->a + d->b * normal_quantile(u) : between(d, u), text);
 }
 
+const char *distribution_end(const Distribution *d, bool is_greatest, char text[VARY_TEXT])
+{
+    if (d->kind == VARY_NORMAL)
+        return distribution_at(d, is_greatest ? 1 - 0x1p-32 : 0x1p-32, text);
+    return number(is_greatest ? d->b : d->a, text);
+}
+
 const char *distribution_level(const Distribution *d, long level, char text[VARY_TEXT])
 {
     long levels = distribution_levels(d);

@@ -23,6 +23,8 @@ long distribution_levels(const Distribution *d);
 const char *distribution_at(const Distribution *d, double u, char text[VARY_TEXT]);
 // Level 0 … distribution_levels()-1: from a to b with both, evenly (of VARY_LOGUNIFORM: in the logarithm); of VARY_NORMAL the quantiles (level + 1/2) / levels.
 const char *distribution_level(const Distribution *d, long level, char text[VARY_TEXT]);
+// The least value, or the greatest; of VARY_NORMAL: those outside of which are 2^-32 of it each, 6.2 deviations away. Not of VARY_VALUES.
+const char *distribution_end(const Distribution *d, bool is_greatest, char text[VARY_TEXT]);
 // x with the share u of a normal distribution of mean 0 and variance 1 below it; |x| <= 9.
 double normal_quantile(double u);
 

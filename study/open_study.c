@@ -1,6 +1,6 @@
 #include "study/open_study.h"
 
-#include "study/points.h"
+#include "study/corners.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -31,38 +31,6 @@ static void add_inputs(OpenStudy *open, const Scene *scene)
 }
 
 // --- checks ---
-
-// A scene with one factor at `value`: its first fault is reported at the value's place in the specification.
-static void try_value(OpenStudy *open, int factor, const char *value, Faults *faults)
-{
-    const Study *study = open->study;
-    const Factor *f = &study->factor[factor];
-    Faults *of_scene = HEAP_ZEROED(1, sizeof *of_scene);
-    int before = faults->count;
-    char *text = study_changed_text(study, factor, value, open->scene_text[0], faults);
-    Scene *scene = text ? scene_parse(text, strlen(text), open->scene_path[0], of_scene) : NULL;
-    if (faults->count == before && of_scene->count > 0)
-        faults_add(faults, study->path, f->line, f->column, "with %s: %.40s the scene is wrong: %.300s", f->path, value, of_scene->text[0]);
-    if (scene)
-        add_inputs(open, scene);
-    scene_free(scene);
-    free(text);
-    free(of_scene);
-}
-
-static void try_factor(OpenStudy *open, int factor, Faults *faults)
-{
-    const Distribution *values = &open->study->factor[factor].values;
-    char text[VARY_TEXT];
-    int before = faults->count;
-    for (int i = 0; i < values->value_count && faults->count == before; i++)
-        try_value(open, factor, values->value[i], faults);
-    if (values->kind == VARY_VALUES)
-        return;
-    try_value(open, factor, distribution_at(values, 0x1p-32, text), faults);
-    if (faults->count == before)
-        try_value(open, factor, distribution_at(values, 1 - 0x1p-32, text), faults);
-}
 
 static void open_scene(OpenStudy *open, const char *path, Faults *faults)
 {
@@ -104,9 +72,8 @@ OpenStudy *open_study(const Study *study, Faults *faults)
     pthread_mutex_init(&open->files, NULL);
     for (int i = 0; i < count; i++)
         open_scene(open, study->scene ? study->scene : study->factor[0].values.value[i], faults);
-    bool has_scenes = faults->count == before;
-    for (int i = study->scene ? 0 : 1; has_scenes && i < study->factor_count; i++)
-        try_factor(open, i, faults);
+    if (faults->count == before)
+        corners_try(open, add_inputs, faults);
     if (faults->count == before)
         return open;
     open_study_close(open);

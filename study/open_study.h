@@ -18,7 +18,7 @@ typedef struct OpenStudy {
     cJSON *inputs;           // path and SHA-256 of each file that the runs depend on, in the order in which they were met
 } OpenStudy;
 
-// Reads the scenes and tries each end of each range and each listed value in the first scene, so that one pass reports what is wrong, at its place in the
+// Reads the scenes and tries the ends of the ranges and the listed values in them (corners.h), so that one pass reports what is wrong, at its place in the
 // specification. NULL with faults.
 OpenStudy *open_study(const Study *study, Faults *faults);
 void open_study_close(OpenStudy *open);      // NULL is allowed

@@ -55,19 +55,21 @@ static void is_repeated(int run, const char *hash, int code)
 }
 
 // A free wire in an open tube: pulled by 1e6 N it is further away after a step than a position can say (diverged); it may begin outside the tube (left); and a
-// load beyond its end cannot be applied (failed), although each value alone is valid.
+// model that is no HDF5 file is noticed when it is opened (failed).
 static void every_kind_of_end_is_a_row(void **state)
 {
     (void)state;
     put("pulled.yaml", "seldinger: 1\nvessel: {tube: {radius_mm: 1.5, path: [{line_mm: 60}]}}\nwire:\n  elements: 20\n  sections:\n"
                        "    - {length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
                        "rig: {start_mm: [1, 0, 0], direction: [1, 0, 0], loads: [{s_mm: 10, force_n: [0.001, 0, 0]}]}\n");
+    put("broken.h5", "no model");
     put("ends.yaml", "sweep: 1\nscene: pulled.yaml\nvary:\n  rig.loads[0].force_n: {values: [[0.00001, 0, 0], [1e6, 0, 0]]}\n"
                      "  rig.start_mm: {values: [[1, 0, 0], [1, 4, 0]]}\n  wire.sections[0].length_mm: {values: [40, 20]}\n"
-                     "  rig.loads[0].s_mm: {values: [10, 40]}\nduration_s: 0.05\nsampling: grid\nkeep: {recordings: failures}\n");
+                     "  vessel: {values: [{tube: {radius_mm: 1.5, path: [{line_mm: 60}]}}, {model: broken.h5}]}\nduration_s: 0.05\nsampling: grid\n"
+                     "keep: {recordings: failures}\n");
     if (run_in("", "sweep ends.yaml -o ends --threads 2") != 0)
         fail_msg("%s", output);
-    assert_non_null(strstr(output, "16 of 16 runs: 3 done, 6 diverged, 3 left the vessel, 4 failed"));
+    assert_non_null(strstr(output, "16 of 16 runs: 2 done, 4 diverged, 2 left the vessel, 8 failed (the column 'message' says why)"));
     assert_int_equal(lines_of("ends/table.csv"), 17);
     char *journal = text_of(in_folder("ends/journal.txt"));
     int ends[4] = {0};
@@ -95,7 +97,9 @@ static void every_kind_of_end_is_a_row(void **state)
         }
     }
     free(journal);
-    assert_true(ends[0] == 3 && ends[1] == 6 && ends[2] == 3 && ends[3] == 4);
+    assert_true(ends[0] == 2 && ends[1] == 4 && ends[2] == 2 && ends[3] == 8);
+    assert_int_equal(run_in("", "sweep ends.yaml --dry-run"), 0);
+    assert_non_null(strstr(output, "s; failed: broken.h5:"));
 }
 
 static void what_cannot_be_meant_is_refused(void **state)
@@ -118,6 +122,65 @@ static void what_cannot_be_meant_is_refused(void **state)
     refused("sweep levels.yaml -o r", "levels.yaml:3:39: 'sweep.vary.vessel.friction.uniform[1]' is '.inf', not a number");
     assert_non_null(strstr(output, "levels.yaml:3:54: 'sweep.vary.vessel.friction.levels' is 0"));
     assert_int_equal(access(in_folder("r"), F_OK), -1);
+}
+
+static void are_refused(const char *vary, const char *sampling, const char *words)
+{
+    char text[800];
+    snprintf(text, sizeof text, "sweep: 1\nscene: tube-scene.yaml\nduration_s: 0.05\nsampling: %s\nvary:\n%s", sampling, vary);
+    put("values.yaml", text);
+    refused("sweep values.yaml --dry-run", words);
+    refused("sweep values.yaml -o values", words);
+}
+
+// What cannot be simulated is refused before the first run, with the keys that matter and no others.
+static void values_that_cannot_be_simulated_are_refused(void **state)
+{
+    (void)state;
+    static const char random[] = "{kind: random, runs: 3}";
+#define SECTION "  wire.sections[0]."
+    are_refused("  vessel.friction: {uniform: [0, 0.1]}\n" SECTION "young_modulus_gpa: {uniform: [-5, 5]}\n", random,
+                "values.yaml:7:39: with wire.sections[0].young_modulus_gpa: -5 the scene is wrong: tube-scene.yaml:");
+    assert_non_null(strstr(output, "'wire.sections[0].young_modulus_gpa' is -5, out of range; expected a number above 0"));
+    assert_null(strstr(output, "friction"));
+    are_refused(SECTION "young_modulus_gpa: {values: [-1, 5, 0]}\n", random, "with wire.sections[0].young_modulus_gpa: -1 the scene");
+    assert_non_null(strstr(output, "with wire.sections[0].young_modulus_gpa: 0 the scene"));
+    are_refused("  vessel.friction: {uniform: [-0.1, 0.1]}\n", random, "values.yaml:6:20: with vessel.friction: -0.1 the scene is wrong");
+    are_refused("  vessel.friction: {normal: [0.05, 0.01]}\n", random, "values.yaml:6:20: with vessel.friction: -0.01");
+    are_refused("  wire.elements: {integer: [0, 10]}\n", random,
+                "with wire.elements: 0 the scene is wrong: tube-scene.yaml:9:13: 'wire.elements' is 0; expected");
+    are_refused("  vessel.contact: {values: [tube, lim]}\n  vessel.tube: {values: [{radius_mm: 1.5, path: [{line_mm: 60}]}]}\n"
+                "  vessel.model: {values: [a.h5]}\n",
+                random, "values.yaml:6:19: with ");
+    are_refused("  vessel: {values: [{plane: {normal: [0, 0, 1]}, contact: mesh}]}\n", random, "contact 'mesh' needs a bounded wall");
+    are_refused("  vessel: {values: [{model: lost.h5}]}\n", random,
+                "values.yaml:6:11: with vessel: {model: lost.h5} the scene is wrong: lost.h5: cannot be read");
+
+    // each value alone is valid in the scene, not both ends together; three more keys do not matter
+    static const char together[] = "  vessel.friction: {uniform: [0, 0.1]}\n" SECTION "inner_diameter_mm: {uniform: [0, 0.35]}\n"
+                                   "  wire.elements: {integer: [30, 40]}\n" SECTION "diameter_mm: {uniform: [0.3, 0.5]}\n"
+                                   "  sheath.inserted_mm: {values: [2, 5]}\n";
+    are_refused(together, random, "values.yaml:7:39: with wire.sections[0].inner_diameter_mm: 0.35 and wire.sections[0].diameter_mm: 0.3 the scene is wrong");
+    assert_non_null(strstr(output, "expected ranges that are valid together"));
+    assert_null(strchr(strchr(output, '\n') + 1, '\n'));    // one message
+
+    // and with so many keys that not all combinations are tried
+    char many[700];
+    snprintf(many, sizeof many,
+             "%s  targets[0].radius_mm: {uniform: [1, 2]}\n  wire.damping.mass_1_s: {uniform: [0, 1]}\n" SECTION
+             "poisson_ratio: {uniform: [0.2, 0.4]}\n" SECTION "density_g_cm3: {uniform: [5, 7]}\n  vessel.tube.radius_mm: {uniform: [1, 1.5]}\n"
+             "  wire.damping.stiffness_s: {uniform: [0, 0.0002]}\n",
+             together);
+    are_refused(many, random, "with wire.sections[0].inner_diameter_mm: 0.35 and wire.sections[0].diameter_mm: 0.3 the scene is wrong");
+    assert_null(strchr(strchr(output, '\n') + 1, '\n'));
+    assert_int_equal(access(in_folder("values"), F_OK), -1);
+
+    // valid together, although not each with the value that the scene has
+    put("values.yaml", "sweep: 1\nscene: tube-scene.yaml\nduration_s: 0.01\nsampling: {kind: random, runs: 2}\nvary:\n" SECTION
+                       "inner_diameter_mm: {uniform: [0.4, 0.45]}\n" SECTION "diameter_mm: {uniform: [0.5, 0.6]}\n");
+    assert_int_equal(run_in("", "sweep values.yaml -o values"), 0);
+    assert_non_null(strstr(output, "2 of 2 runs: 2 done"));
+#undef SECTION
 }
 
 static const char small[] = "sweep: 1\nscene: tube-scene.yaml\nvary: {vessel.friction: {uniform: [0, 0.1]}}\nduration_s: 0.05\n"
@@ -189,6 +252,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_kind_of_end_is_a_row),
         cmocka_unit_test(what_cannot_be_meant_is_refused),
+        cmocka_unit_test(values_that_cannot_be_simulated_are_refused),
         cmocka_unit_test(a_misspelt_figure_is_named),
         cmocka_unit_test(unwritable_folders_are_refused),
         cmocka_unit_test(recordings_that_do_not_fit_stop_the_sweep),
