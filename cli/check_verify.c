@@ -5,6 +5,7 @@
 #include "sim/sim.h"
 
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 // --- all scenes ---
@@ -25,12 +26,21 @@ static bool open_scene(const char *path, int threads, bool quiet, VerifyScene *o
     return cli_open_vessel(scene, threads, quiet, &out->open, faults) && open_vessel_inlet(scene, &out->open, faults) && faults->count == before;
 }
 
+// Its golden run has said so already.
+static bool is_unreadable(const CheckLog *log, const char *scene)
+{
+    for (int i = 0; i < log->count; i++)
+        if (log->at[i].code == EXIT_BAD_INPUT && !strcmp(log->at[i].scene, scene))
+            return true;
+    return false;
+}
+
 int check_verify(int count, char *const *path, int threads, bool quiet, CheckLog *log, Faults *faults)
 {
     VerifyScene *scene = calloc((size_t)count + 1, sizeof *scene);
     int scenes = 0, runs = 0, code = EXIT_DONE;
     for (int i = 0; scene && i < count; i++) {
-        if (!scene_has_verify(path[i]))
+        if (!scene_has_verify(path[i]) || is_unreadable(log, path[i]))
             continue;
         int before = faults->count;
         if (open_scene(path[i], threads, quiet, &scene[scenes], faults) && scene[scenes].scene->verify.case_count > 0)

@@ -106,9 +106,10 @@ static void judge(One *one, CheckCase *result, char message[GOLDEN_MESSAGE])
             result->code = write_golden(one);
         } else if (one->run && one->golden) {
             result->comparison = compare(one);
-            check_print_row(one->row, one->scene, result->comparison, one->options->quiet);
-            if (!one->diverged)
+            if (!one->diverged) {        // else its message says it
+                check_print_row(one->row, one->scene, result->comparison, one->options->quiet);
                 check_describe(result->comparison, message, GOLDEN_MESSAGE);
+            }
             result->code = check_differs(result->comparison) ? EXIT_DIFFERENT : EXIT_DONE;
         }
         result->code = one->diverged ? EXIT_UNTRUSTED : result->code;

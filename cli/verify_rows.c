@@ -48,6 +48,10 @@ static int print_case(const VerifyRun *run, int runs, int index, bool quiet, Che
     int code = EXIT_DONE;
     double before = NAN;
     for (int i = 0; i < runs; i++) {
+        if (run[i].diverged) {       // said once for the scene
+            before = NAN;
+            continue;
+        }
         double result = run[i].result[index], error = fabs(result - c->reference);
         double tolerance = c->tolerance[c->tolerance_count > 1 ? i : 0], ratio = i > 0 ? (double)run[i].elements / run[i - 1].elements : 0;
         char order[16];
@@ -71,7 +75,7 @@ static int print_end(const VerifyRun *run, bool quiet, CheckLog *log)
     const Scene *scene = run->of->scene;
     char message[120];
     for (int k = 0; k < STEP_FLAG_COUNT; k++)
-        if (run->flags & ((1u << k) & ~(unsigned)STEP_LIMITED) && !quiet)
+        if (run->flags & ((1u << k) & ~(unsigned)(STEP_LIMITED | STEP_DIVERGED)) && !quiet)
             printf("%-40s %5d flag %s\n", scene->path, run->elements, step_flag_name[k]);
     if (run->diverged)
         return add_case(log, run, "run", CHECK_ERROR, EXIT_UNTRUSTED, "the run diverged");
@@ -80,6 +84,20 @@ static int print_end(const VerifyRun *run, bool quiet, CheckLog *log)
     snprintf(message, sizeof message, "not at rest (%g mm/s) within rest_s %g s", scene->verify.rest_speed_mm_s, scene->verify.rest_s);
     printf("%-40s %5d %s  MISSED\n", scene->path, run->elements, message);
     return add_case(log, run, "run", CHECK_FAILED, EXIT_DIFFERENT, message);
+}
+
+static void print_diverged(const VerifyRun *run, int runs)
+{
+    bool is_first = true;
+    for (int i = 0; i < runs; i++)
+        if (run[i].diverged) {
+            if (is_first)
+                fprintf(stderr, "%s: the run diverged with %d", run->of->scene->path, run[i].elements);
+            else
+                fprintf(stderr, ", %d", run[i].elements);
+            is_first = false;
+        }
+    fputs(is_first ? "" : " elements\n", stderr);
 }
 
 int verify_print_scene(const VerifyRun *run, int runs, bool quiet, CheckLog *log)
@@ -96,6 +114,7 @@ int verify_print_scene(const VerifyRun *run, int runs, bool quiet, CheckLog *log
             return add_case(log, &run[i], "run", CHECK_ERROR, EXIT_BAD_INPUT, text);
         }
     }
+    print_diverged(run, runs);
     for (int i = 0; i < scene->verify.case_count; i++) {
         int one = print_case(run, runs, i, quiet, log);
         code = one > code ? one : code;

@@ -116,16 +116,18 @@ static void report(Corners *corners, uint32_t keys, const char *why)
     free(one);
 }
 
+// What is wrong with some keys hides what is wrong with others: they are left out, and the rest is tried again.
 static void try_corner(Corners *corners)
 {
     const Study *study = corners->open->study;
-    uint32_t all = ((UINT32_C(1) << study->factor_count) - 1) & (study->scene ? ~UINT32_C(0) : ~UINT32_C(1));
-    try_scene(corners, all, &corners->found);
-    if (corners->found.count == 0)
-        return;
-    char *why = HEAP_TEXT(corners->found.text[0]);
-    report(corners, reduce(corners, all, why), why);
-    free(why);
+    uint32_t keys = ((UINT32_C(1) << study->factor_count) - 1) & (study->scene ? ~UINT32_C(0) : ~UINT32_C(1)), wrong = 1;
+    for (try_scene(corners, keys, &corners->found); wrong && corners->found.count > 0; try_scene(corners, keys, &corners->found)) {
+        char *why = HEAP_TEXT(corners->found.text[0]);
+        wrong = reduce(corners, keys, why);
+        report(corners, wrong, why);
+        keys &= ~wrong;
+        free(why);
+    }
 }
 
 // --- all corners ---

@@ -288,10 +288,46 @@ static void baselines_compare_versions(void **state)
     assert_non_null(strstr(output, "is not in the baseline"));
 }
 
+static int times(const char *words)
+{
+    int count = 0;
+    for (const char *at = output; (at = strstr(at, words)); at++)
+        count++;
+    return count;
+}
+
+// A scene with a golden run and `verify:` is read by both; a run that diverges has no path to compare, and no cases.
+static void a_failure_has_one_message(void **state)
+{
+    (void)state;
+#define VERIFY "verify: {elements: [10, 20, 40], cases: [{name: tip, quantity: position_mm, s_mm: end, axis: [1, 0, 0], reference: 1, tolerance: 1}]}\n"
+    put_scene("once.yaml", "80", "");
+    assert_int_equal(run("check --update once.yaml"), 0);
+    put_scene("once.yaml", "-80", VERIFY);
+    assert_int_equal(run("check once.yaml"), 2);
+    assert_int_equal(times("'wire.sections[0].young_modulus_gpa' is -80"), 1);
+
+    // a free wire, pulled so that a position cannot say where it is after a step
+    put("gone.yaml",
+        "seldinger: 1\nvessel: {tube: {radius_mm: 1.5, path: [{line_mm: 60}]}}\nwire: {elements: 20, sections: [{length_mm: 40, diameter_mm: 0.36, "
+        "young_modulus_gpa: 80}]}\nrig: {start_mm: [1, 0, 0], direction: [1, 0, 0], loads: [{s_mm: 10, force_n: [1e6, 0, 0]}]}\n"
+        "script: [[0, 0, 0], [0.05, 0, 0]]\n" VERIFY);
+    char *golden = text_of(in_folder("once.golden.csv"));
+    put("gone.golden.csv", golden);
+    free(golden);
+    assert_int_equal(run("check gone.yaml --json gone.json"), 3);
+    assert_int_equal(times("gone.yaml: the run diverged at "), 1);
+    assert_int_equal(times("gone.yaml: the run diverged with 10, 20, 40 elements"), 1);
+    assert_int_equal(times("diverged"), 2);
+    assert_int_equal(times("DIFFERS") + times("MISSED") + times("NOT MEASURED"), 0);
+#undef VERIFY
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(figures_have_their_tolerances), cmocka_unit_test(bad_tolerances_are_refused_by_line), cmocka_unit_test(every_case_is_reported),
+        cmocka_unit_test(figures_have_their_tolerances), cmocka_unit_test(bad_tolerances_are_refused_by_line),
+        cmocka_unit_test(every_case_is_reported),        cmocka_unit_test(a_failure_has_one_message),
         cmocka_unit_test(threads_change_nothing),        cmocka_unit_test(baselines_compare_versions),
     };
     return cmocka_run_group_tests(tests, make_folder_with_cache, remove_folder);

@@ -1,4 +1,4 @@
-// What a killed rank loses: the runs in flight, at most one for each rank. The same command goes on to the same bytes.
+// What a killed rank or a killed mpirun loses: the runs in flight, at most one for each rank. The same command goes on to the same bytes.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -59,8 +59,8 @@ static pid_t pid_of_rank(int rank)
     return pid;
 }
 
-// Kills a rank of a sweep into `name` with SIGKILL once the journal has BEFORE results, and waits until mpirun has ended the others.
-static void kill_rank(const char *name, int rank)
+// Starts a sweep into `name` under mpirun and waits until the journal has BEFORE results. Returns mpirun's process and the number of results.
+static pid_t begin_sweep(const char *name, int *before)
 {
     char command[1200], journal[60];
     snprintf(command, sizeof command,
@@ -76,16 +76,28 @@ static void kill_rank(const char *name, int rank)
     for (int i = 0; i < 12000 && !has_ended && lines_of(journal) <= BEFORE; i++, pause_ms(5))
         has_ended = waitpid(child, NULL, WNOHANG) != 0;
     assert_false(has_ended);
-    int status, before = lines_of(journal) - 1;
-    assert_int_equal(kill(pid_of_rank(rank), SIGKILL), 0);
-    assert_int_equal(waitpid(child, &status, 0), child);
-    assert_true(WIFEXITED(status) && WEXITSTATUS(status) != 0);
-    for (int r = 0; r < RANKS; r++) {        // mpirun tells the others to end, and does not wait for it
-        int waits = 0;
-        while (kill(pid_of_rank(r), 0) == 0 && waits++ < 4000)
+    *before = lines_of(journal) - 1;
+    return child;
+}
+
+// Waits until no rank is left; mpirun does not. Returns the time [ms].
+static int wait_for_ranks(void)
+{
+    int waits = 0;
+    for (int r = 0; r < RANKS; r++)
+        while (kill(pid_of_rank(r), 0) == 0 && waits < 4000) {
             pause_ms(5);
-        assert_true(waits < 4000);
-    }
+            waits++;
+        }
+    if (waits == 4000)
+        fail_msg("a rank is still there after 20 s");
+    return waits * 5;
+}
+
+static void report_loss(const char *name, const char *killed, int before)
+{
+    char journal[60];
+    snprintf(journal, sizeof journal, "%s/journal.txt", name);
 
     // the runs are given out in order: those before the last finished one that have no result were in flight
     bool has[RUNS];
@@ -94,9 +106,35 @@ static void kill_rank(const char *name, int rank)
         last = has[run] ? run : last;
     for (int run = 0; run < last; run++)
         missing += !has[run];
-    print_message("rank %d of %d killed: %d results before, %d after; %d runs below the last finished one (%d) without a result, at most %d in flight\n", rank,
+    print_message("%s of %d killed: %d results before, %d after; %d runs below the last finished one (%d) without a result, at most %d in flight\n", killed,
                   RANKS, before, kept, missing, last, RANKS);
     assert_true(kept >= before && missing < RANKS);
+}
+
+// Kills a rank with SIGKILL; mpirun ends the others.
+static void kill_rank(const char *name, int rank)
+{
+    char killed[20];
+    int status, before;
+    pid_t child = begin_sweep(name, &before);
+    assert_int_equal(kill(pid_of_rank(rank), SIGKILL), 0);
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) != 0);
+    wait_for_ranks();
+    snprintf(killed, sizeof killed, "rank %d", rank);
+    report_loss(name, killed, before);
+}
+
+// Ends mpirun itself by a signal.
+static void kill_mpirun(const char *name, int signal, const char *killed)
+{
+    int status, before;
+    pid_t child = begin_sweep(name, &before);
+    assert_int_equal(kill(child, signal), 0);
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFSIGNALED(status) || WEXITSTATUS(status) != 0);
+    print_message("no rank is left %d ms after %s\n", wait_for_ranks(), killed);
+    report_loss(name, killed, before);
 }
 
 static void goes_on(const char *name, bool under_mpirun)
@@ -132,8 +170,26 @@ static void the_manager_is_killed(void **state)
     goes_on("manager", false);
 }
 
+static void mpirun_is_ended(void **state)
+{
+    (void)state;
+    skip_without_mpirun();
+    kill_mpirun("terminated", SIGTERM, "mpirun (SIGTERM)");
+    goes_on("terminated", true);
+}
+
+// mpirun cannot end the ranks then: each notices that it is gone.
+static void mpirun_is_killed(void **state)
+{
+    (void)state;
+    skip_without_mpirun();
+    kill_mpirun("killed", SIGKILL, "mpirun (SIGKILL)");
+    goes_on("killed", true);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_worker_is_killed), cmocka_unit_test(the_manager_is_killed)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_worker_is_killed), cmocka_unit_test(the_manager_is_killed), cmocka_unit_test(mpirun_is_ended),
+                                       cmocka_unit_test(mpirun_is_killed)};
     return cmocka_run_group_tests(tests, make_files, remove_folder);
 }
