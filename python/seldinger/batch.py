@@ -12,6 +12,8 @@ from .scene import Scene
 from .simulator import Floats, Simulator, hands_of
 
 _MOST = lib.SEL_TOOLS_MOST
+_FLOAT = np.dtype(np.float64)
+_asarray, _step, _NULL = np.asarray, lib.sel_batch_step, ffi.NULL       # found once: step() is called often
 
 #: What a simulator of a batch shows after the last step. Of a scene with fewer tools the rest of the tools' values is 0.
 ROW = np.dtype([("time_s", "f8"), ("tip_mm", "f8", 3), ("push_n", "f8", _MOST), ("torque_n_mm", "f8", _MOST), ("inserted_mm", "f8", _MOST),
@@ -80,6 +82,11 @@ class Batch:
         self.hashes: NDArray[np.uint64] = self.rows["hash"]
         self._hands = ffi.new("SelHand[]", n)
         self.commands, self._holds, _ = hands_of(self._hands, n)
+        # for step(), which is called often: shapes of commands with their number of tools, and views of those tools and of the scenes' others
+        self._shapes = {shape: k for k in range(_MOST + 1) for shape in ((k, 2), (1, k, 2), (n, k, 2))}
+        self._tools = max(len(scene.tools) for scene in self.scenes)
+        self._given = tuple(self.commands[:, :k] for k in range(_MOST + 1))
+        self._others = tuple(self.commands[:, k:self._tools] for k in range(_MOST + 1))
         self._simulators: dict[int, Simulator] = {}
 
     def __len__(self) -> int:
@@ -117,18 +124,22 @@ class Batch:
         """
         with self._lock:
             if commands is not None:
-                given = np.asarray(commands, dtype=np.float64)
-                if given.ndim not in (2, 3) or given.shape[-1] != 2 or given.shape[-2] > _MOST or (given.ndim == 3 and given.shape[0] not in (1, len(self))):
+                given = _asarray(commands, _FLOAT)
+                tools = self._shapes.get(given.shape)
+                if tools is None:
                     raise ArgumentError(f"commands have the shape {given.shape}; expected ({len(self)}, tools, 2) or (tools, 2)")
-                self.commands[:, :given.shape[-2]] = given
-                self.commands[:, given.shape[-2]:] = 0
-            mask = ffi.NULL
+                self._given[tools][...] = given
+                if tools < self._tools:
+                    self._others[tools][...] = 0
+            mask = _NULL
             if skip is not None:
                 skipped = np.ascontiguousarray(skip, dtype=np.uint8)
                 if skipped.shape != (len(self),):
                     raise ArgumentError(f"skip has the shape {skipped.shape}; expected ({len(self)},)")
                 mask = ffi.from_buffer("unsigned char *", skipped)
-            status = lib.sel_batch_step(self.handle, self._hands, n, mask)
+            status = _step(self._handle or self.handle, self._hands, n, mask)       # the property refuses a closed batch
+            if commands is not None and tools > self._tools:
+                self.commands[:, self._tools:] = 0      # of tools that no scene has
             if status:
                 self._context.check(status)
 

@@ -5,6 +5,7 @@ import unittest
 import numpy as np
 
 import seldinger
+from seldinger.gym import navigation
 from seldinger.gym import (ENVIRONMENTS, Navigation, Start, VectorNavigation, arch_variety, basic_wire_nav, check_environment, check_vector_environment,
                            dual_device_nav, has_gymnasium, spaces, steve)
 
@@ -389,6 +390,33 @@ class Steve(unittest.TestCase):
             for point in targets:                                           # none in a branch without targets, computed one by one
                 for node, k in zip(nodes, branch):
                     self.assertTrue(k in task.branches or np.linalg.norm(point - node["center_mm"]) >= node["radius_mm"])
+
+    def test_a_vessels_end_truncates_in_training(self):
+        scene = seldinger.Scene(ARCH)
+        ends = navigation.vessel_ends_of(scene)
+        nodes, last = scene.nodes, np.flatnonzero(ends.is_end)
+        self.assertEqual(len(last), 5)                              # four branches and the heart's end; not the inlet
+        self.assertFalse(set(last) & set(nodes["parent"]))
+        for k in last:
+            beyond, before = (ends.center_mm[k] + d * ends.direction[k] for d in (0.1, -0.1))
+            self.assertTrue(ends.are_reached(beyond))
+            self.assertFalse(ends.are_reached(before))
+        self.assertFalse(ends.are_reached(scene.entry[0] - 5 * scene.entry[1]))
+        counts = {}
+        for mode in ("train", "test"):
+            with basic_wire_nav(mode) as env:
+                env.reset(seed=0)
+                random, is_cut = np.random.default_rng(0), False
+                for counts[mode] in range(1, 70):                   # into another branch than the target's
+                    _, _, terminated, is_cut, info = env.step([[35, random.uniform(-180, 180)]])
+                    self.assertFalse(terminated)
+                    self.assertEqual(is_cut, info["vessel_end"])
+                    if is_cut:
+                        break
+                self.assertEqual(is_cut, mode == "train")
+        self.assertLess(counts["train"], 69)
+        with self.assertRaisesRegex(seldinger.ArgumentError, "no centrelines"):
+            tube(vessel_ends=True)
 
     def test_a_seed_draws_the_target(self):
         with basic_wire_nav() as env:

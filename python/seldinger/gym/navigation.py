@@ -45,6 +45,29 @@ class Start:
 SceneOrDraw = Union[Scene, PathLike, Mapping[str, Any], Callable[[np.random.Generator], Scene]]
 
 
+@dataclasses.dataclass(frozen=True)
+class VesselEnds:
+    """Where a vessel ends: nodes of its centrelines, outwards from which there are no others. The inlet, where the tools enter, is none."""
+
+    center_mm: NDArray[np.float64]      #: (n, 3) of all nodes
+    direction: NDArray[np.float64]      #: (n, 3) from the inlet outwards
+    is_end: NDArray[np.bool_]           #: (n,)
+
+    def are_reached(self, point: NDArray[np.float64]) -> bool:
+        """Whether a point, (3,) mm, has passed the last node of a vessel: that node is the nearest of all and the point lies beyond it."""
+        nearest = int(np.argmin(np.sum((self.center_mm - point) ** 2, axis=1)))
+        return bool(self.is_end[nearest] and np.dot(point - self.center_mm[nearest], self.direction[nearest]) >= 0)
+
+
+def vessel_ends_of(scene: Scene) -> VesselEnds:
+    """The ends of a scene's vessels; sacs of aneurysms have none."""
+    nodes = scene.nodes
+    is_vessel = nodes["is_aneurysm"] == 0
+    is_end = is_vessel.copy()
+    is_end[nodes["parent"][is_vessel & (nodes["parent"] >= 0)]] = False      # what only a sac continues is an end
+    return VesselEnds(nodes["center_mm"][is_vessel], nodes["direction"][is_vessel], is_end[is_vessel])
+
+
 class Navigation(Env):
     """Steer the tools of a scene to its target: an environment with the interface of Gymnasium.
 
@@ -63,17 +86,18 @@ class Navigation(Env):
         push_mm_s, twist_deg_s: the fastest hands.
         command_s: [s] for which a command holds; a multiple of the scene's step is taken.
         commands: after so many an episode is truncated; None: never.
+        vessel_ends: True: an episode is truncated where the innermost tip reaches the end of a vessel without the target, as stEVE's VesselEnd does.
         start: how episodes vary; None: as the scene begins.
         shaft_points, shaft_spacing_mm: number and distance of the shaft's points.
         image_size: side of pictures in pixels, 8 to 4096.
         render_mode: "rgb_array", or None.
 
     An action is a float32 array (tools, 2), push [mm/s] and twist [deg/s] of each tool, the outermost first; what is beyond the fastest
-    hands is cut. An episode ends (terminated) when the target is reached; it is truncated after `commands`, at the exercise's time limit and
-    if the simulation diverges. The same seed and actions give the same bits.
+    hands is cut. An episode ends (terminated) when the target is reached; it is truncated after `commands`, at the exercise's time limit, with
+    `vessel_ends` at a vessel's end, and if the simulation diverges. The same seed and actions give the same bits.
 
-    ``info`` holds "success", "distance_mm" from the innermost tip to the target, "points", "errors", "time_s", "diverged" and "start", the
-    drawn figures of the start.
+    ``info`` holds "success", "distance_mm" from the innermost tip to the target, "points", "errors", "time_s", "diverged", "vessel_end"
+    (False without `vessel_ends`) and "start", the drawn figures of the start.
 
     ``reset(options=)`` takes the names of ``Start`` with a number each instead of a drawn one, and "record": path of a recording of the
     episode, which ends with it.
@@ -83,7 +107,7 @@ class Navigation(Env):
 
     def __init__(self, scene: SceneOrDraw, *, observe: Sequence[str] = ("tip", "shaft", "target", "inserted", "turned", "force"),
                  reward: str = "score", push_mm_s: float = 35.0, twist_deg_s: float = 180.0, command_s: float = 0.1, commands: Optional[int] = None,
-                 start: Optional[Start] = None, shaft_points: int = 3, shaft_spacing_mm: float = 2.0, image_size: int = 128,
+                 vessel_ends: bool = False, start: Optional[Start] = None, shaft_points: int = 3, shaft_spacing_mm: float = 2.0, image_size: int = 128,
                  render_mode: Optional[str] = None) -> None:
         self._draw = scene if callable(scene) else None
         if callable(scene):
@@ -105,6 +129,9 @@ class Navigation(Env):
         if reward == "score" and not self._sim.score()["way_mm"] > 0:
             raise ArgumentError("the scene has no exercise, so that there is no score; expected `exercise:` in it, or reward='steve'")
         self._reward, self._observe, self._start, self._image_size = reward, tuple(observe), start or Start(), image_size
+        if vessel_ends and not len(self.scene.nodes):
+            raise ArgumentError("the scene's vessel has no centrelines, so that its ends are not known; expected a model or a shape, or vessel_ends=False")
+        self._has_ends = bool(vessel_ends)
         self._commands, self._steps = commands, max(1, round(command_s / self.scene.step_s))
         self._spacing, self._shaft_points = shaft_spacing_mm, shaft_points
         self.metadata = dict(self.metadata, render_fps=1 / (self._steps * self.scene.step_s))
@@ -181,7 +208,7 @@ class Navigation(Env):
         if self._reward == "steve":
             reward += self._success - 0.005
         is_late = self._score["state"] == "time_out" or (self._commands is not None and self._taken >= self._commands)
-        truncated = bool(not self._success and (is_late or self._diverged))
+        truncated = bool(not self._success and (is_late or self._diverged or self._is_at_end))
         self._is_running = not (self._success or truncated)
         if not self._is_running:
             self._end_recording()
@@ -213,6 +240,7 @@ class Navigation(Env):
         """Points the C-arm at the scene."""
         self._target = self.scene.targets[0]
         self._c_arm = CArm(self.scene, 0.5 * (self.scene.entry[0] + self._target.point))
+        self._ends = vessel_ends_of(self.scene) if self._has_ends else None
 
     def _command_of(self, action: ArrayLike) -> NDArray[np.float64]:
         """The command of an action, (tools, 2): cut at the fastest hands, times the gains of this episode's hand."""
@@ -239,6 +267,7 @@ class Navigation(Env):
         self._score = self._sim.score()
         self._distance = float(np.linalg.norm(self._sim.tip - self._target.point))
         self._diverged = bool(self._sim.flags_ever & Flag.DIVERGED)
+        self._is_at_end = self._ends is not None and self._ends.are_reached(self._sim.tip)
         if self._reward == "score":
             self._success = self._score["state"] == "reached"
             self._worth = self._score["points"] / 100
@@ -280,7 +309,7 @@ class Navigation(Env):
 
     def _info(self) -> dict[str, Any]:
         return {"success": bool(self._success), "distance_mm": self._distance, "points": self._score["points"], "errors": self._score["errors"],
-                "time_s": self._sim.time_s, "diverged": self._diverged, "start": dict(self._drawn)}
+                "time_s": self._sim.time_s, "diverged": self._diverged, "vessel_end": bool(self._is_at_end), "start": dict(self._drawn)}
 
     def _end_recording(self) -> None:
         if self.simulator.is_recording:

@@ -59,6 +59,7 @@ def _environment(task: Task, mode: str, draw: Any, options: dict[str, Any]) -> N
     if mode not in task.commands:
         raise ArgumentError(f"mode is {mode!r}; expected {' or '.join(task.commands)}")
     return Navigation(draw, **{"reward": "steve", "command_s": 1 / 7.5, "push_mm_s": 35.0, "twist_deg_s": 180.0, "commands": task.commands[mode],
+                               "vessel_ends": mode == "train",
                                "observe": ("tip", "shaft", "target"), **options})
 
 
@@ -72,7 +73,7 @@ def basic_wire_nav(mode: str = "train", **options: Any) -> Navigation:
     """BasicWireNav: a J-tipped wire from the descending aorta to a point of a branch of the arch.
 
     Args:
-        mode: "train": an episode has at most 150 commands; "test": 450.
+        mode: "train": an episode has at most 150 commands and ends where the tip reaches a vessel's end; "test": 450.
         options: of ``Navigation``, instead of stEVE_bench's.
     """
     return _in_one_vessel(BASIC_WIRE_NAV, mode, options)
@@ -82,7 +83,7 @@ def dual_device_nav(mode: str = "train", **options: Any) -> Navigation:
     """DualDeviceNav: a wire in a microcatheter from the iliac artery to a point of a carotid or vertebral artery.
 
     Args:
-        mode: "train": an episode has at most 500 commands; "test": 1,000.
+        mode: "train": an episode has at most 500 commands and ends where the tip reaches a vessel's end; "test": 1,000.
         options: of ``Navigation``, instead of stEVE_bench's.
     """
     return _in_one_vessel(DUAL_DEVICE_NAV, mode, options)
@@ -92,7 +93,7 @@ def arch_variety(mode: str = "train", arches: int = 50, **options: Any) -> Navig
     """ArchVariety: the wire of BasicWireNav in another arch of type I in each episode, with a point of one of its branches.
 
     Args:
-        mode: "train": an episode has at most 150 commands; "test": 450.
+        mode: "train": an episode has at most 150 commands and ends where the tip reaches a vessel's end; "test": 450.
         arches: number of different arches, those of the seeds 1 to `arches`. An arch is fitted at its first use, in 3 s of processor time, then it is
             in the user's cache.
         options: of ``Navigation``, instead of stEVE_bench's.
