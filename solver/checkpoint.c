@@ -8,7 +8,7 @@
 #include <string.h>
 
 struct Checkpoint {
-    int point_capacity, first_free;
+    int point_capacity, point_count, first_free;
     int first[STEP_TOOLS_MAX], inside[STEP_TOOLS_MAX], fitted[STEP_TOOLS_MAX];
     double tool_inserted[STEP_TOOLS_MAX], tool_twist[STEP_TOOLS_MAX];
     size_t memory_count;
@@ -80,7 +80,9 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c->tool_twist[k] = s->tools.tool[k].twist;
     }
     SEL_REQUIRE(s->points.count <= c->point_capacity, "a checkpoint has room for all contact points");
-    memcpy(c->place, s->points.place, (size_t)c->point_capacity * sizeof *c->place);
+    // what lies behind the points that exist is not read before it is written: pages that are never touched take no memory
+    c->point_count = s->points.count;
+    memcpy(c->place, s->points.place, (size_t)c->point_count * sizeof *c->place);
     memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
     self_contact_save(s, c->self);
     return c;
@@ -109,7 +111,8 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
         tools_chain(s);
     for (int k = 1; k < s->tools.count; k++)
         s->tools.tool[k].inside = c->inside[k];
-    memcpy(s->points.place, c->place, (size_t)c->point_capacity * sizeof *c->place);
+    SEL_REQUIRE(s->points.count == c->point_count, "a restored chain has the points of its checkpoint");
+    memcpy(s->points.place, c->place, (size_t)c->point_count * sizeof *c->place);
     memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
     self_contact_restore(s, c->self);
     SEL_ASSERT(s->first_free <= s->state.node_count, "the sheath holds nodes of the chain");

@@ -134,8 +134,6 @@ static bool allocate(Stepper *s)
     s->query.near = s->query.which + points;
     s->points.candidate = s->query.near + points;
     s->query.answer_of = s->points.candidate + 2 * points;
-    for (size_t k = 0; k < points; k++)
-        s->points.place[k].node = -1;
     return true;
 }
 
@@ -194,9 +192,12 @@ static void place_wire(Stepper *s, const WireOptions *o)
 {
     if (s->tools.count > 1) {
         s->state.inserted = s->tools.tool[0].inserted;
-        tools_place(s);
-        return;
+        tools_place(s);      // chooses which points exist
     }
+    for (int k = 0; k < s->points.count; k++)
+        s->points.place[k].node = -1;
+    if (s->tools.count > 1)
+        return;
     s->state.inserted = o->has_sheath ? fmin(o->inserted, s->wire.total_length) : s->wire.total_length;
     double behind = s->wire.total_length - s->state.inserted;
     for (int i = 0; i < s->wire.node_count; i++) {

@@ -10,8 +10,8 @@
 #include <unistd.h>
 
 typedef struct Corners {
-    OpenStudy *open;
-    void (*seen)(OpenStudy *open, const Scene *scene);
+    const CornerScenes *scenes;
+    const Study *study;
     Faults *faults, found;
     int level[STUDY_FACTORS];
     int sets;                // of several keys, already reported
@@ -22,7 +22,7 @@ static int levels_of(const Distribution *values) { return values->kind == VARY_V
 
 static const char *value_at(const Corners *corners, int factor, char text[VARY_TEXT])
 {
-    const Study *study = corners->open->study;
+    const Study *study = corners->study;
     const Distribution *values = &study->factor[factor].values;
     int level = corners->level[factor];
     if (values->kind == VARY_VALUES)
@@ -37,10 +37,9 @@ static const char *value_at(const Corners *corners, int factor, char text[VARY_T
 // Adds to `found` what is wrong with the scene whose keys of the set `keys` are at the corner; the other keys are as in the scene.
 static void try_scene(Corners *corners, uint32_t keys, Faults *found)
 {
-    OpenStudy *open = corners->open;
-    const Study *study = open->study;
+    const Study *study = corners->study;
     const char *path = study->scene ? study->scene : study->factor[0].values.value[corners->level[0]];
-    char *text = HEAP_TEXT(open_study_scene_text(open, path)), number[VARY_TEXT];
+    char *text = HEAP_TEXT(corners->scenes->text_of(corners->scenes->context, path)), number[VARY_TEXT];
     faults_clear(found);
     for (int i = study->scene ? 0 : 1; text && i < study->factor_count; i++)
         if (keys >> i & 1) {
@@ -53,7 +52,7 @@ static void try_scene(Corners *corners, uint32_t keys, Faults *found)
     if (needed && access(needed, R_OK) != 0)
         faults_add(found, needed, 0, 0, "cannot be read: %s; expected a readable file", strerror(errno));
     if (scene && open_vessel_suits(scene, found) && found->count == 0)
-        corners->seen(open, scene);
+        corners->scenes->seen(corners->scenes->context, scene);
     scene_free(scene);
     free(text);
 }
@@ -70,7 +69,7 @@ static bool has_fault(const Faults *faults, const char *text)
 static uint32_t reduce(Corners *corners, uint32_t keys, const char *fault)
 {
     Faults *found = HEAP_ZEROED(1, sizeof *found);
-    for (int i = 0; i < corners->open->study->factor_count; i++) {
+    for (int i = 0; i < corners->study->factor_count; i++) {
         uint32_t fewer = keys & ~(UINT32_C(1) << i);
         if (fewer == keys)
             continue;
@@ -93,7 +92,7 @@ static bool is_reported(Corners *corners, uint32_t keys)
 
 static void report(Corners *corners, uint32_t keys, const char *why)
 {
-    const Study *study = corners->open->study;
+    const Study *study = corners->study;
     const Factor *first = NULL;
     char with[200] = "", number[VARY_TEXT];
     Faults *one = HEAP_ZEROED(1, sizeof *one);
@@ -119,7 +118,7 @@ static void report(Corners *corners, uint32_t keys, const char *why)
 // What is wrong with some keys hides what is wrong with others: they are left out, and the rest is tried again.
 static void try_corner(Corners *corners)
 {
-    const Study *study = corners->open->study;
+    const Study *study = corners->study;
     uint32_t keys = ((UINT32_C(1) << study->factor_count) - 1) & (study->scene ? ~UINT32_C(0) : ~UINT32_C(1)), wrong = 1;
     for (try_scene(corners, keys, &corners->found); wrong && corners->found.count > 0; try_scene(corners, keys, &corners->found)) {
         char *why = HEAP_TEXT(corners->found.text[0]);
@@ -134,7 +133,7 @@ static void try_corner(Corners *corners)
 
 static void try_combinations(Corners *corners, int count)
 {
-    const Study *study = corners->open->study;
+    const Study *study = corners->study;
     for (int row = 0; row < count; row++) {
         int rest = row;
         for (int i = 0; i < study->factor_count; i++) {
@@ -150,7 +149,7 @@ static void try_combinations(Corners *corners, int count)
 static void try_pairs(Corners *corners, int longest)
 {
     enum { BITS = 5 };
-    const Study *study = corners->open->study;
+    const Study *study = corners->study;
     const int rows = longest > 2 + 2 * BITS ? longest : 2 + 2 * BITS;
     for (int row = 0; row < rows; row++) {
         for (int i = 0; i < study->factor_count; i++) {
@@ -162,13 +161,13 @@ static void try_pairs(Corners *corners, int longest)
     }
 }
 
-void corners_try(OpenStudy *open, void (*seen)(OpenStudy *open, const Scene *scene), Faults *faults)
+void corners_try(const CornerScenes *scenes, Faults *faults)
 {
     Corners *corners = HEAP_ZEROED(1, sizeof *corners);
     int combinations = 1, longest = 2;
-    *corners = (Corners){.open = open, .seen = seen, .faults = faults};
-    for (int i = 0; i < open->study->factor_count; i++) {
-        int levels = levels_of(&open->study->factor[i].values);
+    *corners = (Corners){.scenes = scenes, .study = scenes->study, .faults = faults};
+    for (int i = 0; i < scenes->study->factor_count; i++) {
+        int levels = levels_of(&scenes->study->factor[i].values);
         combinations = combinations > CORNERS_MOST ? combinations : combinations * levels;
         longest = levels > longest ? levels : longest;
     }

@@ -17,8 +17,9 @@ static void add_input(OpenStudy *open, const char *path)
     cJSON_AddStringToObject(open->inputs, path, sha256_of_file(path, digest) ? digest : "missing");
 }
 
-static void add_inputs(OpenStudy *open, const Scene *scene)
+static void add_inputs(void *context, const Scene *scene)
 {
+    OpenStudy *open = context;
     add_input(open, scene->model_path);
     add_input(open, scene->mesh_path);
     add_input(open, scene->tube_points_path);
@@ -61,6 +62,8 @@ static void open_scene(OpenStudy *open, const char *path, Faults *faults)
     scene_free(scene);
 }
 
+static const char *text_of(void *open, const char *path) { return open_study_scene_text(open, path); }
+
 OpenStudy *open_study(const Study *study, Faults *faults)
 {
     int before = faults->count, count = study->scene ? 1 : study->factor[0].values.value_count;
@@ -73,7 +76,7 @@ OpenStudy *open_study(const Study *study, Faults *faults)
     for (int i = 0; i < count; i++)
         open_scene(open, study->scene ? study->scene : study->factor[0].values.value[i], faults);
     if (faults->count == before)
-        corners_try(open, add_inputs, faults);
+        corners_try(&(CornerScenes){.study = study, .text_of = text_of, .seen = add_inputs, .context = open}, faults);
     if (faults->count == before)
         return open;
     open_study_close(open);

@@ -8,6 +8,7 @@
 #include "sim/vessel_cache.h"
 #include "sim/open_vessel.h"
 #include "sim/recording.h"
+#include "solver/solver.h"
 
 #include <stdatomic.h>
 
@@ -22,6 +23,7 @@ struct SelScene {
     Scene *scene;
     SharedVessel *shared;    // NULL: not open yet
     OpenVessel open;         // what it holds
+    ATOMIC(Checkpoint *) start;   // the state at time 0, which all its simulators share; NULL before the first
 };
 
 struct SelRecording {

@@ -3,6 +3,7 @@
 #include "sim/library/recon.h"
 #include "sim/library/scene_text.h"
 #include "sim/library/wall_query.h"
+#include "sim/simulator.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +18,7 @@ void sel_open_options_init(SelOpenOptions *options, size_t size)
 
 // --- holding ---
 
-// Only the number of holders of a scene ever changes.
+// Only the number of holders of a scene and its start ever change.
 const SelScene *scene_held(const SelScene *scene)
 {
     atomic_fetch_add(&((SelScene *)(size_t)scene)->holders, 1);
@@ -26,6 +27,7 @@ const SelScene *scene_held(const SelScene *scene)
 
 static void free_scene(SelScene *scene)
 {
+    checkpoint_free(atomic_load(&scene->start));
     vessel_cache_release(scene->shared, IDLE_MOST);
     scene_free(scene->scene);
     free(scene);

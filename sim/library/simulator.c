@@ -33,7 +33,6 @@ static void free_simulator(SelSimulator *s)
 {
     session_tracker_free(s->tracker);
     simulator_destroy(s->simulator);
-    checkpoint_free(s->start);
     free(s->node);
     free(s->own);
     image_memory_free(&s->image);
@@ -54,6 +53,15 @@ static Checkpoint *state_of(const SelSimulator *s)
     if (!state)
         heap_is_empty(0, __FILE__);
     return state;
+}
+
+// The first simulator of a scene keeps its start for all of them; of two at the same time one does.
+static void keep_start(const SelSimulator *s)
+{
+    SelScene *scene = (SelScene *)(size_t)s->scene;
+    Checkpoint *none = NULL, *own = atomic_load(&scene->start) ? NULL : state_of(s);
+    if (own && !atomic_compare_exchange_strong(&scene->start, &none, own))
+        checkpoint_free(own);
 }
 
 static SessionTracker *new_tracker(const SelSimulator *s)
@@ -86,7 +94,7 @@ static bool make(SelContext *context, void *what)
     if (!s->simulator)
         return false;
     make_scratch(s);
-    s->start = state_of(s);
+    keep_start(s);
     s->tracker = making->options.keeps_score ? new_tracker(s) : NULL;
     return true;
 }
@@ -172,7 +180,7 @@ static bool begin_again(SelContext *context, void *what)
     bool keeps_score = s->tracker;
     session_tracker_free(s->tracker);
     s->tracker = NULL;
-    simulator_begin_again(s->simulator, s->start);
+    simulator_begin_again(s->simulator, atomic_load(&s->scene->start));
     s->script_cursor = 0;
     s->tracker = keeps_score ? new_tracker(s) : NULL;
     return true;

@@ -27,7 +27,6 @@ struct SelSimulator {
     NodeReport *node;        // (node_capacity) scratch
     int own_capacity;        // for the tool with the most nodes
     ToolNode *own;           // (own_capacity) scratch
-    Checkpoint *start;       // the state at time 0
     ImageMemory image;
 };
 

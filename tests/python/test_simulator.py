@@ -24,6 +24,23 @@ class Steps(unittest.TestCase):
         sim.follow(round(sim.scene.script_s / sim.scene.step_s))
         self.assertEqual(sim.state_hash, PHANTOM_HASH)
 
+    def test_two_tools_take_less_than_3_mb(self):
+        def resident_mb():
+            with open("/proc/self/statm", encoding="ascii") as file:
+                return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+        scene = seldinger.Scene(seldinger.scene_path("steve/dual-device-nav.yaml"))
+        first = seldinger.Simulator(scene)
+        first.follow(20)
+        before = resident_mb()
+        many = [seldinger.Simulator(scene) for _ in range(8)]
+        for sim in many:
+            sim.follow(20)
+        self.assertLess((resident_mb() - before) / len(many), 3)
+        for sim in many[:2]:                    # the start that they share serves each of them
+            sim.reset()
+            sim.follow(20)
+            self.assertEqual(sim.state_hash, first.state_hash)
+
     def test_n_steps_are_n_times_one(self):
         a, b = seldinger.Simulator(TUBE), seldinger.Simulator(TUBE)
         a.step([[30, 90]], n=50)
