@@ -154,7 +154,7 @@ static void try_pairs(Corners *corners, int longest)
     for (int row = 0; row < rows; row++) {
         for (int i = 0; i < study->factor_count; i++) {
             const Distribution *values = &study->factor[i].values;
-            int bit = i >> (row - 2) / 2 % BITS & 1;
+            int bit = row < 2 ? 0 : i >> (row - 2) / 2 % BITS & 1;
             corners->level[i] = values->kind == VARY_VALUES ? row % values->value_count : row < 2 ? row : bit ^ (row & 1);
         }
         try_corner(corners);
