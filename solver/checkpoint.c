@@ -33,10 +33,10 @@ void checkpoint_free(Checkpoint *c)
     free(c);
 }
 
-static void copy_rest(Rest *to, const Rest *from, const Stepper *s)
+static void copy_rest(Rest *to, const Rest *from)
 {
     double *moved = to->moved;
-    memcpy(moved, from->moved, row_of(s, s->wire.node_count) * sizeof *moved);
+    memcpy(moved, from->moved, from->rows * sizeof *moved);
     *to = *from;
     to->moved = moved;
 }
@@ -58,7 +58,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c->memory = calloc(c->memory_count, sizeof *c->memory);
         c->self_bytes = self_contact_bytes(s);
         c->self = malloc(c->self_bytes + 1);
-        c->rest.moved = calloc(row_of(s, s->wire.node_count), sizeof *c->rest.moved);
+        c->rest.moved = calloc(s->rest.rows, sizeof *c->rest.moved);
         if (!c->place || !c->memory || !c->self || !c->rest.moved) {
             checkpoint_free(c);
             return NULL;
@@ -69,7 +69,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
     c->report = s->report;
-    copy_rest(&c->rest, &s->rest, s);
+    copy_rest(&c->rest, &s->rest);
     for (int k = 0; k < s->tools.count; k++)
         memcpy(c->hand_force[k], s->hands.hand[k].force, sizeof c->hand_force[k]);
     for (int k = 0; s->tools.count > 1 && k < s->tools.count; k++) {
@@ -98,7 +98,7 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
-    copy_rest(&s->rest, &c->rest, s);
+    copy_rest(&s->rest, &c->rest);
     for (int k = 0; k < s->tools.count; k++)
         memcpy(s->hands.hand[k].force, c->hand_force[k], sizeof c->hand_force[k]);
     tools_refit(s, c->fitted);

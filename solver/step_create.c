@@ -42,6 +42,7 @@ static bool allocate_scratch(Stepper *s)
     s->system.u = take(&at, rows);
     s->iterate.moved = take(&at, rows);
     s->rest.moved = take(&at, rows);
+    s->rest.rows = rows;
     s->iterate.seen = take(&at, rows);
     s->system.product = take(&at, rows);
     s->iterate.kept = take(&at, 7 * m + rows + 2 * inner);

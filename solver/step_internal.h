@@ -196,7 +196,8 @@ typedef struct StepProgress {
 // Rest (step_rest.c).
 typedef struct Rest {
     double time;             // [ms] for which the tool has stayed at one place in quiet steps
-    double *moved;           // [rows] motion of the unknowns since then
+    size_t rows;             // of the longest chain
+    double *moved;           // (rows) motion of the unknowns since then
     unsigned released;       // tools that no hand held in the last step
     bool is_quiet;           // of this step: the hands are still, and no load grows
 } Rest;
