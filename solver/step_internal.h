@@ -195,7 +195,7 @@ typedef struct StepProgress {
 
 // Rest (step_rest.c).
 typedef struct Rest {
-    double time;             // [ms] for which the tool has stayed at one place in quiet steps
+    double time;             // [ms] for which the tool has stayed at one place in quiet steps, a long step counted as STEP_MOST (step_rest.c)
     size_t rows;             // of the longest chain
     double *moved;           // (rows) motion of the unknowns since then
     unsigned released;       // tools that no hand held in the last step

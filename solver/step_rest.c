@@ -5,15 +5,15 @@
 // takes hold, or a tool is exchanged. Positions and forces remain those of the last solution; only the time goes on.
 //
 // A period of time is judged, not a step, because slow motions look like rest in one step, and fast ones have ended after the period: a creep with time constant
-// T stops within X / (exp(REST_TIME / T) - 1) of its end, an oscillation where its amplitude is X. Neither depends on the step. X is the error of the solve: of
-// contacts, which are solved iteratively, or of rounding.
+// T stops within X / (exp(REST_TIME / T) - 1) of its end, an oscillation where its amplitude is X. Neither depends on the step; but a step longer than STEP_MOST
+// is an iteration of statics and counts as STEP_MOST. X is the error of the solve: of contacts, which are solved iteratively, or of rounding.
 #include "base/base.h"
 #include "solver/tools_internal.h"
 
 #include <string.h>
 
 static const double REST_IN_CONTACT = 1e-7, REST_FREE = 1e-10;     // X [mm], [rad]
-static const double REST_TIME = 500;             // [ms]
+static const double REST_TIME = 500, STEP_MOST = 1;              // [ms]
 static const unsigned UNFINISHED = STEP_DIVERGED | STEP_NOT_CONVERGED | STEP_LIMITED;
 
 static bool still_grows(const Stepper *s)
@@ -73,7 +73,7 @@ void rest_judge(Stepper *s)
     }
     const ContactSet *set = &s->system.set;
     double least = set->count + set->pair_count + set->slide_count > 0 ? REST_IN_CONTACT : REST_FREE;
-    s->rest.time = is_quiet && farthest <= least ? s->rest.time + s->dt : 0;
+    s->rest.time = is_quiet && farthest <= least ? s->rest.time + fmin(s->dt, STEP_MOST) : 0;
     if (s->rest.time >= REST_TIME)
         lose_velocity(s);
 }
