@@ -64,16 +64,19 @@ void rest_judge(Stepper *s)
 {
     double farthest = 0, *moved = s->rest.moved;
     size_t rows = row_of(s, s->state.node_count);
-    bool is_quiet = s->rest.is_quiet && !s->progress.has_failed && (s->report.flags & UNFINISHED) == 0;
+    if (!s->rest.is_quiet || s->progress.has_failed || (s->report.flags & UNFINISHED) != 0) {
+        s->rest.time = 0;
+        return;
+    }
     if (s->rest.time <= 0)
         memset(moved, 0, rows * sizeof *moved);
-    for (size_t i = 0; is_quiet && i < rows; i++) {
+    for (size_t i = 0; i < rows; i++) {
         moved[i] += s->iterate.moved[i];
         farthest = fmax(farthest, fabs(moved[i]));
     }
     const ContactSet *set = &s->system.set;
     double least = set->count + set->pair_count + set->slide_count > 0 ? REST_IN_CONTACT : REST_FREE;
-    s->rest.time = is_quiet && farthest <= least ? s->rest.time + fmin(s->dt, STEP_MOST) : 0;
+    s->rest.time = farthest <= least ? s->rest.time + fmin(s->dt, STEP_MOST) : 0;
     if (s->rest.time >= REST_TIME)
         lose_velocity(s);
 }
