@@ -193,12 +193,9 @@ static void place_wire(Stepper *s, const WireOptions *o)
 {
     if (s->tools.count > 1) {
         s->state.inserted = s->tools.tool[0].inserted;
-        tools_place(s);      // chooses which points exist
-    }
-    for (int k = 0; k < s->points.count; k++)
-        s->points.place[k].node = -1;
-    if (s->tools.count > 1)
+        tools_place(s);
         return;
+    }
     s->state.inserted = o->has_sheath ? fmin(o->inserted, s->wire.total_length) : s->wire.total_length;
     double behind = s->wire.total_length - s->state.inserted;
     for (int i = 0; i < s->wire.node_count; i++) {
@@ -287,7 +284,9 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         s->contact.tolerance = usual.tolerance;
     s->newton_max = o.newton_max > 0 ? o.newton_max : NEWTON_MAX;
     s->is_slender = o.follows_touch && stepper_is_slender(s);
-    place_wire(s, &o.wire);
+    place_wire(s, &o.wire);      // of several tools, only now it is known which points exist
+    for (int k = 0; k < s->points.count; k++)
+        s->points.place[k].node = -1;
     s->first_free = stepper_count_held(s, 0);
     SEL_ASSERT(s->first_free >= 0 && s->first_free <= s->state.node_count, "the sheath holds nodes of the chain");
     return s;
