@@ -125,7 +125,8 @@ static void all_due(FieldModel *model)
         model->due[i] = true;
 }
 
-static bool fit(FieldModel *model, const FieldFitOptions *options, const Progress *progress)
+// Fits to the model's rows, at last to `all`.
+static bool fit(FieldModel *model, const FieldRows *all, const FieldFitOptions *options, const Progress *progress)
 {
     Schedule s = {model, progress, 0, 3 + 2 * options->levels + LAST_SWEEPS, false};
     if (!lay_base(model))
@@ -150,6 +151,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
         for (int k = 0; k < 2; k++)
             sweep(&s, 3);
     }
+    model->rows = all;
     for (int k = 0; k < LAST_SWEEPS; k++) {
         all_due(model);
         sweep(&s, 3);
@@ -224,10 +226,11 @@ VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, co
         faults_add(faults, "fit", 0, 0, "the tree has %lld points; expected at least 4 points on the wall", (long long)tree->point_count);
         return NULL;
     }
-    FieldRows rows = {0};
+    FieldRows rows, few;
     FieldModel model = {0};
     VesselTree *out = NULL;
-    if (field_rows_create(&rows, tree, options->threads) && field_model_create(&model, tree, &rows, options->threads) && fit(&model, options, progress)) {
+    if (field_rows_create(&rows, &few, tree, options->voxel_mm, options->threads) &&
+        field_model_create(&model, tree, few.first ? &few : &rows, options->threads) && fit(&model, &rows, options, progress)) {
         out = make_tree(&model, faults);
         if (options->left_out)
             *options->left_out = rows.dropped;
@@ -238,5 +241,6 @@ VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, co
     }
     field_model_free(&model);
     field_rows_free(&rows);
+    field_rows_free(&few);
     return out;
 }

@@ -117,10 +117,11 @@ static void measure_noise(void *context, long index)
         const RowTile *tile = tile_of(job, t);
         for (; next < tile->data && taken < SAMPLES; next += step) {
             Vec3 x = row_place(job, tile, next);
+            double each = (double)tile->weight[next];
             Mean m = mean_about(job, node, x, NOISE_REACH * r);
-            if (points_of(&m) < 4)
+            if (points_of(&m) < 4 * each)
                 m = mean_about(job, node, x, 2 * NOISE_REACH * r);
-            double points = points_of(&m), mean = m.sum / fmax(m.weight, 1e-12);
+            double points = points_of(&m) / each, mean = m.sum / fmax(m.weight, 1e-12);
             if (points >= 3)
                 spread[taken++] = sqrt(fmax(0, m.sum2 / m.weight - mean * mean) * points / (points - 1));
         }

@@ -26,17 +26,30 @@ static const double SAC_CONE = 0.97;
 // Largest bound of an outside guard: enough to prevent a closed sheet there. Between two walls a smooth field is not lower, and guards that demand the scaled
 // distance would push the walls apart.
 static const double OUTSIDE = 0.15;
+// Few rows on a voxel's face of wall, and the least of a node.
+static const double FEW_A_FACE = 4, FEW_LEAST = 16;
 enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
+
+typedef struct DraftPoint {
+    Vec3 at;
+    float few;               // weight among the few rows; 0: not one of them
+} DraftPoint;
+
+typedef struct DraftGuard {
+    Vec3 at;
+    float low, high, few;
+} DraftGuard;
 
 typedef struct Draft {       // rows of a node while they are being collected
     int data, guards, data_capacity, guard_capacity;
-    Vec3 *point, *at;
-    float (*bound)[2];
+    DraftPoint *point;
+    DraftGuard *guard;
     bool failed;
 } Draft;
 
 typedef struct Job {
     const VesselTree *tree;
+    double voxel;            // [mm] 0: unknown
     PowerBlocks blocks;
     double *reach;           // (N) [mm] no point of a node lies further from its centre
     double *link;            // (N) [mm] length of the link that is lumen to the parent; 0: there is none
@@ -52,11 +65,11 @@ bool field_link_is_lumen(const VesselTree *tree, int node)
     return parent >= 0 && vec3_distance(tree->center[node], tree->center[parent]) <= (at_sac ? 1.5 : 1) * (tree->radius[node] + tree->radius[parent]);
 }
 
-static void add_point(Draft *d, Vec3 x)
+static void add_point(Draft *d, Vec3 x, double few)
 {
     if (d->data == d->data_capacity) {
         int capacity = 2 * d->data_capacity + 64;
-        Vec3 *more = realloc(d->point, (size_t)capacity * sizeof *more);
+        DraftPoint *more = realloc(d->point, (size_t)capacity * sizeof *more);
         if (!more) {
             d->failed = true;
             return;
@@ -64,26 +77,22 @@ static void add_point(Draft *d, Vec3 x)
         d->point = more;
         d->data_capacity = capacity;
     }
-    d->point[d->data++] = x;
+    d->point[d->data++] = (DraftPoint){x, (float)few};
 }
 
-static void add_guard(Draft *d, Vec3 x, double low, double high)
+static void add_guard(Draft *d, Vec3 x, double low, double high, double few)
 {
     if (d->guards == d->guard_capacity) {
         int capacity = 2 * d->guard_capacity + 64;
-        Vec3 *more = realloc(d->at, (size_t)capacity * sizeof *more);
-        d->at = more ? more : d->at;
-        float(*bound)[2] = realloc(d->bound, (size_t)capacity * sizeof *bound);
-        d->bound = bound ? bound : d->bound;
-        if (!more || !bound) {
+        DraftGuard *more = realloc(d->guard, (size_t)capacity * sizeof *more);
+        if (!more) {
             d->failed = true;
             return;
         }
+        d->guard = more;
         d->guard_capacity = capacity;
     }
-    d->at[d->guards] = x;
-    d->bound[d->guards][0] = (float)low;
-    d->bound[d->guards++][1] = (float)high;
+    d->guard[d->guards++] = (DraftGuard){x, (float)low, (float)high, (float)few};
 }
 
 // Distance of x from the axis of node's link to its parent (from its own centre if the link is not lumen), as a fraction of the radius there.
@@ -170,23 +179,23 @@ static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)
 // The bound of a guard `clear` mm from the wall in a vessel of radius r.
 static double low_bound(double clear, double r) { return 0.5 * fmin(1, 2 * clear / r); }
 
-static void guard_around_point(const Job *job, int node, Vec3 p, Draft *d)
+static void guard_around_point(const Job *job, int node, DraftPoint point, Draft *d)
 {
     const VesselTree *tree = job->tree;
-    Vec3 axis = axis_point(tree, node, p), out = vec3_sub(p, axis);
+    Vec3 p = point.at, axis = axis_point(tree, node, p), out = vec3_sub(p, axis);
     double r = tree->radius[node], far = vec3_norm(out);
     if (!(far > 0.2 * r))
         return;
     out = vec3_scale(out, 1 / far);
     for (int k = 1; k <= 2; k++) {
         double in = far * k / 3;
-        add_guard(d, vec3_add_scaled(p, -in, out), low_bound(0.5 * in, r), MOST_INSIDE);
+        add_guard(d, vec3_add_scaled(p, -in, out), low_bound(0.5 * in, r), MOST_INSIDE, (double)point.few);
     }
     for (int k = 0; k < 3; k++) {
         static const double away[3] = {0.35, 0.8, 1.4};
         Vec3 x = vec3_add_scaled(p, away[k] * r, out);
         if (is_outside(job, node, x, 0.3 * r))
-            add_guard(d, x, -HUGE_VAL, -OUTSIDE * fmin(1, away[k]));
+            add_guard(d, x, -HUGE_VAL, -OUTSIDE * fmin(1, away[k]), (double)point.few);
     }
 }
 
@@ -201,7 +210,7 @@ static void guard_ring(const Job *job, int node, Draft *d)
         for (int far = 0; far < 2; far++) {
             Vec3 x = vec3_add_scaled(c, (1.6 + 0.6 * far) * r, out);
             if (is_outside(job, node, x, 0.4 * r))
-                add_guard(d, x, -HUGE_VAL, -0.8 * OUTSIDE);
+                add_guard(d, x, -HUGE_VAL, -0.8 * OUTSIDE, 1);
         }
     }
 }
@@ -210,7 +219,7 @@ static void guard_axis(const VesselTree *tree, int node, Draft *d)
 {
     int parent = tree->parent[node];
     double r = tree->radius[node];
-    add_guard(d, tree->center[node], low_bound(0.5 * r, r), MOST_INSIDE);
+    add_guard(d, tree->center[node], low_bound(0.5 * r, r), MOST_INSIDE, 1);
     if (!field_link_is_lumen(tree, node))
         return;
     Vec3 a = tree->center[parent], b = tree->center[node], axis = vec3_unit_or(vec3_sub(b, a), tree->direction[node]);
@@ -219,10 +228,10 @@ static void guard_axis(const VesselTree *tree, int node, Draft *d)
     for (int k = 0; k < steps; k++) {
         double t = (k + 0.5) / steps, free = fmin(r, tree->radius[parent]);
         Vec3 x = vec3_mix(a, b, t);
-        add_guard(d, x, low_bound(0.5 * free, free), MOST_INSIDE);
+        add_guard(d, x, low_bound(0.5 * free, free), MOST_INSIDE, 1);
         for (int around = 0; around < 4; around++) {
             Vec3 side = around < 2 ? e1 : e2;
-            add_guard(d, vec3_add_scaled(x, (around % 2 ? 0.4 : -0.4) * free, side), low_bound(0.3 * free, free), MOST_INSIDE);
+            add_guard(d, vec3_add_scaled(x, (around % 2 ? 0.4 : -0.4) * free, side), low_bound(0.3 * free, free), MOST_INSIDE, 1);
         }
     }
 }
@@ -234,24 +243,24 @@ static void extend_inlet(const VesselTree *tree, Draft *d)
     double r = tree->radius[0], least = HUGE_VAL, most = -HUGE_VAL;
     int own = d->data, slab_points = 0;
     for (int i = 0; i < own; i++) {
-        double t = vec3_dot(vec3_sub(d->point[i], root), up);
+        double t = vec3_dot(vec3_sub(d->point[i].at, root), up);
         least = fmin(least, t), most = fmax(most, t);
     }
     double slab = fmin(most - least, 0.4 * r);
     if (own < 12 || most - least < 0.2 * r)
         return;
     for (int i = 0; i < own; i++)
-        slab_points += vec3_dot(vec3_sub(d->point[i], root), up) >= most - slab;
+        slab_points += vec3_dot(vec3_sub(d->point[i].at, root), up) >= most - slab;
     slab = slab_points < 12 ? most - least : slab;
     for (int copy = 1; copy < 16 && most + (copy - 1) * slab < FIELD_INLET_RADII * r; copy++)
         for (int i = 0; i < own; i++) {
-            Vec3 p = d->point[i];
+            Vec3 p = d->point[i].at;
             double t = vec3_dot(vec3_sub(p, root), up);
             if (t >= most - slab && t + copy * slab < FIELD_INLET_RADII * r)
-                add_point(d, vec3_add_scaled(p, copy * slab, up));
+                add_point(d, vec3_add_scaled(p, copy * slab, up), (double)d->point[i].few);
         }
     for (int k = 1; k <= 4; k++)
-        add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), MOST_INSIDE);
+        add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), MOST_INSIDE, 1);
 }
 
 static void measure_reach(const VesselTree *tree, double *reach, double *link)
@@ -266,18 +275,51 @@ static void measure_reach(const VesselTree *tree, double *reach, double *link)
     }
 }
 
+static bool is_fork(const VesselTree *tree, int node) { return tree->neighbour_offset[node + 1] - tree->neighbour_offset[node] > 2; }
+
+static bool is_near_fork(const VesselTree *tree, int node)
+{
+    bool found = is_fork(tree, node);
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1] && !found; k++)
+        found = is_fork(tree, tree->near[k]);
+    return found;
+}
+
+// Rays see the same voxels many times: returns how many of a node's points one of the few stands for, so that a voxel's face of wall, counted once along the
+// tree, has FEW_A_FACE of them. At forks, where mouths are narrow and points rare, all are needed: fewer made mouths of aneurism.nrrd narrower.
+static double points_a_row(const VesselTree *tree, double voxel_mm, int node)
+{
+    double r = tree->radius[node], along = tree->height[node], points = (double)(tree->point_offset[node + 1] - tree->point_offset[node]);
+    if (!(voxel_mm > 0) || is_near_fork(tree, node))
+        return 1;
+    if (tree->parent[node] >= 0)
+        along = fmin(along, vec3_distance(tree->center[node], tree->center[tree->parent[node]]));
+    double wall = tree->kind[node] == NODE_VESSEL ? 2 * PI * r * along : 4 * PI * r * r;
+    return fmax(1, points / fmax(FEW_LEAST, FEW_A_FACE * wall / (voxel_mm * voxel_mm)));
+}
+
+// Returns the weight of point i of the tree among the few rows, of which one in `every` is chosen: by multiples of the golden section, which have no rhythm in
+// common with the order of rays.
+static double few_weight(int64_t i, double every)
+{
+    const double golden = 0.6180339887498949;
+    double at = golden * (double)i;
+    return at - floor(at) < 1 / every ? every : 0;
+}
+
 static void draft_node(void *context, long index)
 {
     Job *job = context;
     const VesselTree *tree = job->tree;
     int node = (int)index, root_open = node == 0 && vessel_tree_root_is_open(tree);
     Draft *d = &job->draft[node];
+    double every = points_a_row(tree, job->voxel, node);
     for (int64_t i = tree->point_offset[node]; i < tree->point_offset[node + 1]; i++) {
         Vec3 p = tree->point[i];
         if (is_in_lumen(job, node, p))
             job->dropped[node]++;
         else
-            add_point(d, p);
+            add_point(d, p, few_weight(i, every));
     }
     for (int i = (node * 3) % GUARD_EVERY; i < d->data; i += GUARD_EVERY)
         guard_around_point(job, node, d->point[i], d);
@@ -294,15 +336,15 @@ static void draft_node(void *context, long index)
         return;
     }
     for (int i = 0; i < d->data; i++)
-        job->cell[node][i] = power_walk(tree, d->point[i], node, 8);
+        job->cell[node][i] = power_walk(tree, d->point[i].at, node, 8);
     for (int i = 0; i < d->guards; i++)
-        job->cell[node][d->data + i] = power_walk(tree, d->at[i], node, 8);
+        job->cell[node][d->data + i] = power_walk(tree, d->guard[i].at, node, 8);
 }
 
 // --- Tiles ---
 
 typedef struct Row {
-    float x[3], low, high;
+    float x[3], low, high, weight;
     bool is_data;
 } Row;
 
@@ -357,7 +399,7 @@ static void split_rows(Row *row, int count, int *tiles, size_t *floats)
     }
     int d = padded(data), g = padded(count - data);
     *tiles += 1;
-    *floats += (size_t)(3 * (d + g) + d + 2 * g);
+    *floats += (size_t)(4 * (d + g) + 2 * g);
 }
 
 // Fills the tiles of rows that were split; their numbers go to `memory`.
@@ -377,16 +419,15 @@ static void fill_tiles(const Row *row, int count, int node, RowTile **tile, floa
     float *next = *memory;
     RowTile *to = (*tile)++;
     *to = (RowTile){.node = node, .data_padded = d, .guards_padded = g, .x = next, .y = next + d + g, .z = next + 2 * (d + g), .weight = next + 3 * (d + g)};
-    to->low = to->weight + d, to->high = to->low + g;
+    to->low = to->weight + d + g, to->high = to->low + g;
     *memory = to->high + g;
     for (int k = 0; k < 3; k++)
         to->middle[k] = 0.5f * (low[k] + high[k]);
     for (int i = 0; i < count; i++) {
         int at = row[i].is_data ? to->data++ : d + to->guards++;
         to->x[at] = row[i].x[0], to->y[at] = row[i].x[1], to->z[at] = row[i].x[2];
-        if (row[i].is_data)
-            to->weight[at] = 1;
-        else
+        to->weight[at] = row[i].weight;
+        if (!row[i].is_data)
             to->low[at - d] = row[i].low, to->high[at - d] = row[i].high;
         float dx = row[i].x[0] - to->middle[0], dy = row[i].x[1] - to->middle[1], dz = row[i].x[2] - to->middle[2];
         to->radius = fmaxf(to->radius, sqrtf(dx * dx + dy * dy + dz * dz));
@@ -409,18 +450,33 @@ static void fill_cell(void *context, long index)
     fill_tiles(job->row + job->first[index], job->first[index + 1] - job->first[index], (int)index, &tile, &memory);
 }
 
-// Collects all rows (M), those of a cell consecutive; first (N+1) gives the first row of each cell.
-static Row *collect_rows(const Job *job, int *first)
+// Row k of a node's draft: data first.
+static Row row_of(const Job *job, int node, int k, bool few)
 {
     const VesselTree *tree = job->tree;
-    int n = tree->node_count, total = 0;
+    const Draft *d = &job->draft[node];
+    int cell = job->cell[node][k];
+    // in a cell wider than the guard's own vessel, the field rises more slowly
+    float scale = (float)fmin(1, tree->radius[node] / tree->radius[cell]);
+    bool is_data = k < d->data;
+    DraftGuard from = is_data ? (DraftGuard){.at = d->point[k].at, .few = d->point[k].few} : d->guard[k - d->data];
+    Vec3 x = vec3_sub(from.at, tree->center[cell]);
+    return (Row){{(float)x.x, (float)x.y, (float)x.z}, from.low * scale, from.high < 0 ? from.high * scale : from.high, few ? from.few : 1, is_data};
+}
+
+static float weight_of(const Draft *d, int k, bool few) { return !few ? 1 : k < d->data ? d->point[k].few : d->guard[k - d->data].few; }
+
+// Collects the rows (M), those of a cell consecutive; first (N+1) gives the first row of each cell.
+static Row *collect_rows(const Job *job, int *first, bool few)
+{
+    int n = job->tree->node_count, total = 0;
     for (int i = 0; i < n; i++) {
         const Draft *d = &job->draft[i];
         if (d->failed)
             return NULL;
         for (int k = 0; k < d->data + d->guards; k++)
-            first[job->cell[i][k] + 1]++;
-        total += d->data + d->guards;
+            if (weight_of(d, k, few) > 0)
+                first[job->cell[i][k] + 1]++, total++;
     }
     Row *row = malloc(((size_t)total + 1) * sizeof *row);
     int sum = 0;
@@ -431,25 +487,20 @@ static Row *collect_rows(const Job *job, int *first)
     }
     for (int i = 0; i < n && row; i++) {
         const Draft *d = &job->draft[i];
-        for (int k = 0; k < d->data + d->guards; k++) {
-            bool is_data = k < d->data;
-            int cell = job->cell[i][k];
-            Vec3 x = vec3_sub(is_data ? d->point[k] : d->at[k - d->data], tree->center[cell]);
-            // in a cell wider than the guard's own vessel, the field rises more slowly
-            float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]), low = is_data ? 0 : d->bound[k - d->data][0],
-                  high = is_data ? 0 : d->bound[k - d->data][1];
-            row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, low * scale, high < 0 ? high * scale : high, is_data};
-        }
+        for (int k = 0; k < d->data + d->guards; k++)
+            if (weight_of(d, k, few) > 0)
+                row[first[job->cell[i][k] + 1]++] = row_of(job, i, k, few);
     }
     return row;
 }
 
-static bool make_tiles(const Job *job, FieldRows *rows, int threads)
+static bool make_tiles(const Job *job, FieldRows *rows, bool few, int threads)
 {
+    *rows = (FieldRows){.node_count = job->tree->node_count, .first = calloc((size_t)job->tree->node_count + 1, sizeof *rows->first)};
     int n = rows->node_count, *first = calloc((size_t)n + 1, sizeof *first), tiles = 0;
-    TileJob t = {rows, first ? collect_rows(job, first) : NULL, first, calloc((size_t)n + 1, sizeof *t.floats)};
+    TileJob t = {rows, first ? collect_rows(job, first, few) : NULL, first, calloc((size_t)n + 1, sizeof *t.floats)};
     size_t floats = 0;
-    bool good = t.row && t.floats;
+    bool good = rows->first && t.row && t.floats;
     if (good)
         parallel_for(threads, n, split_cell, &t, NULL);
     for (int i = 0; i <= n && good; i++) {
@@ -471,27 +522,40 @@ static bool make_tiles(const Job *job, FieldRows *rows, int threads)
     return good;
 }
 
-bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
+// Returns true if the few rows are less than half of all.
+static bool are_few(const Job *job)
+{
+    int64_t all = 0, few = 0;
+    for (int i = 0; i < job->tree->node_count; i++) {
+        const Draft *d = &job->draft[i];
+        all += d->data;
+        for (int k = 0; k < d->data; k++)
+            few += d->point[k].few > 0;
+    }
+    return 2 * few < all;
+}
+
+bool field_rows_create(FieldRows *rows, FieldRows *few, const VesselTree *tree, double voxel_mm, int threads)
 {
     size_t n = (size_t)tree->node_count;
-    *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
+    *rows = *few = (FieldRows){0};
     Job job = {.tree = tree,
+               .voxel = voxel_mm,
                .reach = calloc(n, sizeof *job.reach),
                .link = calloc(n, sizeof *job.link),
                .draft = calloc(n, sizeof *job.draft),
                .cell = calloc(n, sizeof *job.cell),
                .dropped = calloc(n, sizeof *job.dropped)};
-    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.reach && job.link && job.draft && job.cell && job.dropped;
+    bool good = power_blocks_create(&job.blocks, tree) && job.reach && job.link && job.draft && job.cell && job.dropped;
     if (good) {
         measure_reach(tree, job.reach, job.link);
         parallel_for(threads, tree->node_count, draft_node, &job, NULL);
-        good = make_tiles(&job, rows, threads);
+        good = make_tiles(&job, rows, false, threads) && (!are_few(&job) || make_tiles(&job, few, true, threads));
     }
     for (int i = 0; i < tree->node_count && job.draft && job.cell && job.dropped; i++) {
         rows->dropped += job.dropped[i];
         free(job.draft[i].point);
-        free(job.draft[i].at);
-        free(job.draft[i].bound);
+        free(job.draft[i].guard);
         free(job.cell[i]);
     }
     free(job.reach);
@@ -500,8 +564,6 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
     free(job.cell);
     free(job.dropped);
     power_blocks_free(&job.blocks);
-    if (!good)
-        field_rows_free(rows);
     return good;
 }
 

@@ -15,7 +15,7 @@ typedef struct RowTile {     // neighbouring rows of one node: at most FIELD_TIL
     int data, data_padded;   // D: number of points on the wall, target f = 0
     int guards, guards_padded;   // G: number of guards, target f within [low, high]
     float *x, *y, *z;        // (padded D + padded G) [mm] from the node's centre
-    float *weight;           // (padded D) weight of a point: 1, or 0 in the padding
+    float *weight;           // (padded D + padded G) number of points for which a row stands; 0 in the padding
     float *low, *high;       // (padded G) infinite in the padding
     float middle[3], radius; // [mm] a ball around all rows
 } RowTile;
@@ -33,7 +33,9 @@ typedef struct FieldRows {
 bool field_link_is_lumen(const VesselTree *tree, int node);
 // Length of the wall's continuation upstream of an open inlet, in the root's radii.
 #define FIELD_INLET_RADII 2.2
-bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads);
+// Also makes `few`, a choice of the rows in which each stands for several, if the angiogram's voxel size is known (0: unknown) and rays saw each voxel many
+// times; else few->first is NULL. Returns false if out of memory; the rows must be freed even then.
+bool field_rows_create(FieldRows *rows, FieldRows *few, const VesselTree *tree, double voxel_mm, int threads);
 void field_rows_free(FieldRows *rows);
 
 #endif

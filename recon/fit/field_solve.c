@@ -50,7 +50,7 @@ typedef struct Work {        // memory of one region's solution
     double *matrix, *slope;  // (U, U), (U)
     double *factor, *step;
     FieldBlob *trial;        // (region's blobs)
-    float *row, *gram;       // of a tile: its columns, stored by row, and their product
+    FitRows *rows;           // (region's blobs) their rows in a tile
 } Work;
 
 // --- Setting up ---
@@ -97,21 +97,21 @@ static void sum_still(const Sweep *sweep, int region, TileWork *tw)
     }
 }
 
-enum { POINTS_MAX = FIELD_TILE + GUARD_TILE, ROWS_MAX = POINTS_MAX + FIELD_TILE };          // limits of a tile: data and guards, and these plus slopes
+enum { POINTS_MAX = FIELD_TILE + GUARD_TILE };   // of a tile
+_Static_assert(POINTS_MAX + FIELD_TILE <= FIT_ROWS, "a tile's data, guards and slopes fit");
 
 static bool begin_work(Work *w, const Sweep *sweep, const Region *region)
 {
     *w = (Work){.sweep = sweep, .region = region, .unknowns = UNKNOWNS * region->count};
     int number = (int)(region - sweep->region), most = tiles_of(sweep, region);
-    size_t u = (size_t)w->unknowns, stride = (u + FIELD_LANES) / FIELD_LANES * FIELD_LANES;
+    size_t u = (size_t)w->unknowns;
     w->tile = calloc((size_t)most + 1, sizeof *w->tile);
     w->local = malloc(((size_t)most * (size_t)region->count + 1) * sizeof *w->local);
     w->memory = malloc(((size_t)most * (2 * POINTS_MAX + 6 * FIELD_TILE) + 1) * sizeof *w->memory);
     w->matrix = malloc(2 * (u * u + u) * sizeof *w->matrix);
     w->trial = malloc((size_t)region->count * sizeof *w->trial);
-    w->row = aligned_alloc(64, stride * ROWS_MAX * sizeof *w->row);
-    w->gram = aligned_alloc(64, stride * stride * sizeof *w->gram);
-    if (!w->tile || !w->local || !w->memory || !w->matrix || !w->trial || !w->row || !w->gram)
+    w->rows = malloc((size_t)region->count * sizeof *w->rows);
+    if (!w->tile || !w->local || !w->memory || !w->matrix || !w->trial || !w->rows)
         return false;
     w->slope = w->matrix + u * u, w->factor = w->slope + u, w->step = w->factor + u * u;
     float *next = w->memory;
@@ -142,8 +142,7 @@ static void end_work(Work *w)
     free(w->memory);
     free(w->matrix);
     free(w->trial);
-    free(w->row);
-    free(w->gram);
+    free(w->rows);
 }
 
 // --- Rows ---
@@ -161,25 +160,19 @@ static void sum_tile(const Work *w, TileWork *tw, const FieldBlob *blob)
     }
 }
 
-// Geman and McClure's loss: about e^2 near 0, at most knee^2, so that points which contradict the others do not outweigh them.
-static double loss(double e, double knee) { return e * e / (1 + e * e / (knee * knee)); }
-
-// Sum of squares of a tile's rows from the present sums.
+// Sum of squares of a tile's rows from the present sums. The loss is at most knee^2, so that points which contradict the others do not outweigh them.
 static double energy_of_tile(const FieldModel *model, const TileWork *tw)
 {
     const RowTile *tile = tw->tile;
-    double r = model->tree->radius[tile->node], knee = model->knee * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
-    for (int i = 0; i < tile->data; i++) {
-        float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i];
-        double slope = sqrt((double)(gx * gx + gy * gy + gz * gz)), off = bend * (0.5 * r * slope - 1);
-        sum += loss((double)tw->f[i] / fmax(slope, least), knee) + off * off;
-    }
-    double scale = 0.5 * r * model->guard_weight;
-    for (int i = 0; i < tile->guards; i++) {
-        float value = tw->f[tile->data_padded + i];
-        double e = value < tile->low[i] ? (double)(value - tile->low[i]) : value > tile->high[i] ? (double)(value - tile->high[i]) : 0;
-        sum += scale * scale * e * e;
-    }
+    double r = model->tree->radius[tile->node], loss[FIELD_TILE > GUARD_TILE ? FIELD_TILE : GUARD_TILE], sum = 0;
+    FitScale scale = {.radius = r, .knee = model->knee * r, .least_slope = LEAST_SLOPE / r, .bend = model->smooth * r};
+    fit_lanes_losses(tw->f, tw->g, tile->weight, tile->data, &scale, loss);
+    for (int i = 0; i < tile->data; i++)
+        sum += loss[i];
+    fit_lanes_guard_losses(tw->f + tile->data_padded, tile->low, tile->high, tile->weight + tile->data_padded, tile->guards, 0.5 * r * model->guard_weight,
+                           loss);
+    for (int i = 0; i < tile->guards; i++)
+        sum += loss[i];
     return sum;
 }
 
@@ -222,60 +215,54 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
         if (e == 0)
             continue;
         to->x[rows] = tile->x[d + i], to->y[rows] = tile->y[d + i], to->z[rows] = tile->z[d + i];
-        to->scale[rows] = guard;
-        residual[rows++] = guard * e;
+        float scale = guard * sqrtf(tile->weight[d + i]);
+        to->scale[rows] = scale;
+        residual[rows++] = scale * e;
     }
     for (; rows % FIELD_LANES != 0; rows++)
         to->x[rows] = to->y[rows] = to->z[rows] = to->scale[rows] = residual[rows] = 0;
     to->data = d, to->rows = rows;
     for (int i = 0; i < d; i++) {
         float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i], slope = sqrtf(gx * gx + gy * gy + gz * gz), held = slope > least ? slope : least;
-        float e = tw->f[i] / held, w = tile->weight[i] / (1 + e * e / (knee * knee)), unit = slope > 1e-6f ? 1 / slope : 0;
+        float e = tw->f[i] / held, root = sqrtf(tile->weight[i]), w = root / (1 + e * e / (knee * knee)), unit = slope > 1e-6f ? 1 / slope : 0;
         to->scale[i] = w / held;
         residual[i] = w * e;
-        to->bend[i] = tile->weight[i] * bend;
+        to->bend[i] = root * bend;
         residual[rows + i] = to->bend[i] * (slope - 1 / half);
         to->n[0][i] = gx * unit, to->n[1][i] = gy * unit, to->n[2][i] = gz * unit;
     }
 }
 
 // Adds the block of a pair of blobs to the upper triangle of the matrix.
-static void add_pair(Work *w, int a, int b, const float *block, int stride)
+static void add_pair(Work *w, int a, int b, float block[UNKNOWNS][FIT_ENTRIES])
 {
     bool turned = a > b;     // transposed, because the numbers of a tile's blobs need not be sorted
     double *to = w->matrix + (size_t)(UNKNOWNS * (turned ? b : a)) * (size_t)w->unknowns + (size_t)(UNKNOWNS * (turned ? a : b));
     for (int i = 0; i < UNKNOWNS; i++)
         for (int k = a == b ? i : 0; k < UNKNOWNS; k++)
-            to[(size_t)i * (size_t)w->unknowns + (size_t)k] += (double)(turned ? block[k * stride + i] : block[i * stride + k]);
+            to[(size_t)i * (size_t)w->unknowns + (size_t)k] += (double)(turned ? block[k][i] : block[i][k]);
 }
 
 static void add_tile(Work *w, const TileWork *tw)
 {
     const FieldModel *model = w->sweep->model;
     Weighed rows;
-    float residual[ROWS_MAX];
+    float residual[FIT_ROWS], column[UNKNOWNS][FIT_ROWS], block[UNKNOWNS][FIT_ENTRIES];
     weigh_rows(model, tw, &rows, residual);
-    int length = rows.rows + rows.data, columns = UNKNOWNS * tw->count + 1, stride = (columns + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES;
+    int length = rows.rows + rows.data;
     const float *normal[3] = {rows.n[0], rows.n[1], rows.n[2]};
-    float column[UNKNOWNS][ROWS_MAX];
-    for (int i = 0; i < length; i++) {
-        for (int k = columns; k < stride; k++)
-            w->row[i * stride + k] = 0;
-        w->row[i * stride + columns - 1] = residual[i];
-    }
     for (int k = 0; k < tw->count; k++) {
         LaneBlob lane = field_lane_blob(model->tree, tw->tile->node, &w->trial[tw->local[k]]);
-        fit_lanes_columns(rows.x, rows.y, rows.z, rows.rows, rows.data, &lane, rows.scale, rows.bend, normal, column[0], ROWS_MAX);
-        for (int i = 0; i < length; i++)
-            for (int m = 0; m < UNKNOWNS; m++)
-                w->row[i * stride + UNKNOWNS * k + m] = column[m][i];
+        fit_lanes_columns(rows.x, rows.y, rows.z, rows.rows, rows.data, &lane, rows.scale, rows.bend, normal, column[0], FIT_ROWS);
+        fit_lanes_turn(column[0], FIT_ROWS, residual, length, &w->rows[k]);
     }
-    fit_lanes_gram(w->row, length, stride, w->gram);
     for (int a = 0; a < tw->count; a++)
-        for (int b = a; b < tw->count; b++)
-            add_pair(w, tw->local[a], tw->local[b], w->gram + UNKNOWNS * (a * stride + b), stride);
-    for (int a = 0; a < UNKNOWNS * tw->count; a++)
-        w->slope[UNKNOWNS * tw->local[a / UNKNOWNS] + a % UNKNOWNS] += (double)w->gram[a * stride + columns - 1];
+        for (int b = a; b < tw->count; b++) {
+            fit_lanes_product(&w->rows[a], &w->rows[b], length, block);
+            add_pair(w, tw->local[a], tw->local[b], block);
+            for (int k = 0; k < UNKNOWNS && a == b; k++)
+                w->slope[UNKNOWNS * tw->local[a] + k] += (double)block[k][UNKNOWNS];
+        }
 }
 
 static void add_priors(Work *w)

@@ -8,6 +8,7 @@
 #include "base/simd.h"
 #include "geom/blobby.h"
 #include "recon/fit/field_fit.h"
+#include "recon/fit/field_rows.h"
 #include "recon/fit/model_measure.h"
 #include "tests/recon/fitted_shape.h"
 
@@ -72,6 +73,54 @@ static void noise_is_averaged(void **state)
     ModelMeasure m = measure("noise 0.05 mm", model, shape);
     assert_true(m.wall[PLACE_TUBE].rms < 0.012);
     assert_true(is_slow || m.wall[PLACE_SAC].rms < 0.012);
+    vessel_tree_free(model);
+    shape_free(shape);
+}
+
+// Where rays saw each voxel many times, few rows stand for all points: everywhere but near forks, and together for as many as there are.
+static void few_rows_stand_for_all_points(void **state)
+{
+    (void)state;
+    static const char option[3][2][64] = {{"points", "100"}, {"spacing", "0.2"}, {"length_mm", "40"}};
+    Shape *shape = make("y", 3, option);
+    VesselTree *tree = shape_sample(shape, &faults);
+    assert_non_null(tree);
+    FieldRows all, few, none, fine;
+    assert_true(field_rows_create(&all, &few, tree, 1, 0) && field_rows_create(&fine, &none, tree, 0.05, 0));
+    assert_non_null(few.first);
+    assert_null(none.first);      // no voxel of 0.05 mm was seen twice
+    int rows[2] = {0}, far = 0;
+    double weight[2] = {0};
+    for (int n = 0; n < tree->node_count; n++)
+        for (int which = 0; which < 2; which++) {
+            const FieldRows *of = which ? &few : &all;
+            for (int t = of->first[n]; t < of->first[n + 1]; t++)
+                for (int i = 0; i < of->tile[t].data; i++) {
+                    rows[which]++, weight[which] += (double)of->tile[t].weight[i];
+                    far += which && of->tile[t].weight[i] > 2;
+                }
+        }
+    print_message("%d of %d rows, which stand for %.0f; %d for more than two\n", rows[1], rows[0], weight[1], far);
+    assert_true(weight[0] == rows[0]);
+    assert_true(2 * rows[1] < rows[0] && fabs(weight[1] - weight[0]) < 0.02 * weight[0]);
+    assert_true(far > 0 && far < rows[1]);
+    field_rows_free(&all);
+    field_rows_free(&few);
+    field_rows_free(&fine);
+    field_rows_free(&none);
+    vessel_tree_free(tree);
+    shape_free(shape);
+}
+
+static void noise_of_many_points_is_averaged(void **state)
+{
+    (void)state;
+    static const char option[4][2][64] = {{"points", "100"}, {"spacing", "0.2"}, {"length_mm", "40"}, {"noise_mm", "0.1"}};
+    Shape *shape = make("y", 4, option);
+    VesselTree *model = shared_fit(shape, 1, 0);
+    ModelMeasure m = measure("few rows at first", model, shape);
+    assert_true(m.wall[PLACE_TUBE].rms < 0.02 && m.wall[PLACE_BIFURCATION].rms < 0.03);
+    assert_int_equal(m.ghost_nodes, 0);
     vessel_tree_free(model);
     shape_free(shape);
 }
@@ -162,6 +211,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exact_samples_give_the_wall),
         cmocka_unit_test(noise_is_averaged),
+        cmocka_unit_test(few_rows_stand_for_all_points),
+        cmocka_unit_test(noise_of_many_points_is_averaged),
         cmocka_unit_test(threads_and_instruction_sets_give_the_same_bits),
         cmocka_unit_test(a_link_is_lumen_where_its_balls_meet),
         cmocka_unit_test(unfit_input_is_refused),
