@@ -4,9 +4,11 @@
 //   any of these, blades, mode, mask: bake the base from the layers.
 //   always: copy the base back where the tools were, and multiply the tools in.
 // Showing adds the noise of the pulse; a held picture is only shown.
+// On a software renderer the base has no lumen, and lumen, tools and noise are added together while showing (render/xray_pixels.h).
 #include "render/fluoroscope.h"
 
 #include "render/fluoroscope_parts.h"
+#include "render/gl_canvas.h"
 #include "render/message.h"
 
 #include <epoxy/gl.h>
@@ -192,6 +194,7 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     f->tone.contrast = options->contrast_attenuation;
     f->tone.gain = options->dsa_gain;
     f->tone.exposure = log(median_transmission);
+    f->on_processor = gl_is_software();
     fluoroscope_forget(f);
     return f;
 }
@@ -210,6 +213,7 @@ void fluoroscope_destroy(Fluoroscope *f)
                         &f->still.base,    &f->still.picture, &f->turning.bare, &f->turning.base,  &f->turning.picture};
     for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);
+    xray_pixels_free(&f->pixels);
     ribbon_free(&f->ribbon);
     ribbon_path_free(&f->sheath);
     for (int k = 0; k < f->tool_count; k++)
@@ -232,6 +236,7 @@ Fluoroscope *fluoroscope_create_beside(const Fluoroscope *first, const Pose *pos
     options.tools = pose ? first->looks : NULL;
     options.pose = pose;
     f->is_beside = true;
+    f->on_processor = first->on_processor;
     f->options = first->options;
     f->anatomy = first->anatomy;
     f->lumen = first->lumen;
@@ -495,6 +500,20 @@ static void opacify(Fluoroscope *f)
     layers_opacify(&f->programs, &f->now->bare, lumen, roadmap, &f->c_arm, &f->tone, low, high, &f->now->base);
 }
 
+// Hands the layers that changed to the processor.
+static void take_pixels(Fluoroscope *f, bool is_baked, bool lumen_changed)
+{
+    const PictureLayers *now = f->now;
+    if (is_baked)
+        xray_pixels_take_bare(&f->pixels, now->bare.framebuffer, now->bare.side);
+    if (lumen_changed) {
+        xray_pixels_take_field(&f->pixels.lumen, f->lumen_layer.framebuffer, f->lumen_is_empty ? 0 : f->lumen_layer.side);
+        xray_pixels_take_field(&f->pixels.roadmap, f->roadmap_layer.framebuffer, f->tone.has_roadmap ? f->roadmap_layer.side : 0);
+    }
+    lay_tools(f, &f->shown, now->bare.side);
+    layers_take_tools(&f->programs, &f->ribbon, &f->tone, &now->picture, &f->pixels);
+}
+
 // Makes the picture without noise for the exposure taken. The mask comes first, since both use the same layers.
 static void make_picture(Fluoroscope *f, bool is_fresh)
 {
@@ -517,6 +536,10 @@ static void make_picture(Fluoroscope *f, bool is_fresh)
     bool is_baked = changes.anatomy || has_new_mask || is_fresh || blades_or_mode_differ(&f->baked, &f->shown.xray);
     if (is_baked)
         bake(f);
+    if (f->on_processor) {
+        take_pixels(f, is_baked, changes.lumen);
+        return;
+    }
     const Layer *base = f->lumen_is_empty && !has_roadmap ? &now->bare : &now->base;
     if (base == &now->base && (is_baked || changes.lumen))
         opacify(f);
@@ -547,9 +570,9 @@ static void fill(int x, int y, int width, int height, float red, float green, fl
 static void draw_surroundings(const Fluoroscope *f, ViewPort port, bool leaves_surroundings)
 {
     int x = f->corner[0], y = f->corner[1], side = f->side;
-    const float dark = 0.016f;
+    const float dark = SURROUNDINGS_GREY;
     glEnable(GL_SCISSOR_TEST);
-    if (!leaves_surroundings) {
+    if (!leaves_surroundings && !f->on_processor) {
         fill(port.x, port.y, x - port.x, port.height, dark, dark, dark);
         fill(x + side, port.y, port.x + port.width - x - side, port.height, dark, dark, dark);
         fill(x, port.y, side, y - port.y, dark, dark, dark);
@@ -564,9 +587,17 @@ static void draw_surroundings(const Fluoroscope *f, ViewPort port, bool leaves_s
     glDisable(GL_SCISSOR_TEST);
 }
 
-static bool fit_picture(PictureLayers *layers, int side, LayerFormat format)
+static bool fit_picture(const Fluoroscope *f, PictureLayers *layers, int side, LayerFormat format)
 {
+    if (f->on_processor)
+        return layer_fit(&layers->bare, side, format) && layer_fit(&layers->picture, side, LAYER_RG16);
     return layer_fit(&layers->bare, side, format) && layer_fit(&layers->base, side, format) && layer_fit(&layers->picture, side, format);
+}
+
+static bool fit_pictures(Fluoroscope *f, int side)
+{
+    return fit_picture(f, &f->still, side, LAYER_RGBA16) && fit_picture(f, &f->turning, (side + 1) / 2, LAYER_RGBA16_SMOOTH) &&
+           (!f->on_processor || xray_pixels_fit(&f->pixels, side));
 }
 
 // Prepares the square of a port. Returns false if it is too small or the driver fails.
@@ -576,7 +607,7 @@ static bool begin_drawing(Fluoroscope *f, ViewPort port)
     bool is_resized = side != f->side;
     if (side < 8)
         return false;
-    if (is_resized && (!fit_picture(&f->still, side, LAYER_RGBA16) || !fit_picture(&f->turning, (side + 1) / 2, LAYER_RGBA16_SMOOTH)))
+    if (is_resized && !fit_pictures(f, side))
         return false;
     layers_set_state();
     f->side = side;
@@ -587,6 +618,13 @@ static bool begin_drawing(Fluoroscope *f, ViewPort port)
     return true;
 }
 
+static void show_pixels(Fluoroscope *f, ViewPort port, bool leaves_surroundings)
+{
+    const ViewPort square = {port.framebuffer, f->corner[0], f->corner[1], f->side, f->side};
+    const int corner[2] = {leaves_surroundings ? 0 : f->corner[0] - port.x, leaves_surroundings ? 0 : f->corner[1] - port.y};
+    layers_show_pixels(&f->programs, &f->pixels, &f->c_arm, &f->tone, f->shown.pulse, leaves_surroundings ? square : port, corner, f->side);
+}
+
 static void finish_drawing(Fluoroscope *f, bool is_pulse, bool is_held, ViewPort port, bool leaves_surroundings)
 {
     if (is_pulse || f->layers_are_stale)
@@ -594,7 +632,10 @@ static void finish_drawing(Fluoroscope *f, bool is_pulse, bool is_held, ViewPort
     f->is_held = is_held;
     f->has_picture = true;
     f->layers_are_stale = false;
-    layers_show(&f->programs, &f->now->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1], f->side);
+    if (f->on_processor)
+        show_pixels(f, port, leaves_surroundings);
+    else
+        layers_show(&f->programs, &f->now->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1], f->side);
     draw_surroundings(f, port, leaves_surroundings);
 }
 

@@ -144,17 +144,17 @@ static uint64_t mix_bits(uint64_t x)
 static void noise_offset(uint32_t pulse, int offset[3])
 {
     uint64_t bits = mix_bits(pulse);
-    offset[0] = (int)(bits & (NOISE_TILE - 1));
-    offset[1] = (int)(bits >> 16 & (NOISE_TILE - 1));
+    offset[0] = (int)(bits & (NOISE_SIDE - 1));
+    offset[1] = (int)(bits >> 16 & (NOISE_SIDE - 1));
     offset[2] = (int)(bits >> 32 & 1);
 }
 
 static bool make_noise(LayerPrograms *programs)
 {
-    const size_t n = NOISE_TILE, cells = n * n;
+    const size_t n = NOISE_SIDE, cells = n * n;
     double *raw = malloc(cells * sizeof *raw), *soft = malloc(cells * sizeof *soft), square = 0;
-    uint8_t *tile = malloc(cells);
-    bool good = raw && soft && tile;
+    uint8_t *tile = programs->tile[0] = malloc(cells), *turned = programs->tile[1] = malloc(cells);
+    bool good = raw && soft && tile && turned;
     for (size_t i = 0; good && i < cells; i++) {
         // Box-Muller method
         double u = (double)((mix_bits(2 * i) >> 11) + 1) / 9007199254740993.0, v = (double)(mix_bits(2 * i + 1) >> 11) / 9007199254740992.0;
@@ -170,16 +170,17 @@ static bool make_noise(LayerPrograms *programs)
     for (size_t i = 0; good && i < cells; i++)
         tile[i] = (uint8_t)lround(fmin(fmax((soft[i] / sqrt(square / (double)cells) + 4) / 8, 0), 1) * 255);
     if (good) {
+        for (size_t i = 0; i < cells; i++)
+            turned[i % n * n + i / n] = tile[i];
         glGenTextures(1, &programs->noise);
         glBindTexture(GL_TEXTURE_2D, programs->noise);
         glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-        glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, NOISE_TILE, NOISE_TILE, 0, GL_RED, GL_UNSIGNED_BYTE, tile);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, NOISE_SIDE, NOISE_SIDE, 0, GL_RED, GL_UNSIGNED_BYTE, tile);
         glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
         glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     }
     free(raw);
     free(soft);
-    free(tile);
     return good;
 }
 
@@ -285,6 +286,8 @@ void layers_destroy(LayerPrograms *programs)
     glDeleteBuffers(1, &programs->shape_vertices);
     glDeleteTextures(1, &programs->noise);
     glDeleteTextures(1, &programs->volume);
+    free(programs->tile[0]);
+    free(programs->tile[1]);
     *programs = (LayerPrograms){0};
 }
 
@@ -292,12 +295,14 @@ bool layer_fit(Layer *layer, int side, LayerFormat format)
 {
     if (layer->side == side)
         return true;
-    GLint filter = format == LAYER_RGBA16 ? GL_NEAREST : GL_LINEAR;
+    GLint filter = format == LAYER_RGBA16 || format == LAYER_RG16 ? GL_NEAREST : GL_LINEAR;
     layer_destroy(layer);
     glGenTextures(1, &layer->texture);
     glBindTexture(GL_TEXTURE_2D, layer->texture);
     if (format == LAYER_R32F)
         glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, side, side, 0, GL_RED, GL_FLOAT, NULL);
+    else if (format == LAYER_RG16)
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RG16, side, side, 0, GL_RG, GL_UNSIGNED_SHORT, NULL);
     else
         glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16, side, side, 0, GL_RGBA, GL_UNSIGNED_SHORT, NULL);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
@@ -446,6 +451,22 @@ static void tone_powers(const LayerTone *tone, double power[2])
     power[1] = power[0] - 0.5;
 }
 
+// The powers of two by which a millimetre of contrast agent darkens brightness and noise.
+static void lumen_powers(const LayerTone *tone, double power[2])
+{
+    tone_powers(tone, power);
+    for (int k = 0; k < 2; k++)
+        power[k] *= tone->contrast / log(2);
+}
+
+// Full scale of the baked brightness, and of the baked noise for a tile that stores n / 8, in units of the screen's white.
+static void shown_units(const LayerTone *tone, double unit[2])
+{
+    const double noise = tone->is_subtracted ? white * tone->gain / sqrt(weakest) : white * live_power;
+    unit[0] = white * room[0];
+    unit[1] = tone->quanta > 0 ? 8 * room[1] * noise / sqrt(tone->quanta) : 0;
+}
+
 void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Layer *mask, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
                  const Layer *to)
 {
@@ -481,9 +502,8 @@ void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Laye
                     const int low[2], const int high[2], const Layer *to)
 {
     unsigned program = programs->opacify[lumen->side < to->side][roadmap != NULL];
-    const double to_base_two = tone->contrast / log(2);
     double power[2];
-    tone_powers(tone, power);
+    lumen_powers(tone, power);
     if (high[0] <= low[0] || high[1] <= low[1])
         return;
     bind_layer(to);
@@ -492,7 +512,7 @@ void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Laye
     set_texture(program, "lumen", 1, GL_TEXTURE_2D, lumen->texture);
     set_texture(program, "roadmap", 2, GL_TEXTURE_2D, texture_of(roadmap));
     set_float(program, "slant", c_arm->field_mm / C_ARM_SOURCE_MM);
-    glUniform2f(glGetUniformLocation(program, "power"), (float)(power[0] * to_base_two), (float)(power[1] * to_base_two));
+    glUniform2f(glGetUniformLocation(program, "power"), (float)power[0], (float)power[1]);
     glEnable(GL_SCISSOR_TEST);
     glScissor(low[0], low[1], high[0] - low[0], high[1] - low[1]);
     draw_square(programs);
@@ -526,9 +546,9 @@ void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerT
 {
     unsigned program = programs->show[tone->has_roadmap];
     int offset[3];
+    double unit[2];
     noise_offset(pulse, offset);
-    // one unit of the baked noise channel; the tile stores n / 8
-    double unit = tone->is_subtracted ? white * tone->gain / sqrt(weakest) : white * live_power;
+    shown_units(tone, unit);
     bind_layer(baked);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glViewport(x, y, side, side);
@@ -537,6 +557,38 @@ void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerT
     set_texture(program, "noise", 1, GL_TEXTURE_2D, programs->noise);
     set_float(program, "side", side);
     glUniform3iv(glGetUniformLocation(program, "offset"), 1, offset);
-    glUniform2f(glGetUniformLocation(program, "scale"), (float)(white * room[0]), tone->quanta > 0 ? (float)(8 * room[1] * unit / sqrt(tone->quanta)) : 0);
+    glUniform2f(glGetUniformLocation(program, "scale"), (float)unit[0], (float)unit[1]);
     draw_square(programs);
+}
+
+void layers_take_tools(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, const Layer *tools, XrayPixels *to)
+{
+    const int *low = ribbon->low, *high = ribbon->high, none[2] = {0, 0};
+    if (ribbon->count < 1 || high[0] <= low[0] || high[1] <= low[1]) {
+        xray_pixels_take_tools(to, tools->framebuffer, none, none);
+        return;
+    }
+    bind_layer(tools);
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(low[0], low[1], high[0] - low[0], high[1] - low[1]);
+    glClearColor(1, 1, 1, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+    glDisable(GL_SCISSOR_TEST);
+    layers_draw_tools(programs, ribbon, tone, false, tools);
+    xray_pixels_take_tools(to, tools->framebuffer, low, high);
+}
+
+bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, const CArm *c_arm, const LayerTone *tone, uint32_t pulse, ViewPort port,
+                        const int corner[2], int side)
+{
+    int offset[3];
+    noise_offset(pulse, offset);
+    const bool is_rotated = offset[2] != 0;
+    PixelLook look = {.slant = c_arm->field_mm / C_ARM_SOURCE_MM,
+                      .noise = programs->tile[is_rotated],
+                      .offset = {offset[is_rotated], offset[!is_rotated]},
+                      .has_roadmap = tone->has_roadmap};
+    lumen_powers(tone, look.power);
+    shown_units(tone, look.unit);
+    return xray_pixels_show(pixels, &look, port, corner, side, SURROUNDINGS_GREY);
 }

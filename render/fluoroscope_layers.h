@@ -4,13 +4,14 @@
 
 #include "render/fluoroscope_anatomy.h"
 #include "render/fluoroscope_tool.h"
+#include "render/xray_pixels.h"
 
 typedef struct Layer {
     unsigned texture, framebuffer;
     int side;                // [pixel], 0: not created yet
 } Layer;
 
-typedef enum { LAYER_R32F, LAYER_RGBA16, LAYER_RGBA16_SMOOTH } LayerFormat;   // smooth: to be magnified
+typedef enum { LAYER_R32F, LAYER_RG16, LAYER_RGBA16, LAYER_RGBA16_SMOOTH } LayerFormat;   // smooth: to be magnified
 
 typedef struct LayerPrograms {
     unsigned volume_march, shape, total, tool;
@@ -20,11 +21,10 @@ typedef struct LayerPrograms {
     unsigned empty_array;    // a full-screen triangle needs no vertices
     unsigned tool_array, tool_vertices;
     unsigned shape_array, shape_vertices;
-    unsigned noise;          // NOISE_TILE^2 R8: normally distributed numbers n as (n + 4) / 8
+    unsigned noise;          // NOISE_SIDE^2 R8: normally distributed numbers n as (n + 4) / 8
+    uint8_t *tile[2];        // the same in memory, and with columns as rows
     unsigned volume;         // 3D R8: Anatomy.level; 0: none
 } LayerPrograms;
-
-enum { NOISE_TILE = 512 };
 
 // How the brightness follows from the transmission T; the tool multiplies it by T^brightness and the noise by T^noise.
 typedef struct LayerTone {
@@ -63,5 +63,12 @@ void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Laye
 void layers_draw_tools(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to);
 // Draws a baked layer, of any resolution, and noise into a square of the framebuffer at x, y.
 void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y, int side);
+
+// The same on the processor (render/xray_pixels.h), from a layer baked without the lumen. `tools`: a layer of two channels for the tools' transmission.
+void layers_take_tools(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, const Layer *tools, XrayPixels *to);
+// Also draws the port around the square.
+bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, const CArm *c_arm, const LayerTone *tone, uint32_t pulse, ViewPort port,
+                        const int corner[2], int side);
+#define SURROUNDINGS_GREY 0.016f
 
 #endif

@@ -18,7 +18,7 @@ typedef struct Exposure {
 } Exposure;
 
 typedef struct PictureLayers {
-    Layer bare, base, picture;   // without the lumen; with it; with the tools too
+    Layer bare, base, picture;   // without the lumen; with it; with the tools too. On the processor: no base, and the transmission of the tools alone
 } PictureLayers;
 
 typedef struct Fluoroscope Fluoroscope;
@@ -36,6 +36,8 @@ struct Fluoroscope {
     Layer anatomy_layer, anatomy_next, lumen_layer, roadmap_layer, mask;
     int anatomy_rows;            // rows drawn of anatomy_next, which replaces the coarse one when complete
     PictureLayers still, turning, *now;   // at full and at half resolution; the one that is shown
+    bool on_processor;           // lumen, tools and noise are added by `pixels`, else by shaders; fixed before the first draw
+    XrayPixels pixels;
     Ribbon ribbon;
     RibbonPath sheath;           // count 0: none
     Vec3 sheath_node[2];

@@ -103,6 +103,12 @@ void gl_canvas_read(const GlCanvas *canvas, uint8_t *rgb)
 
 void gl_canvas_finish(void) { glFinish(); }
 
+bool gl_is_software(void)
+{
+    const char *name = (const char *)glGetString(GL_RENDERER);
+    return name && (strstr(name, "llvmpipe") || strstr(name, "softpipe"));
+}
+
 static bool add_shader(unsigned program, GLenum kind, const char *text, char *message, size_t capacity)
 {
     unsigned shader = glCreateShader(kind);

@@ -26,6 +26,7 @@ void gl_canvas_read(const GlCanvas *canvas, uint8_t *rgb);
 void gl_framebuffer_read(unsigned framebuffer, int width, int height, uint8_t *rgb);
 
 void gl_canvas_finish(void);   // waits until everything is drawn, for timing
+bool gl_is_software(void);     // the driver draws on the processor: Mesa's llvmpipe or softpipe
 
 // Returns 0 with the first lines of the compiler's output in `message`.
 unsigned gl_program_create(const char *vertex_shader, const char *fragment_shader, char *message, size_t capacity);

@@ -3,14 +3,11 @@
 #define SELDINGER_RENDER_GL_ENLARGER_H
 
 #include "render/enlarge.h"
-#include "render/view_port.h"
+#include "render/gl_strip.h"
 
 typedef struct GlEnlarger {    // initialise with zeros
     Enlarger pixels;
-    uint32_t *strip;           // (height, width) the rows under way
-    unsigned texture, framebuffer;
-    int width, height;         // of the texture
-    bool is_turned;            // as the buffer of a window
+    GlStrip strip;
 } GlEnlarger;
 
 // `framebuffer`: of width x height pixels, not multisampled. Returns false if memory runs out or the driver fails.
