@@ -367,12 +367,20 @@ static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
     return true;
 }
 
-static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const float *contrast, bool coarse, bool *is_empty)
+static void draw_lumen(Fluoroscope *f, Layer *layer, PixelField *field, const CArm *c_arm, const float *contrast, bool coarse, bool *is_empty)
 {
     *is_empty = !f->lumen.is_there || f->lumen_out_of_beam || !contrast_is_seen(contrast, f->lumen.node_count) ||
                 !layer_fit(layer, coarse ? (f->side + 1) / 2 : f->side, LAYER_R32F);
+    float *value = !*is_empty && f->on_processor ? pixel_field_begin(field, layer->side) : NULL;
+    *is_empty |= f->on_processor && !value;
     if (*is_empty)
         return;
+    if (value) {
+        lumen_add(&f->lumen, c_arm, contrast, coarse, layer->side, value);
+        pixel_field_end(field);
+        layer_put(layer, value);     // for the mask of DSA
+        return;
+    }
     layer_begin(layer);
     lumen_layer_draw(&f->lumen, c_arm, contrast, coarse);
 }
@@ -420,11 +428,11 @@ static LayerChanges update_layers(Fluoroscope *f, const Exposure *exposure, bool
     }
     if (lumen) {
         f->lumen_is_coarse = coarse;
-        draw_lumen(f, &f->lumen_layer, &c_arm, exposure->contrast, coarse, &f->lumen_is_empty);
+        draw_lumen(f, &f->lumen_layer, &f->pixels.lumen, &c_arm, exposure->contrast, coarse, &f->lumen_is_empty);
         memcpy(f->lumen_contrast, exposure->contrast, (size_t)lumen_nodes(f) * sizeof *f->lumen_contrast);
     }
     if (roadmap) {
-        draw_lumen(f, &f->roadmap_layer, &c_arm, f->memory.roadmap, coarse, &f->roadmap_is_empty);
+        draw_lumen(f, &f->roadmap_layer, &f->pixels.roadmap, &c_arm, f->memory.roadmap, coarse, &f->roadmap_is_empty);
         memcpy(f->roadmap_contrast, f->memory.roadmap, (size_t)lumen_nodes(f) * sizeof *f->roadmap_contrast);
         f->roadmap_is_stale = false;
     }
@@ -501,15 +509,11 @@ static void opacify(Fluoroscope *f)
 }
 
 // Hands the layers that changed to the processor.
-static void take_pixels(Fluoroscope *f, bool is_baked, bool lumen_changed)
+static void take_pixels(Fluoroscope *f, bool is_baked)
 {
     const PictureLayers *now = f->now;
     if (is_baked)
         xray_pixels_take_bare(&f->pixels, now->bare.framebuffer, now->bare.side);
-    if (lumen_changed) {
-        xray_pixels_take_field(&f->pixels.lumen, f->lumen_layer.framebuffer, f->lumen_is_empty ? 0 : f->lumen_layer.side);
-        xray_pixels_take_field(&f->pixels.roadmap, f->roadmap_layer.framebuffer, f->tone.has_roadmap ? f->roadmap_layer.side : 0);
-    }
     lay_tools(f, &f->shown, now->bare.side);
     layers_take_tools(&f->programs, &f->ribbon, &f->tone, &now->picture, &f->pixels);
 }
@@ -537,7 +541,7 @@ static void make_picture(Fluoroscope *f, bool is_fresh)
     if (is_baked)
         bake(f);
     if (f->on_processor) {
-        take_pixels(f, is_baked, changes.lumen);
+        take_pixels(f, is_baked);
         return;
     }
     const Layer *base = f->lumen_is_empty && !has_roadmap ? &now->bare : &now->base;
@@ -622,7 +626,7 @@ static void show_pixels(Fluoroscope *f, ViewPort port, bool leaves_surroundings)
 {
     const ViewPort square = {port.framebuffer, f->corner[0], f->corner[1], f->side, f->side};
     const int corner[2] = {leaves_surroundings ? 0 : f->corner[0] - port.x, leaves_surroundings ? 0 : f->corner[1] - port.y};
-    layers_show_pixels(&f->programs, &f->pixels, &f->c_arm, &f->tone, f->shown.pulse, leaves_surroundings ? square : port, corner, f->side);
+    layers_show_pixels(&f->programs, &f->pixels, !f->lumen_is_empty, &f->c_arm, &f->tone, f->shown.pulse, leaves_surroundings ? square : port, corner, f->side);
 }
 
 static void finish_drawing(Fluoroscope *f, bool is_pulse, bool is_held, ViewPort port, bool leaves_surroundings)

@@ -347,6 +347,14 @@ static void bind_layer(const Layer *layer)
     glViewport(0, 0, layer->side, layer->side);
 }
 
+void layer_put(const Layer *layer, const float *value)
+{
+    glActiveTexture(GL_TEXTURE0);
+    glBindTexture(GL_TEXTURE_2D, layer->texture);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, layer->side, layer->side, GL_RED, GL_FLOAT, value);
+}
+
 void layer_begin(const Layer *layer)
 {
     bind_layer(layer);
@@ -578,8 +586,8 @@ void layers_take_tools(const LayerPrograms *programs, const Ribbon *ribbon, cons
     xray_pixels_take_tools(to, tools->framebuffer, low, high);
 }
 
-bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, const CArm *c_arm, const LayerTone *tone, uint32_t pulse, ViewPort port,
-                        const int corner[2], int side)
+bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, bool has_lumen, const CArm *c_arm, const LayerTone *tone, uint32_t pulse,
+                        ViewPort port, const int corner[2], int side)
 {
     int offset[3];
     noise_offset(pulse, offset);
@@ -587,6 +595,7 @@ bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, const
     PixelLook look = {.slant = c_arm->field_mm / C_ARM_SOURCE_MM,
                       .noise = programs->tile[is_rotated],
                       .offset = {offset[is_rotated], offset[!is_rotated]},
+                      .has_lumen = has_lumen,
                       .has_roadmap = tone->has_roadmap};
     lumen_powers(tone, look.power);
     shown_units(tone, look.unit);

@@ -43,6 +43,7 @@ void layers_destroy(LayerPrograms *programs);
 // Recreates the layer if its size differs. Returns false if the driver fails.
 bool layer_fit(Layer *layer, int side, LayerFormat format);
 void layer_destroy(Layer *layer);
+void layer_put(const Layer *layer, const float *value);   // (side, side), rows from the bottom, into a float layer
 void layer_begin(const Layer *layer);   // binds it, clears it to 0 and sets the viewport
 
 // Draws the attenuation of rows `first` to `first` + `rows` of the layer.
@@ -67,8 +68,8 @@ void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerT
 // The same on the processor (render/xray_pixels.h), from a layer baked without the lumen. `tools`: a layer of two channels for the tools' transmission.
 void layers_take_tools(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, const Layer *tools, XrayPixels *to);
 // Also draws the port around the square.
-bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, const CArm *c_arm, const LayerTone *tone, uint32_t pulse, ViewPort port,
-                        const int corner[2], int side);
+bool layers_show_pixels(const LayerPrograms *programs, XrayPixels *pixels, bool has_lumen, const CArm *c_arm, const LayerTone *tone, uint32_t pulse,
+                        ViewPort port, const int corner[2], int side);
 #define SURROUNDINGS_GREY 0.016f
 
 #endif

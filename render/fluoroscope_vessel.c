@@ -51,8 +51,9 @@ static bool send_lumen(LumenMesh *to, const TriangleMesh *mesh, const int *node,
         memcpy(vertex[v], entry, sizeof entry);
     }
     send_mesh(to, mesh->vertex_count, (const float(*)[4])vertex, mesh->triangle_count, (const int(*)[3])mesh->triangle);
+    bool good = wall_mesh_make(&to->wall, mesh->vertex_count, (const float(*)[4])vertex, mesh->triangle_count, (const int(*)[3])mesh->triangle);
     free(vertex);
-    return true;
+    return good;
 }
 
 static void delete_mesh(LumenMesh *mesh)
@@ -60,6 +61,7 @@ static void delete_mesh(LumenMesh *mesh)
     const unsigned buffer[2] = {mesh->vertices, mesh->indices};
     glDeleteBuffers(2, buffer);
     glDeleteVertexArrays(1, &mesh->array);
+    wall_mesh_free(&mesh->wall);
 }
 
 // --- tree nodes of the vertices ---
@@ -227,12 +229,12 @@ void lumen_box(const Lumen *lumen, const CArm *c_arm, int side, int low[2], int 
     }
 }
 
-static void send_nodes(Lumen *lumen, const CArm *c_arm, const float *concentration)
+static bool find_nodes(Lumen *lumen, const CArm *c_arm, const float *concentration)
 {
     // the integral of c dz along the tree, in double precision and from the plane of the isocentre, so that a long tree loses no precision
     double *potential = malloc((size_t)lumen->node_count * sizeof *potential);
     if (!potential)
-        return;
+        return false;
     for (int n = 0; n < lumen->node_count; n++) {
         int parent = lumen->parent[n];
         double c = concentration[n], z = vec3_dot(c_arm->towards, vec3_sub(lumen->center[n], c_arm->isocentre));
@@ -246,22 +248,47 @@ static void send_nodes(Lumen *lumen, const CArm *c_arm, const float *concentrati
         lumen->shift_slope[n][1] = (float)c;
     }
     free(potential);
+    return true;
+}
+
+static void send_nodes(Lumen *lumen, const CArm *c_arm, const float *concentration)
+{
+    if (!find_nodes(lumen, c_arm, concentration))
+        return;
     glBindBuffer(GL_TEXTURE_BUFFER, lumen->buffer);
     glBufferData(GL_TEXTURE_BUFFER, (GLsizeiptr)((size_t)lumen->node_count * sizeof *lumen->shift_slope), lumen->shift_slope, GL_STREAM_DRAW);
 }
 
+static LumenMesh *mesh_of(Lumen *lumen, bool coarse) { return coarse && lumen->coarse.index_count > 0 ? &lumen->coarse : &lumen->fine; }
+
+static WallView view_of(const Lumen *lumen, const CArm *c_arm)
+{
+    WallView view = {.towards = {(float)c_arm->towards.x, (float)c_arm->towards.y, (float)c_arm->towards.z},
+                     .shift = (float)vec3_dot(c_arm->towards, vec3_sub(lumen->origin, c_arm->isocentre)),
+                     .facing = (float)(lumen->sign * c_arm->handedness),
+                     .shift_slope = (const float(*)[2])lumen->shift_slope};
+    c_arm_matrix(c_arm, lumen->origin, 0.5 * C_ARM_NEAREST_MM, 10 * C_ARM_SOURCE_MM, view.clip);
+    return view;
+}
+
+void lumen_add(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse, int side, float *value)
+{
+    const WallView view = view_of(lumen, c_arm);
+    if (find_nodes(lumen, c_arm, concentration))
+        lumen_raster(&mesh_of(lumen, coarse)->wall, &view, side, value);
+}
+
 void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse)
 {
-    const LumenMesh *mesh = coarse && lumen->coarse.index_count > 0 ? &lumen->coarse : &lumen->fine;
-    float clip[16];
+    const LumenMesh *mesh = mesh_of(lumen, coarse);
+    const WallView view = view_of(lumen, c_arm);
     unsigned program = lumen->program;
     send_nodes(lumen, c_arm, concentration);
-    c_arm_matrix(c_arm, lumen->origin, 0.5 * C_ARM_NEAREST_MM, 10 * C_ARM_SOURCE_MM, clip);
     glUseProgram(program);
-    glUniformMatrix4fv(glGetUniformLocation(program, "clip"), 1, GL_FALSE, clip);
-    glUniform3f(glGetUniformLocation(program, "towards"), (float)c_arm->towards.x, (float)c_arm->towards.y, (float)c_arm->towards.z);
-    glUniform1f(glGetUniformLocation(program, "shift"), (float)vec3_dot(c_arm->towards, vec3_sub(lumen->origin, c_arm->isocentre)));
-    glUniform1f(glGetUniformLocation(program, "facing"), (float)(lumen->sign * c_arm->handedness));
+    glUniformMatrix4fv(glGetUniformLocation(program, "clip"), 1, GL_FALSE, view.clip);
+    glUniform3fv(glGetUniformLocation(program, "towards"), 1, view.towards);
+    glUniform1f(glGetUniformLocation(program, "shift"), view.shift);
+    glUniform1f(glGetUniformLocation(program, "facing"), view.facing);
     glUniform1i(glGetUniformLocation(program, "nodes"), 0);
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_BUFFER, lumen->texture);

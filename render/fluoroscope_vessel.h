@@ -11,10 +11,12 @@
 
 #include "geom/geom.h"
 #include "render/fluoroscope_options.h"
+#include "render/lumen_raster.h"
 
 typedef struct LumenMesh {
     unsigned array, vertices, indices;
     int index_count;
+    WallMesh wall;               // the same in memory
 } LumenMesh;
 
 typedef struct Lumen {
@@ -40,5 +42,7 @@ bool lumen_is_in_beam(const Lumen *lumen, const CArm *c_arm);
 void lumen_box(const Lumen *lumen, const CArm *c_arm, int side, int low[2], int high[2]);
 // Adds F to the bound framebuffer with one float channel (depth along the axis of the C-arm, ignoring the obliquity of the rays).
 void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse);
+// The same on the processor, added to value (side, side), rows from the bottom.
+void lumen_add(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse, int side, float *value);
 
 #endif

@@ -12,6 +12,8 @@
 
 enum { BLOCK = 16, EDGE = 16 };    // EDGE: floats before a row, which repeat its end
 
+#define LEAST_LENGTH 1e-4f         // [mm] of a ray in contrast agent, which darkens it by 1e-5: what remains where walls cancel in floats
+
 typedef struct SlantRow {
     float first, step, square;     // tangent of the first pixel's ray along the row, from pixel to pixel; square of the tangent across it
 } SlantRow;
@@ -161,15 +163,18 @@ static bool fit_field(PixelField *field, int side)
     return true;
 }
 
-void xray_pixels_take_field(PixelField *field, unsigned framebuffer, int side)
+float *pixel_field_begin(PixelField *field, int side)
 {
-    field->side = 0;
-    if (side < 1 || !fit_field(field, side))
-        return;
+    if (!fit_field(field, side))
+        return NULL;
     field->side = side;
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
-    glPixelStorei(GL_PACK_ALIGNMENT, 1);
-    glReadPixels(0, 0, side, side, GL_RED, GL_FLOAT, field->value);
+    memset(field->value, 0, (size_t)side * (size_t)side * sizeof *field->value);
+    return field->value;
+}
+
+void pixel_field_end(PixelField *field)
+{
+    const int side = field->side;
     for (int y = 0; y < side; y++) {
         const float *row = field->value + (size_t)y * (size_t)side;
         int first = 0, end = side;
@@ -280,7 +285,7 @@ static void add_roadmap(XrayPixels *pixels, const PixelLook *look, int y, float 
     const int side = pixels->side;
     int range[2];
     memset(opacity, 0, (size_t)side * sizeof *opacity);
-    if (pixels->roadmap.side < 1 || !sample_row(&pixels->roadmap, y, pixels->sample[0] + EDGE, pixels->sample[1] + EDGE, range))
+    if (!sample_row(&pixels->roadmap, y, pixels->sample[0] + EDGE, pixels->sample[1] + EDGE, range))
         return;
     const SlantRow slant = slant_of(look, side, range[0], y);
     kernels()->tint(range[1] - range[0], pixels->sample[1] + EDGE + range[0], &slant, pixels->bare[2] + (size_t)y * (size_t)side + range[0],
@@ -296,7 +301,7 @@ static void make_row_of(XrayPixels *pixels, const PixelLook *look, int y)
     int range[2];
     for (int k = 0; k < 2; k++)
         run->scale(side, pixels->bare[k] + at, (float)(look->unit[k] / 65535), part[k]);
-    if (pixels->lumen.side > 0 && sample_row(&pixels->lumen, y, pixels->sample[0] + EDGE, pixels->sample[1] + EDGE, range)) {
+    if (look->has_lumen && sample_row(&pixels->lumen, y, pixels->sample[0] + EDGE, pixels->sample[1] + EDGE, range)) {
         const SlantRow slant = slant_of(look, side, range[0], y);
         const float power[2] = {(float)look->power[0], (float)look->power[1]};
         run->darken(range[1] - range[0], pixels->sample[1] + EDGE + range[0], &slant, power, part[0] + range[0], part[1] + range[0]);
@@ -376,11 +381,10 @@ static void show_row(XrayPixels *pixels, const PixelLook *look, int y, int side,
     grain_row(look, &pixels->mixed, 0, y, side, is_turned, out);
 }
 
-static bool fit_fields(XrayPixels *pixels)
+static bool fit_fields(XrayPixels *pixels, const PixelLook *look)
 {
-    const bool is_blurred = (pixels->lumen.side > 0 ? pixels->lumen.side : pixels->roadmap.side) >= pixels->side;   // as opacify of the shaders
-    return (pixels->lumen.side < 1 || fit_taps(&pixels->lumen, pixels->side, is_blurred)) &&
-           (pixels->roadmap.side < 1 || fit_taps(&pixels->roadmap, pixels->side, is_blurred));
+    const bool is_blurred = (look->has_lumen ? pixels->lumen.side : pixels->roadmap.side) >= pixels->side;   // as opacify of the shaders
+    return (!look->has_lumen || fit_taps(&pixels->lumen, pixels->side, is_blurred)) && (!look->has_roadmap || fit_taps(&pixels->roadmap, pixels->side, is_blurred));
 }
 
 static void fill_pixels(uint32_t *out, int count, uint32_t value)
@@ -392,7 +396,7 @@ static void fill_pixels(uint32_t *out, int count, uint32_t value)
 bool xray_pixels_show(XrayPixels *pixels, const PixelLook *look, ViewPort port, const int corner[2], int side, double dark)
 {
     SEL_ASSERT(pixels->side <= side && side <= pixels->side_most, "the square is not smaller than the picture, and there is memory for its rows");
-    if (!fit_fields(pixels) || !gl_strip_fit(&pixels->out, port))
+    if (!fit_fields(pixels, look) || !gl_strip_fit(&pixels->out, port))
         return false;
     const uint32_t ground = (uint32_t)lround(255 * dark) * 0x010101u | 0xff000000u;
     const int right = corner[0] + side;

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef struct PixelField {      // a layer of floats, rows from the bottom; side 0: it is zero everywhere
+typedef struct PixelField {      // a layer of floats, rows from the bottom
     int side;
     size_t capacity;
     float *value;                // (side, side)
@@ -48,7 +48,7 @@ typedef struct PixelLook {
     double slant;                // tangent of the angle between the rays to both sides of the picture, in the plane of a side
     const uint8_t *noise;        // (NOISE_SIDE, NOISE_SIDE) tile, periodic
     int offset[2];               // of the picture's lower left corner in it
-    bool has_roadmap;
+    bool has_lumen, has_roadmap; // false: the field is zero everywhere
 } PixelLook;
 
 enum { NOISE_SIDE = 512 };
@@ -56,10 +56,12 @@ enum { NOISE_SIDE = 512 };
 // Memory for a picture of up to `side` pixels. Returns false if it runs out.
 bool xray_pixels_fit(XrayPixels *pixels, int side);
 void xray_pixels_free(XrayPixels *pixels);
-// What a framebuffer of side x side holds: 16 bits in four channels; one float (0: nothing); the box of a framebuffer with 16 bits in two channels.
+// What a framebuffer of side x side holds: 16 bits in four channels; its box, if it has 16 bits in two channels.
 void xray_pixels_take_bare(XrayPixels *pixels, unsigned framebuffer, int side);
-void xray_pixels_take_field(PixelField *field, unsigned framebuffer, int side);
 void xray_pixels_take_tools(XrayPixels *pixels, unsigned framebuffer, const int low[2], const int high[2]);
+// A field to be filled, zero at first; NULL if memory runs out. Filled: call pixel_field_end().
+float *pixel_field_begin(PixelField *field, int side);
+void pixel_field_end(PixelField *field);
 // Draws into a square of `side` pixels, not less than the picture's, at `corner` of the port, and `dark` (0 to 1) around it. Returns false if the driver fails.
 bool xray_pixels_show(XrayPixels *pixels, const PixelLook *look, ViewPort port, const int corner[2], int side, double dark);
 
