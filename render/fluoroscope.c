@@ -10,6 +10,7 @@
 #include "render/fluoroscope_parts.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
+#include "render/shape_raster.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -214,6 +215,7 @@ void fluoroscope_destroy(Fluoroscope *f)
     for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);
     xray_pixels_free(&f->pixels);
+    free(f->solids);
     ribbon_free(&f->ribbon);
     ribbon_path_free(&f->sheath);
     for (int k = 0; k < f->tool_count; k++)
@@ -329,7 +331,7 @@ static double find_mean(const Fluoroscope *f, const CArm *c_arm)
     int count = 0;
     for (int j = -4; j <= 4; j++)
         for (int i = -4; i <= 4; i++) {
-            double a = anatomy_along(&f->anatomy, c_arm_source(c_arm), c_arm_ray(c_arm, i * 0.11, j * 0.11));
+            double a = shape_shadows_along(&f->shadows, &f->anatomy, c_arm, i * 0.11, j * 0.11);
             if (a > 0.1) {
                 sum += a;
                 count++;
@@ -340,23 +342,36 @@ static double find_mean(const Fluoroscope *f, const CArm *c_arm)
 
 static bool has_anatomy(const Fluoroscope *f) { return f->anatomy.level || f->anatomy.body.count > 0; }
 
-enum { ANATOMY_STRIPS = 4 };
+enum { ANATOMY_STRIPS = 4, SOLIDS_FINE = 384, SOLIDS_COARSE = 160 };
+
+// A volume is marched through by a shader.
+static void draw_anatomy(Fluoroscope *f, const CArm *c_arm, const Layer *to, int first, int rows, int steps)
+{
+    if (f->on_processor && !f->anatomy.level && !f->solids)
+        f->solids = malloc(SOLIDS_FINE * SOLIDS_FINE * sizeof *f->solids);
+    if (!f->on_processor || f->anatomy.level || !f->solids) {
+        layers_draw_anatomy(&f->programs, &f->anatomy, &f->shadows, c_arm, to, first, rows, steps);
+        return;
+    }
+    shape_raster(&f->shadows, c_arm, to->side, first, rows, f->solids);
+    layer_put(to, first, rows, f->solids + (size_t)first * (size_t)to->side);
+}
 
 static void draw_coarse_anatomy(Fluoroscope *f, const CArm *c_arm)
 {
-    int side = f->anatomy.level ? 96 : 160;
+    int side = f->anatomy.level ? 96 : SOLIDS_COARSE;
     f->anatomy_rows = 0;
     if (has_anatomy(f) && layer_fit(&f->anatomy_layer, side, LAYER_R32F))
-        layers_draw_anatomy(&f->programs, &f->anatomy, &f->shadows, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
+        draw_anatomy(f, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
 }
 
 // Draws the next strip of the fine anatomy, or all the rest. Returns true if it is complete and in use.
 static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
 {
-    int side = f->anatomy.level ? 256 : 384, rows = at_once ? side - f->anatomy_rows : side / ANATOMY_STRIPS;
+    int side = f->anatomy.level ? 256 : SOLIDS_FINE, rows = at_once ? side - f->anatomy_rows : side / ANATOMY_STRIPS;
     if (!has_anatomy(f) || !layer_fit(&f->anatomy_next, side, LAYER_R32F))
         return true;
-    layers_draw_anatomy(&f->programs, &f->anatomy, &f->shadows, c_arm, &f->anatomy_next, f->anatomy_rows, rows, ANATOMY_GRID);
+    draw_anatomy(f, c_arm, &f->anatomy_next, f->anatomy_rows, rows, ANATOMY_GRID);
     f->anatomy_rows += rows;
     if (f->anatomy_rows < side)
         return false;
@@ -378,7 +393,7 @@ static void draw_lumen(Fluoroscope *f, Layer *layer, PixelField *field, const CA
     if (value) {
         lumen_add(&f->lumen, c_arm, contrast, coarse, layer->side, value);
         pixel_field_end(field);
-        layer_put(layer, value);     // for the mask of DSA
+        layer_put(layer, 0, layer->side, value);     // for the mask of DSA
         return;
     }
     layer_begin(layer);
@@ -413,9 +428,9 @@ static LayerChanges update_layers(Fluoroscope *f, const Exposure *exposure, bool
     f->c_arm = c_arm;
     f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
     if (moved) {
-        f->tone.mean = find_mean(f, &c_arm);
         if (!shape_shadows_cast(&f->shadows, &f->anatomy, &c_arm))
             f->shadows.count = 0;
+        f->tone.mean = find_mean(f, &c_arm);
         f->anatomy_rows = 0;
     }
     if (moved && !at_once)

@@ -313,10 +313,14 @@ bool shape_shadows_cast(ShapeShadows *shadows, const Anatomy *anatomy, const CAr
     const Similarity *place = &anatomy->place;
     shadows->count = 0;
     if (shadows->capacity < body->count) {
-        ShadowVertex *more = realloc(shadows->vertex, (size_t)body->count * SHADOW_VERTICES * sizeof *more);
-        if (!more)
+        shape_shadows_free(shadows);
+        shadows->vertex = malloc((size_t)body->count * SHADOW_VERTICES * sizeof *shadows->vertex);
+        shadows->box = malloc((size_t)body->count * sizeof *shadows->box);
+        shadows->shape = malloc((size_t)body->count * sizeof *shadows->shape);
+        if (!shadows->vertex || !shadows->box || !shadows->shape) {
+            shape_shadows_free(shadows);
             return false;
-        shadows->vertex = more;
+        }
         shadows->capacity = body->count;
     }
     Vec3 source = into_body(place, vec3_sub(c_arm_source(c_arm), place->shift)), isocentre = into_body(place, vec3_sub(c_arm->isocentre, place->shift));
@@ -339,6 +343,8 @@ bool shape_shadows_cast(ShapeShadows *shadows, const Anatomy *anatomy, const CAr
                 v.plane[k][j] = (float)vec3_dot(shape->plane[k], ray[j]);
             v.plane[k][3] = is_cut ? (float)(vec3_dot(shape->plane[k], source) - shape->offset[k]) : -1;
         }
+        memcpy(shadows->box[shadows->count / SHADOW_VERTICES], box, sizeof box);
+        shadows->shape[shadows->count / SHADOW_VERTICES] = i;
         static const int corner[SHADOW_VERTICES][2] = {{0, 1}, {2, 1}, {2, 3}, {0, 1}, {2, 3}, {0, 3}};
         for (int k = 0; k < SHADOW_VERTICES; k++) {
             v.place[0] = box[corner[k][0]];
@@ -352,7 +358,24 @@ bool shape_shadows_cast(ShapeShadows *shadows, const Anatomy *anatomy, const CAr
 void shape_shadows_free(ShapeShadows *shadows)
 {
     free(shadows->vertex);
+    free(shadows->box);
+    free(shadows->shape);
     *shadows = (ShapeShadows){0};
+}
+
+double shape_shadows_along(const ShapeShadows *shadows, const Anatomy *anatomy, const CArm *c_arm, double fx, double fy)
+{
+    const Similarity *place = &anatomy->place;
+    const Vec3 source = c_arm_source(c_arm), ray = c_arm_ray(c_arm, fx, fy);
+    const Vec3 o = into_body(place, vec3_sub(source, place->shift)), d = into_body(place, ray);
+    const float x = (float)(fx + 0.5), y = (float)(fy + 0.5);
+    double sum = anatomy->level ? volume_along(anatomy, source, ray) : 0;
+    for (int i = 0; i < shadows->count / SHADOW_VERTICES; i++) {
+        const float *box = shadows->box[i];
+        if (x >= box[0] && x <= box[2] && y >= box[1] && y <= box[3])
+            sum += body_shape_along(&anatomy->body.shape[shadows->shape[i]], o, d);
+    }
+    return fmax(sum, 0);
 }
 
 // --- display ---

@@ -45,8 +45,12 @@ typedef struct ShadowVertex {
 typedef struct ShapeShadows {    // zeroed: empty
     int count, capacity;         // vertices; shapes
     ShadowVertex *vertex;
+    float (*box)[4];             // of each solid that is seen: least x and y, most x and y, 0 to 1
+    int *shape;                  // and which it is of the body
 } ShapeShadows;
 bool shape_shadows_cast(ShapeShadows *shadows, const Anatomy *anatomy, const CArm *c_arm);   // false if out of memory
 void shape_shadows_free(ShapeShadows *shadows);
+// As anatomy_along() for the ray at fx, fy (-0.5 to 0.5) of the picture for which the shadows were cast: only solids whose rectangle contains it are visited.
+double shape_shadows_along(const ShapeShadows *shadows, const Anatomy *anatomy, const CArm *c_arm, double fx, double fy);
 
 #endif

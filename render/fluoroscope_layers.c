@@ -347,12 +347,12 @@ static void bind_layer(const Layer *layer)
     glViewport(0, 0, layer->side, layer->side);
 }
 
-void layer_put(const Layer *layer, const float *value)
+void layer_put(const Layer *layer, int first, int rows, const float *value)
 {
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_2D, layer->texture);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, layer->side, layer->side, GL_RED, GL_FLOAT, value);
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, first, layer->side, rows, GL_RED, GL_FLOAT, value);
 }
 
 void layer_begin(const Layer *layer)

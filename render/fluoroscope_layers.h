@@ -43,7 +43,7 @@ void layers_destroy(LayerPrograms *programs);
 // Recreates the layer if its size differs. Returns false if the driver fails.
 bool layer_fit(Layer *layer, int side, LayerFormat format);
 void layer_destroy(Layer *layer);
-void layer_put(const Layer *layer, const float *value);   // (side, side), rows from the bottom, into a float layer
+void layer_put(const Layer *layer, int first, int rows, const float *value);   // (rows, side) from row `first`, counted from below, into a float layer
 void layer_begin(const Layer *layer);   // binds it, clears it to 0 and sets the viewport
 
 // Draws the attenuation of rows `first` to `first` + `rows` of the layer.

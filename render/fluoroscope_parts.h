@@ -38,6 +38,7 @@ struct Fluoroscope {
     PictureLayers still, turning, *now;   // at full and at half resolution; the one that is shown
     bool on_processor;           // lumen, tools and noise are added by `pixels`, else by shaders; fixed before the first draw
     XrayPixels pixels;
+    float *solids;               // scratch for the attenuation of the anatomy's solids; NULL: none yet
     Ribbon ribbon;
     RibbonPath sheath;           // count 0: none
     Vec3 sheath_node[2];

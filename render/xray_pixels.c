@@ -38,7 +38,7 @@ typedef struct PixelKernels {
 
 #define FORMS(set)                                                                                                                                             \
     {                                                                                                                                                          \
-        split_##set, scale_##set, mix_##set, mix_three_##set, spread_three_##set, spread_##set, spread_twice_##set, darken_##set, tint_##set, shade_##set,      \
+        split_##set, scale_##set, mix_##set, mix_three_##set, spread_three_##set, spread_##set, spread_twice_##set, darken_##set, tint_##set, shade_##set,     \
             grain_##set, grain_tinted_##set                                                                                                                    \
     }
 static const PixelKernels kernels_on[SIMD_COUNT] = SIMD_EACH(FORMS);
@@ -384,7 +384,8 @@ static void show_row(XrayPixels *pixels, const PixelLook *look, int y, int side,
 static bool fit_fields(XrayPixels *pixels, const PixelLook *look)
 {
     const bool is_blurred = (look->has_lumen ? pixels->lumen.side : pixels->roadmap.side) >= pixels->side;   // as opacify of the shaders
-    return (!look->has_lumen || fit_taps(&pixels->lumen, pixels->side, is_blurred)) && (!look->has_roadmap || fit_taps(&pixels->roadmap, pixels->side, is_blurred));
+    return (!look->has_lumen || fit_taps(&pixels->lumen, pixels->side, is_blurred)) &&
+           (!look->has_roadmap || fit_taps(&pixels->roadmap, pixels->side, is_blurred));
 }
 
 static void fill_pixels(uint32_t *out, int count, uint32_t value)
