@@ -9,10 +9,12 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
 #include "tube_scene.h"
 
 static const double IN_CONTACT = 1e-7, FREE = 1e-10, TIME = 500;        // REST_IN_CONTACT, REST_FREE [mm], REST_TIME [ms]
 static const StepCommand none[STEP_TOOLS_MAX];
+static const int first_case = WHOLE_OR_SHORT(0, 1);      // 0: one tool, 1: two tools, which take the same steps and more
 
 // One step, without a solve if the tool is known to be at rest.
 static bool step_or_rest(Stepper *s, const StepCommand *command, unsigned released)
@@ -111,7 +113,7 @@ static size_t state_bytes(const Stepper *s, char *to)
 static void nothing_changes(void **state)
 {
     (void)state;
-    for (int two = 0; two < 2; two++) {
+    for (int two = first_case; two < 2; two++) {
         Rested r = {0};
         rested_make(&r, two);
         Vec3 tip = vec3(0, 0, 0);
@@ -146,7 +148,7 @@ static void nothing_changes(void **state)
 static void as_if_solved(void **state)
 {
     (void)state;
-    for (int two = 0; two < 2; two++) {
+    for (int two = first_case; two < 2; two++) {
         Rested r = {0};
         rested_make(&r, two);
         assert_true(steps_to_rest(r.stepper, 8000) < 8000);
@@ -168,7 +170,7 @@ static void as_if_solved(void **state)
 static void taken_up_again(void **state)
 {
     (void)state;
-    for (int two = 0; two < 2; two++) {
+    for (int two = first_case; two < 2; two++) {
         Rested r[2] = {0};
         int known = 0, solved = 0;
         for (int k = 0; k < 2; k++)
@@ -227,6 +229,7 @@ static void woken_at_once(void **state)
 static void a_slow_push(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     for (double speed = 1e-4; speed > 1e-8; speed *= 1e-3) {
         Bench b;
         bench_in_tube(&b, NULL, 0, 100, 20, 10, 1);
@@ -249,6 +252,7 @@ static void a_slow_push(void **state)
 static void a_slow_relaxation(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     const double length = 100, force = 1;
     for (double constant = 100; constant < 2e3; constant *= 10) {
         Bench b;
@@ -276,6 +280,7 @@ static void a_slow_relaxation(void **state)
 static void a_small_swing(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     const double length = 100;
     for (double sag = 1e-3; sag > 1e-6; sag *= 1e-2) {
         Bench b;
@@ -295,6 +300,7 @@ static void a_small_swing(void **state)
 static void a_slow_load(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     enum { STEPS = 100000 };
     const double length = 20, sag = 0.05 * FREE / TIME * STEPS;
     Bench b;
