@@ -4,6 +4,7 @@
 // A ray along the lumen has no edge: its result is noise, and each such point lowers the inlier rate of the true cylinder. Rays whose steepest fall
 // is below `edge` times the brightness range around the centre are discarded.
 #include "recon/track/cast_rays.h"
+#include "base/base.h"
 #include "recon/volume/bspline.h"
 
 #include <string.h>
@@ -64,59 +65,65 @@ void sphere_directions(int level, Vec3 *out)
 
 // --- rays ---
 
-typedef struct RayProfile {
-    float value[MAX_RAY_SAMPLES];
+enum { RAY_LANES = 8 };      // rays in a bundle, one in each lane
+
+typedef struct Bundle {
+    float value[MAX_RAY_SAMPLES][RAY_LANES];   // lanes without a ray repeat the last one
     int samples;
     double step;             // [mm]
-} RayProfile;
+} Bundle;
 
-static void sample_ray(const Volume *volume, Vec3 voxel, Vec3 direction, const RayOptions *options, RayProfile *ray)
+#define KERNEL_TEXT "recon/track/cast_rays_kernel.inc"
+#include "base/each_simd.inc"
+static void (*const smooth_on[SIMD_COUNT])(float (*)[RAY_LANES], int, int, float (*)[RAY_LANES]) = SIMD_FORMS(smooth);
+static void (*const brightness_on[SIMD_COUNT])(float (*)[RAY_LANES], int, float *, float *) = SIMD_FORMS(brightness);
+static void (*const find_steepest_on[SIMD_COUNT])(float (*)[RAY_LANES], int, int *) = SIMD_FORMS(find_steepest);
+
+static int bundle_size(int count, int first) { return count - first < RAY_LANES ? count - first : RAY_LANES; }
+
+static void sample_bundle(const Volume *volume, Vec3 voxel, const Vec3 *direction, int count, const RayOptions *options, Bundle *rays)
 {
-    ray->samples = options->samples;
-    ray->step = options->length / (options->samples - 1);
-    bspline_sample_line(volume, voxel, vec3_scale(mat3_mul_vec(&volume->to_voxel, direction), ray->step), ray->samples, ray->value);
+    float line[RAY_LANES * MAX_RAY_SAMPLES];
+    const int n = options->samples;
+    rays->samples = n;
+    rays->step = options->length / (n - 1);
+    for (int r = 0; r < RAY_LANES; r++)
+        if (r < count)
+            bspline_sample_line(volume, voxel, vec3_scale(mat3_mul_vec(&volume->to_voxel, direction[r]), rays->step), n, line + r * n);
+        else
+            memcpy(line + r * n, line + (count - 1) * n, (size_t)n * sizeof *line);
+    for (int k = 0; k < n; k++)
+        for (int r = 0; r < RAY_LANES; r++)
+            rays->value[k][r] = line[r * n + k];
 }
 
 // Moving average over an odd number of samples; the ends repeat.
-static void smooth_ray(RayProfile *ray, double width)
+static void smooth_bundle(Bundle *rays, double width)
 {
-    int half = (int)(width / ray->step / 2 + 0.5), n = ray->samples;
+    int half = (int)(width / rays->step / 2 + 0.5), n = rays->samples;
     if (half < 1)
         return;
     if (half > n / 4)
         half = n / 4;
-    float smooth[MAX_RAY_SAMPLES];
-    double sum = 0;
-    for (int i = -half; i <= half; i++)
-        sum += (double)ray->value[i < 0 ? 0 : i];
-    for (int i = 0; i < n; i++) {
-        smooth[i] = (float)(sum / (2 * half + 1));
-        int in = i + half + 1, out = i - half;
-        sum += (double)ray->value[in < n ? in : n - 1] - (double)ray->value[out > 0 ? out : 0];
-    }
-    memcpy(ray->value, smooth, (size_t)n * sizeof *smooth);
+    float raw[MAX_RAY_SAMPLES][RAY_LANES];
+    memcpy(raw, rays->value, (size_t)n * sizeof *raw);
+    smooth_on[simd_level()](raw, n, half, rays->value);
 }
 
-static double fall(const RayProfile *ray, int i) { return (double)ray->value[i + 1] - (double)ray->value[i - 1]; }
+static double fall(const Bundle *rays, int r, int i) { return (double)rays->value[i + 1][r] - (double)rays->value[i - 1][r]; }
 
-// The steepest place among samples [first, last], refined; *slope is its (negative) gradient per mm.
-static double steepest(const RayProfile *ray, int first, int last, double *slope)
+// The place of ray r's steepest fall at sample `best`, refined; *slope is its (negative) gradient per mm.
+static double refine(const Bundle *rays, int r, int best, double *slope)
 {
-    double shift = 0, b = fall(ray, first);
-    int best = first;
-    for (int i = first + 1; i <= last; i++) {
-        double f = fall(ray, i);
-        best = f < b ? i : best;
-        b = f < b ? f : b;
-    }
-    if (best > 1 && best < ray->samples - 2) {
-        double a = fall(ray, best - 1), c = fall(ray, best + 1), bend = a - 2 * b + c;
+    double shift = 0, b = fall(rays, r, best);
+    if (best > 1 && best < rays->samples - 2) {
+        double a = fall(rays, r, best - 1), c = fall(rays, r, best + 1), bend = a - 2 * b + c;
         if (bend > 0)
             shift = 0.5 * (a - c) / bend;
         shift = fmax(-0.5, fmin(0.5, shift));
     }
-    *slope = b / (2 * ray->step);
-    return (best + shift) * ray->step;
+    *slope = b / (2 * rays->step);
+    return (best + shift) * rays->step;
 }
 
 int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, Vec3 *point)
@@ -124,16 +131,16 @@ int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int coun
     double distance[MAX_DIRECTIONS], slope[MAX_DIRECTIONS];
     float least = INFINITY, most = -INFINITY;
     Vec3 voxel = volume_voxel_of(volume, center);
-    RayProfile ray;
-    for (int i = 0; i < count; i++) {
-        sample_ray(volume, voxel, direction[i], options, &ray);
-        // brightness range: the lumen is bright in the first third of the rays, the background is the darkest of all
-        for (int k = 0; k < ray.samples; k++)
-            least = ray.value[k] < least ? ray.value[k] : least;
-        for (int k = 0; k <= ray.samples / 3; k++)
-            most = ray.value[k] > most ? ray.value[k] : most;
-        smooth_ray(&ray, options->smoothing);
-        distance[i] = steepest(&ray, 1, ray.samples - 2, &slope[i]);
+    Bundle rays;
+    const SimdLevel level = simd_level();
+    for (int first = 0; first < count; first += RAY_LANES) {
+        int used = bundle_size(count, first), best[RAY_LANES];
+        sample_bundle(volume, voxel, direction + first, used, options, &rays);
+        brightness_on[level](rays.value, rays.samples, &least, &most);
+        smooth_bundle(&rays, options->smoothing);
+        find_steepest_on[level](rays.value, rays.samples, best);
+        for (int r = 0; r < used; r++)
+            distance[first + r] = refine(&rays, r, best[r], &slope[first + r]);
     }
     double needed = options->edge * ((double)most - (double)least) / volume_voxel_size(volume);
     int found = 0;
@@ -143,19 +150,32 @@ int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int coun
     return found;
 }
 
+// Distance of the steepest fall within a voxel of where ray r falls below `level`; 0 if it does not.
+static double edge_at_level(const Bundle *rays, int r, double level, double voxel_size)
+{
+    const int window = (int)(voxel_size / rays->step + 0.5);
+    int crossing = 1;
+    double slope;
+    while (crossing < rays->samples && (double)rays->value[crossing][r] >= level)
+        crossing++;
+    if (crossing + 1 >= rays->samples)
+        return 0;
+    int best = crossing - window < 1 ? 1 : crossing - window, last = crossing + window > rays->samples - 2 ? rays->samples - 2 : crossing + window;
+    for (int i = best + 1; i <= last; i++)
+        best = fall(rays, r, i) < fall(rays, r, best) ? i : best;
+    return refine(rays, r, best, &slope);
+}
+
 void cast_rays_level_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double level, double *distance)
 {
     Vec3 voxel = volume_voxel_of(volume, center);
-    double slope;
-    RayProfile ray;
-    for (int i = 0; i < count; i++) {
-        sample_ray(volume, voxel, direction[i], options, &ray);
-        smooth_ray(&ray, options->smoothing);
-        int window = (int)(volume_voxel_size(volume) / ray.step + 0.5), crossing = 1;
-        while (crossing < ray.samples && (double)ray.value[crossing] >= level)
-            crossing++;
-        int first = crossing - window, last = crossing + window;
-        distance[i] = crossing + 1 >= ray.samples ? 0 : steepest(&ray, first < 1 ? 1 : first, last > ray.samples - 2 ? ray.samples - 2 : last, &slope);
+    Bundle rays;
+    for (int first = 0; first < count; first += RAY_LANES) {
+        int used = bundle_size(count, first);
+        sample_bundle(volume, voxel, direction + first, used, options, &rays);
+        smooth_bundle(&rays, options->smoothing);
+        for (int r = 0; r < used; r++)
+            distance[first + r] = edge_at_level(&rays, r, level, volume_voxel_size(volume));
     }
 }
 

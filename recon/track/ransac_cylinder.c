@@ -25,36 +25,56 @@ Random random_from_seed(uint64_t seed, uint64_t stream)
 // --- circles ---
 
 // Trials are drawn and computed in batches; surplus draws of the last batch are discarded.
-enum { BATCH = 16 };
+enum { BATCH = 16, COUNTED_TOGETHER = 8 };
 typedef struct Circles {
     double u0[BATCH], v0[BATCH], ax[BATCH], ay[BATCH], bx[BATCH], by[BATCH];   // first point, and the two others relative to it
-    double cu[BATCH], cv[BATCH], r2[BATCH];
+    double cu[BATCH], cv[BATCH], r[BATCH];
     int fits[BATCH];         // trials whose points are not collinear and whose circle is roughly within the limits
 } Circles;
 
+// Points of a least-squares fit, a block at a time, and the sums of its normal equations.
+enum { FIT_BLOCK = 64 };
+typedef struct Residuals {
+    double x[FIT_BLOCK], y[FIT_BLOCK], z[FIT_BLOCK];   // relative to the cylinder's centre
+    double j[4][FIT_BLOCK], e[FIT_BLOCK], rho[FIT_BLOCK];
+} Residuals;
+typedef double Four __attribute__((vector_size(32)));
+typedef struct Normal {      // for the unknowns 0 … 3: a[n][m], b[m]; for the last: a[4][m], a44, b4
+    Four a[5], b;
+    double a44, b4;
+} Normal;
+
+#define KERNEL_TEXT "recon/track/ransac_kernel.inc"
+#include "base/each_simd.inc"
+static void (*const draw_points_on[SIMD_COUNT])(uint64_t, int, int *) = SIMD_FORMS(draw_points);
+static int (*const count_ring_on[SIMD_COUNT])(const float *, const float *, int, float, float, float, float) = SIMD_FORMS(count_ring);
+static void (*const circles_of_three_on[SIMD_COUNT])(Circles *, double, double, double) = SIMD_FORMS(circles_of_three);
+
+static void (*const residuals_on[SIMD_COUNT])(Residuals *, int, Vec3, double) = SIMD_FORMS(residuals);
+static void (*const derivatives_on[SIMD_COUNT])(Residuals *, int, Vec3, Vec3, Vec3, double) = SIMD_FORMS(derivatives);
+static void (*const add_normal_on[SIMD_COUNT])(const Residuals *, int, double, Normal *) = SIMD_FORMS(add_normal);
+
 // Each trial consumes three random numbers, whatever its result.
-static void draw_triples(Circles *c, const float *u, const float *v, int count, Random *random)
+static void draw_triples(Circles *c, const double *u, const double *v, int count, Random random, SimdLevel level)
 {
+    int index[3 * BATCH];
+    draw_points_on[level](random.state, count, index);
     for (int k = 0; k < BATCH; k++) {
-        int i = random_index(random, count), j = random_index(random, count), l = random_index(random, count);
-        c->u0[k] = (double)u[i];
-        c->v0[k] = (double)v[i];
-        c->ax[k] = (double)u[j] - (double)u[i];
-        c->ay[k] = (double)v[j] - (double)v[i];
-        c->bx[k] = (double)u[l] - (double)u[i];
-        c->by[k] = (double)v[l] - (double)v[i];
+        int i = index[3 * k], j = index[3 * k + 1], l = index[3 * k + 2];
+        c->u0[k] = u[i];
+        c->v0[k] = v[i];
+        c->ax[k] = u[j] - u[i];
+        c->ay[k] = v[j] - v[i];
+        c->bx[k] = u[l] - u[i];
+        c->by[k] = v[l] - v[i];
         c->fits[k] = (i != j) & (i != l) & (j != l);
     }
 }
 
-#define KERNEL_TEXT "recon/track/ransac_kernel.inc"
-#include "base/each_simd.inc"
-static int (*const count_ring_on[SIMD_COUNT])(const float *, const float *, int, float, float, float, float) = SIMD_FORMS(count_ring);
-static void (*const circles_of_three_on[SIMD_COUNT])(Circles *, double, double, double) = SIMD_FORMS(circles_of_three);
-
 double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const RansacOptions *options, Random *random, Cylinder *out)
 {
-    float u[MAX_RANSAC_POINTS], v[MAX_RANSAC_POINTS];
+    float u[MAX_RANSAC_POINTS + COUNTED_TOGETHER], v[MAX_RANSAC_POINTS + COUNTED_TOGETHER];
+    double wide_u[MAX_RANSAC_POINTS], wide_v[MAX_RANSAC_POINTS];   // the same numbers
     Vec3 e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
     if (count < 3 || count > MAX_RANSAC_POINTS)
         return 0;
@@ -62,15 +82,19 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
         Vec3 q = vec3_sub(point[i], origin);
         u[i] = (float)vec3_dot(q, e1);
         v[i] = (float)vec3_dot(q, e2);
+        wide_u[i] = (double)u[i];
+        wide_v[i] = (double)v[i];
     }
+    int padded = count;
+    for (; padded % COUNTED_TOGETHER; padded++)
+        u[padded] = v[padded] = INFINITY;   // lies on no circle
     int best = 0, trial = 0;
     const double rounding = 1e-9;   // tolerance; the exact test follows
     double least2 = options->radius_min * options->radius_min * (1 - rounding), most2 = options->radius_max * options->radius_max * (1 + rounding);
     const SimdLevel level = simd_level();
     for (bool more = true; more;) {
         Circles c;
-        Random drawn = *random;
-        draw_triples(&c, u, v, count, &drawn);
+        draw_triples(&c, wide_u, wide_v, count, *random, level);
         circles_of_three_on[level](&c, least2, most2, options->offset_max * options->offset_max);
         int k = 0;
         for (; k < BATCH; k++, trial++) {
@@ -79,11 +103,11 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
                 break;
             if (!c.fits[k])
                 continue;
-            double r = sqrt(c.r2[k]);
+            double r = c.r[k];
             if (!(r >= options->radius_min && r <= options->radius_max))
                 continue;
             double low = fmax(r - options->threshold, 0), high = r + options->threshold;
-            int inside = count_ring_on[level](u, v, count, (float)c.cu[k], (float)c.cv[k], (float)(low * low), (float)(high * high));
+            int inside = count_ring_on[level](u, v, padded, (float)c.cu[k], (float)c.cv[k], (float)(low * low), (float)(high * high));
             if (inside > best) {
                 best = inside;
                 *out = (Cylinder){vec3_add_scaled(vec3_add_scaled(origin, c.cu[k], e1), c.cv[k], e2), r, axis, 0};
@@ -111,14 +135,51 @@ int cylinder_inliers(const Cylinder *c, const Vec3 *point, int count, double thr
     return found;
 }
 
+// Fills in the positions of listed points from number `first` on. Returns how many.
+static int take_block(Residuals *p, Vec3 center, const Vec3 *point, const int *inlier, int count, int first)
+{
+    int used = count - first < FIT_BLOCK ? count - first : FIT_BLOCK;
+    for (int i = 0; i < used; i++) {
+        Vec3 q = vec3_sub(point[inlier[first + i]], center);
+        p->x[i] = q.x;
+        p->y[i] = q.y;
+        p->z[i] = q.z;
+    }
+    return used;
+}
+
 static double sum_of_squares(const Cylinder *c, const Vec3 *point, const int *inlier, int count)
 {
     double sum = 0;
-    for (int i = 0; i < count; i++) {
-        double e = axis_distance(vec3_sub(point[inlier[i]], c->center), c->axis) - c->radius;
-        sum += e * e;
+    Residuals p;
+    for (int first = 0; first < count; first += FIT_BLOCK) {
+        int used = take_block(&p, c->center, point, inlier, count, first);
+        residuals_on[simd_level()](&p, used, c->axis, c->radius);
+        for (int i = 0; i < used; i++)
+            sum += p.e[i] * p.e[i];
     }
     return sum;
+}
+
+// Normal equations of the step from cylinder c; only the lower half of `a` is filled in.
+static void normal_equations(const Cylinder *c, Vec3 e1, Vec3 e2, const Vec3 *point, const int *inlier, int count, double a[5][5], double b[5])
+{
+    const SimdLevel level = simd_level();
+    Normal n = {0};
+    Residuals p;
+    for (int first = 0; first < count; first += FIT_BLOCK) {
+        int used = take_block(&p, c->center, point, inlier, count, first);
+        derivatives_on[level](&p, used, c->axis, e1, e2, c->radius);
+        add_normal_on[level](&p, used, c->radius, &n);
+    }
+    for (int m = 0; m < 4; m++) {
+        for (int k = 0; k <= m; k++)
+            a[m][k] = n.a[k][m];
+        a[4][m] = n.a[4][m];
+        b[m] = n.b[m];
+    }
+    a[4][4] = n.a44;
+    b[4] = n.b4;
 }
 
 // x = (a, b, p, t, dr), all in units of the first radius
@@ -161,21 +222,8 @@ static Cylinder refine_gauss_newton(const Cylinder *start, const Vec3 *point, co
     double least = sum_of_squares(&best, point, inlier, count), damping = 1e-3;
     for (int iteration = 0; iteration < 20 && damping < 1e6; iteration++) {
         Vec3 e1 = vec3_normal_to(best.axis), e2 = vec3_cross(best.axis, e1);
-        double a[5][5] = {{0}}, b[5] = {0}, r = best.radius;
-        for (int i = 0; i < count; i++) {
-            Vec3 q = vec3_sub(point[inlier[i]], best.center);
-            double along = vec3_dot(q, best.axis), n1 = vec3_dot(q, e1), n2 = vec3_dot(q, e2), rho = sqrt(n1 * n1 + n2 * n2);
-            if (rho < 1e-9 * r)
-                continue;
-            n1 /= rho;
-            n2 /= rho;
-            double j[5] = {-n1 * r, -n2 * r, -along * n1, -along * n2, -r}, e = rho - r;
-            for (int m = 0; m < 5; m++) {
-                b[m] -= j[m] * e;
-                for (int n = 0; n <= m; n++)
-                    a[m][n] += j[m] * j[n];
-            }
-        }
+        double a[5][5] = {{0}}, b[5], r = best.radius;
+        normal_equations(&best, e1, e2, point, inlier, count, a, b);
         for (int m = 0; m < 5; m++)
             a[m][m] += damping * a[m][m] + 1e-12 * r * r * count;
         if (!solve5(a, b))

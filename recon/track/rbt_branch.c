@@ -20,6 +20,7 @@
 #include <string.h>
 
 const char rbt_enters_forbidden[] = "enters a forbidden region";
+static const char no_cylinder[] = "no cylinder fits the points";
 enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000, SHOWN_EACH = 4 };
 
 // --- estimation, section 3.1 ---
@@ -98,19 +99,46 @@ static double median_along(Tracker *t, const Cylinder *c, int inliers)
     return inliers % 2 ? t->along[inliers / 2] : 0.5 * (t->along[inliers / 2 - 1] + t->along[inliers / 2]);
 }
 
-// The complete estimation step. Returns false if no cylinder is valid (t->why gives the reason); otherwise t->estimate holds the node.
-bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
+static RayOptions rays_of(const Tracker *t, double radius)
 {
     const RbtParameters *p = t->parameters;
-    RayOptions rays = {p->ray_length * predicted->radius, (int)p->n_p, p->ray_smoothing_voxels * t->voxel, p->ray_edge};
-    double threshold = fmax(relative_threshold * predicted->radius, p->r_t_voxels * t->voxel);
-    int least = t->ray_count / 8;   // fewer edges than this cannot be a tube
+    return (RayOptions){p->ray_length * radius, (int)p->n_p, p->ray_smoothing_voxels * t->voxel, p->ray_edge};
+}
+
+// Finds the wall points around a prediction, or keeps those of the last call if they are the same. Returns their number.
+static int find_candidates(Tracker *t, const Cylinder *predicted)
+{
+    RayOptions rays = rays_of(t, predicted->radius);
+    const Vec3 x = predicted->center, last = t->cast.center;
+    bool is_same = t->cast.volume == t->volume && memcmp(&x, &last, sizeof x) == 0 && memcmp(&rays.length, &t->cast.length, sizeof rays.length) == 0;
+    if (!is_same) {
+        t->cast.volume = t->volume;
+        t->cast.center = x;
+        t->cast.length = rays.length;
+        t->cast.count = cast_rays(t->volume, x, t->ray, t->ray_count, &rays, t->candidate);
+    }
+    return t->cast.count;
+}
+
+static double threshold_of(const Tracker *t, const Cylinder *predicted, double relative_threshold)
+{
+    return fmax(relative_threshold * predicted->radius, t->parameters->r_t_voxels * t->voxel);
+}
+
+static int fewest_points(const Tracker *t) { return t->ray_count / 8; }   // fewer edges than this cannot be a tube
+
+// Fits a cylinder to the wall points around a prediction. Returns false if none is valid (t->why gives the reason); otherwise t->estimate holds its centre,
+// axis, radius and contrast.
+static bool fit_cylinder(Tracker *t, const Cylinder *predicted, double relative_threshold)
+{
+    const RbtParameters *p = t->parameters;
+    double threshold = threshold_of(t, predicted, relative_threshold);
     Cylinder c;
-    int n = cast_rays(t->volume, predicted->center, t->ray, t->ray_count, &rays, t->candidate);
+    int n = find_candidates(t, predicted);
     t->why = "too few rays reach a wall";
-    if (n < least)
+    if (n < fewest_points(t))
         return false;
-    t->why = "no cylinder fits the points";
+    t->why = no_cylinder;
     if (search_axes(t, predicted, n, threshold, &c) <= 0)
         return false;
     if (vec3_dot(c.axis, predicted->axis) < 0)
@@ -124,31 +152,47 @@ bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_thr
             return false;
         inliers = cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
     }
-    if (inliers < least)
+    if (inliers < fewest_points(t))
         return false;
     c.center = vec3_add_scaled(c.center, median_along(t, &c, inliers), c.axis);
-    // new candidates from the new centre give the node's points and height
-    rays.length = p->ray_length * c.radius;
-    n = cast_rays(t->volume, c.center, t->ray, t->ray_count, &rays, t->candidate);
-    inliers = n < least ? 0 : cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
+    t->estimate.node = (TrackNode){.cylinder = c, .contrast = contrast_of(t, &c), .kind = NODE_VESSEL, .parent = -1};
+    return true;
+}
+
+// Casts rays from the centre of the fitted cylinder, which give the node's points and height. Returns false if too few of them agree with it.
+static bool measure_node(Tracker *t, const Cylinder *predicted, double relative_threshold)
+{
+    const RbtParameters *p = t->parameters;
+    Cylinder *c = &t->estimate.node.cylinder;
+    Vec3 *point = t->estimate.point;
+    RayOptions rays = rays_of(t, c->radius);
+    int n = cast_rays(t->volume, c->center, t->ray, t->ray_count, &rays, point), least = fewest_points(t);
+    int inliers = n < least ? 0 : cylinder_inliers(c, point, n, threshold_of(t, predicted, relative_threshold), t->inlier);
     double rate = n > 0 ? (double)inliers / n : 0;
+    t->why = no_cylinder;
     if (inliers < least || rate <= p->relaxed * p->p_inl)
         return false;
     for (int i = 0; i < inliers; i++)
-        t->along[i] = fabs(vec3_dot(vec3_sub(t->candidate[t->inlier[i]], c.center), c.axis));
+        t->along[i] = fabs(vec3_dot(vec3_sub(point[t->inlier[i]], c->center), c->axis));
     sort_doubles(t->along, (size_t)inliers);
     int inside = (int)ceil(p->height_share * inliers);
-    c.height = 2 * t->along[inside > 0 ? inside - 1 : 0];
-    t->estimate.node = (TrackNode){.cylinder = c, .inlier_rate = rate, .contrast = contrast_of(t, &c), .kind = NODE_VESSEL, .parent = -1};
+    c->height = 2 * t->along[inside > 0 ? inside - 1 : 0];
     int kept = 0;
     for (int i = 0; i < inliers; i++) {
-        Vec3 x = t->candidate[t->inlier[i]];
-        if (2 * fabs(vec3_dot(vec3_sub(x, c.center), c.axis)) <= c.height)
-            t->estimate.point[kept++] = x;
+        Vec3 x = point[t->inlier[i]];
+        if (2 * fabs(vec3_dot(vec3_sub(x, c->center), c->axis)) <= c->height)
+            point[kept++] = x;
     }
+    t->estimate.node.inlier_rate = rate;
     t->estimate.node.point_count = kept;
     t->why = NULL;
-    return c.height > 0 && vec3_is_finite(c.center);
+    return c->height > 0 && vec3_is_finite(c->center);
+}
+
+// The complete estimation step. Returns false if no cylinder is valid (t->why gives the reason); otherwise t->estimate holds the node.
+bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
+{
+    return fit_cylinder(t, predicted, relative_threshold) && measure_node(t, predicted, relative_threshold);
 }
 
 // --- one branch ---
@@ -162,7 +206,7 @@ static double recent_contrast(const Track *track)
     return sum / (track->count - first);
 }
 
-// Returns true if the estimate is acceptable as the next node of the branch.
+// Returns true if the fitted cylinder is acceptable as the next node of the branch.
 static bool is_progress(Tracker *t, const Track *branch, double step, bool is_retry, bool may_overlap)
 {
     const RbtParameters *p = t->parameters;
@@ -221,6 +265,21 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     return may_overlap || tracker_node_around(t, next->cylinder.center, p->overlap) < 0;
 }
 
+// One attempt to find the next node. The node is measured last, because that takes as many rays as the fit; an unacceptable cylinder is only measured if
+// the reason is wanted.
+static bool try_node(Tracker *t, const Track *branch, const Cylinder *predicted, double relative_threshold, double step, bool is_retry, bool may_overlap,
+                     bool is_reason_wanted)
+{
+    if (!fit_cylinder(t, predicted, relative_threshold))
+        return false;
+    bool is_good = is_progress(t, branch, step, is_retry, may_overlap);
+    const char *why = t->why;
+    if ((!is_good && !is_reason_wanted) || !measure_node(t, predicted, relative_threshold))
+        return false;
+    t->why = why;
+    return is_good;
+}
+
 // Finds the next node of a branch: the step of eq. (1), then the longer ones, each with both thresholds. Returns false at the end of the vessel.
 static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
 {
@@ -233,8 +292,7 @@ static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
         double length = k ? p->retry_steps[k - 1] * step : step;
         predicted.center = vec3_add_scaled(predicted.center, length, predicted.axis);
         for (int second = 0; second <= (p->r_t_second > 0); second++) {
-            bool found = tracker_estimate(t, &predicted, second ? p->r_t_second : p->r_t) && is_progress(t, branch, length, k > 0, may_overlap);
-            if (found) {
+            if (try_node(t, branch, &predicted, second ? p->r_t_second : p->r_t, length, k > 0, may_overlap, !first_reason)) {
                 t->estimate.node.retried = k > 0;
                 return true;
             }

@@ -49,7 +49,13 @@ typedef struct Tracker {
     Vec3 ray[MAX_RAYS];
     Vec3 axis[MAX_AXES];     // unit vectors of half a sphere around +z, by increasing angle with it
     Random random;
-    Vec3 candidate[MAX_RAYS];
+    Vec3 candidate[MAX_RAYS]; // wall points around the last prediction …
+    struct {
+        const Volume *volume;
+        Vec3 center;
+        double length;       // [mm] of the rays
+        int count;
+    } cast;                  // … which is tried with a second threshold; volume: NULL before the first
     int inlier[MAX_RAYS];
     double along[MAX_RAYS];
     Estimate estimate;

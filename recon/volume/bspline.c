@@ -3,8 +3,9 @@
 // Floats suffice: 64 products of values known to a few digits. A row's four taps are four lanes, joined at the end: rows are added along y, then slices
 // along z, then lanes, always in this order, so that a sample has the same bits on every instruction set, alone or in a line.
 //
-// Lines are sampled in blocks: positions and cells of a block at once, then sample by sample with the cell's taps in registers, which the next sample
-// mostly shares (a ray takes ten samples per voxel). Lanes of different samples would have to gather each of their 64 taps.
+// Lines are sampled in blocks: positions, weights and cells of a block at once, then the sums along y sample by sample, with the cell's taps in registers,
+// which the next sample mostly shares (a ray takes ten samples per voxel), and then the sums along z and x in lanes of samples. Lanes of samples from the
+// beginning would have to gather each of their 64 taps.
 #include "recon/volume/bspline.h"
 #include "base/base.h"
 
@@ -28,16 +29,6 @@ INLINE Row load_row(const float *from)
     Row row;
     memcpy(&row, from, sizeof row);
     return row;
-}
-
-// Four samples at once: the lanes of each sample times its weights (one array of samples for each lane), added as (0 + 1) + (2 + 3).
-INLINE Row join_lanes(const Row *r, const float *w, size_t stride)
-{
-    Row a = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5), b = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5);
-    Row c = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7), d = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
-    Row l0 = __builtin_shufflevector(a, b, 0, 1, 4, 5), l1 = __builtin_shufflevector(a, b, 2, 3, 6, 7);
-    Row l2 = __builtin_shufflevector(c, d, 0, 1, 4, 5), l3 = __builtin_shufflevector(c, d, 2, 3, 6, 7);
-    return (l0 * load_row(w) + l1 * load_row(w + stride)) + (l2 * load_row(w + 2 * stride) + l3 * load_row(w + 3 * stride));
 }
 
 // Samples near the border, where some taps lie outside the grid; those taps count as the volume's minimum.
@@ -83,39 +74,69 @@ float bspline_sample(const Volume *volume, Vec3 voxel) { return sample(volume, v
 
 // --- lines ---
 
-enum { LINE_BLOCK = 16 };
+enum { LINE_BLOCK = 64, LINE_LANES = 8 };
 
 typedef struct LineBlock {
-    double place[3][LINE_BLOCK];     // voxel coordinates
     float weight[3][4][LINE_BLOCK];
-    int cell[LINE_BLOCK];            // index of the first of its 64 taps; -1: some tap is outside the grid
+    int cell[LINE_BLOCK + 1];        // index of the first of a sample's 64 taps; -1: some tap is outside the grid. -2 after the last sample
 } LineBlock;
 
-// Fills in the block for the samples from number `first` on.
-INLINE void line_block_place(LineBlock *block, const Volume *volume, Vec3 start, Vec3 step, int first)
+// Returns true if all taps of samples first … last are in the grid. Coordinates along a line are monotonic, rounded ones too.
+INLINE bool line_is_inside(const Volume *volume, Vec3 start, Vec3 step, int first, int last)
 {
     const double begin[3] = {start.x, start.y, start.z}, along[3] = {step.x, step.y, step.z};
-    int base[3][LINE_BLOCK];
-    float part[LINE_BLOCK];
+    bool is_inside = true;
     for (int a = 0; a < 3; a++) {
-        double most = volume->size[a];
-        for (int s = 0; s < LINE_BLOCK; s++) {
-            double x = begin[a] + (first + s) * along[a], held = x > 0 ? x : 0;   // clamped to where a cast to int is defined; no cell lies outside
-            held = held < most ? held : most;
-            base[a][s] = (int)(held + 4) - 5;
-            block->place[a][s] = x;
-            part[s] = (float)(held - (base[a][s] + 1));
+        double x = begin[a] + first * along[a] + 4, y = begin[a] + last * along[a] + 4, most = volume->size[a] + 2;
+        is_inside = is_inside && x >= 5 && x < most && y >= 5 && y < most;
+    }
+    return is_inside;
+}
+
+// Weights and cells of samples whose taps are all in the grid. `count`: a multiple of LINE_LANES. Short loops: a processor overlaps their chains of
+// operations, but not those of one long loop.
+INLINE void line_place_inside(LineBlock *block, const Volume *volume, Vec3 start, Vec3 step, int first, int count)
+{
+    const double begin[3] = {start.x, start.y, start.z}, along[3] = {step.x, step.y, step.z};
+    const double row = volume->size[0], slice = row * volume->size[1], stride[3] = {1, row, slice}, origin = 5 * (1 + row + slice);
+    float part[3][LINE_BLOCK];
+    for (int l = 0; l < count; l += LINE_LANES) {
+        double cell[LINE_LANES];
+        for (int s = 0; s < LINE_LANES; s++)
+            cell[s] = -origin;
+        for (int a = 0; a < 3; a++)
+            for (int s = 0; s < LINE_LANES; s++) {
+                double x = begin[a] + (first + l + s) * along[a], whole = (double)(int)(x + 4);
+                part[a][l + s] = (float)(x - (whole - 4));
+                cell[s] += stride[a] * whole;
+            }
+        for (int s = 0; s < LINE_LANES; s++)
+            block->cell[l + s] = (int)cell[s];
+    }
+    for (int a = 0; a < 3; a++)
+        for (int l = 0; l < count; l += LINE_LANES)
+            for (int s = l; s < l + LINE_LANES; s++)
+                weights(part[a][s], &block->weight[a][0][s], &block->weight[a][1][s], &block->weight[a][2][s], &block->weight[a][3][s]);
+    block->cell[count] = -2;
+}
+
+// The same for samples anywhere.
+INLINE void line_place(LineBlock *block, const Volume *volume, Vec3 start, Vec3 step, int first, int count)
+{
+    const double begin[3] = {start.x, start.y, start.z}, along[3] = {step.x, step.y, step.z};
+    for (int s = 0; s < count; s++) {
+        int base[3];
+        bool is_inside = true;
+        for (int a = 0; a < 3; a++) {
+            double x = begin[a] + (first + s) * along[a];
+            is_inside = is_inside && x + 4 >= 5 && x + 4 < volume->size[a] + 2;
+            base[a] = is_inside ? (int)(x + 4) - 5 : 0;
+            weights(is_inside ? (float)(x - (base[a] + 1)) : 0, &block->weight[a][0][s], &block->weight[a][1][s], &block->weight[a][2][s],
+                    &block->weight[a][3][s]);
         }
-        for (int s = 0; s < LINE_BLOCK; s++)
-            weights(part[s], &block->weight[a][0][s], &block->weight[a][1][s], &block->weight[a][2][s], &block->weight[a][3][s]);
+        block->cell[s] = is_inside ? (base[2] * volume->size[1] + base[1]) * volume->size[0] + base[0] : -1;
     }
-    const int nx = volume->size[0], ny = volume->size[1], nz = volume->size[2];
-    for (int s = 0; s < LINE_BLOCK; s++) {
-        int x = base[0][s], y = base[1][s], z = base[2][s];
-        bool inside = (x >= 0) & (y >= 0) & (z >= 0) & (x + 3 < nx) & (y + 3 < ny) & (z + 3 < nz);
-        unsigned cell = ((unsigned)z * (unsigned)ny + (unsigned)y) * (unsigned)nx + (unsigned)x;   // may wrap around for samples that do not use it
-        block->cell[s] = inside ? (int)cell : -1;
-    }
+    block->cell[count] = -2;
 }
 
 #define KERNEL_TEXT "recon/volume/bspline_kernel.inc"
