@@ -23,10 +23,10 @@ int sphere_level_of(int count)
 
 enum { MAX_DIRECTIONS = 2562 };
 
-// Each midpoint once: an edge belongs to two faces.
+// Each midpoint once: an edge belongs to two faces, and the other one was mostly added shortly before.
 static int add_direction(Vec3 *out, int *count, Vec3 v)
 {
-    for (int i = 0; i < *count; i++)
+    for (int i = *count - 1; i >= 0; i--)
         if (vec3_norm2(vec3_sub(out[i], v)) < 1e-12)
             return i;
     out[*count] = v;

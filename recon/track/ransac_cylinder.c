@@ -32,10 +32,13 @@ typedef struct Circles {
     int fits[BATCH];         // trials whose points are not collinear and whose circle is roughly within the limits
 } Circles;
 
-// Points of a least-squares fit, a block at a time, and the sums of its normal equations.
+// Points of a least-squares fit; residuals and derivatives of a block of them; the sums of the normal equations.
 enum { FIT_BLOCK = 64 };
+typedef struct FitPoints {
+    double x[MAX_RANSAC_POINTS], y[MAX_RANSAC_POINTS], z[MAX_RANSAC_POINTS];
+    int count;
+} FitPoints;
 typedef struct Residuals {
-    double x[FIT_BLOCK], y[FIT_BLOCK], z[FIT_BLOCK];   // relative to the cylinder's centre
     double j[4][FIT_BLOCK], e[FIT_BLOCK], rho[FIT_BLOCK];
 } Residuals;
 typedef double Four __attribute__((vector_size(32)));
@@ -50,8 +53,8 @@ static void (*const draw_points_on[SIMD_COUNT])(uint64_t, int, int *) = SIMD_FOR
 static int (*const count_ring_on[SIMD_COUNT])(const float *, const float *, int, float, float, float, float) = SIMD_FORMS(count_ring);
 static void (*const circles_of_three_on[SIMD_COUNT])(Circles *, double, double, double) = SIMD_FORMS(circles_of_three);
 
-static void (*const residuals_on[SIMD_COUNT])(Residuals *, int, Vec3, double) = SIMD_FORMS(residuals);
-static void (*const derivatives_on[SIMD_COUNT])(Residuals *, int, Vec3, Vec3, Vec3, double) = SIMD_FORMS(derivatives);
+static void (*const residuals_on[SIMD_COUNT])(const FitPoints *, int, int, const Cylinder *, double *) = SIMD_FORMS(residuals);
+static void (*const derivatives_on[SIMD_COUNT])(const FitPoints *, int, int, const Cylinder *, Vec3, Vec3, Residuals *) = SIMD_FORMS(derivatives);
 static void (*const add_normal_on[SIMD_COUNT])(const Residuals *, int, double, Normal *) = SIMD_FORMS(add_normal);
 
 // Each trial consumes three random numbers, whatever its result.
@@ -135,42 +138,41 @@ int cylinder_inliers(const Cylinder *c, const Vec3 *point, int count, double thr
     return found;
 }
 
-// Fills in the positions of listed points from number `first` on. Returns how many.
-static int take_block(Residuals *p, Vec3 center, const Vec3 *point, const int *inlier, int count, int first)
+static void take_points(const Vec3 *point, const int *inlier, int count, FitPoints *out)
 {
-    int used = count - first < FIT_BLOCK ? count - first : FIT_BLOCK;
-    for (int i = 0; i < used; i++) {
-        Vec3 q = vec3_sub(point[inlier[first + i]], center);
-        p->x[i] = q.x;
-        p->y[i] = q.y;
-        p->z[i] = q.z;
+    SEL_REQUIRE(count <= MAX_RANSAC_POINTS, "a cylinder is fitted to at most MAX_RANSAC_POINTS points");
+    out->count = count;
+    for (int i = 0; i < count; i++) {
+        out->x[i] = point[inlier[i]].x;
+        out->y[i] = point[inlier[i]].y;
+        out->z[i] = point[inlier[i]].z;
     }
-    return used;
 }
 
-static double sum_of_squares(const Cylinder *c, const Vec3 *point, const int *inlier, int count)
+static int block_size(const FitPoints *points, int first) { return points->count - first < FIT_BLOCK ? points->count - first : FIT_BLOCK; }
+
+static double sum_of_squares(const Cylinder *c, const FitPoints *points)
 {
-    double sum = 0;
-    Residuals p;
-    for (int first = 0; first < count; first += FIT_BLOCK) {
-        int used = take_block(&p, c->center, point, inlier, count, first);
-        residuals_on[simd_level()](&p, used, c->axis, c->radius);
+    double sum = 0, e[FIT_BLOCK];
+    for (int first = 0; first < points->count; first += FIT_BLOCK) {
+        int used = block_size(points, first);
+        residuals_on[simd_level()](points, first, used, c, e);
         for (int i = 0; i < used; i++)
-            sum += p.e[i] * p.e[i];
+            sum += e[i] * e[i];
     }
     return sum;
 }
 
 // Normal equations of the step from cylinder c; only the lower half of `a` is filled in.
-static void normal_equations(const Cylinder *c, Vec3 e1, Vec3 e2, const Vec3 *point, const int *inlier, int count, double a[5][5], double b[5])
+static void normal_equations(const Cylinder *c, Vec3 e1, Vec3 e2, const FitPoints *points, double a[5][5], double b[5])
 {
     const SimdLevel level = simd_level();
     Normal n = {0};
-    Residuals p;
-    for (int first = 0; first < count; first += FIT_BLOCK) {
-        int used = take_block(&p, c->center, point, inlier, count, first);
-        derivatives_on[level](&p, used, c->axis, e1, e2, c->radius);
-        add_normal_on[level](&p, used, c->radius, &n);
+    Residuals residuals;
+    for (int first = 0; first < points->count; first += FIT_BLOCK) {
+        int used = block_size(points, first);
+        derivatives_on[level](points, first, used, c, e1, e2, &residuals);
+        add_normal_on[level](&residuals, used, c->radius, &n);
     }
     for (int m = 0; m < 4; m++) {
         for (int k = 0; k <= m; k++)
@@ -216,20 +218,20 @@ static bool solve5(double a[5][5], double b[5])
     return true;
 }
 
-static Cylinder refine_gauss_newton(const Cylinder *start, const Vec3 *point, const int *inlier, int count)
+static Cylinder refine_gauss_newton(const Cylinder *start, const FitPoints *points)
 {
     Cylinder best = *start;
-    double least = sum_of_squares(&best, point, inlier, count), damping = 1e-3;
+    double least = sum_of_squares(&best, points), damping = 1e-3;
     for (int iteration = 0; iteration < 20 && damping < 1e6; iteration++) {
         Vec3 e1 = vec3_normal_to(best.axis), e2 = vec3_cross(best.axis, e1);
         double a[5][5] = {{0}}, b[5], r = best.radius;
-        normal_equations(&best, e1, e2, point, inlier, count, a, b);
+        normal_equations(&best, e1, e2, points, a, b);
         for (int m = 0; m < 5; m++)
-            a[m][m] += damping * a[m][m] + 1e-12 * r * r * count;
+            a[m][m] += damping * a[m][m] + 1e-12 * r * r * points->count;
         if (!solve5(a, b))
             break;
         Cylinder next = moved(&best, e1, e2, b);
-        double sum = sum_of_squares(&next, point, inlier, count);
+        double sum = sum_of_squares(&next, points);
         if (next.radius > 0 && sum < least) {
             bool done = least - sum < 1e-9 * least;
             best = next;
@@ -250,9 +252,7 @@ bool cylinder_refine_has_powell(void) { return true; }
 typedef struct PowellProblem {
     const Cylinder *start;
     Vec3 e1, e2;
-    const Vec3 *point;
-    const int *inlier;
-    int count;
+    const FitPoints *points;
 } PowellProblem;
 
 static double powell_energy(unsigned n, const double *x, double *gradient, void *context)
@@ -261,13 +261,13 @@ static double powell_energy(unsigned n, const double *x, double *gradient, void 
     (void)n;
     (void)gradient;
     Cylinder c = moved(p->start, p->e1, p->e2, x);
-    return sum_of_squares(&c, p->point, p->inlier, p->count) / (p->start->radius * p->start->radius);
+    return sum_of_squares(&c, p->points) / (p->start->radius * p->start->radius);
 }
 
-static Cylinder refine_powell(const Cylinder *start, const Vec3 *point, const int *inlier, int count)
+static Cylinder refine_powell(const Cylinder *start, const FitPoints *points)
 {
     Vec3 e1 = vec3_normal_to(start->axis);
-    PowellProblem problem = {start, e1, vec3_cross(start->axis, e1), point, inlier, count};
+    PowellProblem problem = {start, e1, vec3_cross(start->axis, e1), points};
     double x[5] = {0}, energy;
     nlopt_opt powell = nlopt_create(NLOPT_LN_PRAXIS, 5);
     if (!powell)
@@ -285,18 +285,17 @@ static Cylinder refine_powell(const Cylinder *start, const Vec3 *point, const in
 #else
 bool cylinder_refine_has_powell(void) { return false; }
 
-static Cylinder refine_powell(const Cylinder *start, const Vec3 *point, const int *inlier, int count)
-{
-    return refine_gauss_newton(start, point, inlier, count);
-}
+static Cylinder refine_powell(const Cylinder *start, const FitPoints *points) { return refine_gauss_newton(start, points); }
 #endif
 
 double cylinder_refine(Cylinder *cylinder, const Vec3 *point, const int *inlier, int count, bool by_powell, bool *good)
 {
     Cylinder c = *cylinder;
+    FitPoints points;
+    take_points(point, inlier, count, &points);
     *good = count >= 6;
     if (*good) {
-        c = by_powell ? refine_powell(cylinder, point, inlier, count) : refine_gauss_newton(cylinder, point, inlier, count);
+        c = by_powell ? refine_powell(cylinder, &points) : refine_gauss_newton(cylinder, &points);
         *good = vec3_is_finite(c.center) && vec3_is_finite(c.axis) && c.radius > 0 && isfinite(c.radius);
     }
     if (*good) {
@@ -304,7 +303,7 @@ double cylinder_refine(Cylinder *cylinder, const Vec3 *point, const int *inlier,
         c.center = vec3_add_scaled(c.center, vec3_dot(vec3_sub(cylinder->center, c.center), c.axis), c.axis);
         *cylinder = c;
     }
-    return sqrt(sum_of_squares(cylinder, point, inlier, count) / (count > 0 ? count : 1));
+    return sqrt(sum_of_squares(cylinder, &points) / (count > 0 ? count : 1));
 }
 
 // |P|^2 = 2 P.C + (r^2 - |C|^2) is linear in C and the last term; Gauss-Newton on the true distance follows.

@@ -30,7 +30,7 @@ typedef struct RansacOptions {
 double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const RansacOptions *options, Random *random, Cylinder *out);
 // Finds the points within `threshold` of the cylinder and lists their indices in `inlier` (space for `count`). Returns their number.
 int cylinder_inliers(const Cylinder *cylinder, const Vec3 *point, int count, double threshold, int *inlier);
-// Minimises the squared distances of the listed points over centre, axis and radius, by Gauss-Newton, or by Powell's method as in the paper. The position of
+// Minimises the squared distances of the listed points (MAX_RANSAC_POINTS at most) over centre, axis and radius, by Gauss-Newton, or by Powell's method as in the paper. The position of
 // the centre along the axis does not change. Returns the root mean square [mm]; *good is false if the fit diverged (the cylinder is then unchanged). Without
 // NLopt in the build both methods are Gauss-Newton, so callers check cylinder_refine_has_powell() first.
 double cylinder_refine(Cylinder *cylinder, const Vec3 *point, const int *inlier, int inlier_count, bool by_powell, bool *good);

@@ -90,13 +90,39 @@ static double search_axes(Tracker *t, const Cylinder *predicted, int candidates,
     return best > p->relaxed * p->p_inl ? best : 0;
 }
 
+// Puts the value there that sorting would put at `place` (less than `count`), lower or equal ones before and higher or equal ones behind it, and returns it.
+// Hoare's FIND (1961): in proportion to the count, where sorting calls a function for each comparison. No value may be NaN.
+static double place_double(double *value, int count, int place)
+{
+    for (int first = 0, last = count - 1; first < last;) {
+        double middle = value[place];
+        int low = first, high = last;
+        while (low <= high) {
+            while (value[low] < middle)
+                low++;
+            while (middle < value[high])
+                high--;
+            if (low <= high) {
+                double moved = value[low];
+                value[low++] = value[high];
+                value[high--] = moved;
+            }
+        }
+        if (high < place)
+            first = low;
+        if (place < low)
+            last = high;
+    }
+    return value[place];
+}
+
 // Returns the consensus set's median position along the axis, relative to the centre; the median becomes the new centre.
 static double median_along(Tracker *t, const Cylinder *c, int inliers)
 {
     for (int i = 0; i < inliers; i++)
         t->along[i] = vec3_dot(vec3_sub(t->candidate[t->inlier[i]], c->center), c->axis);
-    sort_doubles(t->along, (size_t)inliers);
-    return inliers % 2 ? t->along[inliers / 2] : 0.5 * (t->along[inliers / 2 - 1] + t->along[inliers / 2]);
+    double upper = place_double(t->along, inliers, inliers / 2);
+    return inliers % 2 ? upper : 0.5 * (place_double(t->along, inliers / 2, inliers / 2 - 1) + upper);
 }
 
 static RayOptions rays_of(const Tracker *t, double radius)
@@ -174,9 +200,8 @@ static bool measure_node(Tracker *t, const Cylinder *predicted, double relative_
         return false;
     for (int i = 0; i < inliers; i++)
         t->along[i] = fabs(vec3_dot(vec3_sub(point[t->inlier[i]], c->center), c->axis));
-    sort_doubles(t->along, (size_t)inliers);
     int inside = (int)ceil(p->height_share * inliers);
-    c->height = 2 * t->along[inside > 0 ? inside - 1 : 0];
+    c->height = 2 * place_double(t->along, inliers, inside > 0 ? inside - 1 : 0);
     int kept = 0;
     for (int i = 0; i < inliers; i++) {
         Vec3 x = point[t->inlier[i]];
