@@ -32,12 +32,12 @@ enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
 typedef struct DraftPoint {
     Vec3 at;
-    float few;               // weight among the few rows; 0: not one of them
+    float few;               // weight among few data; 0: not one of them
 } DraftPoint;
 
 typedef struct DraftGuard {
     Vec3 at;
-    float low, high, few;
+    float low, high, weight;
 } DraftGuard;
 
 typedef struct Draft {       // rows of a node while they are being collected
@@ -80,7 +80,7 @@ static void add_point(Draft *d, Vec3 x, double few)
     d->point[d->data++] = (DraftPoint){x, (float)few};
 }
 
-static void add_guard(Draft *d, Vec3 x, double low, double high, double few)
+static void add_guard(Draft *d, Vec3 x, double low, double high, double weight)
 {
     if (d->guards == d->guard_capacity) {
         int capacity = 2 * d->guard_capacity + 64;
@@ -92,7 +92,7 @@ static void add_guard(Draft *d, Vec3 x, double low, double high, double few)
         d->guard = more;
         d->guard_capacity = capacity;
     }
-    d->guard[d->guards++] = (DraftGuard){x, (float)low, (float)high, (float)few};
+    d->guard[d->guards++] = (DraftGuard){x, (float)low, (float)high, (float)weight};
 }
 
 // Distance of x from the axis of node's link to its parent (from its own centre if the link is not lumen), as a fraction of the radius there.
@@ -321,8 +321,9 @@ static void draft_node(void *context, long index)
         else
             add_point(d, p, few_weight(i, every));
     }
-    for (int i = (node * 3) % GUARD_EVERY; i < d->data; i += GUARD_EVERY)
-        guard_around_point(job, node, d->point[i], d);
+    for (int i = 0; i < d->data; i += GUARD_EVERY)
+        if (d->point[i].few > 0)
+            guard_around_point(job, node, d->point[i], d);
     if (root_open)
         extend_inlet(tree, d);
     guard_axis(tree, node, d);
@@ -450,7 +451,9 @@ static void fill_cell(void *context, long index)
     fill_tiles(job->row + job->first[index], job->first[index + 1] - job->first[index], (int)index, &tile, &memory);
 }
 
-// Row k of a node's draft: data first.
+// Row k of a draft: data first. A guard beside a point stands for as many as the point, among few data and among all.
+static float weight_of(const Draft *d, int k, bool few) { return k >= d->data ? d->guard[k - d->data].weight : few ? d->point[k].few : 1; }
+
 static Row row_of(const Job *job, int node, int k, bool few)
 {
     const VesselTree *tree = job->tree;
@@ -459,12 +462,10 @@ static Row row_of(const Job *job, int node, int k, bool few)
     // in a cell wider than the guard's own vessel, the field rises more slowly
     float scale = (float)fmin(1, tree->radius[node] / tree->radius[cell]);
     bool is_data = k < d->data;
-    DraftGuard from = is_data ? (DraftGuard){.at = d->point[k].at, .few = d->point[k].few} : d->guard[k - d->data];
+    DraftGuard from = is_data ? (DraftGuard){.at = d->point[k].at} : d->guard[k - d->data];
     Vec3 x = vec3_sub(from.at, tree->center[cell]);
-    return (Row){{(float)x.x, (float)x.y, (float)x.z}, from.low * scale, from.high < 0 ? from.high * scale : from.high, few ? from.few : 1, is_data};
+    return (Row){{(float)x.x, (float)x.y, (float)x.z}, from.low * scale, from.high < 0 ? from.high * scale : from.high, weight_of(d, k, few), is_data};
 }
-
-static float weight_of(const Draft *d, int k, bool few) { return !few ? 1 : k < d->data ? d->point[k].few : d->guard[k - d->data].few; }
 
 // Collects the rows (M), those of a cell consecutive; first (N+1) gives the first row of each cell.
 static Row *collect_rows(const Job *job, int *first, bool few)

@@ -154,10 +154,10 @@ static void sum_tile(const Work *w, TileWork *tw, const FieldBlob *blob)
     memcpy(tw->f, tw->still_f, (size_t)all * sizeof(float));
     for (int k = 0; k < 3; k++)
         memcpy(tw->g[k], tw->still_g[k], (size_t)d * sizeof(float));
-    for (int k = 0; k < tw->count; k++) {
-        LaneBlob lane = field_lane_blob(w->sweep->model->tree, tile->node, &blob[tw->local[k]]);
-        fit_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->f, tw->g);
-    }
+    LaneBlob lane[REGION_BLOBS];
+    for (int k = 0; k < tw->count; k++)
+        lane[k] = field_lane_blob(w->sweep->model->tree, tile->node, &blob[tw->local[k]]);
+    fit_lanes_sum(tile->x, tile->y, tile->z, all, d, lane, tw->count, tw->f, tw->g);
 }
 
 // Sum of squares of a tile's rows from the present sums. The loss is at most knee^2, so that points which contradict the others do not outweigh them.
@@ -207,8 +207,7 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
 {
     const RowTile *tile = tw->tile;
     int d = tile->data_padded, rows = d;
-    float r = (float)model->tree->radius[tile->node], knee = (float)model->knee * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r,
-          bend = (float)model->smooth * r * half, guard = half * (float)model->guard_weight;
+    float r = (float)model->tree->radius[tile->node], guard = 0.5f * r * (float)model->guard_weight;
     memcpy(to->x, tile->x, (size_t)d * sizeof(float)), memcpy(to->y, tile->y, (size_t)d * sizeof(float)), memcpy(to->z, tile->z, (size_t)d * sizeof(float));
     for (int i = 0; i < tile->guards; i++) {
         float f = tw->f[d + i], e = f < tile->low[i] ? f - tile->low[i] : f > tile->high[i] ? f - tile->high[i] : 0;
@@ -222,15 +221,12 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
     for (; rows % FIELD_LANES != 0; rows++)
         to->x[rows] = to->y[rows] = to->z[rows] = to->scale[rows] = residual[rows] = 0;
     to->data = d, to->rows = rows;
-    for (int i = 0; i < d; i++) {
-        float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i], slope = sqrtf(gx * gx + gy * gy + gz * gz), held = slope > least ? slope : least;
-        float e = tw->f[i] / held, root = sqrtf(tile->weight[i]), w = root / (1 + e * e / (knee * knee)), unit = slope > 1e-6f ? 1 / slope : 0;
-        to->scale[i] = w / held;
-        residual[i] = w * e;
-        to->bend[i] = root * bend;
-        residual[rows + i] = to->bend[i] * (slope - 1 / half);
-        to->n[0][i] = gx * unit, to->n[1][i] = gy * unit, to->n[2][i] = gz * unit;
-    }
+    FitScale scale = {.radius = (double)r,
+                      .knee = (double)((float)model->knee * r),
+                      .least_slope = (double)((float)LEAST_SLOPE / r),
+                      .bend = (double)((float)model->smooth * r)};
+    float *const normal[3] = {to->n[0], to->n[1], to->n[2]};
+    fit_lanes_weigh(tw->f, tw->g, tile->weight, d, &scale, to->scale, to->bend, residual, residual + rows, normal);
 }
 
 // Adds the block of a pair of blobs to the upper triangle of the matrix.

@@ -8,6 +8,8 @@ typedef struct FitKernels {
     void (*sum)(const float *, const float *, const float *, int, int, const LaneBlob *, int, float *, float *, float *, float *);
     void (*losses)(const float *, const float *, const float *, const float *, const float *, int, const FitScale *, double *);
     void (*guard_losses)(const float *, const float *, const float *, const float *, int, double, double *);
+    void (*weigh)(const float *, const float *, const float *, const float *, const float *, int, const FitScale *, float *, float *, float *, float *, float *,
+                  float *, float *);
     void (*columns)(const float *, const float *, const float *, int, int, const LaneBlob *, const float *, const float *, const float *, const float *,
                     const float *, float *, int);
     void (*turn)(const float *, int, const float *, int, float (*)[FIT_ENTRIES], uint64_t *);
@@ -17,7 +19,7 @@ typedef struct FitKernels {
 
 #define KERNEL_TABLE(set)                                                                                                                                      \
     {                                                                                                                                                          \
-        sum_##set, losses_##set, guard_losses_##set, columns_##set, turn_##set, product_##set, mean_##set                                                      \
+        sum_##set, losses_##set, guard_losses_##set, weigh_##set, columns_##set, turn_##set, product_##set, mean_##set                                         \
     }
 
 #define KERNEL_TEXT "recon/fit/fit_kernel.inc"
@@ -39,6 +41,12 @@ void fit_lanes_losses(const float *f, float *const g[3], const float *weight, in
 void fit_lanes_guard_losses(const float *f, const float *low, const float *high, const float *weight, int rows, double scale, double *loss)
 {
     kernels()->guard_losses(f, low, high, weight, rows, scale, loss);
+}
+
+void fit_lanes_weigh(const float *f, float *const g[3], const float *weight, int rows, const FitScale *by, float *scale, float *bend, float *residual,
+                     float *off, float *const n[3])
+{
+    kernels()->weigh(f, g[0], g[1], g[2], weight, rows, by, scale, bend, residual, off, n[0], n[1], n[2]);
 }
 
 void fit_lanes_columns(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, const float *scale, const float *bend,

@@ -22,6 +22,9 @@ typedef struct FitScale {
 // the distance from [low, high].
 void fit_lanes_losses(const float *f, float *const g[3], const float *weight, int rows, const FitScale *scale, double *loss);
 void fit_lanes_guard_losses(const float *f, const float *low, const float *high, const float *weight, int rows, double scale, double *loss);
+// The linearisation of data: factors of the derivatives of f and of n.g, the residuals of both, and the direction n of g. The loss's weight is held.
+void fit_lanes_weigh(const float *f, float *const g[3], const float *weight, int rows, const FitScale *by, float *scale, float *bend, float *residual,
+                     float *off, float *const n[3]);
 // Computes the derivatives by a blob's amplitude, centre (in units of its reach) and logarithm of its reach: five columns, each of `rows` entries scale * df,
 // then of `sloped` entries bend * d(n.g). `stride` is the number of entries from column to column.
 void fit_lanes_columns(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, const float *scale, const float *bend,
