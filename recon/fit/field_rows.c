@@ -26,13 +26,13 @@ static const double SAC_CONE = 0.97;
 // Largest bound of an outside guard: enough to prevent a closed sheet there. Between two walls a smooth field is not lower, and guards that demand the scaled
 // distance would push the walls apart.
 static const double OUTSIDE = 0.15;
-// Few rows on a voxel's face of wall, and the least of a node.
+// Of the selection: points on an area of wall as large as a voxel's face, and least number of points of a node.
 static const double FEW_A_FACE = 4, FEW_LEAST = 16;
 enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
 typedef struct DraftPoint {
     Vec3 at;
-    float few;               // weight among few data; 0: not one of them
+    float few;               // weight in the selection; 0: not selected
 } DraftPoint;
 
 typedef struct DraftGuard {
@@ -285,8 +285,8 @@ static bool is_near_fork(const VesselTree *tree, int node)
     return found;
 }
 
-// Rays see the same voxels many times: returns how many of a node's points one of the few stands for, so that a voxel's face of wall, counted once along the
-// tree, has FEW_A_FACE of them. At forks, where mouths are narrow and points rare, all are needed: fewer made mouths of aneurism.nrrd narrower.
+// Returns the number of a node's points that one selected point stands for. Many rays pass through the same voxels, and nodes overlap along the tree: FEW_A_FACE
+// points are enough for each voxel's face of wall. Near forks all are needed: with fewer, mouths of aneurism.nrrd became narrower.
 static double points_a_row(const VesselTree *tree, double voxel_mm, int node)
 {
     double r = tree->radius[node], along = tree->height[node], points = (double)(tree->point_offset[node + 1] - tree->point_offset[node]);
@@ -298,8 +298,8 @@ static double points_a_row(const VesselTree *tree, double voxel_mm, int node)
     return fmax(1, points / fmax(FEW_LEAST, FEW_A_FACE * wall / (voxel_mm * voxel_mm)));
 }
 
-// Returns the weight of point i of the tree among the few rows, of which one in `every` is chosen: by multiples of the golden section, which have no rhythm in
-// common with the order of rays.
+// Returns the weight of point i of the tree if one in `every` is selected; 0 if it is not selected. Multiples of the golden section spread the selection over
+// all directions of the rays, whatever their order.
 static double few_weight(int64_t i, double every)
 {
     const double golden = 0.6180339887498949;
@@ -451,7 +451,7 @@ static void fill_cell(void *context, long index)
     fill_tiles(job->row + job->first[index], job->first[index + 1] - job->first[index], (int)index, &tile, &memory);
 }
 
-// Row k of a draft: data first. A guard beside a point stands for as many as the point, among few data and among all.
+// Weight of row k of a draft, data first. Only selected points have guards, so a guard has its point's weight in the selection and among all rows.
 static float weight_of(const Draft *d, int k, bool few) { return k >= d->data ? d->guard[k - d->data].weight : few ? d->point[k].few : 1; }
 
 static Row row_of(const Job *job, int node, int k, bool few)
@@ -523,7 +523,7 @@ static bool make_tiles(const Job *job, FieldRows *rows, bool few, int threads)
     return good;
 }
 
-// Returns true if the few rows are less than half of all.
+// Returns true if less than half of the points are selected.
 static bool are_few(const Job *job)
 {
     int64_t all = 0, few = 0;

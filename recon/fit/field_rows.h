@@ -33,8 +33,8 @@ typedef struct FieldRows {
 bool field_link_is_lumen(const VesselTree *tree, int node);
 // Length of the wall's continuation upstream of an open inlet, in the root's radii.
 #define FIELD_INLET_RADII 2.2
-// Also makes `few`, a choice of the rows in which each stands for several, if the angiogram's voxel size is known (0: unknown) and rays saw each voxel many
-// times; else few->first is NULL. Returns false if out of memory; the rows must be freed even then.
+// Also makes `few`, a selection in which each row stands for several points, if the voxel size is known (0: unknown) and less than half of the points are
+// enough; else few->first is NULL. Returns false if out of memory; the rows must be freed even then.
 bool field_rows_create(FieldRows *rows, FieldRows *few, const VesselTree *tree, double voxel_mm, int threads);
 void field_rows_free(FieldRows *rows);
 

@@ -250,7 +250,7 @@ static void add_tile(Work *w, const TileWork *tw)
     for (int k = 0; k < tw->count; k++) {
         LaneBlob lane = field_lane_blob(model->tree, tw->tile->node, &w->trial[tw->local[k]]);
         fit_lanes_columns(rows.x, rows.y, rows.z, rows.rows, rows.data, &lane, rows.scale, rows.bend, normal, column[0], FIT_ROWS);
-        fit_lanes_turn(column[0], FIT_ROWS, residual, length, &w->rows[k]);
+        fit_lanes_transpose(column[0], FIT_ROWS, residual, length, &w->rows[k]);
     }
     for (int a = 0; a < tw->count; a++)
         for (int b = a; b < tw->count; b++) {

@@ -12,14 +12,14 @@ typedef struct FitKernels {
                   float *, float *);
     void (*columns)(const float *, const float *, const float *, int, int, const LaneBlob *, const float *, const float *, const float *, const float *,
                     const float *, float *, int);
-    void (*turn)(const float *, int, const float *, int, float (*)[FIT_ENTRIES], uint64_t *);
+    void (*transpose)(const float *, int, const float *, int, float (*)[FIT_ENTRIES], uint64_t *);
     void (*product)(const FitRows *, const FitRows *, int, float (*)[FIT_ENTRIES]);
     void (*mean)(const float *, const float *, const float *, const float *, const float *, int, const LaneBlob *, float (*)[FIELD_LANES]);
 } FitKernels;
 
 #define KERNEL_TABLE(set)                                                                                                                                      \
     {                                                                                                                                                          \
-        sum_##set, losses_##set, guard_losses_##set, weigh_##set, columns_##set, turn_##set, product_##set, mean_##set                                         \
+        sum_##set, losses_##set, guard_losses_##set, weigh_##set, columns_##set, transpose_##set, product_##set, mean_##set                                    \
     }
 
 #define KERNEL_TEXT "recon/fit/fit_kernel.inc"
@@ -61,9 +61,9 @@ void fit_lanes_mean(const float *x, const float *y, const float *z, const float 
     kernels()->mean(x, y, z, weight, value, rows, ball, sum);
 }
 
-void fit_lanes_turn(const float *column, int stride, const float *residual, int rows, FitRows *to)
+void fit_lanes_transpose(const float *column, int stride, const float *residual, int rows, FitRows *to)
 {
-    kernels()->turn(column, stride, residual, rows, to->row, to->live);
+    kernels()->transpose(column, stride, residual, rows, to->row, to->live);
 }
 
 void fit_lanes_product(const FitRows *left, const FitRows *right, int rows, float product[5][FIT_ENTRIES]) { kernels()->product(left, right, rows, product); }

@@ -36,7 +36,7 @@ typedef struct FitRows {
 } FitRows;
 
 // Fills a blob's rows from its five columns and the tile's residuals.
-void fit_lanes_turn(const float *column, int stride, const float *residual, int rows, FitRows *to);
+void fit_lanes_transpose(const float *column, int stride, const float *residual, int rows, FitRows *to);
 // Computes product = J'K for the rows J of one blob and K of another one; column 5 is J' times the residual.
 void fit_lanes_product(const FitRows *left, const FitRows *right, int rows, float product[5][FIT_ENTRIES]);
 // Sums over a tile's data within `reach` of (x, y, z): m w, m w^2, m w e, m w e^2, with m the weights, w = (1 - d^2/reach^2)^3 and e the values. Counts as above. Adds to `sum`,
