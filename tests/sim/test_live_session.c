@@ -34,6 +34,14 @@ static void wait_for(LiveSession *session, double time_s)
         nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
 }
 
+static const Moment *wait_for_pause(Realtime *realtime)
+{
+    const Moment *moment;
+    while (!(moment = realtime_moment(realtime)) || moment->figures.state != REALTIME_PAUSED)
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    return moment;
+}
+
 static LiveSession open_session(const LiveSessionOptions *options)
 {
     LiveSession session;
@@ -178,10 +186,7 @@ static void a_session_continues_from_a_moment_of_it(void **state)
     session = open_session(&options);
     assert_true(progress_calls == 300 / 64 && part > 0.8);
     assert_near(session.resumed_s, 0.3, 1e-9);
-    const Moment *moment;
-    while (!(moment = realtime_moment(session.realtime)) || moment->figures.state != REALTIME_PAUSED)
-        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
-    assert_int_equal(moment->pose->step, 300);
+    assert_int_equal(wait_for_pause(session.realtime)->pose->step, 300);
     realtime_pause(session.realtime, false);
     wait_for(&session, 0.5);
     let_go();
@@ -232,7 +237,7 @@ static const char coaxial_text[] =
     "  - {name: tube, kind: microcatheter, elements: 14, sections: [{length_mm: 60, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
     "  - {name: thread, kind: wire, elements: 16, sections: [{length_mm: 90, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
     "     exchange: [{elements: 24, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 80}]}]}\n"
-    "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: 1.5, path: [{line_mm: 10}, {arc: {radius_mm: 20, angle_deg: 50}}, {line_mm: 30}]}, "
+    "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: 1.5, path: [{line_mm: 3}, {arc: {radius_mm: 20, angle_deg: 50}}, {line_mm: 30}]}, "
     "contact: tube, friction: 0.05}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 4}\n";
 
@@ -274,9 +279,12 @@ static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
     hand_grip_lock(&grip, 2);
     realtime_set_grip(session.realtime, &grip);
     wait_for(&session, 0.4);
-    // the force at a hand is the sum for both locked tools
-    const StepReport report = realtime_moment(session.realtime)->pose->report;
-    assert_true(isfinite(atomic_load(&pair[0].force_n)) && report.push[0] != 0 && report.push[1] != 0);
+    // both tools touch the bend; the force at a hand is the sum for both locked tools
+    realtime_pause(session.realtime, true);
+    const StepReport report = wait_for_pause(session.realtime)->pose->report;
+    assert_true(report.push[0] > 1e-6 && report.push[1] > 1e-6);
+    assert_near(atomic_load(&pair[0].force_n), report.push[0] + report.push[1], 1e-15);
+    realtime_pause(session.realtime, false);
     wait_for(&session, 0.5);
     hand_grip_lock(&grip, 2);
     grip.chosen = 1;
