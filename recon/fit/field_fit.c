@@ -13,7 +13,9 @@ static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 // The loss gets sharper from level to level: with a sharp loss from the start, a wall far from the base would remain an outlier.
 static const double base_knee = 1, level_knee[] = {0.35, 0.35, 0.35, 0.25, 0.25, 0.25, 0.25, 0.25};
-enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
+// A new reach needs two sweeps, because a region's first step changes what its neighbours need; the blobs that are added at the same reach correct little.
+static const int level_sweeps[] = {2, 1, 2, 1, 2, 1, 1, 1};
+enum { LEVELS = sizeof level_reach / sizeof level_reach[0], BASE_SWEEPS = 3, LAST_SWEEPS = 2, BASE_STEPS = 3, STEPS = 4 };
 
 FieldFitOptions field_fit_default_options(void)
 {
@@ -128,15 +130,17 @@ static void all_due(FieldModel *model)
 // Fits to the model's rows, at last to `all`.
 static bool fit(FieldModel *model, const FieldRows *all, const FieldFitOptions *options, const Progress *progress)
 {
-    Schedule s = {model, progress, 0, 3 + 2 * options->levels + LAST_SWEEPS, false};
+    Schedule s = {model, progress, 0, BASE_SWEEPS + LAST_SWEEPS, false};
+    for (int level = 0; level < options->levels; level++)
+        s.total += level_sweeps[level];
     if (!lay_base(model))
         return false;
     all_due(model);
     model->knee = base_knee;
     // fit the amplitudes alone first: centres that start far from the solution end in bad minima that no finer blob corrects
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < BASE_SWEEPS; k++) {
         model->amplitudes_only = k < 2;
-        sweep(&s, 3);
+        sweep(&s, BASE_STEPS);
     }
     for (int level = 0; level < options->levels && !s.failed; level++) {
         bool known = options->voxel_mm > 0, given = options->target_mm > 0;
@@ -148,14 +152,13 @@ static bool fit(FieldModel *model, const FieldRows *all, const FieldFitOptions *
                            options->least_reach_voxels * options->voxel_mm, options->significance};
         model->knee = level_knee[level];
         s.failed |= field_refine(model, &how) < 0;
-        for (int k = 0; k < 2; k++)
-            sweep(&s, 3);
+        for (int k = 0; k < level_sweeps[level]; k++)
+            sweep(&s, STEPS);
     }
     model->rows = all;
-    for (int k = 0; k < LAST_SWEEPS; k++) {
-        all_due(model);
-        sweep(&s, 3);
-    }
+    all_due(model);
+    for (int k = 0; k < LAST_SWEEPS; k++)
+        sweep(&s, STEPS);
     return !s.failed;
 }
 

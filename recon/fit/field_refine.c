@@ -27,7 +27,6 @@ typedef struct Job {
     FieldModel *model;
     const FieldRefine *how;
     float (*residual)[FIELD_TILE];   // (tiles) residuals of the data
-    double *noise;           // (N) [mm]
     Candidate **found;       // (N)
     int *count;              // (N)
     bool *failed;            // (N)
@@ -106,12 +105,12 @@ static int data_of(const Job *job, int node)
 // Effective number of points of the weighted mean.
 static double points_of(const Mean *m) { return m->weight * m->weight / fmax(m->weight2, 1e-12); }
 
-static void measure_noise(void *context, long index)
+// Standard deviation of the noise of a node's residuals [mm].
+static double noise_of(const Job *job, int node)
 {
     enum { SAMPLES = 24 };
-    Job *job = context;
     const int *first = job->model->rows->first;
-    int node = (int)index, step = data_of(job, node) / SAMPLES + 1, taken = 0, next = 0;
+    int step = data_of(job, node) / SAMPLES + 1, taken = 0, next = 0;
     double spread[SAMPLES], r = job->model->tree->radius[node];
     for (int t = first[node]; t < first[node + 1]; t++) {
         const RowTile *tile = tile_of(job, t);
@@ -129,7 +128,7 @@ static void measure_noise(void *context, long index)
         next = next > 0 ? next : 0;
     }
     sort_doubles(spread, (size_t)taken);
-    job->noise[node] = taken > 0 ? spread[taken / 2] : 0;
+    return taken > 0 ? spread[taken / 2] : 0;
 }
 
 static int compare_candidates(const void *a, const void *b)
@@ -146,7 +145,7 @@ static void find_candidates(void *context, long index)
 {
     Job *job = context;
     int node = (int)index, found = 0;
-    double r = job->model->tree->radius[node], reach = job->how->reach * r;
+    double r = job->model->tree->radius[node], reach = job->how->reach * r, noise = -1;   // measured when it is first needed: few nodes have candidates
     double tolerance = fmax(job->how->tolerance_mm, job->how->tolerance * r);
     const int *first = job->model->rows->first;
     Candidate *list = malloc(((size_t)data_of(job, node) + 1) * sizeof *list);
@@ -157,9 +156,12 @@ static void find_candidates(void *context, long index)
         for (int i = 0; i < tile->data; i++) {
             Vec3 x = row_place(job, tile, i);
             Mean m = mean_about(job, node, x, reach);
-            double mean = m.sum / m.weight, noise = job->noise[node] * sqrt(m.weight2) / m.weight, points = m.weight * m.weight / m.weight2;
-            double least = fmax(tolerance, job->how->significance * noise);
-            if (points >= 4 && fabs(mean) > least && points >= POINTS_A_BLOB * (1 + blobs_about(job->model, node, x, reach)))
+            double mean = m.sum / m.weight, points = m.weight * m.weight / m.weight2;
+            if (!(points >= 4 && fabs(mean) > tolerance && points >= POINTS_A_BLOB * (1 + blobs_about(job->model, node, x, reach))))
+                continue;
+            noise = noise < 0 ? noise_of(job, node) : noise;
+            double least = fmax(tolerance, job->how->significance * noise * sqrt(m.weight2) / m.weight);
+            if (fabs(mean) > least)
                 list[found++] = (Candidate){fabs(mean) / least, node, x, mean};
         }
     }
@@ -234,13 +236,12 @@ int field_refine(FieldModel *model, const FieldRefine *how)
     Job job = {.model = model,
                .how = how,
                .residual = calloc(tiles, sizeof *job.residual),
-               .noise = calloc(n, sizeof *job.noise),
                .found = calloc(n, sizeof *job.found),
                .count = calloc(n, sizeof *job.count),
                .failed = calloc(n, sizeof *job.failed)};
-    bool good = job.residual && job.noise && job.found && job.count && job.failed;
-    void (*const stage[])(void *, long) = {measure_residuals, measure_noise, find_candidates};
-    for (int k = 0; k < 3 && good; k++) {
+    bool good = job.residual && job.found && job.count && job.failed;
+    void (*const stage[])(void *, long) = {measure_residuals, find_candidates};
+    for (int k = 0; k < 2 && good; k++) {
         parallel_for(model->threads, (long)n, stage[k], &job, NULL);
         for (size_t i = 0; i < n; i++)
             good = good && !job.failed[i];
@@ -249,7 +250,6 @@ int field_refine(FieldModel *model, const FieldRefine *how)
     for (size_t i = 0; i < n && job.found; i++)
         free(job.found[i]);
     free(job.residual);
-    free(job.noise);
     free(job.found);
     free(job.count);
     free(job.failed);

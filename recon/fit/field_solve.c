@@ -53,6 +53,11 @@ typedef struct Work {        // memory of one region's solution
     FitRows *rows;           // (region's blobs) their rows in a tile
 } Work;
 
+// With less damping most first steps would make the sum of squares larger and would be tried again.
+static const double FIRST_DAMPING = 0.1;
+// A region is left when a step reduces its sum of squares by a smaller share than ENOUGH; it is due in the next sweep if this one reduced it by more than AGAIN.
+static const double ENOUGH = 0.01, AGAIN = 0.02;
+
 // --- Setting up ---
 
 static int tiles_of(const Sweep *sweep, const Region *region)
@@ -350,7 +355,7 @@ static void solve_region(void *context, long index)
     }
     for (int k = 0; k < region->count; k++)
         now[k] = w.trial[k] = model->blob[order[k]];
-    double least = region->before = energy(&w, now), damping = 1e-3;
+    double least = region->before = energy(&w, now), damping = FIRST_DAMPING;
     bool is_summed = true;   // the sums are those of `now`
     for (int step = 0, tries = 0; step < sweep->steps && tries < 3 * sweep->steps; tries++) {
         if (tries == 0 || is_summed) {
@@ -363,7 +368,7 @@ static void solve_region(void *context, long index)
                 w.trial[k] = moved_by(&now[k], w.step + UNKNOWNS * k, &model->blob[order[k]]);
             double there = energy(&w, w.trial);
             if (there < least) {
-                bool enough = there > 0.999 * least;
+                bool enough = there > (1 - ENOUGH) * least;
                 least = there;
                 memcpy(now, w.trial, (size_t)region->count * sizeof *now);
                 damping = fmax(damping / 6, 1e-6);
@@ -381,7 +386,7 @@ static void solve_region(void *context, long index)
     region->after = least;
     for (int k = 0; k < region->count; k++)
         model->blob[order[k]] = now[k];
-    bool gained = least < 0.98 * region->before;
+    bool gained = least < (1 - AGAIN) * region->before;
     for (int n = 0; n < region->nodes; n++)
         model->due[region->node[n]] |= gained;
     end_work(&w);

@@ -9,7 +9,7 @@ import numpy as np
 import seldinger
 
 PHANTOM = "scenes/phantom/scene.yaml"
-PHANTOM_HASH = "7101e2090e328aed"        # of `seldinger run` on the same scene, over the script
+PHANTOM_HASH = "692e8186b7da73ab"        # of `seldinger run` on the same scene, over the script
 
 TUBE = {"vessel": {"tube": {"start_mm": [0, 0, 0], "direction": [1, 0, 0], "normal": [0, 1, 0], "radius_mm": 2.0, "path": [{"line_mm": 60}]}, "contact": "tube",
                    "friction": 0.1},
