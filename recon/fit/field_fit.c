@@ -13,7 +13,7 @@ static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 // The loss gets sharper from level to level: with a sharp loss from the start, a wall far from the base would remain an outlier.
 static const double base_knee = 1, level_knee[] = {0.35, 0.35, 0.35, 0.25, 0.25, 0.25, 0.25, 0.25};
-// A new reach needs two sweeps, because a region's first step changes what its neighbours need; the blobs that are added at the same reach correct little.
+// A new reach needs two sweeps, because a region's first step changes what its neighbours need; later blobs of the same reach, and the finest, are few.
 static const int level_sweeps[] = {2, 1, 2, 1, 2, 1, 1, 1};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], BASE_SWEEPS = 3, LAST_SWEEPS = 2, BASE_STEPS = 3, STEPS = 4 };
 
