@@ -4,7 +4,7 @@
 // 2. Levels of ever smaller blobs, R = 1.4 r to 0.35 r: a blob is added where the residual, averaged over its support, exceeds the tolerance and the noise.
 // 3. After each level amplitudes, centres and radii of all blobs are fitted to all rows by Levenberg and Marquardt's method, region by region; each region
 //    accepts its own steps, so that no part of a tree delays or degrades another.
-//    Where an angiogram gives many points for each voxel, all sweeps but the last four fit to a selection of them (field_rows.h).
+//    Where an angiogram gives many points for each voxel, all sweeps but the last two fit to a selection of them (field_rows.h).
 // Rows are the data (distance f / |grad f|), their slope (|grad f| near 2/r keeps the field near a scaled distance) and one-sided guards: inside the
 // lumen along the tree and between axis and wall, outside where there is neither a tube nor data. A link longer than the sum of its two radii is not lumen
 // and stays closed.
