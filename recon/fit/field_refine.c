@@ -156,7 +156,7 @@ static void find_candidates(void *context, long index)
         for (int i = 0; i < tile->data; i++) {
             Vec3 x = row_place(job, tile, i);
             Mean m = mean_about(job, node, x, reach);
-            double mean = m.sum / m.weight, points = m.weight * m.weight / m.weight2;
+            double mean = m.sum / m.weight, points = points_of(&m);
             if (!(points >= 4 && fabs(mean) > tolerance && points >= POINTS_A_BLOB * (1 + blobs_about(job->model, node, x, reach))))
                 continue;
             noise = noise < 0 ? noise_of(job, node) : noise;

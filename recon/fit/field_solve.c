@@ -358,7 +358,7 @@ static void solve_region(void *context, long index)
     double least = region->before = energy(&w, now), damping = FIRST_DAMPING;
     bool is_summed = true;   // the sums are those of `now`
     for (int step = 0, tries = 0; step < sweep->steps && tries < 3 * sweep->steps; tries++) {
-        if (tries == 0 || is_summed) {
+        if (is_summed) {
             memcpy(w.trial, now, (size_t)region->count * sizeof *now);
             linearise(&w);
             is_summed = false;
